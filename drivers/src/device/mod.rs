@@ -1,0 +1,466 @@
+//! Devices: what one device's objects or lines mean, behind traits in domain terms.
+//!
+//! Every device is sans-io: input and time come in, payloads and events go out. The
+//! controller owns the loop (`truestage::tick`) that feeds them.
+
+pub mod cia401;
+pub mod cia402;
+pub mod dcon;
+pub mod umd2;
+
+use core::fmt;
+use core::time::Duration;
+use units::{
+    Celsius, Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, RelativeHumidity,
+    Time, Volts,
+};
+
+use crate::transport::Input;
+use crate::wire::Payload;
+use crate::wire::canopen::emcy::Emergency;
+use crate::wire::canopen::nmt::NmtState;
+use crate::wire::canopen::sdo::AbortCode;
+use crate::wire::canopen::{NodeId, Object};
+use crate::wire::cia402::PowerState;
+
+/// The sans-io face that every device shows to the loop that drives it.
+pub trait Device {
+    /// Takes what came in on the device's port, also when it is meant for another device.
+    fn handle(&mut self, now: Time, input: &Input);
+
+    /// Acts on deadlines that have passed.
+    fn handle_timeout(&mut self, now: Time);
+
+    /// When [`Device::handle_timeout`] wants to be called next; [`Time::NEVER`] for never.
+    fn poll_timeout(&self) -> Time;
+
+    /// The next payload to send, in order.
+    fn poll_transmit(&mut self) -> Option<Payload>;
+
+    /// The next alarm.
+    fn poll_alarm(&mut self) -> Option<Alarm>;
+
+    /// Begins the start procedure: who is it, is it what the configuration says, set it up.
+    fn start(&mut self, now: Time);
+
+    /// How the last command (or the start) went, once, when it has ended.
+    fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>>;
+
+    /// What the device said it is, once the start procedure has asked.
+    fn identity(&self) -> Option<Identity>;
+
+    /// Counters for a person who looks for trouble: name and value.
+    fn counters(&self) -> Vec<(&'static str, u64)>;
+}
+
+/// A controlled direction: one servo drive.
+pub trait Axis: Device {
+    /// Begins a command; a command that still runs is superseded.
+    /// [`Device::poll_outcome`] says when it is done, and how.
+    fn command(&mut self, now: Time, command: AxisCommand);
+
+    /// The newest sample of the axis, `None` before the first one.
+    fn reading(&self) -> Option<AxisReading>;
+
+    /// The newest state, in the drive's own terms.
+    fn power_state(&self) -> Option<PowerState>;
+
+    /// Whether the drive has a reference since it was last powered.
+    fn is_homed(&self) -> bool;
+}
+
+/// What an axis can be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisCommand {
+    /// Switch on, up to operation enabled.
+    Enable,
+    /// Switch off, in a controlled way.
+    Disable,
+    /// Stop as fast as the quick stop deceleration allows, then disable.
+    QuickStop,
+    /// Acknowledge a fault, once.
+    ResetFault,
+    /// Profile position move to `target` (drive coordinates); done when target reached.
+    MoveTo {
+        /// Where to, in drive coordinates.
+        target: Metres,
+        /// Profile velocity.
+        speed: MetresPerSecond,
+        /// Profile acceleration and deceleration.
+        acceleration: MetresPerSecondSquared,
+    },
+    /// Slow down and stand, staying enabled; done when standing.
+    Halt,
+    /// Home on the negative limit switch (method 17); the drive's coordinates become
+    /// `position` there.
+    HomeNegativeLimit {
+        /// The coordinate of the switch.
+        position: Metres,
+        /// Search speed.
+        speed: MetresPerSecond,
+    },
+    /// Home here (method 37): the drive's coordinate becomes `position`.
+    HomeHere {
+        /// The coordinate of where the axis stands now.
+        position: Metres,
+    },
+}
+
+/// One sample of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisReading {
+    /// When it arrived.
+    pub at: Time,
+    /// The encoder, as the drive counts.
+    pub counts: Counts,
+    /// The same in metres, drive coordinates.
+    pub position: Metres,
+    /// The drive's own following error, where it is mapped.
+    pub following_error: Option<Metres>,
+    /// Whether the drive reports its target reached and no motion pending.
+    pub standing: bool,
+}
+
+/// Voltages that are read together.
+pub trait AnalogInput: Device {
+    /// How many channels are used.
+    fn channels(&self) -> usize;
+
+    /// The newest sample, `None` before the first; its age is the caller's to judge by `at`.
+    fn reading(&self) -> Option<&AnalogReading>;
+}
+
+/// One sample of all channels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnalogReading {
+    /// When it arrived.
+    pub at: Time,
+    /// Each channel, in the order of the configuration.
+    pub volts: Vec<Volts>,
+    /// Per channel: whether the converter stood at an end of its range.
+    pub saturated: Vec<bool>,
+}
+
+/// An instrument that measures the change of a length from a datum.
+pub trait DisplacementInstrument: Device {
+    /// Begins an average over the next `samples` good samples.
+    /// [`Device::poll_outcome`] says when it is done; then [`DisplacementInstrument::average`].
+    fn begin_average(&mut self, now: Time, samples: u32);
+
+    /// The last average, `None` before the first.
+    fn average(&self) -> Option<DisplacementReading>;
+
+    /// The newest good sample, `None` before the first and while the beam is lost.
+    fn latest(&self) -> Option<DisplacementReading>;
+
+    /// Makes the present displacement the datum: it reads zero from now on.
+    /// Also accepts a lost count: after a lost beam nothing is read until this is called.
+    fn set_datum(&mut self, now: Time);
+
+    /// What the instrument's own sensors say about its environment.
+    fn environment(&self) -> Environment;
+}
+
+/// A displacement, not yet corrected for the medium or for temperature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplacementReading {
+    /// When the (last) sample arrived.
+    pub at: Time,
+    /// Displacement as if the beam ran in vacuum; the instrument's optics are included.
+    pub vacuum: Metres,
+    /// Standard deviation of the samples averaged, zero for a single one.
+    pub standard_deviation: Metres,
+    /// How many samples were averaged.
+    pub samples: u32,
+}
+
+/// What an instrument's weather sensors say; `None` where it has none or they fell silent.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Environment {
+    /// Air.
+    pub air_temperature: Option<Celsius>,
+    /// The machine's material.
+    pub material_temperature: Option<Celsius>,
+    /// Air.
+    pub pressure: Option<Pascals>,
+    /// Air.
+    pub humidity: Option<RelativeHumidity>,
+}
+
+/// The identity object 0x1018 and the device type 0x1000; serial devices fill what they have.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Identity {
+    /// 0x1000.
+    pub device_type: u32,
+    /// 0x1018:01.
+    pub vendor: u32,
+    /// 0x1018:02.
+    pub product: u32,
+    /// 0x1018:03.
+    pub revision: u32,
+    /// 0x1018:04.
+    pub serial: u32,
+    /// 0x1008, or what a serial device calls itself.
+    pub name: String,
+}
+
+/// Something that must stop the machine, or at least be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    missing_docs,
+    reason = "fields are named by what they are: node, waited, state, limit"
+)]
+pub enum Alarm {
+    /// No heartbeat for the consumer time.
+    HeartbeatLost { node: NodeId, waited: Duration },
+    /// The node booted by itself: it was reset or lost power, its reference is gone.
+    UnexpectedBootUp { node: NodeId },
+    /// The node left operational.
+    UnexpectedNmtState { node: NodeId, state: NmtState },
+    /// An emergency message that reports an error.
+    Emergency { node: NodeId, emergency: Emergency },
+    /// The node's synchronous PDO did not come for `missed` SYNCs.
+    PdoLost { node: NodeId, missed: u32 },
+    /// A PDO was shorter than its mapping.
+    PdoTooShort {
+        node: NodeId,
+        expected: usize,
+        seen: usize,
+    },
+    /// The drive left the state it was told to keep.
+    DriveState {
+        node: NodeId,
+        expected: PowerState,
+        seen: PowerState,
+    },
+    /// The drive says its following error left the window.
+    FollowingError { node: NodeId },
+    /// An implausible jump of a position.
+    PositionJump {
+        node: NodeId,
+        jump: Metres,
+        limit: Metres,
+    },
+    /// The interferometer's measurement beam is blocked or too weak.
+    BeamLost,
+    /// The interferometer's laser head gives no reference.
+    LaserLost,
+    /// The stage moved faster than the interferometer can count.
+    SlewError,
+    /// Samples are missing from the interferometer's stream.
+    SamplesLost { lost: u64 },
+    /// The stream ended.
+    StreamSilent { waited: Duration },
+    /// Lines that are not understood came in a row: wrong baud rate?
+    Garbage { lines: u64 },
+    /// An analog channel's sample is too old.
+    StaleSample { waited: Duration },
+}
+
+/// Why a command of a device failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the Display text says what each field is")]
+pub enum DeviceError {
+    /// The node aborted a transfer.
+    #[error("{node}, {object}: aborted the transfer with {code} while {step}")]
+    SdoAbort {
+        node: NodeId,
+        object: Object,
+        code: AbortCode,
+        step: &'static str,
+    },
+    /// A transfer was not answered.
+    #[error("{node}, {object}: no answer within {waited:?} ({attempts} attempts) while {step}")]
+    SdoTimeout {
+        node: NodeId,
+        object: Object,
+        waited: Duration,
+        attempts: u32,
+        step: &'static str,
+    },
+    /// A transfer went wrong in another way and was aborted by us.
+    #[error("{node}, {object}: transfer broken off with {code} while {step}")]
+    SdoProtocol {
+        node: NodeId,
+        object: Object,
+        code: AbortCode,
+        step: &'static str,
+    },
+    /// The device is not the one the configuration names.
+    #[error(
+        "{node}: {what} is {seen:#010X}, the configuration says {expected:#010X}; \
+             fit the right device or correct the configuration"
+    )]
+    WrongIdentity {
+        node: NodeId,
+        what: &'static str,
+        expected: u32,
+        seen: u32,
+    },
+    /// A value read back differs from what was written.
+    #[error("{node}, {object}: read back {seen:#X}, wrote {expected:#X} ({step})")]
+    ReadBack {
+        node: NodeId,
+        object: Object,
+        expected: u64,
+        seen: u64,
+        step: &'static str,
+    },
+    /// Something that was awaited did not come.
+    #[error("{device}: waited {waited:?} for {awaited}, last saw {seen}")]
+    Timeout {
+        device: DeviceName,
+        awaited: &'static str,
+        waited: Duration,
+        seen: Seen,
+    },
+    /// The drive refused or failed a command.
+    #[error("{node}: {step} failed, drive is in {state}")]
+    DriveRefused {
+        node: NodeId,
+        step: &'static str,
+        state: PowerState,
+    },
+    /// The command needs something that is not so.
+    #[error("{device}: {step} needs {needs}")]
+    NotPossible {
+        device: DeviceName,
+        step: &'static str,
+        needs: &'static str,
+    },
+    /// A value cannot be represented in the drive's units.
+    #[error("{node}: {what} {value} does not fit {object} (limit {limit})")]
+    OutOfRange {
+        node: NodeId,
+        object: Object,
+        what: &'static str,
+        value: f64,
+        limit: f64,
+    },
+    /// An alarm ended the command.
+    #[error("{device}: {step} ended by an alarm: {alarm}")]
+    Alarmed {
+        device: DeviceName,
+        step: &'static str,
+        alarm: Alarm,
+    },
+}
+
+/// Which device speaks: a node on the bus or a serial device by its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DeviceName {
+    /// On CAN.
+    Node(NodeId),
+    /// On a serial line.
+    Serial(&'static str),
+}
+
+impl fmt::Display for DeviceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Node(node) => node.fmt(f),
+            Self::Serial(kind) => f.write_str(kind),
+        }
+    }
+}
+
+/// What was last seen when something awaited did not come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "each is one kind of observation")]
+pub enum Seen {
+    Nothing,
+    Nmt(NmtState),
+    Power(PowerState),
+    Statusword(u16),
+    Mode(i8),
+    Position(Metres),
+    Samples(u32),
+}
+
+impl fmt::Display for Seen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => f.write_str("nothing"),
+            Self::Nmt(state) => state.fmt(f),
+            Self::Power(state) => state.fmt(f),
+            Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
+            Self::Mode(raw) => write!(f, "mode {raw}"),
+            Self::Position(at) => write!(f, "position {:.6} mm", at.mm()),
+            Self::Samples(count) => write!(f, "{count} samples"),
+        }
+    }
+}
+
+impl fmt::Display for Alarm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::HeartbeatLost { node, waited } => {
+                write!(
+                    f,
+                    "{node}: no heartbeat for {waited:?}; power, cable or drive lost"
+                )
+            }
+            Self::UnexpectedBootUp { node } => {
+                write!(
+                    f,
+                    "{node}: booted by itself; it lost power or was reset, zero again"
+                )
+            }
+            Self::UnexpectedNmtState { node, state } => {
+                write!(f, "{node}: left operational, is {state}")
+            }
+            Self::Emergency { node, emergency } => write!(
+                f,
+                "{node}: emergency {}, error register {:#04X}",
+                emergency.code, emergency.register
+            ),
+            Self::PdoLost { node, missed } => {
+                write!(f, "{node}: process data missing for {missed} SYNC periods")
+            }
+            Self::PdoTooShort {
+                node,
+                expected,
+                seen,
+            } => {
+                write!(f, "{node}: process data of {seen} bytes, mapped {expected}")
+            }
+            Self::DriveState {
+                node,
+                expected,
+                seen,
+            } => {
+                write!(f, "{node}: drive is in {seen}, should be in {expected}")
+            }
+            Self::FollowingError { node } => {
+                write!(
+                    f,
+                    "{node}: following error outside its window; blocked or overloaded?"
+                )
+            }
+            Self::PositionJump { node, jump, limit } => write!(
+                f,
+                "{node}: position jumped by {:.3} mm, possible are {:.3} mm",
+                jump.mm(),
+                limit.mm()
+            ),
+            Self::BeamLost => {
+                f.write_str("interferometer: beam lost; clear and align it, set a new datum")
+            }
+            Self::LaserLost => f.write_str("interferometer: no reference from the laser head"),
+            Self::SlewError => f.write_str("interferometer: too fast to count; slow down"),
+            Self::SamplesLost { lost } => write!(f, "interferometer: {lost} samples missing"),
+            Self::StreamSilent { waited } => {
+                write!(
+                    f,
+                    "interferometer: no sample for {waited:?}; cable or power?"
+                )
+            }
+            Self::Garbage { lines } => {
+                write!(f, "{lines} lines in a row not understood; wrong baud rate?")
+            }
+            Self::StaleSample { waited } => {
+                write!(f, "analog input: no sample for {waited:?}")
+            }
+        }
+    }
+}

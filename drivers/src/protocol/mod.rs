@@ -1,0 +1,1 @@
+//! Sans-io protocol machines: frames and time come in, frames and events go out.

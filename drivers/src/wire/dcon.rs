@@ -1,0 +1,270 @@
+//! The ASCII protocol of ADAM-4000 and I-7000 analog input modules ("DCON").
+//!
+//! Source: Advantech ADAM-4000 series manual, chapter 4 and appendix on checksums. A module
+//! answers nothing at all to a syntax error, a wrong address or a wrong checksum. This codec
+//! covers analog input in engineering units: `+1.2345`, sign always given.
+
+/// Ends every line.
+pub const CR: u8 = b'\r';
+/// Seven characters for each channel: sign, digits and point.
+pub const CHANNEL_CHARACTERS: usize = 7;
+
+/// What the host asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// `#AA`: all channels.
+    ReadAll {
+        /// Module address.
+        address: u8,
+    },
+    /// `#AAN`: one channel.
+    ReadChannel {
+        /// Module address.
+        address: u8,
+        /// 0 to 7.
+        channel: u8,
+    },
+    /// `$AAM`: the module's name.
+    ReadName {
+        /// Module address.
+        address: u8,
+    },
+    /// `$AAF`: the firmware version.
+    ReadFirmware {
+        /// Module address.
+        address: u8,
+    },
+    /// `$AA2`: the configuration.
+    ReadConfiguration {
+        /// Module address.
+        address: u8,
+    },
+    /// `#**`: all modules sample now; nobody answers.
+    SampleAll,
+    /// `$AA4`: what was sampled at `#**`.
+    ReadSampled {
+        /// Module address.
+        address: u8,
+    },
+}
+
+/// Why a line is not what it was read as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DconError {
+    /// The line does not have the form of the message.
+    #[error("analog module: line is not of the form {expected}")]
+    Syntax {
+        /// The form that was expected.
+        expected: &'static str,
+    },
+    /// The two checksum digits do not match.
+    #[error("analog module: checksum {seen:#04X}, expected {expected:#04X}")]
+    Checksum {
+        /// Computed over the line.
+        expected: u8,
+        /// Read from the line.
+        seen: u8,
+    },
+    /// The module refused the command (`?AA`).
+    #[error("analog module {address:#04X} refused the command")]
+    Refused {
+        /// Module address.
+        address: u8,
+    },
+    /// Over-range or open input, shown as a value of all nines.
+    #[error("analog module: channel {channel} is out of its range")]
+    OutOfRange {
+        /// 0 to 7.
+        channel: usize,
+    },
+}
+
+impl Command {
+    /// The line without checksum and CR.
+    pub fn emit(&self) -> String {
+        match *self {
+            Self::ReadAll { address } => format!("#{address:02X}"),
+            Self::ReadChannel { address, channel } => format!("#{address:02X}{channel}"),
+            Self::ReadName { address } => format!("${address:02X}M"),
+            Self::ReadFirmware { address } => format!("${address:02X}F"),
+            Self::ReadConfiguration { address } => format!("${address:02X}2"),
+            Self::SampleAll => "#**".to_owned(),
+            Self::ReadSampled { address } => format!("${address:02X}4"),
+        }
+    }
+
+    /// From a line without checksum and CR; `None` where a module would stay silent.
+    pub fn parse(line: &str) -> Option<Self> {
+        if line == "#**" {
+            return Some(Self::SampleAll);
+        }
+        let address = u8::from_str_radix(line.get(1..3)?, 16).ok()?;
+        match (line.get(..1)?, line.get(3..)?) {
+            ("#", "") => Some(Self::ReadAll { address }),
+            ("#", channel) => {
+                let channel = channel.parse().ok().filter(|channel| *channel < 8)?;
+                Some(Self::ReadChannel { address, channel })
+            }
+            ("$", "M") => Some(Self::ReadName { address }),
+            ("$", "F") => Some(Self::ReadFirmware { address }),
+            ("$", "2") => Some(Self::ReadConfiguration { address }),
+            ("$", "4") => Some(Self::ReadSampled { address }),
+            _ => None,
+        }
+    }
+}
+
+/// The checksum digits of a line: the sum of its characters modulo 256.
+pub fn checksum(line: &str) -> u8 {
+    line.bytes().fold(0, u8::wrapping_add)
+}
+
+/// The bytes on the wire: the line, its checksum where in use, CR.
+pub fn frame(line: &str, with_checksum: bool) -> Vec<u8> {
+    let digits = if with_checksum {
+        format!("{:02X}", checksum(line))
+    } else {
+        String::new()
+    };
+    [line.as_bytes(), digits.as_bytes(), &[CR]].concat()
+}
+
+/// Checks and removes the checksum of a line (CR already removed).
+///
+/// # Errors
+/// When the line is not ASCII, too short or its checksum differs.
+pub fn unframe(line: &[u8], with_checksum: bool) -> Result<&str, DconError> {
+    let form = DconError::Syntax {
+        expected: "printable ASCII with two checksum digits",
+    };
+    let text = core::str::from_utf8(line).map_err(|_| form)?;
+    if !text.is_ascii() {
+        return Err(form);
+    }
+    if !with_checksum {
+        return Ok(text);
+    }
+    let (body, digits) = text
+        .split_at_checked(text.len().saturating_sub(2))
+        .ok_or(form)?;
+    let seen = u8::from_str_radix(digits, 16).map_err(|_| form)?;
+    let expected = checksum(body);
+    if seen == expected {
+        Ok(body)
+    } else {
+        Err(DconError::Checksum { expected, seen })
+    }
+}
+
+/// One channel in volts as a module prints it for the ±10 V range: `+01.234` or, with
+/// `decimals` 4 (±1 V and ±5 V ranges), `+1.2345`.
+pub fn format_volts(volts: f64, decimals: usize) -> String {
+    let limit = if decimals >= 4 { 9.9999 } else { 99.999 };
+    let shown = volts.clamp(-limit, limit);
+    format!("{shown:+0width$.decimals$}", width = CHANNEL_CHARACTERS)
+}
+
+/// The volts of each channel in a reply `>+1.2345-0.0012…`.
+///
+/// # Errors
+/// When the line has another form, or a channel shows the all-nines of an over-range input.
+pub fn parse_volts(line: &str) -> Result<Vec<f64>, DconError> {
+    const FORM: DconError = DconError::Syntax {
+        expected: ">±n.nnnn for each channel",
+    };
+    if let Some(address) = line.strip_prefix('?') {
+        let address = u8::from_str_radix(address, 16).map_err(|_| FORM)?;
+        return Err(DconError::Refused { address });
+    }
+    let body = line.strip_prefix('>').ok_or(FORM)?;
+    if body.is_empty() || !body.len().is_multiple_of(CHANNEL_CHARACTERS) {
+        return Err(FORM);
+    }
+    (0..body.len() / CHANNEL_CHARACTERS)
+        .map(|channel| {
+            let start = channel * CHANNEL_CHARACTERS;
+            let text = body.get(start..start + CHANNEL_CHARACTERS).ok_or(FORM)?;
+            parse_channel(text, channel).ok_or(FORM)?
+        })
+        .collect()
+}
+
+/// `None` for a wrong form, an inner error for over-range.
+fn parse_channel(text: &str, channel: usize) -> Option<Result<f64, DconError>> {
+    let digits = text.strip_prefix(['+', '-'])?;
+    let plain = digits
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || byte == b'.');
+    let points = digits.bytes().filter(|byte| *byte == b'.').count();
+    if !plain || points != 1 {
+        return None;
+    }
+    if digits.bytes().all(|byte| byte == b'9' || byte == b'.') {
+        return Some(Err(DconError::OutOfRange { channel }));
+    }
+    Some(Ok(text.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advantech ADAM-4000 manual, checksum example: `#012` gives `B6`… here the sum itself.
+    #[test]
+    fn the_checksum_is_the_sum_of_the_characters() {
+        assert_eq!(checksum("$012"), 0xB7);
+        assert_eq!(frame("$012", true), b"$012B7\r");
+        assert_eq!(unframe(b"$012B7", true), Ok("$012"));
+        assert!(matches!(
+            unframe(b"$012B8", true),
+            Err(DconError::Checksum { .. })
+        ));
+    }
+
+    #[test]
+    fn commands_read_both_ways() {
+        for (command, line) in [
+            (Command::ReadAll { address: 0x1F }, "#1F"),
+            (
+                Command::ReadChannel {
+                    address: 1,
+                    channel: 3,
+                },
+                "#013",
+            ),
+            (Command::ReadName { address: 1 }, "$01M"),
+            (Command::ReadSampled { address: 2 }, "$024"),
+            (Command::SampleAll, "#**"),
+        ] {
+            assert_eq!(command.emit(), line);
+            assert_eq!(Command::parse(line), Some(command));
+        }
+        assert_eq!(Command::parse("#018"), None);
+        assert_eq!(Command::parse("#G1"), None);
+    }
+
+    #[test]
+    fn channels_are_seven_characters_each() {
+        assert_eq!(parse_volts(">+1.4567-0.0012"), Ok(vec![1.4567, -0.0012]));
+        assert_eq!(parse_volts(">+01.234"), Ok(vec![1.234]));
+        assert_eq!(format_volts(-1.5, 4), "-1.5000");
+        assert_eq!(format_volts(2.5, 3), "+02.500");
+    }
+
+    #[test]
+    fn what_is_not_a_plain_number_is_refused() {
+        for line in [
+            ">+1,4567", ">+1.456", "+1.4567", ">+inf   ", ">1.45678", ">", ">+1.45.7",
+        ] {
+            assert!(
+                matches!(parse_volts(line), Err(DconError::Syntax { .. })),
+                "{line}"
+            );
+        }
+        assert_eq!(
+            parse_volts(">+9.9999"),
+            Err(DconError::OutOfRange { channel: 0 })
+        );
+        assert_eq!(parse_volts("?01"), Err(DconError::Refused { address: 1 }));
+    }
+}

@@ -1,0 +1,26 @@
+//! Bytes to typed messages and back; no state, no time, no I/O.
+//!
+//! Everything here is `parse(bytes) -> Result` and `emit() -> bytes`. Codes that a standard
+//! does not name are kept as `Unknown(raw)`, never folded into a known one. Drivers and
+//! emulators share only this module, so every codec is pinned by golden bytes.
+
+pub mod can;
+pub mod candump;
+pub mod canopen;
+pub mod cia402;
+pub mod dcon;
+pub mod slcan;
+pub mod umd2;
+
+/// What one port carries at once: a CAN frame, or a run of bytes on a serial line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Payload {
+    /// On a CAN bus.
+    Frame(can::CanFrame),
+    /// On a serial line; where it is cut into runs means nothing.
+    Bytes(Vec<u8>),
+}
+
+/// One of a machine's buses or serial lines, by its place in the configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Port(pub u8);

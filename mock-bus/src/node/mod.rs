@@ -1,0 +1,36 @@
+//! Each emulated device's bus face.
+//!
+//! A node is sans-io: payloads, time and the plant come in, payloads go out.
+
+pub mod canopen_server;
+pub mod cia401_analog;
+pub mod cia402_drive;
+pub mod dcon_module;
+pub mod profile;
+pub mod umd2_interferometer;
+
+use drivers::wire::Payload;
+use units::Time;
+
+use crate::plant::Plant;
+
+/// One emulated device.
+pub trait Node {
+    /// Takes what was sent on the node's port; CAN nodes see every frame of their bus.
+    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant);
+
+    /// Lets time pass up to `now`; called at least at every [`Node::next_event`].
+    fn advance(&mut self, now: Time, plant: &mut Plant);
+
+    /// When the node wants to be advanced next; [`Time::NEVER`] for never.
+    fn next_event(&self) -> Time;
+
+    /// The next payload the node sends.
+    fn poll_transmit(&mut self) -> Option<Payload>;
+
+    /// The mains goes off (everything volatile is lost, the node falls silent).
+    fn power_off(&mut self, now: Time, plant: &mut Plant);
+
+    /// The mains comes back: the node boots.
+    fn power_on(&mut self, now: Time, plant: &mut Plant);
+}

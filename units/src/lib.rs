@@ -1,0 +1,56 @@
+//! SI quantities, encoder counts and monotonic time.
+//!
+//! Every public signature of truestage speaks these types; micrometres, millimetres and
+//! arc-seconds exist only where a person writes or reads them (configuration, data files,
+//! screen). The package depends on nothing, so that everybody may import it.
+
+mod counts;
+mod quantity;
+mod time;
+
+pub use counts::{Counts, Scale};
+pub use quantity::{
+    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
+    Volts,
+};
+pub use time::Time;
+
+/// The direction from which a target is reached.
+///
+/// ISO 230-2 writes it ↑ and ↓; data files write it `+` and `-`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Approach {
+    /// Coordinates increase on the way to the target (↑, `+`).
+    Forward,
+    /// Coordinates decrease on the way to the target (↓, `-`).
+    Reverse,
+}
+
+impl Approach {
+    /// The approach of a move from `start` to `end`, or `None` when they are equal.
+    pub fn of_move(start: Metres, end: Metres) -> Option<Self> {
+        if end > start {
+            Some(Self::Forward)
+        } else if end < start {
+            Some(Self::Reverse)
+        } else {
+            None
+        }
+    }
+
+    /// `+1.0` for forward, `-1.0` for reverse.
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::Forward => 1.0,
+            Self::Reverse => -1.0,
+        }
+    }
+
+    /// The character data files use: `+` or `-`.
+    pub const fn symbol(self) -> char {
+        match self {
+            Self::Forward => '+',
+            Self::Reverse => '-',
+        }
+    }
+}
