@@ -1,0 +1,31 @@
+//! The mathematics of truestage: estimate, store, correct, judge.
+//!
+//! Every function here is pure or a plain state machine: measured values and times come in as
+//! arguments, results and named errors go out. There is no socket, file, clock, thread, sleep
+//! or random number inside, so that a whole commissioning runs in virtual time and twice alike.
+//!
+//! | module | what it answers |
+//! |---|---|
+//! | [`measurement`] | are these measured data complete and in order? |
+//! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
+//! | [`hall_zero`] | where is the drift-free origin (system S5)? |
+//! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
+//! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
+//! | [`apply`] | how does a correction get onto a moving axis without a bump? |
+//! | [`interpolation`], [`least_squares`], [`uncertainty`] | the numerics under them |
+//!
+//! Sign: deviation = actual − target (ISO 230-2), compensation = −deviation. The correction is
+//! the exact inverse: the command `c` with `c + deviation(c) = target`.
+//!
+//! Absent: drivers, devices and files; model types are not (de)serialised here.
+
+pub mod air;
+pub mod apply;
+pub mod error_table;
+pub mod hall_zero;
+pub mod interpolation;
+pub mod iso230;
+pub mod least_squares;
+pub mod length_correction;
+pub mod measurement;
+pub mod uncertainty;

@@ -1,0 +1,393 @@
+//! The CSV reader under the series: header, cells, and where each one stood.
+//!
+//! Numbers are taken only in plain decimal or exponent notation with a decimal point. What a
+//! spreadsheet does to data (decimal commas, semicolons, `nan`, other units) is recognised and
+//! named, because "invalid float" helps nobody at a machine.
+
+use units::Approach;
+
+use super::SeriesError;
+
+/// A data file that cannot be used: where, what was seen, what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}:{line}:{column}: {fault}")]
+pub struct DataError {
+    /// Name of the source as given by the caller.
+    pub file: String,
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Column in characters, counted from 1.
+    pub column: usize,
+    /// What is wrong there.
+    pub fault: Fault,
+}
+
+/// What is wrong with a data file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// No header row.
+    #[error("the file is empty; its first row must be the header `{expected}`")]
+    Empty {
+        /// The header wanted.
+        expected: &'static str,
+    },
+    /// A header but no data row.
+    #[error("there is no data row under the header")]
+    NoRows,
+    /// A column that does not belong to the format.
+    #[error("unknown column `{seen}`; the header must be `{expected}`")]
+    UnknownColumn {
+        /// The name seen.
+        seen: String,
+        /// The header wanted.
+        expected: &'static str,
+    },
+    /// The right quantity in another unit.
+    #[error("column `{seen}` is in the wrong unit: convert its values and name it `{wanted}`")]
+    WrongUnit {
+        /// The name seen.
+        seen: String,
+        /// The name wanted.
+        wanted: &'static str,
+    },
+    /// A column of the format is not there.
+    #[error("column `{missing}` is missing; the header must be `{expected}`")]
+    MissingColumn {
+        /// The column.
+        missing: &'static str,
+        /// The header wanted.
+        expected: &'static str,
+    },
+    /// A column twice.
+    #[error("column `{seen}` appears twice; remove one")]
+    DuplicateColumn {
+        /// The name.
+        seen: &'static str,
+    },
+    /// The header or a row is separated by something else than commas.
+    #[error("the columns are separated by `{seen}`; save the file with commas between columns")]
+    Separator {
+        /// The separator seen.
+        seen: char,
+    },
+    /// A row of another length than the header.
+    #[error("the row has {seen} cells, the header {expected}{hint}",
+        hint = if seen > expected { "; decimal commas? write decimal points" } else { "" })]
+    CellCount {
+        /// Cells in the row.
+        seen: usize,
+        /// Cells in the header.
+        expected: usize,
+    },
+    /// The quoting of the file cannot be read.
+    #[error("the quotes in this row cannot be read; write numbers without quotes")]
+    Quoting,
+    /// An empty cell.
+    #[error("`{column}` is empty; a value that was not measured must not be in the file")]
+    MissingValue {
+        /// The column.
+        column: &'static str,
+    },
+    /// A number with a decimal comma.
+    #[error("`{column}` is `{seen}`: write a decimal point, not a comma")]
+    DecimalComma {
+        /// The column.
+        column: &'static str,
+        /// The cell.
+        seen: String,
+    },
+    /// A NaN, an infinity or a number too large.
+    #[error("`{column}` is `{seen}`, not a finite number; measure the point again")]
+    NotFinite {
+        /// The column.
+        column: &'static str,
+        /// The cell.
+        seen: String,
+    },
+    /// Not a number.
+    #[error("`{column}` is `{seen}`, not a number; write plain decimals without units")]
+    NotANumber {
+        /// The column.
+        column: &'static str,
+        /// The cell.
+        seen: String,
+    },
+    /// Not a run number.
+    #[error("`run` is `{seen}`; number the runs 0, 1, 2, …")]
+    NotARun {
+        /// The cell.
+        seen: String,
+    },
+    /// Not an approach.
+    #[error("`approach` is `{seen}`; write + (coordinates increase) or -")]
+    NotAnApproach {
+        /// The cell.
+        seen: String,
+    },
+    /// The same point twice.
+    #[error("target {target_mm} mm of run {run} ({approach}) is already in the file; keep one")]
+    Duplicate {
+        /// Its run.
+        run: u32,
+        /// `+` or `-`.
+        approach: char,
+        /// Its target.
+        target_mm: f64,
+    },
+    /// Runs out of order.
+    #[error("run {seen} comes after run {previous}; keep the rows in the order measured")]
+    RunOrder {
+        /// This row's run.
+        seen: u32,
+        /// The row before's.
+        previous: u32,
+    },
+    /// Targets against the approach.
+    #[error(
+        "target {seen_mm} mm comes after {previous_mm} mm, which is not approach `{approach}`; \
+         keep the rows in the order measured"
+    )]
+    TargetOrder {
+        /// `+` or `-`.
+        approach: char,
+        /// This row's target.
+        seen_mm: f64,
+        /// The target before it.
+        previous_mm: f64,
+    },
+}
+
+/// The columns of one file format.
+pub(super) struct Format {
+    columns: &'static [&'static str],
+    header: &'static str,
+}
+
+impl Format {
+    pub(super) const LINEAR: Self = Self {
+        columns: &["run", "approach", "target_mm", "measured_mm"],
+        header: "run,approach,target_mm,measured_mm",
+    };
+    pub(super) const HALL: Self = Self {
+        columns: &["position_um", "peak_v", "slope_v"],
+        header: "position_um,peak_v,slope_v",
+    };
+}
+
+struct Cell {
+    text: String,
+    column: usize,
+}
+
+/// A file's cells in the format's own column order, with the place of each.
+pub(super) struct Table {
+    file: String,
+    format: &'static [&'static str],
+    rows: Vec<(usize, Vec<Cell>)>,
+}
+
+impl Table {
+    pub(super) fn read(text: &str, file: &str, format: &Format) -> Result<Self, DataError> {
+        let fail = |line: usize, column: usize, fault: Fault| DataError {
+            file: file.to_owned(),
+            line,
+            column,
+            fault,
+        };
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut rows = Vec::new();
+        let mut header: Option<Vec<usize>> = None;
+        for (index, line) in text.lines().enumerate() {
+            if line.trim().is_empty() || line.trim_start().starts_with('#') {
+                continue;
+            }
+            let cells = split(line).ok_or_else(|| fail(index + 1, 1, Fault::Quoting))?;
+            match &header {
+                None => {
+                    let order = read_header(&cells, format)
+                        .map_err(|(column, fault)| fail(index + 1, column, fault))?;
+                    header = Some(order);
+                }
+                Some(order) if cells.len() != order.len() => {
+                    let (seen, expected) = (cells.len(), order.len());
+                    let column = cells.get(expected).map_or(line.chars().count() + 1, |c| c.column);
+                    return Err(fail(index + 1, column, Fault::CellCount { seen, expected }));
+                }
+                Some(order) => rows.push((index + 1, sorted(cells, order))),
+            }
+        }
+        let end = text.lines().count().max(1);
+        if header.is_none() {
+            return Err(fail(1, 1, Fault::Empty { expected: format.header }));
+        }
+        if rows.is_empty() {
+            return Err(fail(end, 1, Fault::NoRows));
+        }
+        Ok(Self { file: file.to_owned(), format: format.columns, rows })
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn fail(&self, row: usize, column: usize, fault: Fault) -> DataError {
+        let (line, cells) = &self.rows[row];
+        DataError { file: self.file.clone(), line: *line, column: cells[column].column, fault }
+    }
+
+    pub(super) fn number(&self, row: usize, column: usize) -> Result<f64, DataError> {
+        let seen = self.rows[row].1[column].text.as_str();
+        let name = self.format[column];
+        let fault = match parse_number(seen) {
+            Ok(value) => return Ok(value),
+            Err(Number::Missing) => Fault::MissingValue { column: name },
+            Err(Number::Comma) => Fault::DecimalComma { column: name, seen: seen.to_owned() },
+            Err(Number::Infinite) => Fault::NotFinite { column: name, seen: seen.to_owned() },
+            Err(Number::Word) => Fault::NotANumber { column: name, seen: seen.to_owned() },
+        };
+        Err(self.fail(row, column, fault))
+    }
+
+    pub(super) fn run(&self, row: usize, column: usize) -> Result<u32, DataError> {
+        let seen = self.rows[row].1[column].text.as_str();
+        let digits = !seen.is_empty() && seen.bytes().all(|b| b.is_ascii_digit());
+        seen.parse().ok().filter(|_| digits).ok_or_else(|| {
+            let fault = match seen {
+                "" => Fault::MissingValue { column: self.format[column] },
+                _ => Fault::NotARun { seen: seen.to_owned() },
+            };
+            self.fail(row, column, fault)
+        })
+    }
+
+    pub(super) fn approach(&self, row: usize, column: usize) -> Result<Approach, DataError> {
+        let fault = match self.rows[row].1[column].text.as_str() {
+            "+" => return Ok(Approach::Forward),
+            "-" => return Ok(Approach::Reverse),
+            "" => Fault::MissingValue { column: self.format[column] },
+            seen => Fault::NotAnApproach { seen: seen.to_owned() },
+        };
+        Err(self.fail(row, column, fault))
+    }
+
+    /// Puts the place of the offending row on an error of the whole series.
+    pub(super) fn series_error(&self, error: SeriesError) -> DataError {
+        match error {
+            SeriesError::Empty => self.fail(0, 0, Fault::NoRows),
+            SeriesError::NotFinite { index } => {
+                let seen = self.rows[index].1[0].text.clone();
+                self.fail(index, 0, Fault::NotFinite { column: self.format[0], seen })
+            }
+            SeriesError::Duplicate { index, run, approach, target } => {
+                let (approach, target_mm) = (approach.symbol(), target.mm());
+                self.fail(index, 2, Fault::Duplicate { run, approach, target_mm })
+            }
+            SeriesError::RunOrder { index, seen, previous } => {
+                self.fail(index, 0, Fault::RunOrder { seen, previous })
+            }
+            SeriesError::TargetOrder { index, approach, seen, previous } => {
+                let (seen_mm, previous_mm) = (seen.mm(), previous.mm());
+                let approach = approach.symbol();
+                self.fail(index, 2, Fault::TargetOrder { approach, seen_mm, previous_mm })
+            }
+        }
+    }
+}
+
+/// The cells of one line and where each starts; `None` when its quotes do not match.
+fn split(line: &str) -> Option<Vec<Cell>> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(line.as_bytes());
+    let record = reader.records().next()?.ok()?;
+    if line.contains('"') {
+        // Quoted cells are legal CSV; their place is then only known to the line.
+        let whole = line.matches('"').count() % 2 == 0;
+        return whole.then(|| {
+            record.iter().map(|text| Cell { text: text.to_owned(), column: 1 }).collect()
+        });
+    }
+    let mut column = 1;
+    let mut cells = Vec::with_capacity(record.len());
+    for (raw, text) in line.split(',').zip(record.iter()) {
+        let indent = raw.chars().take_while(|c| c.is_whitespace()).count();
+        cells.push(Cell { text: text.to_owned(), column: column + indent });
+        column += raw.chars().count() + 1;
+    }
+    Some(cells)
+}
+
+/// For each column of the format, the place of its cell in a row of the file.
+fn read_header(cells: &[Cell], format: &Format) -> Result<Vec<usize>, (usize, Fault)> {
+    let expected = format.header;
+    let mut order = vec![None; format.columns.len()];
+    for (place, cell) in cells.iter().enumerate() {
+        let known = format.columns.iter().position(|&name| name == cell.text);
+        let Some(index) = known else {
+            return Err((cell.column, unknown_column(&cell.text, format)));
+        };
+        if order[index].replace(place).is_some() {
+            return Err((cell.column, Fault::DuplicateColumn { seen: format.columns[index] }));
+        }
+    }
+    let mut places = Vec::with_capacity(order.len());
+    for (place, missing) in order.into_iter().zip(format.columns) {
+        places.push(place.ok_or((1, Fault::MissingColumn { missing, expected }))?);
+    }
+    Ok(places)
+}
+
+fn unknown_column(seen: &str, format: &Format) -> Fault {
+    if let Some(separator) = seen.chars().find(|c| matches!(c, ';' | '\t' | '|')) {
+        return Fault::Separator { seen: separator };
+    }
+    let quantity = |name: &str| name.split('_').next().unwrap_or(name).to_ascii_lowercase();
+    let same = format
+        .columns
+        .iter()
+        .find(|name| name.contains('_') && quantity(name) == quantity(seen));
+    match same {
+        Some(wanted) => Fault::WrongUnit { seen: seen.to_owned(), wanted },
+        None => Fault::UnknownColumn { seen: seen.to_owned(), expected: format.header },
+    }
+}
+
+fn sorted(cells: Vec<Cell>, order: &[usize]) -> Vec<Cell> {
+    let mut cells: Vec<Option<Cell>> = cells.into_iter().map(Some).collect();
+    order
+        .iter()
+        .map(|&place| cells[place].take().expect("the header's places are distinct"))
+        .collect()
+}
+
+/// Why a cell is not a number.
+enum Number {
+    Missing,
+    Comma,
+    Infinite,
+    Word,
+}
+
+fn parse_number(cell: &str) -> Result<f64, Number> {
+    if cell.is_empty() {
+        return Err(Number::Missing);
+    }
+    let plain = cell.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
+    if plain {
+        return match cell.parse::<f64>() {
+            // Some writers put 1e308 for "no value": it survives parsing but no conversion.
+            Ok(value) if value.abs() < 1e12 => Ok(value),
+            Ok(_) => Err(Number::Infinite),
+            Err(_) => Err(Number::Word),
+        };
+    }
+    if cell.contains(',') && cell.replace(',', ".").parse::<f64>().is_ok() {
+        return Err(Number::Comma);
+    }
+    match cell.parse::<f64>() {
+        Ok(_) => Err(Number::Infinite),
+        Err(_) => Err(Number::Word),
+    }
+}
