@@ -1,1 +1,48 @@
-//! x
+//! truestage: makes precision motion stages go where they are told.
+//!
+//! One cycle for any stage: **calibrate → zero → compensate → verify**. This package joins
+//! the drivers, the mathematics and the records; it is both a library and the command
+//! `truestage`.
+//!
+//! # A stage in a program of yours
+//!
+//! ```no_run
+//! use truestage::{Failure, Machine, StopRequest, Store, config, ports};
+//! use units::Metres;
+//!
+//! fn main() -> Result<(), Failure> {
+//!     let loaded = config::load("machine.toml".as_ref())?;
+//!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), 1.0)?;
+//!     let mut machine = Machine::new(&loaded, Box::new(transport));
+//!     let section = &loaded.config.machine;
+//!     let store = Store::new(&section.data_dir, &section.name);
+//!     machine.guarded(|machine| {
+//!         machine.start()?;
+//!         machine.zero("x", &store)?;
+//!         machine.load_active("x", &store)?;
+//!         machine.move_to("x", Metres::from_mm(12.5))?;
+//!         machine.shut_down()
+//!     })
+//! }
+//! ```
+//!
+//! This is not a safety controller: wire STO.
+
+pub mod assemble;
+pub mod bus_plan;
+pub mod config;
+pub mod cycle;
+pub mod emulated;
+pub mod failure;
+pub mod json;
+pub mod machine;
+pub mod observer;
+pub mod ports;
+pub mod report;
+pub mod store;
+pub mod text;
+mod tick;
+
+pub use failure::Failure;
+pub use machine::{Machine, StopRequest};
+pub use store::Store;

@@ -1,0 +1,199 @@
+//! `truestage cal`: what is stored, what is in use, and back again.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+use serde_json::json;
+use truestage::store::{CalibrationRecord, NodeRecord, Store, short};
+use truestage::{Failure, config};
+use units::Metres;
+
+use super::output::Output;
+
+#[derive(Debug, Subcommand)]
+pub(super) enum CalCommand {
+    /// All calibrations of the machine; `*` marks those in use.
+    List {
+        /// The machine's configuration.
+        #[arg(default_value = "machine.toml")]
+        config: PathBuf,
+    },
+    /// One calibration, whole.
+    Show {
+        /// The machine's configuration.
+        config: PathBuf,
+        /// Its name, or the beginning of it.
+        id: String,
+    },
+    /// Two calibrations side by side.
+    Diff {
+        /// The machine's configuration.
+        config: PathBuf,
+        /// The older one.
+        before: String,
+        /// The newer one.
+        after: String,
+    },
+    /// Use this calibration from now on.
+    Activate {
+        /// The machine's configuration.
+        config: PathBuf,
+        /// Its name, or the beginning of it.
+        id: String,
+    },
+    /// Go back to the calibration used before.
+    Rollback {
+        /// The machine's configuration.
+        config: PathBuf,
+        /// Which axis.
+        #[arg(long)]
+        axis: String,
+    },
+}
+
+pub(super) fn run(command: &CalCommand, output: Output) -> Result<(), Failure> {
+    match command {
+        CalCommand::List { config } => list(&store_of(config)?, output),
+        CalCommand::Show { config, id } => show(&store_of(config)?, id, output),
+        CalCommand::Diff { config, before, after } => {
+            diff(&store_of(config)?, before, after, output)
+        }
+        CalCommand::Activate { config, id } => activate(config, id, output),
+        CalCommand::Rollback { config, axis } => rollback(&store_of(config)?, axis, output),
+    }
+}
+
+fn store_of(config: &std::path::Path) -> Result<Store, Failure> {
+    let loaded = config::load(config)?;
+    let section = &loaded.config.machine;
+    Ok(Store::new(&section.data_dir, &section.name))
+}
+
+fn list(store: &Store, output: Output) -> Result<(), Failure> {
+    let mut lines = Vec::new();
+    let mut values = Vec::new();
+    for id in store.list()? {
+        match store.load(&id) {
+            Ok(record) => {
+                let used = store.active(&record.axis)?.current.as_deref() == Some(&id);
+                lines.push(format!(
+                    "{} {}  {}  axis {}  {} nodes  {}",
+                    if used { '*' } else { ' ' },
+                    short(&id),
+                    record.created,
+                    record.axis,
+                    record.nodes.len(),
+                    record.source
+                ));
+                values.push(json!({"id": id, "active": used, "axis": record.axis,
+                                   "created": record.created, "source": record.source}));
+            }
+            Err(error) => {
+                lines.push(format!("! {}  {error}", short(&id)));
+                values.push(json!({"id": id, "error": error.to_string()}));
+            }
+        }
+    }
+    if lines.is_empty() {
+        lines.push("no calibrations yet; `truestage calibrate` makes one".into());
+    }
+    output.result(&lines.join("\n"), &json!({"calibrations": values}));
+    Ok(())
+}
+
+fn show(store: &Store, id: &str, output: Output) -> Result<(), Failure> {
+    let id = store.resolve(id)?;
+    let record = store.load(&id)?;
+    let mut text = format!(
+        "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, {} runs, \
+         closure {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
+        record.machine,
+        record.stage_serial,
+        record.axis,
+        record.created,
+        record.program,
+        record.source,
+        record.runs,
+        micrometres(record.closure_m),
+    );
+    for node in &record.nodes {
+        text += &node_line(node);
+    }
+    let value = serde_json::to_value(&record).expect("plain data always serialises");
+    output.result(&text, &json!({"id": id, "record": value}));
+    Ok(())
+}
+
+fn micrometres(metres: Option<f64>) -> String {
+    metres.map_or("–".to_owned(), |it| format!("{:.3}", Metres(it).um()))
+}
+
+fn node_line(node: &NodeRecord) -> String {
+    format!(
+        "\n  {:>13.3}   {:>12}   {:>12}   {:>11}",
+        Metres(node.position_m).mm(),
+        micrometres(node.forward_m),
+        micrometres(node.reverse_m),
+        micrometres(node.forward_u_m.or(node.reverse_u_m)),
+    )
+}
+
+fn diff(store: &Store, before: &str, after: &str, output: Output) -> Result<(), Failure> {
+    let load = |id: &str| -> Result<CalibrationRecord, Failure> {
+        Ok(store.load(&store.resolve(id)?)?)
+    };
+    let (before, after) = (load(before)?, load(after)?);
+    let mut lines = vec!["  position (mm)   Δ forward (µm)   Δ reverse (µm)".to_owned()];
+    let mut values = Vec::new();
+    for new in &after.nodes {
+        let Some(old) = before.nodes.iter().find(|old| old.position_m == new.position_m) else {
+            continue;
+        };
+        let change = |new: Option<f64>, old: Option<f64>| Some(new? - old?);
+        let (forward, reverse) =
+            (change(new.forward_m, old.forward_m), change(new.reverse_m, old.reverse_m));
+        let position = Metres(new.position_m).mm();
+        let (forward_um, reverse_um) = (micrometres(forward), micrometres(reverse));
+        lines.push(format!("  {position:>13.3}   {forward_um:>14}   {reverse_um:>14}"));
+        values.push(json!({
+            "position_mm": position,
+            "forward_um": forward.map(|it| Metres(it).um()),
+            "reverse_um": reverse.map(|it| Metres(it).um()),
+        }));
+    }
+    if values.is_empty() {
+        lines.push("  no position stands in both".into());
+    }
+    output.result(&lines.join("\n"), &json!({"changes": values}));
+    Ok(())
+}
+
+/// The stage and the configuration are checked here; the drive itself when it is used.
+fn activate(path: &std::path::Path, id: &str, output: Output) -> Result<(), Failure> {
+    let loaded = config::load(path)?;
+    let section = &loaded.config.machine;
+    let store = Store::new(&section.data_dir, &section.name);
+    let id = store.resolve(id)?;
+    let record = store.load(&id)?;
+    let here = CalibrationRecord {
+        stage_serial: section.stage_serial.clone(),
+        config_hash: loaded.hash.clone(),
+        ..record.clone()
+    };
+    record.belongs_to(&id, &here)?;
+    if !loaded.config.axis.contains_key(&record.axis) {
+        let known = loaded.config.axis.keys().cloned().collect::<Vec<_>>().join(", ");
+        return Err(Failure::NoSuchAxis { axis: record.axis, known });
+    }
+    store.activate(&record.axis, &id)?;
+    let text = format!("axis {}: {} is in use", record.axis, short(&id));
+    output.result(&text, &json!({"axis": record.axis, "active": id}));
+    Ok(())
+}
+
+fn rollback(store: &Store, axis: &str, output: Output) -> Result<(), Failure> {
+    let id = store.rollback(axis)?;
+    let text = format!("axis {axis}: back to {}", short(&id));
+    output.result(&text, &json!({"axis": axis, "active": id}));
+    Ok(())
+}

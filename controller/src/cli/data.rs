@@ -1,0 +1,170 @@
+//! `truestage fit` and `truestage iso230`: the mathematics on data measured elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+use compensator::error_table::{self, FitOptions, Fitted};
+use compensator::hall_zero::fit_hall;
+use compensator::iso230;
+use compensator::measurement::{HallSeries, LinearSeries};
+use serde_json::json;
+use truestage::cycle::utc_now;
+use truestage::store::{
+    CalibrationRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord, SCHEMA_VERSION, Store,
+    short,
+};
+use truestage::{Failure, assemble, config, json as to_json, text};
+
+use super::output::Output;
+
+#[derive(Debug, Subcommand)]
+pub(super) enum FitCommand {
+    /// An error table from columns run,approach,target_mm,measured_mm.
+    Linear {
+        /// The data file.
+        data: PathBuf,
+        /// Store it as a calibration of this machine (activate it with `cal activate`).
+        #[arg(long, value_name = "CONFIG")]
+        save: Option<PathBuf>,
+        /// The axis it belongs to; the only one when there is one.
+        #[arg(long)]
+        axis: Option<String>,
+    },
+    /// The drift-free zero from columns position_um,peak_v,slope_v.
+    Hall {
+        /// The data file.
+        data: PathBuf,
+    },
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path)
+        .map_err(|source| Failure::File { path: path.to_owned(), source })
+}
+
+pub(super) fn iso230(path: &Path, output: Output) -> Result<(), Failure> {
+    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let figures = iso230::evaluate(&series)?;
+    let mut text = text::figures_table(&[("measured", &figures)]);
+    if !figures.conforms() {
+        text += "\nnote: ISO 230-2 asks for five runs from each side and five targets";
+    }
+    output.result(&text, &to_json::figures(&figures));
+    Ok(())
+}
+
+pub(super) fn fit(command: &FitCommand, output: Output) -> Result<(), Failure> {
+    match command {
+        FitCommand::Linear { data, save, axis } => {
+            linear(data, save.as_deref(), axis.as_deref(), output)
+        }
+        FitCommand::Hall { data } => hall(data, output),
+    }
+}
+
+fn linear(
+    path: &Path,
+    save: Option<&Path>,
+    axis: Option<&str>,
+    output: Output,
+) -> Result<(), Failure> {
+    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let name = axis.unwrap_or("x").to_owned();
+    let fitted = error_table::analyse(&series, &FitOptions::default())
+        .map_err(|source| Failure::Fit { axis: name, source })?;
+    let mut value = to_json::fitted(&fitted);
+    let mut text = format!(
+        "{} positions, largest deviation {:.3} µm, {} of {} points left out",
+        fitted.table.nodes().len(),
+        fitted.table.largest().um(),
+        fitted.robust.outliers.len(),
+        series.measurements().len()
+    );
+    if let Some(lost_motion) = fitted.table.lost_motion() {
+        text += &format!(
+            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {:.3} µm",
+            lost_motion.mean.um(),
+            lost_motion.standard_uncertainty.um()
+        );
+    }
+    if let Some(config) = save {
+        let id = store_fit(config, axis, path, &series, &fitted)?;
+        text += &format!("\nstored as {}; use it with `truestage cal activate`", short(&id));
+        value["calibration"] = json!(id);
+    }
+    output.result(&text, &value);
+    Ok(())
+}
+
+/// Stores a table measured elsewhere. The drive cannot be asked here, so its identity is what
+/// the configuration expects; with a serial number there it is checked like any other.
+fn store_fit(
+    config_path: &Path,
+    axis: Option<&str>,
+    data: &Path,
+    series: &LinearSeries,
+    fitted: &Fitted,
+) -> Result<String, Failure> {
+    let loaded = config::load(config_path)?;
+    let axes = &loaded.config.axis;
+    let name = match (axis, axes.len()) {
+        (Some(axis), _) => axis.to_owned(),
+        (None, 1) => axes.keys().next().expect("there is one").clone(),
+        (None, _) => String::new(),
+    };
+    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
+    let axis = axes
+        .get(&name)
+        .ok_or_else(|| Failure::NoSuchAxis { axis: name.clone(), known: known() })?;
+    if let Some(limits) = &axis.compensation {
+        assemble::compensation(limits, &name, fitted.table.clone())?;
+    }
+    let section = &loaded.config.machine;
+    let lost_motion = fitted.table.lost_motion();
+    let record = CalibrationRecord {
+        schema_version: SCHEMA_VERSION,
+        kind: "linear_error_table".into(),
+        machine: section.name.clone(),
+        stage_serial: section.stage_serial.clone(),
+        config_hash: loaded.hash.clone(),
+        axis: name,
+        drive: IdentityRecord {
+            device_type: axis.identity.device_type,
+            vendor: axis.identity.vendor_id,
+            product: axis.identity.product_code,
+            revision: axis.identity.revision.unwrap_or(0),
+            serial: axis.identity.serial_number.unwrap_or(0),
+            name: String::new(),
+        },
+        resolution_m: axis.resolution_nm * 1e-9,
+        created: utc_now(),
+        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+        source: data.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        instrument: InstrumentRecord { name: "measured elsewhere".into(), ..Default::default() },
+        environment: EnvironmentRecord::default(),
+        runs: series.runs().len() as u32,
+        closure_m: None,
+        lost_motion_m: lost_motion.map(|it| it.mean.value()),
+        lost_motion_u_m: lost_motion.map(|it| it.standard_uncertainty.value()),
+        nodes: CalibrationRecord::nodes_of(&fitted.table),
+    };
+    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
+}
+
+fn hall(path: &Path, output: Output) -> Result<(), Failure> {
+    let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let estimate = fit_hall(&series)
+        .map_err(|source| Failure::Refine { axis: path.display().to_string(), source })?;
+    let text = format!(
+        "origin {:.4} µm, standard uncertainty {:.4} µm ({} points)\nflanks at {:.1} and {:.1} µm, \
+         mid voltage {:.4} V",
+        estimate.origin.um(),
+        estimate.standard_uncertainty.um(),
+        estimate.points,
+        estimate.left.position.um(),
+        estimate.right.position.um(),
+        estimate.mid_voltage.value()
+    );
+    output.result(&text, &to_json::zero(&estimate));
+    Ok(())
+}

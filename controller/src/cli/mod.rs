@@ -1,0 +1,150 @@
+//! The command line. Its words are the cycle's own.
+
+mod cal;
+mod data;
+mod demo;
+mod output;
+mod page;
+mod progress;
+mod scan;
+mod session;
+mod verbs;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use output::Output;
+
+/// Makes precision motion stages go where they are told.
+#[derive(Debug, Parser)]
+#[command(name = "truestage", version, arg_required_else_help = true)]
+struct Cli {
+    /// Print one JSON object on stdout instead of text.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The whole cycle on an emulated machine: start here.
+    Demo(demo::DemoArgs),
+    /// Judge a configuration; touches no bus.
+    Check {
+        /// The machine's configuration.
+        #[arg(default_value = "machine.toml")]
+        config: PathBuf,
+    },
+    /// Who is on the buses, and what does not match the configuration; nothing is changed.
+    Scan(MachineArgs),
+    /// Find the origin with the Hall sensors.
+    Zero(AxisArgs),
+    /// Zero, measure the deviations, store and activate the calibration.
+    Calibrate(CalibrateArgs),
+    /// Zero, measure between the calibrated positions, judge by ISO 230-2.
+    Verify(VerifyArgs),
+    /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
+    Move(MoveArgs),
+    /// Stored calibrations.
+    #[command(subcommand)]
+    Cal(cal::CalCommand),
+    /// The same mathematics on data measured elsewhere.
+    #[command(subcommand)]
+    Fit(data::FitCommand),
+    /// ISO 230-2 figures of measured data (columns run,approach,target_mm,measured_mm).
+    Iso230 {
+        /// The data file.
+        data: PathBuf,
+    },
+    /// A self-contained HTML page of a run.
+    Report(page::ReportArgs),
+}
+
+/// How a machine is reached.
+#[derive(Clone, Debug, Args)]
+struct MachineArgs {
+    /// The machine's configuration.
+    #[arg(default_value = "machine.toml")]
+    config: PathBuf,
+    /// Use another endpoint for a bus or line of the configuration: `can0=slcan:/dev/pts/3`,
+    /// `can0=socketcan:vcan0`, `laser=/dev/pts/4`. May be given several times.
+    #[arg(long = "port", value_name = "NAME=ENDPOINT")]
+    ports: Vec<String>,
+    /// The clock of an emulated machine that runs faster than real time (`mock-bus --speed`).
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    clock_speed: f64,
+    /// Write everything on the buses to this file, in candump's log format.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+}
+
+#[derive(Clone, Debug, Args)]
+struct AxisArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Which axis; the only one when there is one.
+    #[arg(long)]
+    axis: Option<String>,
+}
+
+#[derive(Clone, Debug, Args)]
+struct CalibrateArgs {
+    #[command(flatten)]
+    axis: AxisArgs,
+    /// Continue the newest interrupted run of this axis, or the journal given.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = "")]
+    resume: Option<PathBuf>,
+    /// Save although the place measured first and last differs by more than the limit.
+    #[arg(long)]
+    accept_drift: bool,
+}
+
+#[derive(Clone, Debug, Args)]
+struct VerifyArgs {
+    #[command(flatten)]
+    axis: AxisArgs,
+    /// Without the calibration: the stage as found.
+    #[arg(long)]
+    uncompensated: bool,
+    /// Continue the newest interrupted run of this axis, or the journal given.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = "")]
+    resume: Option<PathBuf>,
+}
+
+#[derive(Clone, Debug, Args)]
+struct MoveArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Where to: `x=12.5mm`, `x=-300um`.
+    #[arg(required = true, value_name = "AXIS=LENGTH")]
+    targets: Vec<String>,
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let output = Output::new(cli.json);
+    let result = match cli.command {
+        Command::Demo(args) => demo::run(&args, output),
+        Command::Check { config } => verbs::check(&config, output),
+        Command::Scan(args) => scan::run(&args, output),
+        Command::Zero(args) => verbs::zero(&args, output),
+        Command::Calibrate(args) => verbs::calibrate(&args, output),
+        Command::Verify(args) => verbs::verify(&args, output),
+        Command::Move(args) => verbs::move_to(&args, output),
+        Command::Cal(command) => cal::run(&command, output),
+        Command::Fit(command) => data::fit(&command, output),
+        Command::Iso230 { data } => data::iso230(&data, output),
+        Command::Report(args) => page::run(&args, output),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output.failure(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! `truestage report`: a page of one run.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use compensator::iso230::{self, Figures};
+use serde_json::json;
+use truestage::report::{self, Page, Section};
+use truestage::store::read_journal;
+use truestage::{Failure, cycle};
+
+use super::output::Output;
+
+#[derive(Debug, Args)]
+pub(super) struct ReportArgs {
+    /// The run's journal (`machine-data/MACHINE/runs/….jsonl`).
+    run: PathBuf,
+    /// Where to write the page; beside the journal when not given.
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &ReportArgs, output: Output) -> Result<(), Failure> {
+    let journal = read_journal(&args.run)?;
+    let figures = figures_of(&journal.points)?;
+    let title = format!("{} of axis {}", journal.header.verb, journal.header.axis);
+    let sections = figures
+        .iter()
+        .map(|figures| Section {
+            title: journal.header.verb.clone(),
+            figures,
+            points: &journal.points,
+        })
+        .collect();
+    let page = Page {
+        title,
+        facts: report::facts_of(&journal),
+        sections,
+        calibration: None,
+        zeros: journal.zeros.clone(),
+    };
+    let path = args.output.clone().unwrap_or_else(|| args.run.with_extension("html"));
+    std::fs::write(&path, report::render(&page))
+        .map_err(|source| Failure::File { path: path.clone(), source })?;
+    output.result(&format!("report in {}", path.display()), &json!({"report": path}));
+    Ok(())
+}
+
+/// `None` for a run with too few points for figures (a zero, or one that was interrupted).
+fn figures_of(points: &[truestage::store::PointEntry]) -> Result<Option<Figures>, Failure> {
+    if points.is_empty() {
+        return Ok(None);
+    }
+    Ok(iso230::evaluate(&cycle::series_of(points)?).ok())
+}

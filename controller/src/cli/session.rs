@@ -1,0 +1,77 @@
+//! A machine for one verb: configuration, lease, ports, Ctrl-C.
+
+use std::fs::File;
+use std::io::BufWriter;
+
+use drivers::transport::Transport;
+use drivers::transport::record::Recorder;
+use truestage::config::{self, Loaded};
+use truestage::ports::{self, Overrides};
+use truestage::store::Lease;
+use truestage::{Failure, Machine, StopRequest, Store, assemble};
+
+use super::output::Output;
+use super::progress::Bars;
+use super::{AxisArgs, MachineArgs};
+
+/// A machine that is connected and leased to this process.
+pub(super) struct Session {
+    pub(super) machine: Machine,
+    pub(super) store: Store,
+    _lease: Lease,
+}
+
+impl Session {
+    /// Reads the configuration, takes the lease, opens the ports. Nothing is sent.
+    pub(super) fn open(args: &MachineArgs, verb: &str, output: Output) -> Result<Self, Failure> {
+        let loaded = config::load(&args.config)?;
+        let overrides = Overrides::parse(&args.ports, &loaded.config)?;
+        let section = &loaded.config.machine;
+        let store = Store::new(&section.data_dir, &section.name);
+        let lease = Lease::take(&store, verb)?;
+        let transport = ports::open(&loaded.config, &overrides, args.clock_speed)?;
+        let transport = recorded(transport, args, &loaded)?;
+        let mut machine = Machine::new(&loaded, transport);
+        machine.observe(Box::new(Bars::new(output.is_json())));
+        stop_on_signals(&machine.stop_request())?;
+        Ok(Self { machine, store, _lease: lease })
+    }
+}
+
+fn recorded(
+    transport: impl Transport + 'static,
+    args: &MachineArgs,
+    loaded: &Loaded,
+) -> Result<Box<dyn Transport>, Failure> {
+    let Some(path) = &args.record else { return Ok(Box::new(transport)) };
+    let failed = |source| Failure::File { path: path.clone(), source };
+    let log = BufWriter::new(File::create(path).map_err(failed)?);
+    let ports = assemble::ports(&loaded.config);
+    let names: Vec<_> = ports.iter().map(|(name, port)| (*port, name.as_str())).collect();
+    Ok(Box::new(Recorder::new(transport, log, &names).map_err(failed)?))
+}
+
+/// Ctrl-C and termination ask for a controlled stop; a second one ends the process at once,
+/// and the drives, which watch our heartbeat, stop by themselves.
+pub(super) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let failed = |source| Failure::File { path: "signal handler".into(), source };
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.flag()).map_err(failed)?;
+        signal_hook::flag::register(signal, stop.flag()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// The axis asked for, or the only one.
+pub(super) fn choose_axis(machine: &Machine, args: &AxisArgs) -> Result<String, Failure> {
+    let names = machine.axis_names();
+    match (&args.axis, names.as_slice()) {
+        (Some(axis), _) => machine.axis_config(axis).map(|_| axis.clone()),
+        (None, [only]) => Ok(only.clone()),
+        (None, _) => Err(Failure::Usage {
+            what: "the machine has several axes".into(),
+            help: format!("add --axis with one of {}", names.join(", ")),
+        }),
+    }
+}

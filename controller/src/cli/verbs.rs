@@ -1,0 +1,260 @@
+//! The verbs of the cycle on a real (or separately emulated) machine.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::store::{Store, read_journal};
+use truestage::{Failure, Machine, config, json as to_json, text};
+use units::Metres;
+
+use super::output::Output;
+use super::session::{Session, choose_axis};
+use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+
+pub(super) fn check(path: &Path, output: Output) -> Result<(), Failure> {
+    let loaded = config::load(path)?;
+    let machine = &loaded.config.machine;
+    let text = format!(
+        "{}: sound; machine {} (stage {}), {} axes, {} analog modules, {} instruments\n\
+         calibrations of it carry the configuration hash {}",
+        path.display(),
+        machine.name,
+        machine.stage_serial,
+        loaded.config.axis.len(),
+        loaded.config.analog.len(),
+        loaded.config.instrument.len(),
+        &loaded.hash[..12],
+    );
+    output.result(&text, &json!({"ok": true, "machine": machine.name, "hash": loaded.hash}));
+    Ok(())
+}
+
+/// Starts the machine, zeroes `axis`, loads its calibration, runs `procedure`, switches off.
+fn with_zeroed_axis<R>(
+    args: &AxisArgs,
+    verb: &str,
+    output: Output,
+    load_calibration: bool,
+    procedure: impl FnOnce(&mut Machine, &str, &Store, Option<String>) -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    let mut session = Session::open(&args.machine, verb, output)?;
+    let axis = choose_axis(&session.machine, args)?;
+    let store = session.store.clone();
+    session.machine.guarded(|machine| {
+        machine.start()?;
+        let calibration =
+            if load_calibration { machine.load_active(&axis, &store)? } else { None };
+        machine.zero(&axis, &store)?;
+        let result = procedure(machine, &axis, &store, calibration)?;
+        machine.shut_down()?;
+        Ok(result)
+    })
+}
+
+pub(super) fn zero(args: &AxisArgs, output: Output) -> Result<(), Failure> {
+    let mut session = Session::open(&args.machine, "zero", output)?;
+    let axis = choose_axis(&session.machine, args)?;
+    let store = session.store.clone();
+    let zeroed = session.machine.guarded(|machine| {
+        machine.start()?;
+        let zeroed = machine.zero(&axis, &store)?;
+        machine.shut_down()?;
+        Ok(zeroed)
+    })?;
+    let estimate = &zeroed.estimate;
+    let text = format!(
+        "axis {axis}: zero found, standard uncertainty {:.1} nm ({} samples); the coarse \
+         reference was off by {:.3} µm\nrecorded in {}",
+        estimate.standard_uncertainty.nm(),
+        estimate.points,
+        estimate.origin.um(),
+        zeroed.journal.display()
+    );
+    let value = json!({"axis": axis, "zero": to_json::zero(estimate), "journal": zeroed.journal});
+    output.result(&text, &value);
+    Ok(())
+}
+
+pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Result<(), Failure> {
+    let calibrated = with_zeroed_axis(&args.axis, "calibrate", output, false, |machine, axis, store, _| {
+        let options = CalibrateOptions {
+            resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
+            accept_drift: args.accept_drift,
+        };
+        machine.calibrate(axis, store, &options)
+    })?;
+    let fitted = &calibrated.fitted;
+    let mut text = format!(
+        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, \
+         closure {:.3} µm\n  {}\n  points in {}",
+        &calibrated.id[..12],
+        fitted.table.nodes().len(),
+        fitted.table.largest().um(),
+        calibrated.measured.closure.um(),
+        calibrated.path.display(),
+        calibrated.journal.display()
+    );
+    for point in &fitted.robust.outliers {
+        text += &format!(
+            "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
+            point.run,
+            point.approach.symbol(),
+            point.target.mm(),
+            point.residual.um()
+        );
+    }
+    let value = json!({
+        "calibration": calibrated.id,
+        "path": calibrated.path,
+        "journal": calibrated.journal,
+        "closure_um": to_json::um(calibrated.measured.closure),
+        "fit": to_json::fitted(fitted),
+    });
+    output.result(&text, &value);
+    Ok(())
+}
+
+pub(super) fn verify(args: &VerifyArgs, output: Output) -> Result<(), Failure> {
+    let compensated = !args.uncompensated;
+    let name = if compensated { "as_left" } else { "as_found" };
+    let run = |machine: &mut Machine, axis: &str, store: &Store, calibration: Option<String>| {
+        if compensated && calibration.is_none() {
+            return Err(Failure::Usage {
+                what: format!("axis {axis} has no active calibration"),
+                help: "run `truestage calibrate`, or verify with --uncompensated".into(),
+            });
+        }
+        let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
+        let verified =
+            machine.verify(axis, store, &VerifyOptions { compensated, calibration, resume })?;
+        Ok((axis.to_owned(), verified))
+    };
+    let (axis, verified) = with_zeroed_axis(&args.axis, "verify", output, compensated, run)?;
+    let title = name.replace('_', " ");
+    let mut text = text::figures_table(&[(&title, &verified.figures)]);
+    text += &format!("\npoints in {}", verified.journal.display());
+    let within = verified.is_within_tolerance();
+    let value = json!({
+        "axis": axis,
+        name: to_json::figures(&verified.figures),
+        "tolerance_um": to_json::um(verified.tolerance),
+        "within_tolerance": within,
+        "journal": verified.journal,
+    });
+    if compensated && !within {
+        if !output.is_json() {
+            output.result(&text, &value);
+        }
+        let seen = verified.figures.accuracy.bidirectional;
+        return Err(Failure::OutOfTolerance { axis, seen, limit: verified.tolerance });
+    }
+    output.result(&text, &value);
+    Ok(())
+}
+
+pub(super) fn move_to(args: &MoveArgs, output: Output) -> Result<(), Failure> {
+    let targets = args.targets.iter().map(|text| parse_target(text)).collect::<Result<Vec<_>, _>>()?;
+    let mut session = Session::open(&args.machine, "move", output)?;
+    for (axis, target) in &targets {
+        let (min, max) = {
+            let config = session.machine.axis_config(axis)?;
+            (Metres::from_mm(config.soft_min_mm), Metres::from_mm(config.soft_max_mm))
+        };
+        if !(*target >= min && *target <= max) {
+            return Err(Failure::SoftLimit { axis: axis.clone(), target: *target, min, max });
+        }
+    }
+    let store = session.store.clone();
+    let moved = session.machine.guarded(|machine| {
+        machine.start()?;
+        let mut moved = Vec::new();
+        for (axis, target) in &targets {
+            let calibration = machine.load_active(axis, &store)?;
+            machine.zero(axis, &store)?;
+            let set_point = machine.move_to(axis, *target)?;
+            moved.push((axis.clone(), *target, set_point, calibration));
+        }
+        machine.shut_down()?;
+        Ok(moved)
+    })?;
+    let lines: Vec<_> = moved
+        .iter()
+        .map(|(axis, target, set_point, calibration)| {
+            let by = calibration.as_ref().map_or("no calibration".to_owned(), |id| id[..12].to_owned());
+            format!(
+                "axis {axis}: at {:.6} mm (set-point {:.6} mm, {by})",
+                target.mm(),
+                set_point.mm()
+            )
+        })
+        .collect();
+    let value: Vec<_> = moved
+        .iter()
+        .map(|(axis, target, set_point, calibration)| {
+            json!({"axis": axis, "target_mm": target.mm(), "set_point_mm": set_point.mm(),
+                   "calibration": calibration})
+        })
+        .collect();
+    output.result(&lines.join("\n"), &json!({"moves": value}));
+    Ok(())
+}
+
+/// `x=12.5mm`: the unit is never guessed.
+fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
+    let usage = || Failure::Usage {
+        what: format!("`{text}` is no target"),
+        help: "write AXIS=LENGTH with a unit: x=12.5mm, x=-300um, x=0.1m".into(),
+    };
+    let (axis, length) = text.split_once('=').ok_or_else(usage)?;
+    let units = [("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("nm", 1e-9), ("m", 1.0)];
+    let (digits, scale) = units
+        .iter()
+        .find_map(|(unit, scale)| Some((length.strip_suffix(unit)?, *scale)))
+        .ok_or_else(usage)?;
+    let value: f64 = digits.trim().parse().map_err(|_| usage())?;
+    if !value.is_finite() || axis.is_empty() {
+        return Err(usage());
+    }
+    Ok((axis.to_owned(), Metres(value * scale)))
+}
+
+/// The journal named, or, for a bare `--resume`, the newest incomplete one of this axis.
+fn journal_to_resume(
+    resume: Option<&PathBuf>,
+    store: &Store,
+    verb: &str,
+    axis: &str,
+) -> Result<Option<PathBuf>, Failure> {
+    let Some(path) = resume else { return Ok(None) };
+    if !path.as_os_str().is_empty() {
+        return Ok(Some(path.clone()));
+    }
+    let newest = store.newest_run(verb, axis)?;
+    let incomplete = match &newest {
+        Some(path) => !read_journal(path)?.complete,
+        None => false,
+    };
+    match newest.filter(|_| incomplete) {
+        Some(path) => Ok(Some(path)),
+        None => Err(Failure::Usage {
+            what: format!("axis {axis} has no interrupted {verb} run"),
+            help: "start a new one without --resume".into(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_needs_an_axis_a_number_and_a_unit() {
+        let (axis, target) = parse_target("x=12.5mm").unwrap();
+        assert_eq!((axis.as_str(), target), ("x", Metres(12.5 * 1e-3)));
+        assert_eq!(parse_target("y=-300um").unwrap().1, Metres(-300.0 * 1e-6));
+        for text in ["x=12.5", "x", "=1mm", "x=1,5mm", "x=nanmm", "x=infm", "x=mm"] {
+            assert!(parse_target(text).is_err(), "{text}");
+        }
+    }
+}

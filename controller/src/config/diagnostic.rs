@@ -1,0 +1,76 @@
+//! What is wrong with a configuration: where, why, and what to do.
+
+use core::fmt;
+use core::ops::Range;
+use std::path::PathBuf;
+
+/// One finding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// The file as it was named.
+    pub file: String,
+    /// Counted from 1.
+    pub line: usize,
+    /// Counted from 1, in characters.
+    pub column: usize,
+    /// The key's path, such as `axis.x.soft_min_mm`; empty for a syntax error.
+    pub key: String,
+    /// What is wrong.
+    pub cause: String,
+    /// What to do.
+    pub help: String,
+}
+
+impl Diagnostic {
+    /// A finding at a byte range of `text`.
+    pub(super) fn at(
+        file: &str,
+        text: &str,
+        span: &Range<usize>,
+        key: &str,
+        cause: String,
+        help: String,
+    ) -> Self {
+        let before = text.get(..span.start).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        Self { file: file.to_owned(), line, column, key: key.to_owned(), cause, help }
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}: ", self.file, self.line, self.column)?;
+        if !self.key.is_empty() {
+            write!(f, "{}: ", self.key)?;
+        }
+        write!(f, "{}", self.cause)?;
+        if !self.help.is_empty() {
+            write!(f, "\n  help: {}", self.help)?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a configuration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: cannot read the configuration: {source}", path.display())]
+    Unreadable {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file says something that cannot be.
+    #[error("{}", show(findings))]
+    Invalid {
+        /// All that was found, in the order of the file.
+        findings: Vec<Diagnostic>,
+    },
+}
+
+fn show(findings: &[Diagnostic]) -> String {
+    findings.iter().map(Diagnostic::to_string).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,211 @@
+//! Reading a configuration file: syntax, structure, then sense.
+
+use core::ops::Range;
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+use super::diagnostic::{ConfigError, Diagnostic};
+use super::model::MachineConfig;
+use super::validate::{Finding, validate};
+
+/// A configuration that was read and judged sound.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What the file says.
+    pub config: MachineConfig,
+    /// BLAKE3 of everything in it that a calibration depends on, in hexadecimal.
+    pub hash: String,
+}
+
+/// Reads and judges the configuration at `path`.
+///
+/// # Errors
+/// When the file cannot be read, is no TOML, has unknown or missing keys, or asks for
+/// something impossible; every finding names line and column.
+pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
+    parse(&text, &path.display().to_string())
+}
+
+/// Reads and judges a configuration text; `file` is its name in findings.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
+    let config: MachineConfig = toml::from_str(text).map_err(|error| structural(text, file, &error))?;
+    let findings = validate(&config);
+    if findings.is_empty() {
+        return Ok(Loaded { hash: calibration_hash(&config), config });
+    }
+    let mut findings: Vec<_> = findings.into_iter().map(|it| place(text, file, it)).collect();
+    findings.sort_by_key(|it| (it.line, it.column));
+    Err(ConfigError::Invalid { findings })
+}
+
+/// What a calibration depends on: a change of any of it makes the calibration foreign.
+fn calibration_hash(config: &MachineConfig) -> String {
+    let axes: Vec<_> = config
+        .axis
+        .iter()
+        .map(|(name, axis)| {
+            let zero = axis.zero.as_ref();
+            format!(
+                "{name} {:?} {} {} {:?} {:?}",
+                axis.device,
+                axis.node_id,
+                axis.resolution_nm,
+                axis.identity,
+                zero.map(|zero| (&zero.analog, zero.level_below_peak_v)),
+            )
+        })
+        .collect();
+    let text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    blake3::hash(text.as_bytes()).to_hex().to_string()
+}
+
+fn structural(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
+    let span = error.span().unwrap_or(0..0);
+    let message = error.message().lines().next().unwrap_or("not valid").to_owned();
+    let finding = Diagnostic::at(file, text, &span, "", message.clone(), advice(&message));
+    ConfigError::Invalid { findings: vec![finding] }
+}
+
+/// The words between backquotes: the key that was seen, then those that were expected.
+fn quoted(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+fn advice(message: &str) -> String {
+    let words = quoted(message);
+    if message.starts_with("unknown field") {
+        return unknown_key_advice(&words);
+    }
+    if message.starts_with("missing field") {
+        let key = words.first().copied().unwrap_or("it");
+        return format!("add `{key}`; configs/README.md describes every key");
+    }
+    String::new()
+}
+
+fn unknown_key_advice(words: &[&str]) -> String {
+    let Some((seen, expected)) = words.split_first() else { return String::new() };
+    let stem = |key: &str| key.split('_').next().unwrap_or("").to_owned();
+    let same_stem: Vec<_> = expected.iter().filter(|key| stem(key) == stem(seen)).collect();
+    let near = same_stem
+        .into_iter()
+        .max_by_key(|key| common_prefix(key, seen))
+        .or_else(|| expected.iter().max_by_key(|key| common_prefix(key, seen)));
+    match near {
+        Some(key) if common_prefix(key, seen) >= 3 => {
+            format!("did you mean `{key}`? A key's ending is its unit")
+        }
+        _ => format!("known here: {}", expected.join(", ")),
+    }
+}
+
+fn common_prefix(a: &str, b: &str) -> usize {
+    a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count()
+}
+
+fn place(text: &str, file: &str, finding: Finding) -> Diagnostic {
+    let span = span_of(text, &finding.key).unwrap_or(0..0);
+    Diagnostic::at(file, text, &span, &finding.key, finding.cause, finding.help)
+}
+
+/// Where the value of a dotted key stands; the deepest table on the way when it is absent.
+fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
+    let document = DeTable::parse(text).ok()?;
+    let mut table = document.get_ref();
+    let mut span = None;
+    for part in key.split('.') {
+        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == part) else {
+            break;
+        };
+        span = Some(match value.get_ref() {
+            DeValue::Table(_) => name.span(),
+            _ => value.span(),
+        });
+        match value.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    span
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+
+    #[track_caller]
+    fn findings(text: &str) -> Vec<Diagnostic> {
+        match parse(text, "m.toml") {
+            Err(ConfigError::Invalid { findings }) => findings,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[track_caller]
+    fn line_of(needle: &str) -> usize {
+        LINEAR.lines().position(|line| line.starts_with(needle)).expect(needle) + 1
+    }
+
+    #[test]
+    fn the_shipped_configuration_is_sound() {
+        parse(LINEAR, "linear.toml").unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    #[test]
+    fn a_key_with_the_wrong_unit_is_named_with_line_and_the_right_one() {
+        let text = LINEAR.replace("soft_min_mm", "soft_min_um");
+        let found = &findings(&text)[0];
+        assert_eq!((found.line, found.column), (line_of("soft_min_mm"), 1));
+        assert!(found.help.contains("`soft_min_mm`"), "{found}");
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let text = LINEAR.replace("resolution_nm = 10.0", "#");
+        assert!(findings(&text)[0].cause.contains("resolution_nm"));
+    }
+
+    #[test]
+    fn impossible_values_are_found_where_they_stand() {
+        let text = LINEAR.replace("soft_max_mm = 63.0", "soft_max_mm = -9.0");
+        let found = &findings(&text)[0];
+        assert_eq!(found.key, "axis.x.soft_max_mm");
+        assert_eq!((found.line, found.column), (line_of("soft_max_mm"), 15));
+    }
+
+    #[test]
+    fn two_devices_with_one_node_id_are_refused() {
+        let text = LINEAR.replace("node_id = 2", "node_id = 1");
+        assert!(findings(&text).iter().any(|it| it.cause.contains("already")), "{text}");
+    }
+
+    #[test]
+    fn a_reference_to_nothing_lists_what_there_is() {
+        let text = LINEAR.replace("instrument = \"laser\"", "instrument = \"lasre\"");
+        assert!(findings(&text)[0].help.contains("laser"));
+    }
+
+    #[test]
+    fn a_sync_period_too_short_for_the_bus_names_one_that_fits() {
+        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.5");
+        let found = &findings(&text)[0];
+        assert_eq!(found.key, "can.can0.sync_period_ms");
+        assert!(found.help.contains("ms"), "{found}");
+    }
+
+    #[test]
+    fn the_hash_follows_what_a_calibration_depends_on() {
+        let hash = |text: &str| parse(text, "m").unwrap().hash;
+        let same = LINEAR.replace("runs = 3", "runs = 4");
+        let other = LINEAR.replace("resolution_nm = 10.0", "resolution_nm = 20.0");
+        assert_eq!(hash(LINEAR), hash(&same));
+        assert_ne!(hash(LINEAR), hash(&other));
+    }
+}

@@ -1,0 +1,17 @@
+//! Machine configuration: what is connected where, and how each step of the cycle is done.
+//!
+//! Micrometres and millimetres live here and on the screen only; every key carries its unit
+//! in its name. [`load`] reads and judges a file without touching any bus.
+
+mod diagnostic;
+mod load;
+mod model;
+mod validate;
+
+pub use diagnostic::{ConfigError, Diagnostic};
+pub use load::{Loaded, load, parse};
+pub use model::{
+    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
+    CompensationConfig, EndPolicyName, IdentityConfig, InstrumentConfig, InstrumentDevice,
+    InterpolationName, MachineConfig, MachineSection, SerialLine, VerifyConfig, ZeroConfig,
+};

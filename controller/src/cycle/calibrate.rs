@@ -1,0 +1,261 @@
+//! Calibrate: measure the deviations, fit the error table, store it with all it depends on.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::error_table::{self, Compensation, FitOptions, Fitted};
+use units::Metres;
+
+use super::measure::{Measured, MeasureOptions, RunPlan};
+use super::utc_now;
+use crate::assemble;
+use crate::config::CalibrateConfig;
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::observer::Stage;
+use crate::store::{
+    CalibrationRecord, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader,
+    PointEntry, SCHEMA_VERSION, Store,
+};
+
+/// How a calibration is made.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CalibrateOptions {
+    /// Continue this journal instead of starting a new one.
+    pub resume: Option<PathBuf>,
+    /// Save although the closure error is above its limit.
+    pub accept_drift: bool,
+}
+
+/// A calibration that was made, stored and activated.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// Its name: the BLAKE3 of its file.
+    pub id: String,
+    /// Where it is.
+    pub path: PathBuf,
+    /// Where every point is.
+    pub journal: PathBuf,
+    /// What it says.
+    pub record: CalibrationRecord,
+    /// How the fit went.
+    pub fitted: Fitted,
+    /// What was measured.
+    pub measured: Measured,
+}
+
+impl Machine {
+    /// Measures `axis` with its instrument, fits the table, stores and activates it, and
+    /// uses it from now on.
+    ///
+    /// # Errors
+    /// When the axis is not zeroed, anything stops the machine, the measurement drifted, or
+    /// the table breaks a limit. The calibration in use before stays in use then.
+    pub fn calibrate(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        options: &CalibrateOptions,
+    ) -> Result<Calibrated, Failure> {
+        let config = self.axis_config(axis)?.calibrate.clone();
+        let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
+        if !self.is_zeroed(axis) {
+            return Err(Failure::NotZeroed { axis: axis.to_owned() });
+        }
+        let plan = run_plan(&config);
+        let header = self.journal_header("calibrate", axis, &plan, None);
+        let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
+        let measuring = MeasureOptions { stage: Stage::Calibrate, compensated: false };
+        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, &earlier);
+        let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
+        let limit = Metres::from_um(config.closure_limit_um);
+        if measured.closure.abs() > limit && !options.accept_drift {
+            return Err(Failure::Closure { axis: axis.to_owned(), seen: measured.closure, limit });
+        }
+        let fitted = self.fit_table(axis, &plan, &measured)?;
+        let compensation = self.prepare(axis, fitted.table.clone())?;
+        let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
+        let id = store.save(&record)?;
+        store.activate(axis, &id)?;
+        self.set_compensation(axis, Some(compensation))?;
+        Ok(Calibrated {
+            path: store.calibration_path(&id),
+            journal: journal.path().to_owned(),
+            id,
+            record,
+            fitted,
+            measured,
+        })
+    }
+
+    /// Loads the calibration that `store` says is active for `axis`, after checking that it
+    /// belongs to this machine; returns its name, `None` when there is none.
+    ///
+    /// # Errors
+    /// When it is damaged, belongs to another machine or set-up, or breaks a limit.
+    pub fn load_active(&mut self, axis: &str, store: &Store) -> Result<Option<String>, Failure> {
+        let Some(id) = store.active(axis)?.current else { return Ok(None) };
+        let record = store.load(&id)?;
+        record.belongs_to(&id, &self.this_machine(axis))?;
+        let compensation = self.prepare(axis, record.table(&id)?)?;
+        self.set_compensation(axis, Some(compensation))?;
+        Ok(Some(id))
+    }
+
+    fn fit_table(&self, axis: &str, plan: &RunPlan, measured: &Measured) -> Result<Fitted, Failure> {
+        let instrument = &self.config.instrument[&plan.instrument];
+        let options = FitOptions {
+            u_instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
+            ..FitOptions::default()
+        };
+        error_table::analyse(&measured.series()?, &options)
+            .map_err(|source| Failure::Fit { axis: axis.to_owned(), source })
+    }
+
+    /// Proves that a table can be applied within the limits of the configuration.
+    pub(crate) fn prepare(
+        &self,
+        axis: &str,
+        table: error_table::ErrorTable,
+    ) -> Result<Compensation, Failure> {
+        let config = self.axis_config(axis)?.compensation.as_ref();
+        let config = config.ok_or_else(|| missing(axis, "compensation"))?;
+        assemble::compensation(config, axis, table)
+    }
+
+    fn calibration_record(
+        &self,
+        axis: &str,
+        plan: &RunPlan,
+        journal: &Journal,
+        measured: &Measured,
+        fitted: &Fitted,
+    ) -> CalibrationRecord {
+        let lost_motion = fitted.table.lost_motion();
+        CalibrationRecord {
+            created: utc_now(),
+            source: journal.path().file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            instrument: self.instrument_record(&plan.instrument),
+            environment: measured.environment,
+            runs: plan.runs,
+            closure_m: Some(measured.closure.value()),
+            lost_motion_m: lost_motion.map(|it| it.mean.value()),
+            lost_motion_u_m: lost_motion.map(|it| it.standard_uncertainty.value()),
+            nodes: CalibrationRecord::nodes_of(&fitted.table),
+            ..self.this_machine(axis)
+        }
+    }
+
+    /// A record without measurements that says who this machine is.
+    pub fn this_machine(&self, axis: &str) -> CalibrationRecord {
+        let resolution_nm = self.config.axis.get(axis).map_or(0.0, |axis| axis.resolution_nm);
+        CalibrationRecord {
+            schema_version: SCHEMA_VERSION,
+            kind: "linear_error_table".into(),
+            machine: self.config.machine.name.clone(),
+            stage_serial: self.config.machine.stage_serial.clone(),
+            config_hash: self.config_hash.clone(),
+            axis: axis.to_owned(),
+            drive: self.drive_record(axis),
+            resolution_m: resolution_nm * 1e-9,
+            created: String::new(),
+            program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+            source: String::new(),
+            instrument: InstrumentRecord::default(),
+            environment: crate::store::EnvironmentRecord::default(),
+            runs: 0,
+            closure_m: None,
+            lost_motion_m: None,
+            lost_motion_u_m: None,
+            nodes: Vec::new(),
+        }
+    }
+
+    fn drive_record(&self, axis: &str) -> IdentityRecord {
+        let identity = self.axis(axis).ok().and_then(|unit| unit.device.identity());
+        identity.as_ref().map(IdentityRecord::from).unwrap_or_default()
+    }
+
+    fn instrument_record(&self, name: &str) -> InstrumentRecord {
+        let config = &self.config.instrument[name];
+        let unit = &self.instruments[self.instrument_index(name)];
+        InstrumentRecord {
+            name: name.to_owned(),
+            identity: unit.device.identity().unwrap_or_default().name,
+            air_corrected: config.correct_air,
+            material_corrected: config.correct_material,
+            dead_path_corrected: config.correct_dead_path,
+            cosine_corrected: config.correct_cosine,
+            standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
+        }
+    }
+
+    pub(super) fn journal_header(
+        &self,
+        verb: &str,
+        axis: &str,
+        plan: &RunPlan,
+        calibration: Option<String>,
+    ) -> JournalHeader {
+        JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: verb.to_owned(),
+            machine: self.config.machine.name.clone(),
+            stage_serial: self.config.machine.stage_serial.clone(),
+            config_hash: self.config_hash.clone(),
+            axis: axis.to_owned(),
+            drive: self.drive_record(axis),
+            instrument: self.instrument_record(&plan.instrument),
+            started: utc_now(),
+            calibration,
+            targets_m: plan.targets.iter().map(|target| target.value()).collect(),
+            runs: plan.runs,
+        }
+    }
+}
+
+pub(super) fn missing(axis: &str, section: &'static str) -> Failure {
+    Failure::NotConfigured { axis: axis.to_owned(), section }
+}
+
+pub(super) fn note_failure(journal: &mut Journal, failure: &Failure) {
+    // The failure itself is on its way to the operator; a journal that cannot take the note
+    // as well changes nothing about it.
+    let _ = journal.write(&Entry::Failed { cause: failure.to_string() });
+}
+
+pub(super) fn open_journal(
+    store: &Store,
+    header: &JournalHeader,
+    resume: Option<&PathBuf>,
+) -> Result<(Journal, Vec<PointEntry>), Failure> {
+    match resume {
+        None => Ok((Journal::create(&store.runs(), header)?, Vec::new())),
+        Some(path) => {
+            let (journal, read) = Journal::resume(path, header)?;
+            Ok((journal, read.points))
+        }
+    }
+}
+
+fn run_plan(config: &CalibrateConfig) -> RunPlan {
+    let steps = ((config.end_mm - config.start_mm) / config.step_mm + 1e-9).floor() as u32;
+    let mut targets: Vec<_> = (0..=steps)
+        .map(|step| Metres::from_mm(config.start_mm + f64::from(step) * config.step_mm))
+        .collect();
+    let end = Metres::from_mm(config.end_mm);
+    if let Some(last) = targets.last()
+        && end - *last > Metres::from_mm(config.step_mm * 1e-3)
+    {
+        targets.push(end);
+    }
+    RunPlan {
+        instrument: config.instrument.clone(),
+        targets,
+        runs: config.runs,
+        overrun: Metres::from_mm(config.overrun_mm),
+        settle: Duration::from_millis(config.settle_ms.into()),
+        average_samples: config.average_samples,
+        scale_limit_ppm: config.scale_limit_ppm,
+    }
+}

@@ -1,0 +1,317 @@
+//! Measuring runs: every target approached from both sides, each point into the journal.
+
+use core::time::Duration;
+
+use compensator::length_correction::LengthCorrection;
+use compensator::measurement::{LinearSeries, Measurement};
+use drivers::device::{DisplacementReading, Environment};
+use units::{Approach, Metres};
+
+use super::travel::Correction;
+use crate::assemble;
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::observer::Stage;
+use crate::store::{EnvironmentRecord, Entry, Journal, PointEntry};
+
+/// What is measured, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPlan {
+    /// The instrument's name.
+    pub instrument: String,
+    /// Where, increasing.
+    pub targets: Vec<Metres>,
+    /// How often each from each side.
+    pub runs: u32,
+    /// How far beyond the ends a run turns round, so that every target has its approach.
+    pub overrun: Metres,
+    /// How long the stage stands before it is read.
+    pub settle: Duration,
+    /// How many readings are averaged.
+    pub average_samples: u32,
+    /// Largest relative difference of instrument and encoder believed, where it is judged.
+    pub scale_limit_ppm: f64,
+}
+
+/// How a series is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasureOptions {
+    /// For progress.
+    pub stage: Stage,
+    /// Whether the active calibration corrects the moves.
+    pub compensated: bool,
+}
+
+/// A measured series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Every point.
+    pub points: Vec<PointEntry>,
+    /// The same place, measured last minus first.
+    pub closure: Metres,
+    /// Mean environment of the points.
+    pub environment: EnvironmentRecord,
+}
+
+impl Measured {
+    /// The points as the mathematics takes them.
+    ///
+    /// # Errors
+    /// When they make no series (which a whole run never does).
+    pub fn series(&self) -> Result<LinearSeries, Failure> {
+        series_of(&self.points)
+    }
+}
+
+/// Journal points as a series.
+///
+/// # Errors
+/// When they make none: a point is not finite, or measured twice.
+pub fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
+    let measurements = points
+        .iter()
+        .map(|point| Measurement {
+            run: point.run,
+            approach: approach_of(point.approach),
+            target: Metres(point.target_m),
+            measured: Metres(point.measured_m),
+        })
+        .collect();
+    Ok(LinearSeries::new(measurements)?)
+}
+
+const fn approach_of(symbol: char) -> Approach {
+    match symbol {
+        '-' => Approach::Reverse,
+        _ => Approach::Forward,
+    }
+}
+
+/// Where a run's points stand in the whole measurement, for progress.
+struct Counter {
+    stage: Stage,
+    done: u64,
+    total: u64,
+}
+
+/// The series being measured.
+struct Session<'a> {
+    axis: &'a str,
+    plan: &'a RunPlan,
+    correction: Correction,
+    correction_of_length: LengthCorrection,
+    journal: &'a mut Journal,
+    counter: Counter,
+}
+
+impl Machine {
+    /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
+    /// `earlier` are the points of an interrupted run: its complete runs are kept.
+    ///
+    /// The datum is the axis's zero, approached forward; the same place is measured again at
+    /// the end.
+    ///
+    /// # Errors
+    /// Whatever stops the machine, and an instrument that disagrees with the encoder beyond
+    /// reason.
+    pub fn measure_runs(
+        &mut self,
+        axis: &str,
+        plan: &RunPlan,
+        options: MeasureOptions,
+        journal: &mut Journal,
+        earlier: &[PointEntry],
+    ) -> Result<Measured, Failure> {
+        let per_run = plan.targets.len() * 2;
+        let mut points = whole_runs(earlier, per_run);
+        let correction_of_length = self.set_datum(axis, plan)?;
+        let counter = Counter {
+            stage: options.stage,
+            done: points.len() as u64,
+            total: per_run as u64 * u64::from(plan.runs),
+        };
+        let correction = if options.compensated { Correction::On } else { Correction::Off };
+        let mut session = Session { axis, plan, correction, correction_of_length, journal, counter };
+        let first = points.last().map_or(1, |point| point.run + 1);
+        for run in first..=plan.runs {
+            points.extend(self.measure_run(&mut session, run)?);
+        }
+        let closure = self.measure_closure(&session)?;
+        session.journal.write(&Entry::Complete)?;
+        session.journal.flush_to_disk()?;
+        let environment = mean_environment(&points);
+        Ok(Measured { points, closure, environment })
+    }
+
+    fn measure_run(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+    ) -> Result<Vec<PointEntry>, Failure> {
+        let plan = session.plan;
+        let mut points = Vec::new();
+        let (first, last) = (plan.targets[0], plan.targets[plan.targets.len() - 1]);
+        self.travel(session.axis, first - plan.overrun, Correction::Off)?;
+        for target in &plan.targets {
+            points.push(self.measure_point(session, run, Approach::Forward, *target)?);
+        }
+        self.travel(session.axis, last + plan.overrun, Correction::Off)?;
+        for target in plan.targets.iter().rev() {
+            points.push(self.measure_point(session, run, Approach::Reverse, *target)?);
+        }
+        judge_scale(session.axis, plan, &points)?;
+        Ok(points)
+    }
+
+    fn measure_point(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+        approach: Approach,
+        target: Metres,
+    ) -> Result<PointEntry, Failure> {
+        let axis = session.axis;
+        let set_point = self.travel(axis, target, session.correction)?;
+        let reading = self.read_displacement(session.plan)?;
+        let environment = self.instrument_environment(&session.plan.instrument);
+        let measured = self.correct(session.plan, &reading, &environment, &session.correction_of_length)?;
+        let encoder = self.reading(axis)?.map_or(Metres(f64::NAN), |sample| sample.position);
+        let point = PointEntry {
+            run,
+            approach: approach.symbol(),
+            target_m: target.value(),
+            set_point_m: set_point.value(),
+            encoder_m: encoder.value(),
+            measured_m: measured.value(),
+            scatter_m: reading.standard_deviation.value(),
+            at_s: reading.at.seconds(),
+            environment: EnvironmentRecord::from(&environment),
+        };
+        session.journal.write(&Entry::Point(point))?;
+        session.counter.done += 1;
+        let Counter { stage, done, total } = session.counter;
+        self.observer.progress(stage, axis, done, total);
+        Ok(point)
+    }
+
+    /// Goes to the axis's zero, forward, and makes the instrument read zero there.
+    fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
+        self.go_to_datum(axis, plan)?;
+        self.rest(plan.settle)?;
+        let now = self.now();
+        let at = self.instrument_index(&plan.instrument);
+        self.instruments[at].device.set_datum(now);
+        let environment = self.instrument_environment(&plan.instrument);
+        let config = &self.config.instrument[&plan.instrument];
+        let environment = assemble::correction_environment(config, &environment);
+        LengthCorrection::new(assemble::correction_settings(config), &environment).map_err(
+            |source| Failure::Correction { instrument: plan.instrument.clone(), source },
+        )
+    }
+
+    fn go_to_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<(), Failure> {
+        self.travel(axis, Metres::ZERO - plan.overrun, Correction::Off)?;
+        self.travel(axis, Metres::ZERO, Correction::Off)?;
+        Ok(())
+    }
+
+    fn measure_closure(&mut self, session: &Session<'_>) -> Result<Metres, Failure> {
+        self.go_to_datum(session.axis, session.plan)?;
+        let reading = self.read_displacement(session.plan)?;
+        let environment = self.instrument_environment(&session.plan.instrument);
+        self.correct(session.plan, &reading, &environment, &session.correction_of_length)
+    }
+
+    /// Lets the stage stand, then averages.
+    pub(crate) fn read_displacement(
+        &mut self,
+        plan: &RunPlan,
+    ) -> Result<DisplacementReading, Failure> {
+        self.rest(plan.settle)?;
+        let at = self.instrument_index(&plan.instrument);
+        let now = self.now();
+        self.instruments[at].device.begin_average(now, plan.average_samples);
+        let rate = self.config.instrument[&plan.instrument].sample_rate_hz;
+        // Four times the nominal time: the stream comes in batches over USB.
+        let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(plan.average_samples) / rate);
+        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
+        Ok(self.instruments[at].device.average().expect("an average that ended well is there"))
+    }
+
+    pub(crate) fn rest(&mut self, span: Duration) -> Result<(), Failure> {
+        let until = self.now() + span;
+        self.run_until(until)
+    }
+
+    pub(crate) fn instrument_environment(&self, instrument: &str) -> Environment {
+        self.instruments[self.instrument_index(instrument)].device.environment()
+    }
+
+    fn correct(
+        &self,
+        plan: &RunPlan,
+        reading: &DisplacementReading,
+        environment: &Environment,
+        length: &LengthCorrection,
+    ) -> Result<Metres, Failure> {
+        let config = &self.config.instrument[&plan.instrument];
+        let failed = |source| Failure::Correction { instrument: plan.instrument.clone(), source };
+        let environment = assemble::correction_environment(config, environment);
+        length
+            .correct(reading.vacuum, &environment)
+            .map(|corrected| corrected.displacement)
+            .map_err(failed)
+    }
+}
+
+/// The points of the runs that are whole.
+fn whole_runs(points: &[PointEntry], per_run: usize) -> Vec<PointEntry> {
+    let count = |run: u32| points.iter().filter(|point| point.run == run).count();
+    points.iter().filter(|point| count(point.run) == per_run).copied().collect()
+}
+
+/// Judges instrument against encoder over the longest travel of a run (fault class 31).
+fn judge_scale(axis: &str, plan: &RunPlan, points: &[PointEntry]) -> Result<(), Failure> {
+    let by_encoder = |a: &&PointEntry, b: &&PointEntry| a.encoder_m.total_cmp(&b.encoder_m);
+    let lowest = points.iter().min_by(by_encoder).expect("a run has points");
+    let highest = points.iter().max_by(by_encoder).expect("a run has points");
+    let travel = highest.encoder_m - lowest.encoder_m;
+    let ratio = (highest.measured_m - lowest.measured_m) / travel;
+    let ppm = (ratio - 1.0) * 1e6;
+    if ppm.abs() <= plan.scale_limit_ppm {
+        return Ok(());
+    }
+    Err(Failure::ScaleMismatch {
+        axis: axis.to_owned(),
+        travel: Metres(travel),
+        ppm,
+        limit_ppm: plan.scale_limit_ppm,
+        cause: likely_cause(ratio),
+    })
+}
+
+fn likely_cause(ratio: f64) -> &'static str {
+    let near = |value: f64| (ratio / value - 1.0).abs() < 0.02;
+    match ratio {
+        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument or the axis",
+        _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor`",
+        _ if near(4.0) || near(0.25) => "a factor of four: check `optics_factor`",
+        _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres",
+        _ if near(1e3) || near(1e-3) => "a factor of 1000: check the units of `resolution_nm`",
+        _ if ratio.abs() < 0.02 => "the instrument does not follow: reflector on the stage?",
+        _ => "check `resolution_nm`, the optics and the alignment",
+    }
+}
+
+fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {
+    let mean = |of: fn(&EnvironmentRecord) -> Option<f64>| {
+        let values: Vec<f64> = points.iter().filter_map(|point| of(&point.environment)).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    EnvironmentRecord {
+        air_temperature_c: mean(|it| it.air_temperature_c),
+        material_temperature_c: mean(|it| it.material_temperature_c),
+        pressure_pa: mean(|it| it.pressure_pa),
+        relative_humidity: mean(|it| it.relative_humidity),
+    }
+}

@@ -1,0 +1,24 @@
+//! The cycle: calibrate → zero → compensate → verify, as procedures on a [`Machine`].
+//!
+//! [`Machine`]: crate::machine::Machine
+
+mod calibrate;
+mod measure;
+mod scan;
+mod travel;
+mod verify;
+mod zero;
+
+pub use calibrate::{CalibrateOptions, Calibrated};
+pub use measure::{Measured, MeasureOptions, RunPlan};
+pub use scan::Found;
+pub use verify::{Verified, VerifyOptions};
+pub use zero::Zeroed;
+
+pub use measure::series_of;
+
+/// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.
+pub fn utc_now() -> String {
+    let now = jiff::Timestamp::now();
+    now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}

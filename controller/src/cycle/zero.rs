@@ -1,0 +1,265 @@
+//! Zero: find the drift-free origin with the two Hall sensors (system S5).
+//!
+//! Coarse: the drive homes on its negative limit switch (repeatable to tens of micrometres),
+//! which says where the nominal zero is. Fine: the patent's search with its regression. Last:
+//! the drive's coordinates are set so that the origin found is zero (homing method 37).
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::hall_zero::{
+    Outcome, Progress, Sample, Search, Settings, ZeroEstimate,
+};
+use drivers::device::AxisCommand;
+use units::{Metres, MetresPerSecond, Time};
+
+use super::calibrate::missing;
+use super::travel::Correction;
+use super::utc_now;
+use crate::assemble;
+use crate::config::ZeroConfig;
+use crate::failure::Failure;
+use crate::machine::{Machine, STOP_LIMIT};
+use crate::observer::Stage;
+use crate::store::{Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry};
+
+/// A zero that was found.
+#[derive(Clone, Debug)]
+pub struct Zeroed {
+    /// The regression's result, in the drive's coordinates before they were set.
+    pub estimate: ZeroEstimate,
+    /// The patent's search.
+    pub outcome: Outcome,
+    /// Where it is recorded.
+    pub journal: PathBuf,
+}
+
+/// The steps of zeroing that progress counts.
+const STEPS: u64 = 4;
+
+impl Machine {
+    /// Finds the origin of `axis` and makes it the drive's zero; the axis is enabled and
+    /// stands at its origin afterwards.
+    ///
+    /// # Errors
+    /// Whatever stops the machine; a search or a regression that fails, with step and
+    /// values; an origin that is not certain enough. The axis is not zeroed then.
+    pub fn zero(&mut self, axis: &str, store: &Store) -> Result<Zeroed, Failure> {
+        let config = self.axis_config(axis)?.zero.clone();
+        let config = config.ok_or_else(|| missing(axis, "zero"))?;
+        self.remember(axis).zeroed = false;
+        let mut journal = Journal::create(&store.runs(), &self.zero_header(axis))?;
+        let found = self.find_zero(axis, &config, &mut journal);
+        if let Err(failure) = &found {
+            // The cause is on its way to the operator; the journal is only a second place.
+            let _ = journal.write(&Entry::Failed { cause: failure.to_string() });
+        }
+        let (outcome, estimate) = found?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(Zeroed { estimate, outcome, journal: journal.path().to_owned() })
+    }
+
+    fn find_zero(
+        &mut self,
+        axis: &str,
+        config: &ZeroConfig,
+        journal: &mut Journal,
+    ) -> Result<(Outcome, ZeroEstimate), Failure> {
+        self.observer.progress(Stage::Zero, axis, 0, STEPS);
+        self.enable(axis)?;
+        self.reference(axis, config)?;
+        self.observer.progress(Stage::Zero, axis, 1, STEPS);
+        self.travel(axis, Metres::ZERO, Correction::Off)?;
+        self.observer.progress(Stage::Zero, axis, 2, STEPS);
+        let settings = assemble::hall_settings(config, self.axis_config(axis)?);
+        let outcome = self.search(axis, config, settings)?;
+        self.observer.progress(Stage::Zero, axis, 3, STEPS);
+        let estimate = self.estimate(axis, config, &settings, &outcome)?;
+        journal.write(&Entry::Zero(self.zero_entry(&estimate)))?;
+        self.adopt_zero(axis, estimate.origin)?;
+        self.observer.progress(Stage::Zero, axis, STEPS, STEPS);
+        Ok((outcome, estimate))
+    }
+
+    /// Coarse reference on the negative limit switch.
+    fn reference(&mut self, axis: &str, config: &ZeroConfig) -> Result<(), Failure> {
+        let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
+        let axis_config = self.axis_config(axis)?;
+        let travel_mm = axis_config.soft_max_mm - axis_config.soft_min_mm + 50.0;
+        let limit = Duration::from_secs_f64(10.0 + 2.0 * travel_mm / config.reference_speed_mm_per_s);
+        let position = Metres::from_mm(config.negative_limit_mm);
+        self.command(axis, AxisCommand::HomeNegativeLimit { position, speed }, "reference", limit)?;
+        self.remember(axis).approach.forget();
+        Ok(())
+    }
+
+    /// Runs the patent's search, one step a sample.
+    fn search(
+        &mut self,
+        axis: &str,
+        config: &ZeroConfig,
+        settings: Settings,
+    ) -> Result<Outcome, Failure> {
+        let failed = |source| Failure::SearchSettings { axis: axis.to_owned(), source };
+        let mut search = Search::new(settings, Metres::ZERO, self.now()).map_err(failed)?;
+        let mut pairing = self.pairing(axis, config)?;
+        let mut motion = None;
+        loop {
+            let deadline = search.poll_timeout().min(self.now() + Duration::from_millis(100));
+            self.tick(deadline)?;
+            self.check_motion(axis)?;
+            let progress = match self.paired_sample(axis, config, &mut pairing)? {
+                Some(sample) => Some(search.handle_sample(&sample)),
+                None => search.handle_timeout(self.now()),
+            };
+            match progress {
+                None => {}
+                Some(Progress::Found(outcome)) => return Ok(*outcome),
+                Some(Progress::Failed(source)) => {
+                    self.command(axis, AxisCommand::Halt, "halt", STOP_LIMIT)?;
+                    return Err(Failure::Search { axis: axis.to_owned(), source });
+                }
+                Some(step) => self.obey(axis, &step, &mut motion)?,
+            }
+        }
+    }
+
+    /// Turns the search's wish into a profile move or a halt, when it differs from the last.
+    fn obey(
+        &mut self,
+        axis: &str,
+        progress: &Progress,
+        motion: &mut Option<AxisCommand>,
+    ) -> Result<(), Failure> {
+        let command = match *progress {
+            Progress::Move { to, speed } => {
+                let acceleration = self.acceleration(axis)?;
+                AxisCommand::MoveTo { target: to, speed, acceleration }
+            }
+            _ => AxisCommand::Halt,
+        };
+        if *motion != Some(command) {
+            let at = self.axis_index(axis)?;
+            let now = self.now();
+            self.axes[at].device.command(now, command);
+            *motion = Some(command);
+        }
+        Ok(())
+    }
+
+    /// A move of the search that failed ends the search.
+    fn check_motion(&mut self, axis: &str) -> Result<(), Failure> {
+        let at = self.axis_index(axis)?;
+        match self.axes[at].device.poll_outcome() {
+            Some(Err(source)) => Err(Failure::Device { device: axis.to_owned(), source }),
+            Some(Ok(())) | None => Ok(()),
+        }
+    }
+
+    fn estimate(
+        &self,
+        axis: &str,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> Result<ZeroEstimate, Failure> {
+        let estimate = outcome
+            .refine(settings)
+            .map_err(|source| Failure::Refine { axis: axis.to_owned(), source })?;
+        let limit = Metres::from_um(config.standard_uncertainty_limit_um);
+        if estimate.standard_uncertainty > limit {
+            let seen = estimate.standard_uncertainty;
+            return Err(Failure::ZeroUncertain { axis: axis.to_owned(), seen, limit });
+        }
+        Ok(estimate)
+    }
+
+    /// Goes to the origin and makes it the drive's zero.
+    fn adopt_zero(&mut self, axis: &str, origin: Metres) -> Result<(), Failure> {
+        self.travel(axis, origin, Correction::Off)?;
+        let reading = self.reading(axis)?.expect("an axis that moved has been read");
+        let position = reading.position - origin;
+        self.command(axis, AxisCommand::HomeHere { position }, "set origin", Duration::from_secs(5))?;
+        let memory = self.remember(axis);
+        memory.zeroed = true;
+        memory.approach.forget();
+        Ok(())
+    }
+
+    fn zero_entry(&self, estimate: &ZeroEstimate) -> ZeroEntry {
+        ZeroEntry {
+            origin_m: estimate.origin.value(),
+            standard_uncertainty_m: estimate.standard_uncertainty.value(),
+            patent_p0_m: estimate.p0_patent.unwrap_or(estimate.origin).value(),
+            peak_max_v: estimate.peak_max.value(),
+            mid_v: estimate.mid_voltage.value(),
+            at_s: self.now().seconds(),
+        }
+    }
+
+    fn zero_header(&self, axis: &str) -> JournalHeader {
+        let here = self.this_machine(axis);
+        JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: "zero".into(),
+            machine: here.machine,
+            stage_serial: here.stage_serial,
+            config_hash: here.config_hash,
+            axis: here.axis,
+            drive: here.drive,
+            instrument: InstrumentRecord::default(),
+            started: utc_now(),
+            calibration: None,
+            targets_m: Vec::new(),
+            runs: 0,
+        }
+    }
+
+    fn pairing(&self, axis: &str, config: &ZeroConfig) -> Result<Pairing, Failure> {
+        let bus = &self.axis_config(axis)?.bus;
+        let sync_s = self.config.can[bus].sync_period_ms * 1e-3;
+        let poll_s = self.config.analog[&config.analog].poll_period_ms.map_or(0.0, |ms| ms * 1e-3);
+        let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
+        Ok(Pairing { window, used_axis: Time::ZERO, used_analog: Time::ZERO })
+    }
+
+    /// The newest position and voltages that belong together and were not used before.
+    ///
+    /// On CAN both are sampled at one SYNC and arrive together; members of different SYNC
+    /// periods lie further apart than the window and are never paired.
+    fn paired_sample(
+        &self,
+        axis: &str,
+        config: &ZeroConfig,
+        pairing: &mut Pairing,
+    ) -> Result<Option<Sample>, Failure> {
+        let analog = &self.analogs[self.analog_index(&config.analog)];
+        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.device.reading()) else {
+            return Ok(None);
+        };
+        if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {
+            return Ok(None);
+        }
+        let apart = position.at.since(voltages.at).max(voltages.at.since(position.at));
+        if apart > pairing.window {
+            return Ok(None);
+        }
+        pairing.used_axis = position.at;
+        pairing.used_analog = voltages.at;
+        Ok(Some(Sample {
+            at: position.at.max(voltages.at),
+            position: position.position,
+            peak: voltages.volts[0],
+            slope: voltages.volts[1],
+            standing: position.standing,
+        }))
+    }
+}
+
+/// Which samples were used already.
+struct Pairing {
+    window: Duration,
+    used_axis: Time,
+    used_analog: Time,
+}

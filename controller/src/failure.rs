@@ -1,0 +1,321 @@
+//! Why the machine stopped or refused: each says where, what was expected, what was seen.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::error_table::{CompensationError, FitError};
+use compensator::hall_zero::{RefineError, SearchFailure};
+use drivers::device::{Alarm, DeviceError};
+use drivers::transport::{LinkState, SendError};
+use units::Metres;
+
+use crate::config::ConfigError;
+use crate::store::StoreError;
+
+/// Everything that ends a verb without its result.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The configuration cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A port cannot be opened.
+    #[error(transparent)]
+    Open(#[from] drivers::transport::live::OpenError),
+    /// A payload could not be sent; control words are never dropped silently.
+    #[error("sending to {device}: {source}")]
+    Send {
+        /// The device it was for.
+        device: String,
+        /// Why not.
+        source: SendError,
+    },
+    /// A bus or serial line cannot be used any more.
+    #[error("{port}: {}", link_text(*state))]
+    Link {
+        /// The port's name in the configuration.
+        port: String,
+        /// What became of it.
+        state: LinkState,
+    },
+    /// Our CAN controller left the bus.
+    #[error("{port}: bus-off; check cable, termination and bit rate, then start again")]
+    BusOff {
+        /// The port's name in the configuration.
+        port: String,
+    },
+    /// A device raised an alarm.
+    #[error("{device}: {alarm}")]
+    Alarm {
+        /// The device's name in the configuration.
+        device: String,
+        /// What it said.
+        alarm: Alarm,
+    },
+    /// A command of a device failed.
+    #[error("{device}: {source}")]
+    Device {
+        /// The device's name in the configuration.
+        device: String,
+        /// Why.
+        source: DeviceError,
+    },
+    /// A command did not end in time.
+    #[error("{device}: {step} not done within {waited:?}")]
+    Overdue {
+        /// The device's name in the configuration.
+        device: String,
+        /// What was asked.
+        step: &'static str,
+        /// How long we waited.
+        waited: Duration,
+    },
+    /// A move would leave the soft limits; nothing moved.
+    #[error(
+        "axis {axis}: {:.6} mm is outside the soft limits {:.3} to {:.3} mm; nothing was moved",
+        target.mm(), min.mm(), max.mm()
+    )]
+    SoftLimit {
+        /// Which axis.
+        axis: String,
+        /// Where it should have gone.
+        target: Metres,
+        /// The lower limit.
+        min: Metres,
+        /// The upper limit.
+        max: Metres,
+    },
+    /// The verb needs a zeroed axis.
+    #[error("axis {axis}: not zeroed since power-on; run `truestage zero` first")]
+    NotZeroed {
+        /// Which axis.
+        axis: String,
+    },
+    /// The verb needs something the configuration does not have.
+    #[error("axis {axis}: the configuration has no [axis.{axis}.{section}]")]
+    NotConfigured {
+        /// Which axis.
+        axis: String,
+        /// The missing section.
+        section: &'static str,
+    },
+    /// There is no such axis.
+    #[error("there is no axis `{axis}`; known: {known}")]
+    NoSuchAxis {
+        /// What was asked for.
+        axis: String,
+        /// What there is.
+        known: String,
+    },
+    /// The Hall search failed.
+    #[error("axis {axis}: {source}")]
+    Search {
+        /// Which axis.
+        axis: String,
+        /// Step and values.
+        source: Box<SearchFailure>,
+    },
+    /// The settings of the Hall search cannot work.
+    #[error("axis {axis}: {source}")]
+    SearchSettings {
+        /// Which axis.
+        axis: String,
+        /// Which setting.
+        source: compensator::hall_zero::SettingsError,
+    },
+    /// A target outside the calibrated range.
+    #[error("axis {axis}: {source}; nothing was moved")]
+    OutOfCalibration {
+        /// Which axis.
+        axis: String,
+        /// Where, and what is calibrated.
+        source: compensator::error_table::OutOfRange,
+    },
+    /// The error table jumps.
+    #[error("axis {axis}: {source}")]
+    Jump {
+        /// Which axis.
+        axis: String,
+        /// Which interval.
+        source: compensator::error_table::JumpError,
+    },
+    /// Measurements do not make a series.
+    #[error(transparent)]
+    Series(#[from] compensator::measurement::SeriesError),
+    /// The regression of the zero failed.
+    #[error("axis {axis}: hall zero, refinement: {source}")]
+    Refine {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: RefineError,
+    },
+    /// The zero was found, but not well enough.
+    #[error(
+        "axis {axis}: hall zero found with a standard uncertainty of {:.4} µm, the limit is {:.4} µm",
+        seen.um(), limit.um()
+    )]
+    ZeroUncertain {
+        /// Which axis.
+        axis: String,
+        /// What was reached.
+        seen: Metres,
+        /// What is allowed.
+        limit: Metres,
+    },
+    /// Interferometer and encoder disagree beyond reason.
+    #[error(
+        "axis {axis}: over {:.3} mm the instrument differs from the encoder by {ppm:.0} ppm, \
+         the limit is {limit_ppm:.0} ppm; {cause}",
+        travel.mm()
+    )]
+    ScaleMismatch {
+        /// Which axis.
+        axis: String,
+        /// The travel compared.
+        travel: Metres,
+        /// The relative difference.
+        ppm: f64,
+        /// The limit.
+        limit_ppm: f64,
+        /// What it looks like.
+        cause: &'static str,
+    },
+    /// The same place measured at the beginning and the end differs too much.
+    #[error(
+        "axis {axis}: closure error {:.3} µm, the limit is {:.3} µm; thermal drift or a loose \
+         instrument: nothing was saved",
+        seen.um(), limit.um()
+    )]
+    Closure {
+        /// Which axis.
+        axis: String,
+        /// What was seen.
+        seen: Metres,
+        /// What is allowed.
+        limit: Metres,
+    },
+    /// A reading cannot be corrected.
+    #[error("instrument {instrument}: {source}")]
+    Correction {
+        /// Which instrument.
+        instrument: String,
+        /// Why.
+        source: compensator::length_correction::EnvironmentError,
+    },
+    /// The error table cannot be computed.
+    #[error("axis {axis}: {source}")]
+    Fit {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: FitError,
+    },
+    /// The error table cannot be applied.
+    #[error("axis {axis}: {source}")]
+    Compensation {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: CompensationError,
+    },
+    /// ISO 230-2 figures cannot be computed.
+    #[error(transparent)]
+    Figures(#[from] compensator::iso230::EvaluationError),
+    /// A data file is not what it should be.
+    #[error(transparent)]
+    Data(#[from] compensator::measurement::DataError),
+    /// Calibrations or journals cannot be stored or read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Devices are missing, unknown or not those of the configuration.
+    #[error("{wrong} devices do not match the configuration")]
+    ScanMismatch {
+        /// How many.
+        wrong: usize,
+    },
+    /// The result is out of tolerance.
+    #[error(
+        "axis {axis}: bidirectional accuracy A = {:.3} µm, the tolerance is {:.3} µm",
+        seen.um(), limit.um()
+    )]
+    OutOfTolerance {
+        /// Which axis.
+        axis: String,
+        /// What was measured.
+        seen: Metres,
+        /// What is allowed.
+        limit: Metres,
+    },
+    /// Somebody asked to stop (Ctrl-C).
+    #[error("stopped on request; the axes were stopped and disabled")]
+    Interrupted,
+    /// The command line asks for something that is not there.
+    #[error("{what}; {help}")]
+    Usage {
+        /// What is wrong.
+        what: String,
+        /// What to do.
+        help: String,
+    },
+    /// The emulated machine cannot be brought up.
+    #[error("emulated machine: {0}")]
+    Emulator(#[from] crate::emulated::EmulatedError),
+}
+
+fn link_text(state: LinkState) -> &'static str {
+    match state {
+        LinkState::Up => "came back; the machine must be started anew",
+        LinkState::Down => "the interface was set down (ENETDOWN); set it up and start again",
+        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
+    }
+}
+
+impl Failure {
+    /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus,
+    /// 5 the result is out of tolerance.
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Config(_)
+            | Self::NotConfigured { .. }
+            | Self::NoSuchAxis { .. }
+            | Self::Figures(_)
+            | Self::Data(_)
+            | Self::Series(_)
+            | Self::SearchSettings { .. }
+            | Self::File { .. }
+            | Self::Usage { .. } => 2,
+            Self::SoftLimit { .. }
+            | Self::NotZeroed { .. }
+            | Self::Store(_)
+            | Self::Compensation { .. }
+            | Self::OutOfCalibration { .. }
+            | Self::Jump { .. }
+            | Self::ScaleMismatch { .. } => 3,
+            Self::Open(_)
+            | Self::Send { .. }
+            | Self::Link { .. }
+            | Self::BusOff { .. }
+            | Self::Alarm { .. }
+            | Self::Device { .. }
+            | Self::Overdue { .. }
+            | Self::Search { .. }
+            | Self::Refine { .. }
+            | Self::Correction { .. }
+            | Self::Interrupted
+            | Self::ScanMismatch { .. }
+            | Self::Emulator(_) => 4,
+            Self::ZeroUncertain { .. }
+            | Self::Closure { .. }
+            | Self::Fit { .. }
+            | Self::OutOfTolerance { .. } => 5,
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What `--json` prints: one object, lengths in the unit its key or `unit` names.
+
+use compensator::error_table::{ErrorTable, Fitted};
+use compensator::hall_zero::ZeroEstimate;
+use compensator::iso230::{Directional, Figures};
+use serde_json::{Value, json};
+use units::Metres;
+
+/// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
+pub fn um(length: Metres) -> f64 {
+    let rounded = (length.um() * 1e4).round() / 1e4;
+    // -0.0 would print as "-0.0".
+    rounded + 0.0
+}
+
+fn directional(figure: &Directional) -> Value {
+    json!({
+        "bidirectional": um(figure.bidirectional),
+        "forward": um(figure.forward),
+        "reverse": um(figure.reverse),
+    })
+}
+
+/// ISO 230-2 figures in micrometres.
+pub fn figures(figures: &Figures) -> Value {
+    let targets: Vec<_> = figures
+        .targets
+        .iter()
+        .map(|it| {
+            json!({
+                "target_mm": it.target.mm(),
+                "mean_deviation": {"forward": um(it.mean_forward), "reverse": um(it.mean_reverse)},
+                "standard_deviation": {"forward": um(it.s_forward), "reverse": um(it.s_reverse)},
+                "reversal_value": um(it.reversal_value),
+                "repeatability": {
+                    "bidirectional": um(it.repeatability),
+                    "forward": um(it.repeatability_forward),
+                    "reverse": um(it.repeatability_reverse),
+                },
+            })
+        })
+        .collect();
+    json!({
+        "unit": "um",
+        "reversal_value": um(figures.reversal_value),
+        "mean_reversal_value": um(figures.mean_reversal_value),
+        "mean_bidirectional_deviation_range": um(figures.mean_bidirectional_deviation_range),
+        "systematic_deviation": directional(&figures.systematic_deviation),
+        "repeatability": directional(&figures.repeatability),
+        "accuracy": directional(&figures.accuracy),
+        "runs": figures.runs,
+        "conforms_to_iso_230_2": figures.conforms(),
+        "targets": targets,
+    })
+}
+
+/// An error table: deviations (actual − target) in micrometres.
+pub fn table(table: &ErrorTable) -> Value {
+    let length = |value: Option<Metres>| value.map(um);
+    let nodes: Vec<_> = table
+        .nodes()
+        .iter()
+        .map(|node| {
+            json!({
+                "position_mm": node.position.mm(),
+                "deviation_um": {"forward": length(node.forward), "reverse": length(node.reverse)},
+                "standard_uncertainty_um": {
+                    "forward": length(node.u_forward),
+                    "reverse": length(node.u_reverse),
+                },
+            })
+        })
+        .collect();
+    let lost_motion = table.lost_motion();
+    json!({
+        "lost_motion_um": lost_motion.map(|it| um(it.mean)),
+        "lost_motion_um_u": lost_motion.map(|it| um(it.standard_uncertainty)),
+        "largest_deviation_um": um(table.largest()),
+        "nodes": nodes,
+    })
+}
+
+/// How a table was fitted.
+pub fn fitted(fitted: &Fitted) -> Value {
+    let outliers: Vec<_> = fitted
+        .robust
+        .outliers
+        .iter()
+        .map(|point| {
+            json!({
+                "run": point.run,
+                "approach": point.approach.symbol().to_string(),
+                "target_mm": point.target.mm(),
+                "residual_um": um(point.residual),
+            })
+        })
+        .collect();
+    let mut value = table(&fitted.table);
+    value["outliers"] = json!(outliers);
+    value["outlier_share"] = json!(fitted.robust.share);
+    value["closure_um"] = json!(um(fitted.drift.closure));
+    value["closure_um_u"] = json!(um(fitted.drift.u_closure));
+    value
+}
+
+/// A zero from the Hall sensors.
+pub fn zero(estimate: &ZeroEstimate) -> Value {
+    json!({
+        "origin_um": um(estimate.origin),
+        "origin_um_u": um(estimate.standard_uncertainty),
+        "patent_p0_um": estimate.p0_patent.map(um),
+        "left_flank_um": um(estimate.left.position),
+        "right_flank_um": um(estimate.right.position),
+        "peak_max_v": estimate.peak_max.value(),
+        "mid_voltage_v": estimate.mid_voltage.value(),
+        "residual_rms_peak_mv": estimate.residual_rms_peak.value() * 1e3,
+        "residual_rms_slope_mv": estimate.residual_rms_slope.value() * 1e3,
+        "points": estimate.points,
+    })
+}

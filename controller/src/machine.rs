@@ -1,0 +1,423 @@
+//! One machine: its devices, its transport, and what is known about its axes.
+//!
+//! The machine is driven by plain sequential procedures (the `cycle` folder) that call
+//! [`Machine::tick`]; every wait of every procedure is that one function, so supervision,
+//! heartbeats and the stop request hold at every moment, on real buses and in virtual time
+//! alike (docs/decisions/0001).
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use compensator::apply::ApproachTracker;
+use compensator::error_table::Compensation;
+use drivers::device::{
+    AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
+};
+use drivers::protocol::heartbeat::HeartbeatProducer;
+use drivers::transport::{Port, Transport};
+use units::{Metres, Time};
+
+use crate::assemble;
+use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::failure::Failure;
+use crate::observer::{Observer, Silent};
+
+/// Set from anywhere (a signal handler) to stop the machine in a controlled way.
+#[derive(Clone, Debug, Default)]
+pub struct StopRequest(Arc<AtomicBool>);
+
+impl StopRequest {
+    /// Asks for the stop.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether somebody asked.
+    pub fn is_requested(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// The flag itself, for a signal handler that sets it.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+}
+
+/// A device with its name and its port.
+pub(crate) struct Unit<D: ?Sized> {
+    pub(crate) name: String,
+    pub(crate) port: Port,
+    pub(crate) device: Box<D>,
+}
+
+/// What is known about an axis beyond what its drive says.
+#[derive(Default)]
+pub(crate) struct AxisMemory {
+    /// Zeroed by the Hall sensors since the drive was last powered.
+    pub(crate) zeroed: bool,
+    /// The calibration in use.
+    pub(crate) compensation: Option<Compensation>,
+    /// The direction of the last motion.
+    pub(crate) approach: ApproachTracker,
+}
+
+/// How alarms are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Supervision {
+    /// Not started, or shut down: alarms are dropped.
+    Off,
+    /// An alarm ends whatever runs.
+    On,
+    /// A stop is under way: alarms must not keep it from finishing.
+    Stopping,
+}
+
+/// A machine that is connected.
+pub struct Machine {
+    pub(crate) config: MachineConfig,
+    pub(crate) config_hash: String,
+    pub(crate) transport: Box<dyn Transport>,
+    pub(crate) port_names: BTreeMap<Port, String>,
+    pub(crate) axes: Vec<Unit<dyn Axis>>,
+    pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
+    pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
+    pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
+    pub(crate) memory: BTreeMap<String, AxisMemory>,
+    pub(crate) supervision: Supervision,
+    pub(crate) observer: Box<dyn Observer>,
+    pub(crate) stop: StopRequest,
+}
+
+impl Machine {
+    /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
+    /// Nothing is sent yet.
+    pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
+        let config = loaded.config.clone();
+        let ports = assemble::ports(&config);
+        let now = transport.now();
+        Self {
+            axes: assemble::axes(&config, &ports),
+            analogs: assemble::analogs(&config, &ports),
+            instruments: assemble::instruments(&config, &ports),
+            heartbeats: assemble::heartbeats(&config, &ports, now),
+            memory: config.axis.keys().map(|name| (name.clone(), AxisMemory::default())).collect(),
+            port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
+            config_hash: loaded.hash.clone(),
+            config,
+            transport,
+            supervision: Supervision::Off,
+            observer: Box::new(Silent),
+            stop: StopRequest::default(),
+        }
+    }
+
+    /// Who is told about progress.
+    pub fn observe(&mut self, observer: Box<dyn Observer>) {
+        self.observer = observer;
+    }
+
+    /// The flag that stops this machine.
+    pub fn stop_request(&self) -> StopRequest {
+        self.stop.clone()
+    }
+
+    /// Lets another machine's flag stop this one too.
+    pub fn share_stop_request(&mut self, stop: &StopRequest) {
+        self.stop = stop.clone();
+    }
+
+    /// The machine's clock.
+    pub fn now(&self) -> Time {
+        self.transport.now()
+    }
+
+    /// The configuration.
+    pub const fn config(&self) -> &MachineConfig {
+        &self.config
+    }
+
+    /// BLAKE3 of what a calibration depends on.
+    pub fn config_hash(&self) -> &str {
+        &self.config_hash
+    }
+
+    /// The names of the axes.
+    pub fn axis_names(&self) -> Vec<String> {
+        self.axes.iter().map(|unit| unit.name.clone()).collect()
+    }
+
+    /// The configuration of `axis`.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn axis_config(&self, axis: &str) -> Result<&AxisConfig, Failure> {
+        self.config.axis.get(axis).ok_or_else(|| Failure::NoSuchAxis {
+            axis: axis.to_owned(),
+            known: self.axis_names().join(", "),
+        })
+    }
+
+    /// Whether `axis` was zeroed since its drive was last powered.
+    pub fn is_zeroed(&self, axis: &str) -> bool {
+        self.memory.get(axis).is_some_and(|memory| memory.zeroed)
+            && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
+    }
+
+    /// The calibration `axis` uses now.
+    pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
+        self.memory.get(axis)?.compensation.as_ref()
+    }
+
+    /// Uses `compensation` (or none) for every move of `axis` from now on.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn set_compensation(
+        &mut self,
+        axis: &str,
+        compensation: Option<Compensation>,
+    ) -> Result<(), Failure> {
+        self.axis_config(axis)?;
+        self.remember(axis).compensation = compensation;
+        Ok(())
+    }
+
+    /// The newest sample of `axis`.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn reading(&self, axis: &str) -> Result<Option<AxisReading>, Failure> {
+        Ok(self.axis(axis)?.device.reading())
+    }
+
+    /// What every device said it is, by its name in the configuration.
+    pub fn identities(&self) -> BTreeMap<String, Identity> {
+        let axes = self.axes.iter().map(|unit| (&unit.name, unit.device.identity()));
+        let analogs = self.analogs.iter().map(|unit| (&unit.name, unit.device.identity()));
+        let instruments = self.instruments.iter().map(|unit| (&unit.name, unit.device.identity()));
+        axes.chain(analogs)
+            .chain(instruments)
+            .filter_map(|(name, identity)| Some((name.clone(), identity?)))
+            .collect()
+    }
+
+    /// Counters of every device: dropped, late, mismatched and the like.
+    pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
+        let axes = self.axes.iter().map(|unit| (&unit.name, unit.device.counters()));
+        let analogs = self.analogs.iter().map(|unit| (&unit.name, unit.device.counters()));
+        let instruments = self.instruments.iter().map(|unit| (&unit.name, unit.device.counters()));
+        axes.chain(analogs)
+            .chain(instruments)
+            .flat_map(|(name, counters)| {
+                counters.into_iter().map(move |(what, count)| (name.clone(), what, count))
+            })
+            .collect()
+    }
+
+    /// Starts SYNC and every device, and checks who they are. Nothing moves.
+    ///
+    /// # Errors
+    /// When a device does not answer, is another one than configured, or refuses its set-up.
+    pub fn start(&mut self) -> Result<(), Failure> {
+        self.supervision = Supervision::Off;
+        for memory in self.memory.values_mut() {
+            memory.zeroed = false;
+            memory.approach.forget();
+        }
+        self.set_sync(true)?;
+        let now = self.now();
+        for at in 0..self.device_count() {
+            self.device_mut(at).device.start(now);
+        }
+        let waits = START_LIMIT;
+        for at in 0..self.device_count() {
+            self.await_outcome(at, "start", waits)?;
+        }
+        self.supervision = Supervision::On;
+        Ok(())
+    }
+
+    /// The names of all devices: axes, then analog modules, then instruments.
+    pub fn device_names(&self) -> Vec<String> {
+        let axes = self.axes.iter().map(|unit| unit.name.clone());
+        let analogs = self.analogs.iter().map(|unit| unit.name.clone());
+        let instruments = self.instruments.iter().map(|unit| unit.name.clone());
+        axes.chain(analogs).chain(instruments).collect()
+    }
+
+    /// Disables every axis in a controlled way and stops supervision and SYNC.
+    ///
+    /// # Errors
+    /// When an axis cannot be disabled; the others are tried all the same.
+    pub fn shut_down(&mut self) -> Result<(), Failure> {
+        let mut result = Ok(());
+        self.supervision = Supervision::Stopping;
+        for axis in self.axis_names() {
+            result = result.and(self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT));
+        }
+        self.supervision = Supervision::Off;
+        result.and(self.set_sync(false))
+    }
+
+    /// Runs `procedure`; when it fails, stops and disables every axis before the failure is
+    /// returned.
+    ///
+    /// # Errors
+    /// What `procedure` returns.
+    pub fn guarded<R>(
+        &mut self,
+        procedure: impl FnOnce(&mut Self) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let result = procedure(self);
+        if result.is_err() {
+            self.make_safe();
+        }
+        result
+    }
+
+    /// Quick stop and disable on every axis that can still be reached. Never fails: it does
+    /// what can be done, and the drives' own watch on our heartbeat does the rest.
+    pub fn make_safe(&mut self) {
+        self.supervision = Supervision::Stopping;
+        let now = self.now();
+        for unit in &mut self.axes {
+            unit.device.command(now, AxisCommand::QuickStop);
+        }
+        for at in 0..self.axes.len() {
+            // A drive that is gone cannot confirm; the others must still be stopped.
+            let _ = self.await_outcome(at, "quick stop", STOP_LIMIT);
+        }
+        for axis in self.axis_names() {
+            let _ = self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT);
+        }
+        for memory in self.memory.values_mut() {
+            memory.approach.forget();
+        }
+        let _ = self.set_sync(false);
+        self.supervision = Supervision::Off;
+    }
+
+    /// Gives `command` to `axis` and waits until it is done.
+    pub(crate) fn command(
+        &mut self,
+        axis: &str,
+        command: AxisCommand,
+        step: &'static str,
+        limit: Duration,
+    ) -> Result<(), Failure> {
+        let at = self.axis_index(axis)?;
+        let now = self.now();
+        self.axes[at].device.command(now, command);
+        self.await_outcome(at, step, limit)
+    }
+
+    fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
+        for (port, name) in &self.port_names {
+            let Some(bus) = self.config.can.get(name) else { continue };
+            let period = on.then(|| Duration::from_secs_f64(bus.sync_period_ms * 1e-3));
+            self.transport
+                .set_sync(*port, period)
+                .map_err(|source| Failure::Send { device: format!("SYNC on {name}"), source })?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the outcome of device number `at`.
+    pub(crate) fn await_outcome(
+        &mut self,
+        at: usize,
+        step: &'static str,
+        limit: Duration,
+    ) -> Result<(), Failure> {
+        let deadline = self.now() + limit;
+        loop {
+            if let Some(outcome) = self.device_mut(at).device.poll_outcome() {
+                let device = self.device_name(at);
+                return outcome.map_err(|source| Failure::Device { device, source });
+            }
+            if self.now() >= deadline {
+                return Err(Failure::Overdue { device: self.device_name(at), step, waited: limit });
+            }
+            self.tick(deadline)?;
+        }
+    }
+
+    pub(crate) fn remember(&mut self, axis: &str) -> &mut AxisMemory {
+        self.memory.entry(axis.to_owned()).or_default()
+    }
+
+    pub(crate) fn axis(&self, axis: &str) -> Result<&Unit<dyn Axis>, Failure> {
+        let at = self.axis_index(axis)?;
+        Ok(&self.axes[at])
+    }
+
+    pub(crate) fn axis_index(&self, axis: &str) -> Result<usize, Failure> {
+        self.axes.iter().position(|unit| unit.name == axis).ok_or_else(|| Failure::NoSuchAxis {
+            axis: axis.to_owned(),
+            known: self.axis_names().join(", "),
+        })
+    }
+
+    /// The number of a named instrument among all devices.
+    pub(crate) fn instrument_index(&self, name: &str) -> usize {
+        self.instruments
+            .iter()
+            .position(|unit| unit.name == name)
+            .expect("the configuration was checked: references exist")
+    }
+
+    /// The number of a named analog module.
+    pub(crate) fn analog_index(&self, name: &str) -> usize {
+        self.analogs
+            .iter()
+            .position(|unit| unit.name == name)
+            .expect("the configuration was checked: references exist")
+    }
+
+    /// The number, among all devices, of instrument number `at`.
+    pub(crate) fn instrument_device(&self, at: usize) -> usize {
+        self.axes.len() + self.analogs.len() + at
+    }
+
+    pub(crate) fn device_count(&self) -> usize {
+        self.axes.len() + self.analogs.len() + self.instruments.len()
+    }
+
+    pub(crate) fn device_name(&self, at: usize) -> String {
+        self.device_names().swap_remove(at)
+    }
+
+    /// Device number `at`: axes first, then analog modules, then instruments.
+    pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
+        let (axes, analogs) = (self.axes.len(), self.analogs.len());
+        if at < axes {
+            let unit = &mut self.axes[at];
+            UnitMut { port: unit.port, device: &mut *unit.device }
+        } else if at < axes + analogs {
+            let unit = &mut self.analogs[at - axes];
+            UnitMut { port: unit.port, device: &mut *unit.device }
+        } else {
+            let unit = &mut self.instruments[at - axes - analogs];
+            UnitMut { port: unit.port, device: &mut *unit.device }
+        }
+    }
+
+    /// Where `axis` should be sent so that the point arrives at `target`.
+    pub(crate) fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
+        let config = self.axis_config(axis)?;
+        Ok((Metres::from_mm(config.soft_min_mm), Metres::from_mm(config.soft_max_mm)))
+    }
+}
+
+/// Any device, with its port.
+pub(crate) struct UnitMut<'a> {
+    pub(crate) port: Port,
+    pub(crate) device: &'a mut dyn Device,
+}
+
+/// The longest a device may take to start: some boot for seconds.
+const START_LIMIT: Duration = Duration::from_secs(15);
+/// The longest a stop may take before the next drive is tried.
+pub(crate) const STOP_LIMIT: Duration = Duration::from_secs(2);

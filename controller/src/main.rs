@@ -1,0 +1,9 @@
+//! The command `truestage`.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}

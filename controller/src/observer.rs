@@ -1,0 +1,37 @@
+//! Who is told how far a procedure has come.
+
+/// The procedures of the cycle, as a person names them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Finding the origin.
+    Zero,
+    /// Measuring to learn the deviations.
+    Calibrate,
+    /// Measuring to judge.
+    Verify,
+}
+
+impl Stage {
+    /// For the screen.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Zero => "zero",
+            Self::Calibrate => "calibrate",
+            Self::Verify => "verify",
+        }
+    }
+}
+
+/// Is told about progress.
+pub trait Observer {
+    /// `done` of `total` steps of `stage` on `axis` are done.
+    fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64);
+}
+
+/// Hears nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Silent;
+
+impl Observer for Silent {
+    fn progress(&mut self, _stage: Stage, _axis: &str, _done: u64, _total: u64) {}
+}

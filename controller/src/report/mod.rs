@@ -1,0 +1,188 @@
+//! A self-contained page of a run: facts, plots, figures. No script, no network.
+
+mod svg;
+
+use core::fmt::Write as _;
+
+use compensator::iso230::Figures;
+use units::Metres;
+
+use crate::store::{CalibrationRecord, PointEntry, ReadJournal, ZeroEntry};
+use crate::text;
+
+/// One measured series on the page.
+#[derive(Clone, Debug)]
+pub struct Section<'a> {
+    /// Its heading: `as found`, `as left` …
+    pub title: String,
+    /// Its figures.
+    pub figures: &'a Figures,
+    /// Its points.
+    pub points: &'a [PointEntry],
+}
+
+/// What a page shows.
+#[derive(Clone, Debug, Default)]
+pub struct Page<'a> {
+    /// Heading.
+    pub title: String,
+    /// Name and value, for the head of the page.
+    pub facts: Vec<(String, String)>,
+    /// Measured series.
+    pub sections: Vec<Section<'a>>,
+    /// The calibration in use.
+    pub calibration: Option<&'a CalibrationRecord>,
+    /// Zeros found, in order.
+    pub zeros: Vec<ZeroEntry>,
+}
+
+const STYLE: &str = "\
+body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;\
+color:#1c2430;background:#fff}h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2.2rem}\
+table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem;text-align:right;\
+border-bottom:1px solid #dde3ea}th{color:#566}td:first-child,th:first-child{text-align:left}\
+svg{width:100%;height:auto}.note{color:#566}figure{margin:0}";
+
+/// The page as HTML.
+pub fn render(page: &Page<'_>) -> String {
+    let mut html = String::new();
+    html += "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">";
+    html += "<meta name=\"viewport\" content=\"width=device-width\">";
+    html += &format!("<title>{}</title><style>{STYLE}</style></head><body>", escape(&page.title));
+    html += &format!("<h1>{}</h1>", escape(&page.title));
+    html += &facts(&page.facts);
+    if !page.sections.is_empty() {
+        html += "<h2>ISO 230-2 figures</h2>";
+        html += &figures(&page.sections);
+    }
+    for section in &page.sections {
+        html += &format!("<h2>Deviation {}</h2>", escape(&section.title));
+        html += &format!("<figure>{}</figure>", svg::deviations(section));
+    }
+    if let Some(calibration) = page.calibration {
+        html += "<h2>Calibration</h2>";
+        html += &calibration_table(calibration);
+    }
+    if !page.zeros.is_empty() {
+        html += "<h2>Zeros</h2>";
+        html += &zeros(&page.zeros);
+    }
+    html += "<p class=\"note\">deviation = actual − target. Bars are mean ± 2 s at each target. ";
+    html += "Made by truestage; not a certificate.</p></body></html>\n";
+    html
+}
+
+/// The head of a page for one run.
+pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
+    let header = &journal.header;
+    let drive = &header.drive;
+    let mut facts = vec![
+        ("machine".to_owned(), format!("{} (stage {})", header.machine, header.stage_serial)),
+        ("axis".to_owned(), header.axis.clone()),
+        ("run".to_owned(), format!("{}, started {}", header.verb, header.started)),
+        (
+            "drive".to_owned(),
+            format!("{} {:#X}:{:#X}, serial {}", drive.name, drive.vendor, drive.product, drive.serial),
+        ),
+        ("calibration in use".to_owned(), header.calibration.clone().unwrap_or("none".into())),
+        ("points".to_owned(), journal.points.len().to_string()),
+        ("complete".to_owned(), if journal.complete { "yes" } else { "no" }.to_owned()),
+    ];
+    if !header.instrument.name.is_empty() {
+        let it = &header.instrument;
+        let on = [
+            ("air", it.air_corrected),
+            ("material", it.material_corrected),
+            ("dead path", it.dead_path_corrected),
+            ("cosine", it.cosine_corrected),
+        ];
+        let on: Vec<_> = on.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
+        let corrected = if on.is_empty() { "nothing".to_owned() } else { on.join(", ") };
+        let value = format!("{} ({}), corrected for {corrected}", it.name, it.identity);
+        facts.push(("instrument".to_owned(), value));
+    }
+    facts
+}
+
+fn facts(facts: &[(String, String)]) -> String {
+    let rows = facts.iter().fold(String::new(), |mut rows, (name, value)| {
+        let value = escape(value);
+        let _ = write!(rows, "<tr><th>{}</th><td style=\"text-align:left\">{value}</td></tr>", escape(name));
+        rows
+    });
+    format!("<table>{rows}</table>")
+}
+
+fn figures(sections: &[Section<'_>]) -> String {
+    let mut html = String::from("<table><tr><th>µm</th><th></th>");
+    for section in sections {
+        let _ = write!(html, "<th>{}</th>", escape(&section.title));
+    }
+    html += "</tr>";
+    for (name, symbol, figure) in text::ROWS {
+        let _ = write!(html, "<tr><td>{name}</td><td>{symbol}</td>");
+        for section in sections {
+            let _ = write!(html, "<td>{:.3}</td>", figure(section.figures).um());
+        }
+        html += "</tr>";
+    }
+    html + "</table>"
+}
+
+fn calibration_table(record: &CalibrationRecord) -> String {
+    let cell = |value: Option<f64>| {
+        value.map_or("–".to_owned(), |metres| format!("{:.3}", Metres(metres).um()))
+    };
+    let mut html = String::from(
+        "<table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
+         <th>u ↑ (µm)</th><th>u ↓ (µm)</th></tr>",
+    );
+    for node in &record.nodes {
+        let _ = write!(
+            html,
+            "<tr><td>{:.3}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            Metres(node.position_m).mm(),
+            cell(node.forward_m),
+            cell(node.reverse_m),
+            cell(node.forward_u_m),
+            cell(node.reverse_u_m)
+        );
+    }
+    html + "</table>"
+}
+
+fn zeros(zeros: &[ZeroEntry]) -> String {
+    let mut html = String::from(
+        "<table><tr><th>no.</th><th>origin before (µm)</th><th>u (µm)</th><th>peak (V)</th>\
+         <th>mid voltage (V)</th></tr>",
+    );
+    for (at, zero) in zeros.iter().enumerate() {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{:.3}</td><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td></tr>",
+            at + 1,
+            Metres(zero.origin_m).um(),
+            Metres(zero.standard_uncertainty_m).um(),
+            zero.peak_max_v,
+            zero.mid_v
+        );
+    }
+    html + "</table>"
+}
+
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_person_typed_cannot_become_markup() {
+        let page = Page { title: "<script>\"x\"&".into(), ..Page::default() };
+        let html = render(&page);
+        assert!(!html.contains("<script>"));
+        assert!(html.contains("&lt;script&gt;&quot;x&quot;&amp;"));
+    }
+}

@@ -1,0 +1,167 @@
+//! Plots as plain SVG.
+
+use core::fmt::Write as _;
+
+use units::Metres;
+
+use super::Section;
+
+const WIDTH: f64 = 960.0;
+const HEIGHT: f64 = 320.0;
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 20.0;
+const TOP: f64 = 24.0;
+const BOTTOM: f64 = 44.0;
+const FORWARD: &str = "#0b66c3";
+const REVERSE: &str = "#c2410c";
+
+/// From data to the page.
+struct Axes {
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+impl Axes {
+    fn px(&self, x: f64) -> f64 {
+        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn py(&self, y: f64) -> f64 {
+        HEIGHT - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (HEIGHT - TOP - BOTTOM)
+    }
+}
+
+/// Deviation over position: each point, and mean ± 2 s at each target, both approaches.
+pub(super) fn deviations(section: &Section<'_>) -> String {
+    let points: Vec<(f64, f64, char)> = section
+        .points
+        .iter()
+        .map(|it| {
+            let deviation = Metres(it.measured_m - it.target_m).um();
+            (Metres(it.target_m).mm(), deviation, it.approach)
+        })
+        .collect();
+    let axes = Axes {
+        x: padded(points.iter().map(|it| it.0), 0.02),
+        y: padded(points.iter().map(|it| it.1).chain([0.0]), 0.12),
+    };
+    let mut svg = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">");
+    svg += &format!("<title>Deviation {}</title>", super::escape(&section.title));
+    svg += &grid(&axes);
+    svg += &dots(&axes, &points);
+    svg += &means(&axes, section);
+    svg += &legend();
+    svg + "</svg>"
+}
+
+/// The range of `values`, widened on both sides by `share` of it, and never empty.
+fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let margin = ((high - low) * share).max(1e-6);
+    (low - margin, high + margin)
+}
+
+/// 1, 2 or 5 times a power of ten, giving about `wanted` steps.
+fn step(range: f64, wanted: f64) -> f64 {
+    let raw = range / wanted;
+    let power = 10_f64.powf(raw.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|it| it * power >= raw).unwrap_or(10.0);
+    factor * power
+}
+
+fn ticks(range: (f64, f64), wanted: f64) -> Vec<f64> {
+    let step = step(range.1 - range.0, wanted);
+    let first = (range.0 / step).ceil() as i64;
+    let last = (range.1 / step).floor() as i64;
+    (first..=last).map(|at| at as f64 * step).collect()
+}
+
+/// As few digits as tell the ticks apart.
+fn label(value: f64, step: f64) -> String {
+    let digits = (-step.log10().floor()).max(0.0) as usize;
+    format!("{:.digits$}", value + 0.0)
+}
+
+fn grid(axes: &Axes) -> String {
+    let mut svg = String::from("<g font-size=\"12\" fill=\"#566\" stroke-width=\"1\">");
+    let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+    let y_step = step(axes.y.1 - axes.y.0, 6.0);
+    for y in ticks(axes.y, 6.0) {
+        let py = axes.py(y);
+        let colour = if y.abs() < y_step * 1e-6 { "#8794a3" } else { "#e4e9ef" };
+        let _ = write!(svg, "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>");
+        let (x, y_text, text) = (LEFT - 8.0, py + 4.0, label(y, y_step));
+        let _ = write!(svg, "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>");
+    }
+    let x_step = step(axes.x.1 - axes.x.0, 10.0);
+    for x in ticks(axes.x, 10.0) {
+        let (px, y, text) = (axes.px(x), bottom + 18.0, label(x, x_step));
+        let _ = write!(svg, "<text x=\"{px:.1}\" y=\"{y}\" text-anchor=\"middle\">{text}</text>");
+    }
+    let (middle, base) = ((LEFT + right) / 2.0, HEIGHT - 6.0);
+    let _ = write!(svg, "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">target (mm)</text>");
+    let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">deviation (µm)</text></g>");
+    svg
+}
+
+fn dots(axes: &Axes, points: &[(f64, f64, char)]) -> String {
+    points.iter().fold(String::new(), |mut svg, (x, y, approach)| {
+        let colour = if *approach == '-' { REVERSE } else { FORWARD };
+        let (px, py) = (axes.px(*x), axes.py(*y));
+        let _ = write!(svg, "<circle cx=\"{px:.1}\" cy=\"{py:.1}\" r=\"2.2\" fill=\"{colour}\" opacity=\".35\"/>");
+        svg
+    })
+}
+
+fn means(axes: &Axes, section: &Section<'_>) -> String {
+    let mut svg = String::new();
+    for (colour, forward) in [(FORWARD, true), (REVERSE, false)] {
+        let mut line = String::new();
+        for target in &section.figures.targets {
+            let (mean, s) = if forward {
+                (target.mean_forward.um(), target.s_forward.um())
+            } else {
+                (target.mean_reverse.um(), target.s_reverse.um())
+            };
+            let px = axes.px(target.target.mm());
+            let _ = write!(line, "{px:.1},{:.1} ", axes.py(mean));
+            let (low, high) = (axes.py(mean - 2.0 * s), axes.py(mean + 2.0 * s));
+            let _ = write!(svg, "<line x1=\"{px:.1}\" x2=\"{px:.1}\" y1=\"{low:.1}\" y2=\"{high:.1}\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+        }
+        let _ = write!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>");
+    }
+    svg
+}
+
+fn legend() -> String {
+    let x = WIDTH - RIGHT - 190.0;
+    let y = 14.0;
+    format!(
+        "<g font-size=\"12\"><text x=\"{x}\" y=\"{y}\" fill=\"{FORWARD}\">● forward ↑</text>\
+         <text x=\"{}\" y=\"{y}\" fill=\"{REVERSE}\">● reverse ↓</text></g>",
+        x + 100.0
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers_inside_the_range() {
+        assert_eq!(ticks((-0.3, 10.2), 5.0), [0.0, 5.0, 10.0]);
+        assert_eq!(ticks((0.0, 1.0), 5.0).len(), 6);
+        assert_eq!(label(0.5, 0.5), "0.5");
+        assert_eq!(label(20.0, 10.0), "20");
+    }
+
+    #[test]
+    fn an_empty_plot_has_a_range() {
+        assert_eq!(padded([].into_iter(), 0.1), (0.0, 1.0));
+    }
+}

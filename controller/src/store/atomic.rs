@@ -1,0 +1,55 @@
+//! Writing a file so that a crash at any moment leaves the old one or the new one.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::Path;
+
+use super::{StoreError, io_error};
+
+/// Writes `bytes` to `path`: temporary file in the same folder, fsync, rename, fsync of the
+/// folder. Whatever happens, `path` holds the old content or the whole new one.
+pub(crate) fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
+    let mut file = tempfile::Builder::new()
+        .prefix(".new-")
+        .tempfile_in(folder)
+        .map_err(io_error("create a temporary file beside", path))?;
+    file.write_all(bytes).map_err(io_error("write", path))?;
+    file.as_file().sync_all().map_err(io_error("flush to disk", path))?;
+    file.persist(path)
+        .map_err(|error| io_error("rename into place", path)(error.error))?;
+    sync_folder(folder)
+}
+
+/// A rename is durable only when its folder is.
+fn sync_folder(folder: &Path) -> Result<(), StoreError> {
+    File::open(folder)
+        .and_then(|handle| handle.sync_all())
+        .map_err(io_error("flush the folder", folder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_replaced_file_has_the_new_content_and_leaves_no_temporary() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.json");
+        write_new_or_replace(&path, b"one").unwrap();
+        write_new_or_replace(&path, b"two").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"two");
+        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_an_error_that_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("plain");
+        fs::write(&file, b"x").unwrap();
+        let error = write_new_or_replace(&file.join("b.json"), b"one").unwrap_err();
+        assert!(error.to_string().contains("plain"), "{error}");
+        assert_eq!(fs::read(&file).unwrap(), b"x");
+    }
+}

@@ -1,0 +1,389 @@
+//! Run journals: every measured point is written when it is measured.
+//!
+//! One line an entry: eight hexadecimal digits of CRC-32, a blank, JSON. A killed run leaves
+//! whole lines and at most one torn one at the end, which is dropped when it is read.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::calibration::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
+use super::{SCHEMA_VERSION, StoreError, io_error};
+
+/// What a run is: written first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JournalHeader {
+    /// Of this file.
+    pub schema_version: u32,
+    /// `calibrate`, `verify`, `zero`.
+    pub verb: String,
+    /// The machine's name.
+    pub machine: String,
+    /// The stage's serial number.
+    pub stage_serial: String,
+    /// BLAKE3 of what a calibration depends on.
+    pub config_hash: String,
+    /// Which axis.
+    pub axis: String,
+    /// Who the drive is.
+    pub drive: IdentityRecord,
+    /// What measures.
+    pub instrument: InstrumentRecord,
+    /// When, UTC, RFC 3339.
+    pub started: String,
+    /// The calibration in use, `None` for uncompensated moves.
+    pub calibration: Option<String>,
+    /// The targets of one run, metres.
+    pub targets_m: Vec<f64>,
+    /// How many runs.
+    pub runs: u32,
+}
+
+/// One measured point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointEntry {
+    /// Which run, from 1.
+    pub run: u32,
+    /// `+` or `-`.
+    pub approach: char,
+    /// Where it should be, metres.
+    pub target_m: f64,
+    /// What the drive was sent, metres.
+    pub set_point_m: f64,
+    /// What the encoder said, metres.
+    pub encoder_m: f64,
+    /// What the instrument said, corrected, metres.
+    pub measured_m: f64,
+    /// Standard deviation of the readings averaged, metres.
+    pub scatter_m: f64,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+    /// The environment then.
+    pub environment: EnvironmentRecord,
+}
+
+/// What a zero search found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZeroEntry {
+    /// The origin in the drive's coordinates before it became zero, metres.
+    pub origin_m: f64,
+    /// Its standard uncertainty, metres.
+    pub standard_uncertainty_m: f64,
+    /// The patent's P0 in the same coordinates, metres.
+    pub patent_p0_m: f64,
+    /// Highest voltage of the peak sensor, volts.
+    pub peak_max_v: f64,
+    /// Voltage of the slope sensor at the origin, volts.
+    pub mid_v: f64,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+/// A line of a journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "entry", rename_all = "snake_case")]
+pub enum Entry {
+    /// First line.
+    Header(JournalHeader),
+    /// A measured point.
+    Point(PointEntry),
+    /// A zero.
+    Zero(ZeroEntry),
+    /// The run was continued here after an interruption.
+    Resumed {
+        /// When, UTC, RFC 3339.
+        at: String,
+    },
+    /// The run failed; the points before stay valid.
+    Failed {
+        /// The operator's text.
+        cause: String,
+    },
+    /// The run is complete.
+    Complete,
+}
+
+/// A journal being written.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// Starts a journal in `folder`.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(folder: &Path, header: &JournalHeader) -> Result<Self, StoreError> {
+        fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
+        let stamp = header.started.replace([':', '-'], "");
+        for attempt in 0..10_000_u32 {
+            let name = format!("{stamp}-{}-{}-{attempt:02}.jsonl", header.verb, header.axis);
+            let path = folder.join(name);
+            match OpenOptions::new().append(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    let mut journal = Self { path, file };
+                    journal.write(&Entry::Header(header.clone()))?;
+                    return Ok(journal);
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(io_error("create", &path)(error)),
+            }
+        }
+        let taken = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
+        Err(io_error("create a new journal in", folder)(taken))
+    }
+
+    /// Continues the journal at `path` after its last whole line.
+    ///
+    /// # Errors
+    /// When it cannot be read or does not describe the same run as `header`.
+    pub fn resume(path: &Path, header: &JournalHeader) -> Result<(Self, ReadJournal), StoreError> {
+        let read = read_journal(path)?;
+        same_run(path, &read.header, header)?;
+        let file = OpenOptions::new().append(true).open(path).map_err(io_error("open", path))?;
+        file.set_len(read.valid_bytes).map_err(io_error("cut the torn line of", path))?;
+        let mut journal = Self { path: path.to_owned(), file };
+        journal.write(&Entry::Resumed { at: header.started.clone() })?;
+        Ok((journal, read))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends one entry; it is in the kernel's hands when this returns, so that killing the
+    /// process loses nothing.
+    ///
+    /// # Errors
+    /// When it cannot be written: the run must stop, its points would be lost.
+    pub fn write(&mut self, entry: &Entry) -> Result<(), StoreError> {
+        let json = serde_json::to_string(entry).expect("plain data always serialises");
+        let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
+        self.file.write_all(line.as_bytes()).map_err(io_error("append to", &self.path))
+    }
+
+    /// Forces everything to the disk; called where the axis stands and time does not matter.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
+        self.file.sync_data().map_err(io_error("flush to disk", &self.path))
+    }
+}
+
+/// A journal that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadJournal {
+    /// What the run is.
+    pub header: JournalHeader,
+    /// Its points, in the order they were measured.
+    pub points: Vec<PointEntry>,
+    /// Its zeros.
+    pub zeros: Vec<ZeroEntry>,
+    /// Whether the run was finished.
+    pub complete: bool,
+    /// How many bytes are whole lines.
+    pub valid_bytes: u64,
+    /// Whether a torn line follows them.
+    pub torn: bool,
+}
+
+fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(), StoreError> {
+    let comparisons = [
+        ("verb", old.verb.clone(), new.verb.clone()),
+        ("stage serial", old.stage_serial.clone(), new.stage_serial.clone()),
+        ("configuration hash", old.config_hash.clone(), new.config_hash.clone()),
+        ("axis", old.axis.clone(), new.axis.clone()),
+        ("drive", format!("{:?}", old.drive), format!("{:?}", new.drive)),
+        ("calibration", format!("{:?}", old.calibration), format!("{:?}", new.calibration)),
+        ("targets", format!("{:?}", old.targets_m), format!("{:?}", new.targets_m)),
+    ];
+    for (what, expected, seen) in comparisons {
+        if expected != seen {
+            return Err(StoreError::NotResumable { path: path.to_owned(), what, expected, seen });
+        }
+    }
+    Ok(())
+}
+
+/// Reads a journal up to its last whole line.
+///
+/// # Errors
+/// When it cannot be read, has no header, or a line before the last one is damaged.
+pub fn read_journal(path: &Path) -> Result<ReadJournal, StoreError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let mut read: Option<ReadJournal> = None;
+    let mut valid_bytes = 0;
+    let mut torn = false;
+    let lines: Vec<&[u8]> = bytes.split_inclusive(|byte| *byte == b'\n').collect();
+    for (at, line) in lines.iter().enumerate() {
+        match parse_line(line) {
+            Ok(entry) => {
+                valid_bytes += line.len() as u64;
+                take(path, at + 1, entry, &mut read)?;
+            }
+            Err(_) if at + 1 == lines.len() => torn = true,
+            Err(cause) => {
+                return Err(StoreError::Format { path: path.to_owned(), line: at + 1, cause });
+            }
+        }
+    }
+    let mut read = read.ok_or_else(|| StoreError::Format {
+        path: path.to_owned(),
+        line: 1,
+        cause: "no whole header line".into(),
+    })?;
+    read.valid_bytes = valid_bytes;
+    read.torn = torn;
+    Ok(read)
+}
+
+fn parse_line(line: &[u8]) -> Result<Entry, String> {
+    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
+    let text = text.strip_suffix('\n').ok_or("the line does not end")?;
+    let (digits, json) = text.split_once(' ').ok_or("no checksum")?;
+    let expected = u32::from_str_radix(digits, 16).map_err(|error| error.to_string())?;
+    let seen = crc32fast::hash(json.as_bytes());
+    if seen != expected {
+        return Err(format!("checksum {seen:08x}, the line says {expected:08x}"));
+    }
+    serde_json::from_str(json).map_err(|error| error.to_string())
+}
+
+fn take(
+    path: &Path,
+    line: usize,
+    entry: Entry,
+    read: &mut Option<ReadJournal>,
+) -> Result<(), StoreError> {
+    let misplaced = || StoreError::Format {
+        path: path.to_owned(),
+        line,
+        cause: "the header must be the first line and the only one".into(),
+    };
+    match (entry, read.as_mut()) {
+        (Entry::Header(header), None) if header.schema_version > SCHEMA_VERSION => {
+            return Err(StoreError::Newer { path: path.to_owned(), seen: header.schema_version });
+        }
+        (Entry::Header(header), None) => {
+            *read = Some(ReadJournal {
+                header,
+                points: Vec::new(),
+                zeros: Vec::new(),
+                complete: false,
+                valid_bytes: 0,
+                torn: false,
+            });
+        }
+        (Entry::Header(_), Some(_)) | (_, None) => return Err(misplaced()),
+        (Entry::Point(point), Some(read)) => read.points.push(point),
+        (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
+        (Entry::Resumed { .. } | Entry::Failed { .. }, Some(read)) => read.complete = false,
+        (Entry::Complete, Some(read)) => read.complete = true,
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> JournalHeader {
+        JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: "calibrate".into(),
+            machine: "m".into(),
+            stage_serial: "A".into(),
+            config_hash: "h".into(),
+            axis: "x".into(),
+            drive: IdentityRecord::default(),
+            instrument: InstrumentRecord::default(),
+            started: "2026-01-01T00:00:00Z".into(),
+            calibration: None,
+            targets_m: vec![0.0, 0.003],
+            runs: 2,
+        }
+    }
+
+    fn point(run: u32) -> Entry {
+        Entry::Point(PointEntry {
+            run,
+            approach: '+',
+            target_m: 0.003,
+            set_point_m: 0.003,
+            encoder_m: 0.003,
+            measured_m: 0.003_001,
+            scatter_m: 1e-9,
+            at_s: 1.5,
+            environment: EnvironmentRecord::default(),
+        })
+    }
+
+    #[test]
+    fn a_journal_cut_at_any_byte_loses_at_most_its_last_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        let first_line = fs::read(journal.path()).unwrap().len();
+        for run in 1..=3 {
+            journal.write(&point(run)).unwrap();
+        }
+        let whole = fs::read(journal.path()).unwrap();
+        let cut = folder.path().join("cut.jsonl");
+        for length in first_line..=whole.len() {
+            fs::write(&cut, &whole[..length]).unwrap();
+            let read = read_journal(&cut).unwrap();
+            let complete_lines = whole[..length].iter().filter(|byte| **byte == b'\n').count();
+            assert_eq!(read.points.len(), complete_lines - 1);
+            assert!(!read.complete);
+        }
+    }
+
+    #[test]
+    fn resuming_cuts_the_torn_line_and_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        journal.write(&point(1)).unwrap();
+        let path = journal.path().to_owned();
+        let mut bytes = fs::read(&path).unwrap();
+        bytes.extend_from_slice(b"1234abcd {\"entry\":\"poi");
+        fs::write(&path, &bytes).unwrap();
+        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        assert!(read.torn);
+        assert_eq!(read.points.len(), 1);
+        journal.write(&point(2)).unwrap();
+        journal.write(&Entry::Complete).unwrap();
+        let read = read_journal(&path).unwrap();
+        assert_eq!((read.points.len(), read.complete, read.torn), (2, true, false));
+    }
+
+    #[test]
+    fn a_damaged_line_in_the_middle_is_an_error_with_its_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        journal.write(&point(1)).unwrap();
+        journal.write(&point(2)).unwrap();
+        let path = journal.path().to_owned();
+        let text = fs::read_to_string(&path).unwrap().replacen("\"run\":1", "\"run\":7", 1);
+        fs::write(&path, text).unwrap();
+        let error = read_journal(&path).unwrap_err();
+        assert!(matches!(error, StoreError::Format { line: 2, .. }), "{error}");
+    }
+
+    #[test]
+    fn another_run_cannot_be_resumed() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::create(folder.path(), &header()).unwrap();
+        let mut other = header();
+        other.stage_serial = "B".into();
+        let error = Journal::resume(journal.path(), &other).unwrap_err();
+        assert!(error.to_string().contains("stage serial"), "{error}");
+    }
+}

@@ -1,0 +1,143 @@
+//! What is kept: calibrations, run journals, reports.
+//!
+//! Layout below the configuration's `data_dir`, one folder a machine:
+//! ```text
+//! MACHINE/calibrations/HASH.json   immutable, named by the BLAKE3 of its bytes
+//! MACHINE/active/AXIS.json         which calibration is in use, and which were before
+//! MACHINE/runs/TIME-VERB-AXIS.jsonl   one checksummed line for each measured point
+//! MACHINE/reports/                 pages for people
+//! ```
+//! The structs of these files are their own and carry a version: model types are never
+//! (de)serialised, and a file from a newer program is refused.
+
+mod atomic;
+mod calibration;
+mod journal;
+mod lease;
+
+use std::path::{Path, PathBuf};
+
+pub use calibration::{
+    ActivePointer, CalibrationRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord,
+    NodeRecord, Store, short,
+};
+pub use lease::Lease;
+pub use journal::{Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal};
+
+pub(crate) use atomic::write_new_or_replace;
+
+/// The version of every file this program writes.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Why something cannot be stored, or what is stored cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The operating system refused.
+    #[error("{}: cannot {action}: {source}; the files already stored are untouched", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// With which file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The bytes are not those that were stored.
+    #[error("{}: damaged: its content hashes to {seen}; roll back or calibrate again", path.display())]
+    Damaged {
+        /// Which file.
+        path: PathBuf,
+        /// The hash of what is there.
+        seen: String,
+    },
+    /// The bytes are no record of ours.
+    #[error("{}: line {line}: not a record of this program: {cause}", path.display())]
+    Format {
+        /// Which file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// The parser's words.
+        cause: String,
+    },
+    /// Written by a newer program.
+    #[error(
+        "{}: written with schema version {seen}, this program knows {SCHEMA_VERSION}; \
+         use the newer program", path.display()
+    )]
+    Newer {
+        /// Which file.
+        path: PathBuf,
+        /// Its version.
+        seen: u32,
+    },
+    /// The calibration belongs to another machine or another set-up of this one.
+    #[error(
+        "calibration {id}: {what} is `{expected}` there, but `{seen}` here; it is refused on \
+         this machine, calibrate again"
+    )]
+    Foreign {
+        /// The calibration.
+        id: String,
+        /// What differs.
+        what: &'static str,
+        /// What the calibration says.
+        expected: String,
+        /// What this machine is.
+        seen: String,
+    },
+    /// Another program uses the machine.
+    #[error("the machine is in use by {owner}; stop that first")]
+    Leased {
+        /// Who.
+        owner: String,
+    },
+    /// No calibration has this name.
+    #[error("no calibration `{id}`; `truestage cal list` shows what there is")]
+    Unknown {
+        /// What was asked for.
+        id: String,
+    },
+    /// More than one calibration starts like this.
+    #[error("`{id}` begins the name of {count} calibrations; give more digits")]
+    Ambiguous {
+        /// What was asked for.
+        id: String,
+        /// How many fit.
+        count: usize,
+    },
+    /// There is nothing to go back to.
+    #[error("axis {axis}: no earlier calibration to roll back to")]
+    NoEarlier {
+        /// Which axis.
+        axis: String,
+    },
+    /// The nodes of the record make no table.
+    #[error("calibration {id}: {source}")]
+    Table {
+        /// The calibration.
+        id: String,
+        /// Why.
+        source: compensator::error_table::TableError,
+    },
+    /// The journal cannot be continued.
+    #[error("{}: cannot be resumed: {what} was `{expected}`, is now `{seen}`", path.display())]
+    NotResumable {
+        /// Which journal.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// What the journal says.
+        expected: String,
+        /// What this run would be.
+        seen: String,
+    },
+}
+
+pub(crate) fn io_error(
+    action: &'static str,
+    path: &Path,
+) -> impl FnOnce(std::io::Error) -> StoreError {
+    let path = path.to_owned();
+    move |source| StoreError::Io { action, path, source }
+}

@@ -1,0 +1,149 @@
+//! The one loop: whatever waits, waits here.
+//!
+//! A tick receives at most one arrival, hands it to the devices of its port, lets deadlines
+//! fire, sends what the devices want to send, and judges their alarms. Nothing outside acts
+//! by itself: every event comes through here.
+
+use drivers::device::Alarm;
+use drivers::transport::{Arrival, Input, LinkState, Payload, Port};
+use drivers::wire::can::BusErrorClass;
+use units::Time;
+
+use crate::failure::Failure;
+use crate::machine::{Machine, Supervision};
+
+impl Machine {
+    /// Lets the machine live until something happened or the clock reaches `until`.
+    ///
+    /// # Errors
+    /// When somebody asked to stop, a bus failed, a device raised an alarm, or something
+    /// could not be sent. The axes still move then: see [`Machine::guarded`].
+    pub fn tick(&mut self, until: Time) -> Result<(), Failure> {
+        self.send_pending()?;
+        let deadline = until.min(self.next_deadline());
+        let arrival = self.transport.receive(deadline);
+        let now = self.transport.now();
+        if let Some(arrival) = arrival {
+            self.take(&arrival)?;
+        }
+        self.fire_deadlines(now);
+        self.send_pending()?;
+        self.judge_alarms()?;
+        if self.supervision == Supervision::On && self.stop.is_requested() {
+            return Err(Failure::Interrupted);
+        }
+        Ok(())
+    }
+
+    /// Ticks until the clock reaches `until`.
+    ///
+    /// # Errors
+    /// As [`Machine::tick`].
+    pub fn run_until(&mut self, until: Time) -> Result<(), Failure> {
+        while self.now() < until {
+            self.tick(until)?;
+        }
+        Ok(())
+    }
+
+    fn next_deadline(&mut self) -> Time {
+        let beats = self.heartbeats.iter().map(|(_, producer)| producer.poll_timeout());
+        let first = beats.min().unwrap_or(Time::NEVER);
+        (0..self.device_count())
+            .map(|at| self.device_mut(at).device.poll_timeout())
+            .fold(first, Time::min)
+    }
+
+    fn take(&mut self, arrival: &Arrival) -> Result<(), Failure> {
+        for at in 0..self.device_count() {
+            let unit = self.device_mut(at);
+            if unit.port == arrival.port {
+                unit.device.handle(arrival.at, &arrival.input);
+            }
+        }
+        if self.supervision == Supervision::Stopping {
+            return Ok(());
+        }
+        match arrival.input {
+            Input::Link(state @ (LinkState::Down | LinkState::Gone)) => {
+                Err(Failure::Link { port: self.port_name(arrival.port), state })
+            }
+            Input::BusError(error) if error.class.contains(BusErrorClass::BUS_OFF) => {
+                Err(Failure::BusOff { port: self.port_name(arrival.port) })
+            }
+            Input::Link(LinkState::Up)
+            | Input::BusError(_)
+            | Input::Lost(_)
+            | Input::Payload(_) => Ok(()),
+        }
+    }
+
+    fn fire_deadlines(&mut self, now: Time) {
+        for at in 0..self.device_count() {
+            let device = self.device_mut(at).device;
+            if device.poll_timeout() <= now {
+                device.handle_timeout(now);
+            }
+        }
+    }
+
+    fn send_pending(&mut self) -> Result<(), Failure> {
+        let now = self.transport.now();
+        for at in 0..self.heartbeats.len() {
+            let (port, producer) = &mut self.heartbeats[at];
+            producer.handle_timeout(now);
+            if let Some(frame) = producer.poll_transmit() {
+                let port = *port;
+                self.send(port, &Payload::Frame(frame), "heartbeat")?;
+            }
+        }
+        for at in 0..self.device_count() {
+            loop {
+                let unit = self.device_mut(at);
+                let port = unit.port;
+                let Some(payload) = unit.device.poll_transmit() else { break };
+                let name = self.device_name(at);
+                self.send(port, &payload, &name)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, port: Port, payload: &Payload, device: &str) -> Result<(), Failure> {
+        match self.transport.send(port, payload) {
+            Ok(()) => Ok(()),
+            // While stopping, what can be sent is sent; the drives' watchdogs do the rest.
+            Err(_) if self.supervision == Supervision::Stopping => Ok(()),
+            Err(source) => Err(Failure::Send { device: device.to_owned(), source }),
+        }
+    }
+
+    fn judge_alarms(&mut self) -> Result<(), Failure> {
+        let mut first = None;
+        for at in 0..self.device_count() {
+            while let Some(alarm) = self.device_mut(at).device.poll_alarm() {
+                self.forget_reference(at, &alarm);
+                first = first.or(Some((at, alarm)));
+            }
+        }
+        match first {
+            Some((at, alarm)) if self.supervision == Supervision::On => {
+                Err(Failure::Alarm { device: self.device_name(at), alarm })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A drive that was reset has lost its origin, whoever is listening.
+    fn forget_reference(&mut self, at: usize, alarm: &Alarm) {
+        if !matches!(alarm, Alarm::UnexpectedBootUp { .. }) || at >= self.axes.len() {
+            return;
+        }
+        let name = self.axes[at].name.clone();
+        self.remember(&name).zeroed = false;
+    }
+
+    fn port_name(&self, port: Port) -> String {
+        self.port_names.get(&port).cloned().unwrap_or_else(|| format!("port {}", port.0))
+    }
+}
