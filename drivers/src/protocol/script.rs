@@ -1,0 +1,330 @@
+//! A list of SDO transfers, done one after the other; each step has a text for a person.
+//!
+//! A device's start procedure is such a list: read, expect, write, write and read back. A step
+//! that fails ends the script; a step whose object need not exist is passed over when the
+//! server says so (abort 0x06020000 or 0x06090011).
+
+use std::collections::VecDeque;
+
+use units::Time;
+
+use super::sdo_client::{Method, SdoClient, SdoFailure};
+use crate::wire::canopen::Object;
+use crate::wire::canopen::sdo::AbortCode;
+
+/// An integer of 1 to 8 bytes, as an object holds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Value {
+    bytes: [u8; 8],
+    len: u8,
+}
+
+macro_rules! from_integers {
+    ($($type:ty),*) => {
+        $(
+            /// Little-endian, with the length of the type.
+            impl From<$type> for Value {
+                fn from(value: $type) -> Self {
+                    Self::new(&value.to_le_bytes())
+                }
+            }
+        )*
+    };
+}
+
+from_integers!(u8, i8, u16, i16, u32, i32);
+
+impl Value {
+    fn new(data: &[u8]) -> Self {
+        let mut bytes = [0; 8];
+        let len = data.len().min(8);
+        bytes[..len].copy_from_slice(&data[..len]);
+        Self {
+            bytes,
+            len: len as u8,
+        }
+    }
+
+    /// The bytes that go on the wire.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.len)]
+    }
+
+    /// The value as an unsigned number.
+    pub const fn raw(&self) -> u64 {
+        u64::from_le_bytes(self.bytes)
+    }
+}
+
+/// What one step does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Read and keep; see [`Script::value`].
+    Read,
+    /// Read; anything else than this value is an error.
+    Expect(Value),
+    /// Write.
+    Write(Value),
+    /// Write, read back, compare the bits of `mask`.
+    WriteAndCheck {
+        /// What is written.
+        value: Value,
+        /// The bits the device may not change.
+        mask: u64,
+    },
+}
+
+/// Whether an object must exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Presence {
+    /// Its absence is an error.
+    Required,
+    /// Its absence is noted.
+    Optional,
+}
+
+/// One step of a script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// The object it is about.
+    pub object: Object,
+    /// What it does.
+    pub action: Action,
+    /// Whether the object must exist.
+    pub presence: Presence,
+    /// What a person reads when it fails: "while ...".
+    pub text: &'static str,
+}
+
+impl Step {
+    const fn new(object: Object, action: Action, text: &'static str) -> Self {
+        Self {
+            object,
+            action,
+            presence: Presence::Required,
+            text,
+        }
+    }
+
+    /// Read and keep.
+    pub const fn read(object: Object, text: &'static str) -> Self {
+        Self::new(object, Action::Read, text)
+    }
+
+    /// Read and compare.
+    pub fn expect(object: Object, value: impl Into<Value>, text: &'static str) -> Self {
+        Self::new(object, Action::Expect(value.into()), text)
+    }
+
+    /// Write only.
+    pub fn write(object: Object, value: impl Into<Value>, text: &'static str) -> Self {
+        Self::new(object, Action::Write(value.into()), text)
+    }
+
+    /// Write and read back.
+    pub fn check(object: Object, value: impl Into<Value>, text: &'static str) -> Self {
+        Self::check_bits(object, value, u64::MAX, text)
+    }
+
+    /// Write and read back, comparing only the bits of `mask`.
+    pub fn check_bits(
+        object: Object,
+        value: impl Into<Value>,
+        mask: u64,
+        text: &'static str,
+    ) -> Self {
+        let value = value.into();
+        Self::new(object, Action::WriteAndCheck { value, mask }, text)
+    }
+
+    /// The same step for an object that need not exist.
+    #[must_use]
+    pub const fn optional(mut self) -> Self {
+        self.presence = Presence::Optional;
+        self
+    }
+}
+
+/// Why a script ended early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScriptFailure {
+    /// The object of the step.
+    pub object: Object,
+    /// The text of the step.
+    pub text: &'static str,
+    /// What went wrong.
+    pub cause: ScriptCause,
+}
+
+/// What went wrong in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScriptCause {
+    /// The transfer failed.
+    Sdo(SdoFailure),
+    /// Another value than expected was read (back).
+    Differs {
+        /// What was written or expected.
+        expected: u64,
+        /// What was read.
+        seen: u64,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The next transfer is to be begun.
+    Ready,
+    Reading,
+    Writing,
+    /// Written; the read-back is to be begun.
+    Written,
+}
+
+/// A script on its way.
+#[derive(Debug)]
+pub struct Script {
+    steps: VecDeque<Step>,
+    phase: Phase,
+    values: Vec<(Object, Vec<u8>)>,
+}
+
+impl Script {
+    /// A script of these steps.
+    pub fn new(steps: impl IntoIterator<Item = Step>) -> Self {
+        Self {
+            steps: steps.into_iter().collect(),
+            phase: Phase::Ready,
+            values: Vec::new(),
+        }
+    }
+
+    /// What was read from `object`, in this script; `None` when it was absent.
+    pub fn data(&self, object: Object) -> Option<&[u8]> {
+        self.values
+            .iter()
+            .rev()
+            .find(|(of, _)| *of == object)
+            .map(|(_, data)| data.as_slice())
+    }
+
+    /// The same as an unsigned number of at most 32 bits.
+    pub fn value(&self, object: Object) -> Option<u32> {
+        self.data(object).map(|data| Value::new(data).raw() as u32)
+    }
+
+    /// Goes on: takes the client's outcome and begins the next transfer. Call it after every
+    /// frame and time-out the client was given; no other user may share the client meanwhile.
+    /// `Some` when the script is done.
+    pub fn poll(&mut self, now: Time, client: &mut SdoClient) -> Option<Result<(), ScriptFailure>> {
+        loop {
+            let Some(step) = self.steps.front().copied() else {
+                return Some(Ok(()));
+            };
+            match self.phase {
+                Phase::Reading | Phase::Writing => {
+                    let outcome = client.poll_outcome()?;
+                    if let Err(cause) = self.take(step, outcome) {
+                        self.steps.clear();
+                        return Some(Err(ScriptFailure {
+                            object: step.object,
+                            text: step.text,
+                            cause,
+                        }));
+                    }
+                }
+                Phase::Ready | Phase::Written => {
+                    if self.begin(now, step, client).is_err() {
+                        return None;
+                    }
+                }
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        now: Time,
+        step: Step,
+        client: &mut SdoClient,
+    ) -> Result<(), super::sdo_client::Busy> {
+        let to_write = match step.action {
+            Action::Read | Action::Expect(_) => None,
+            Action::Write(value) | Action::WriteAndCheck { value, .. } => {
+                (self.phase == Phase::Ready).then_some(value)
+            }
+        };
+        // Configuration values may be written twice without harm.
+        match to_write {
+            Some(value) => {
+                client.write_idempotent(now, step.object, value.bytes(), Method::Auto)?;
+                self.phase = Phase::Writing;
+            }
+            None => {
+                client.read(now, step.object, Method::Auto)?;
+                self.phase = Phase::Reading;
+            }
+        }
+        Ok(())
+    }
+
+    fn take(
+        &mut self,
+        step: Step,
+        outcome: Result<Vec<u8>, SdoFailure>,
+    ) -> Result<(), ScriptCause> {
+        let data = match outcome {
+            Ok(data) => data,
+            Err(failure) if step.presence == Presence::Optional && is_absence(&failure) => {
+                self.done();
+                return Ok(());
+            }
+            Err(failure) => return Err(ScriptCause::Sdo(failure)),
+        };
+        match (step.action, self.phase) {
+            (Action::WriteAndCheck { .. }, Phase::Writing) => self.phase = Phase::Written,
+            (Action::Write(_), _) => self.done(),
+            (Action::Read, _) => {
+                self.values.push((step.object, data));
+                self.done();
+            }
+            (Action::Expect(value), _) => {
+                compare(value, u64::MAX, &data)?;
+                self.done();
+            }
+            (Action::WriteAndCheck { value, mask }, _) => {
+                compare(value, mask, &data)?;
+                self.done();
+            }
+        }
+        Ok(())
+    }
+
+    fn done(&mut self) {
+        self.steps.pop_front();
+        self.phase = Phase::Ready;
+    }
+}
+
+const fn is_absence(failure: &SdoFailure) -> bool {
+    match failure {
+        SdoFailure::Aborted { code, .. } => {
+            matches!(code, AbortCode::NoSuchObject | AbortCode::NoSuchSubIndex)
+        }
+        SdoFailure::TimedOut { .. } | SdoFailure::Protocol { .. } => false,
+    }
+}
+
+/// A server that does not indicate the size answers with 4 bytes: only the value's own count.
+fn compare(expected: Value, mask: u64, data: &[u8]) -> Result<(), ScriptCause> {
+    let own = data.len().min(usize::from(expected.len));
+    let seen = Value::new(&data[..own]);
+    let same = seen.raw() & mask == expected.raw() & mask && !data.is_empty();
+    if same {
+        Ok(())
+    } else {
+        Err(ScriptCause::Differs {
+            expected: expected.raw(),
+            seen: Value::new(data).raw(),
+        })
+    }
+}
