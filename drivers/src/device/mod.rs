@@ -6,6 +6,7 @@
 pub mod cia401;
 pub mod cia402;
 pub mod dcon;
+pub mod serial_line;
 pub mod umd2;
 
 use core::fmt;
