@@ -6,6 +6,7 @@
 pub mod cia401;
 pub mod cia402;
 pub mod dcon;
+pub mod serial_line;
 pub mod umd2;
 
 use core::fmt;
@@ -249,6 +250,8 @@ pub enum Alarm {
     SlewError,
     /// Samples are missing from the interferometer's stream.
     SamplesLost { lost: u64 },
+    /// The interferometer began to count anew: it was reset or lost power.
+    CountRestarted,
     /// The stream ended.
     StreamSilent { waited: Duration },
     /// Lines that are not understood came in a row: wrong baud rate?
@@ -449,6 +452,9 @@ impl fmt::Display for Alarm {
             Self::LaserLost => f.write_str("interferometer: no reference from the laser head"),
             Self::SlewError => f.write_str("interferometer: too fast to count; slow down"),
             Self::SamplesLost { lost } => write!(f, "interferometer: {lost} samples missing"),
+            Self::CountRestarted => {
+                f.write_str("interferometer: began to count anew (reset?); set a new datum")
+            }
             Self::StreamSilent { waited } => {
                 write!(
                     f,

@@ -4,6 +4,18 @@
 //! same: live ports (SocketCAN, SLCAN, serial lines), an in-process world in virtual time,
 //! and the replay of a recording.
 
+pub mod clock;
+pub mod in_process;
+pub mod live;
+mod os;
+pub mod record;
+pub mod replay;
+mod serial;
+mod slcan;
+mod socketcan;
+mod stamps;
+pub mod sync_thread;
+
 use core::time::Duration;
 use units::Time;
 

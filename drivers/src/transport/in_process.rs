@@ -1,0 +1,214 @@
+//! A world in this process, in virtual time: no wall clock, the same result every run.
+
+use core::time::Duration;
+use nix::errno::Errno;
+use std::collections::BTreeMap;
+use units::Time;
+
+use super::live::system;
+use super::{Arrival, Payload, Port, SendError, Transport};
+use crate::wire::canopen::sync::emit_sync;
+
+/// What is at the other end of the ports: emulated devices and their machine.
+pub trait World {
+    /// When something happens by itself next; [`Time::NEVER`] for never.
+    fn next_event(&self) -> Time;
+
+    /// Lets time pass up to `to`.
+    fn advance(&mut self, to: Time);
+
+    /// Takes what the host sends.
+    fn deliver(&mut self, at: Time, port: Port, payload: &Payload);
+
+    /// The next thing that reaches the host, if it has arrived by the world's present time.
+    fn collect(&mut self) -> Option<Arrival>;
+}
+
+/// How often a world may ask for the same moment before it is taken to hang.
+const ROUNDS_MAX: u32 = 1_000_000;
+
+#[derive(Clone, Copy, Debug)]
+struct Sync {
+    period: Duration,
+    next: Time,
+}
+
+/// A transport whose other end is a [`World`].
+#[derive(Debug)]
+pub struct InProcess<W> {
+    world: W,
+    now: Time,
+    syncs: BTreeMap<Port, Sync>,
+}
+
+impl<W: World> InProcess<W> {
+    /// Starts at [`Time::ZERO`].
+    pub const fn new(world: W) -> Self {
+        Self {
+            world,
+            now: Time::ZERO,
+            syncs: BTreeMap::new(),
+        }
+    }
+
+    /// The world.
+    pub const fn world(&self) -> &W {
+        &self.world
+    }
+
+    /// The world, to meddle with it: faults, power, hands on the stage.
+    pub const fn world_mut(&mut self) -> &mut W {
+        &mut self.world
+    }
+
+    /// Gives the world back.
+    pub fn into_world(self) -> W {
+        self.world
+    }
+
+    fn next_sync(&self) -> Time {
+        let next = self.syncs.values().map(|sync| sync.next).min();
+        next.unwrap_or(Time::NEVER)
+    }
+
+    /// Sends the SYNCs that are due. The host does not hear its own.
+    fn send_due_syncs(&mut self) {
+        for (port, sync) in &mut self.syncs {
+            while sync.next <= self.now {
+                let frame = Payload::Frame(emit_sync(None));
+                self.world.deliver(sync.next, *port, &frame);
+                sync.next += sync.period;
+            }
+        }
+    }
+}
+
+impl<W: World> Transport for InProcess<W> {
+    fn now(&self) -> Time {
+        self.now
+    }
+
+    fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
+        self.world.deliver(self.now, port, payload);
+        Ok(())
+    }
+
+    /// # Panics
+    /// When the world asks for the same moment without end.
+    fn receive(&mut self, until: Time) -> Option<Arrival> {
+        let mut rounds = 0;
+        loop {
+            if let Some(arrival) = self.world.collect() {
+                return Some(arrival);
+            }
+            // A world may be late for an event, but time does not run backwards.
+            let next = self.world.next_event().min(self.next_sync()).min(until);
+            let before = self.now;
+            self.now = next.max(self.now);
+            self.send_due_syncs();
+            self.world.advance(self.now);
+            if self.now >= until {
+                return self.world.collect();
+            }
+            rounds = if self.now == before { rounds + 1 } else { 0 };
+            assert!(rounds < ROUNDS_MAX, "the world hangs at {}", self.now);
+        }
+    }
+
+    fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
+        match period {
+            None => {
+                self.syncs.remove(&port);
+            }
+            Some(Duration::ZERO) => return Err(system(port, Errno::EINVAL)),
+            Some(period) => {
+                let next = self.now + period;
+                self.syncs.insert(port, Sync { period, next });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::Input;
+    use crate::wire::can::CanFrame;
+
+    /// Answers each frame after 300 µs and writes down what it got.
+    #[derive(Default)]
+    struct Echo {
+        now: Time,
+        heard: Vec<(Time, String)>,
+        answers: Vec<Arrival>,
+    }
+
+    impl World for Echo {
+        fn next_event(&self) -> Time {
+            self.answers.first().map_or(Time::NEVER, |answer| answer.at)
+        }
+
+        fn advance(&mut self, to: Time) {
+            self.now = to;
+        }
+
+        fn deliver(&mut self, at: Time, port: Port, payload: &Payload) {
+            let Payload::Frame(frame) = payload else {
+                return;
+            };
+            self.heard.push((at, frame.to_string()));
+            let at = at + Duration::from_micros(300);
+            let input = Input::Payload(payload.clone());
+            self.answers.push(Arrival { port, at, input });
+        }
+
+        fn collect(&mut self) -> Option<Arrival> {
+            if self.answers.first()?.at > self.now {
+                return None;
+            }
+            Some(self.answers.remove(0))
+        }
+    }
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn time_jumps_to_what_happens_next_and_no_further_than_asked() {
+        let mut bus = InProcess::new(Echo::default());
+        let frame = Payload::Frame(CanFrame::standard(0x601, &[1]));
+        bus.send(Port(2), &frame).unwrap();
+        let answer = bus.receive(Time(MS)).unwrap();
+        assert_eq!((answer.port, answer.at), (Port(2), Time(300_000)));
+        assert_eq!(bus.now(), Time(300_000));
+        assert_eq!(bus.receive(Time(MS)), None);
+        assert_eq!(bus.now(), Time(MS));
+    }
+
+    #[test]
+    fn what_arrives_at_the_deadline_itself_is_not_missed() {
+        let mut bus = InProcess::new(Echo::default());
+        let frame = Payload::Frame(CanFrame::standard(0x601, &[]));
+        bus.send(Port(0), &frame).unwrap();
+        assert!(bus.receive(Time(300_000)).is_some());
+    }
+
+    #[test]
+    fn syncs_are_sent_on_their_grid_until_stopped() {
+        let mut bus = InProcess::new(Echo::default());
+        bus.set_sync(Port(0), Some(Duration::from_millis(2)))
+            .unwrap();
+        while bus.receive(Time(5 * MS)).is_some() {}
+        bus.set_sync(Port(0), None).unwrap();
+        while bus.receive(Time(9 * MS)).is_some() {}
+        let at: Vec<_> = bus.world().heard.iter().map(|(at, _)| at.nanos()).collect();
+        assert_eq!(at, [2 * MS, 4 * MS]);
+        assert!(bus.world().heard.iter().all(|(_, frame)| frame == "080#"));
+    }
+
+    #[test]
+    fn a_period_of_zero_is_refused() {
+        let mut bus = InProcess::new(Echo::default());
+        assert!(bus.set_sync(Port(0), Some(Duration::ZERO)).is_err());
+    }
+}

@@ -1,0 +1,29 @@
+//! The two system calls that no safe library offers.
+
+#![expect(
+    unsafe_code,
+    reason = "serialport gives its descriptor away only as a number, and nix has no \
+              sched_setscheduler"
+)]
+
+use nix::errno::Errno;
+use std::os::fd::{FromRawFd, IntoRawFd, OwnedFd};
+
+/// Takes over the descriptor of an open port.
+pub(super) fn take_descriptor(port: impl IntoRawFd) -> OwnedFd {
+    // SAFETY: `into_raw_fd` hands over an open descriptor that nobody else closes.
+    unsafe { OwnedFd::from_raw_fd(port.into_raw_fd()) }
+}
+
+/// Puts the calling thread under SCHED_FIFO.
+///
+/// # Errors
+/// EPERM without CAP_SYS_NICE or a real-time limit (`ulimit -r`).
+pub(super) fn schedule_fifo(priority: i32) -> Result<(), Errno> {
+    let parameter = libc::sched_param {
+        sched_priority: priority,
+    };
+    // SAFETY: the call reads one `sched_param`; 0 is the calling thread.
+    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) };
+    Errno::result(result).map(drop)
+}

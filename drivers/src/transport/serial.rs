@@ -1,0 +1,390 @@
+//! Serial lines: opening and settings by tokio-serial's port builder, bytes by the
+//! descriptor, vanishing and coming back.
+
+use core::time::Duration;
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use std::collections::VecDeque;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::sync::Arc;
+use tokio_serial::SerialPort as _;
+use units::Time;
+
+use super::clock::Clock;
+use super::live::{LivePort, system};
+use super::os;
+use super::{Input, LinkState, Payload, Port, SendError};
+
+const READ_MAX: usize = 4_096;
+/// What may wait for a slow line before a send is refused.
+const PENDING_MAX: usize = 4_096;
+const FIRST_RETRY: Duration = Duration::from_millis(100);
+const RETRY_MAX: Duration = Duration::from_secs(2);
+
+/// The parity bit of a serial line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Parity {
+    #[default]
+    None,
+    Even,
+    Odd,
+}
+
+/// The stop bits of a serial line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum StopBits {
+    #[default]
+    One,
+    Two,
+}
+
+/// How a serial line is set up. Flow control is off: no device here uses it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SerialSettings {
+    /// Bits per second.
+    pub baud: u32,
+    /// 5 to 8.
+    pub data_bits: u8,
+    /// Parity.
+    pub parity: Parity,
+    /// Stop bits.
+    pub stop_bits: StopBits,
+    /// Data terminal ready; `None` leaves it as it is. A pty has none, which is no error.
+    pub dtr: Option<bool>,
+    /// Request to send; as `dtr`.
+    pub rts: Option<bool>,
+}
+
+impl SerialSettings {
+    /// 8 data bits, no parity, 1 stop bit, DTR and RTS on.
+    pub const fn new(baud: u32) -> Self {
+        Self {
+            baud,
+            data_bits: 8,
+            parity: Parity::None,
+            stop_bits: StopBits::One,
+            dtr: Some(true),
+            rts: Some(true),
+        }
+    }
+}
+
+/// Why a serial line could not be opened.
+#[derive(Debug)]
+pub(super) struct SerialError {
+    pub(super) source: std::io::Error,
+    pub(super) help: &'static str,
+}
+
+/// Opens and sets up a serial line; reads and writes on it never wait.
+pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OwnedFd, SerialError> {
+    let data_bits = match settings.data_bits {
+        5 => tokio_serial::DataBits::Five,
+        6 => tokio_serial::DataBits::Six,
+        7 => tokio_serial::DataBits::Seven,
+        _ => tokio_serial::DataBits::Eight,
+    };
+    let parity = match settings.parity {
+        Parity::None => tokio_serial::Parity::None,
+        Parity::Even => tokio_serial::Parity::Even,
+        Parity::Odd => tokio_serial::Parity::Odd,
+    };
+    let stop_bits = match settings.stop_bits {
+        StopBits::One => tokio_serial::StopBits::One,
+        StopBits::Two => tokio_serial::StopBits::Two,
+    };
+    let mut port = tokio_serial::new(path, settings.baud)
+        .data_bits(data_bits)
+        .parity(parity)
+        .stop_bits(stop_bits)
+        .open_native()
+        .map_err(|error| explain(path, error))?;
+    // A pty has no modem lines (ENOTTY), some adapters do not either.
+    if let Some(level) = settings.dtr {
+        let _ = port.write_data_terminal_ready(level);
+    }
+    if let Some(level) = settings.rts {
+        let _ = port.write_request_to_send(level);
+    }
+    // What came before the settings did may be garbled.
+    let _ = port.clear(tokio_serial::ClearBuffer::Input);
+    let descriptor = os::take_descriptor(port);
+    fcntl(&descriptor, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|errno| SerialError {
+        source: errno.into(),
+        help: "this is no terminal device",
+    })?;
+    Ok(descriptor)
+}
+
+fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
+    let source = std::io::Error::from(error);
+    // tokio-serial folds every cause into "no device": ask the file system.
+    let help = match std::fs::metadata(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
+            "no permission; add the user to the group of the device (often `dialout`)"
+        }
+        Err(_) => "does not exist; `ls /dev/serial/by-id` lists what is plugged in",
+        Ok(_) if std::fs::File::open(path).is_err_and(|e| is_denied(&e)) => {
+            "no permission; add the user to the group of the device (often `dialout`)"
+        }
+        Ok(_) => "another program has it open, or it is no serial device",
+    };
+    SerialError { source, help }
+}
+
+fn is_denied(error: &std::io::Error) -> bool {
+    error.kind() == std::io::ErrorKind::PermissionDenied
+}
+
+/// Bytes on their way out; what a slow line does not take at once is kept, in order.
+#[derive(Debug)]
+pub(super) struct Outbox {
+    descriptor: Option<Arc<OwnedFd>>,
+    pending: VecDeque<u8>,
+    limit: usize,
+}
+
+impl Outbox {
+    pub(super) const fn new(limit: usize) -> Self {
+        Self {
+            descriptor: None,
+            pending: VecDeque::new(),
+            limit,
+        }
+    }
+
+    /// From now on to this descriptor; what was pending is forgotten.
+    pub(super) fn connect(&mut self, descriptor: Option<Arc<OwnedFd>>) {
+        self.descriptor = descriptor;
+        self.pending.clear();
+    }
+
+    pub(super) fn is_pending(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    /// Writes or keeps all of `bytes`, or none: EAGAIN when too much is pending.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> Result<(), Errno> {
+        self.flush()?;
+        if self.pending.len() + bytes.len() > self.limit {
+            return Err(Errno::EAGAIN);
+        }
+        let written = if self.is_pending() {
+            0
+        } else {
+            self.write(bytes)?
+        };
+        self.pending.extend(&bytes[written..]);
+        Ok(())
+    }
+
+    /// Writes of what is pending as much as the line takes now.
+    pub(super) fn flush(&mut self) -> Result<(), Errno> {
+        while self.is_pending() {
+            let (front, _) = self.pending.as_slices();
+            let written = self.write(front)?;
+            if written == 0 {
+                break;
+            }
+            self.pending.drain(..written);
+        }
+        Ok(())
+    }
+
+    /// How many bytes the line took; 0 when it takes none now.
+    fn write(&self, bytes: &[u8]) -> Result<usize, Errno> {
+        let descriptor = self.descriptor.as_ref().ok_or(Errno::ENODEV)?;
+        match nix::unistd::write(descriptor, bytes) {
+            Err(Errno::EAGAIN | Errno::EINTR) => Ok(0),
+            result => result,
+        }
+    }
+}
+
+/// What a read gave.
+pub(super) enum Read {
+    Bytes(Vec<u8>),
+    Nothing,
+    /// The device vanished.
+    Gone,
+}
+
+/// Reads what is there.
+pub(super) fn read(descriptor: &OwnedFd) -> Read {
+    let mut buffer = [0; READ_MAX];
+    match nix::unistd::read(descriptor, &mut buffer) {
+        // A pty whose other side was closed reads as 0 bytes or EIO.
+        Ok(0) => Read::Gone,
+        Ok(count) => Read::Bytes(buffer[..count].to_vec()),
+        Err(Errno::EAGAIN | Errno::EINTR) => Read::Nothing,
+        Err(_) => Read::Gone,
+    }
+}
+
+/// Waits longer after each failure to open again.
+#[derive(Debug)]
+pub(super) struct BackOff {
+    clock: Clock,
+    wait: Duration,
+    at: Time,
+}
+
+impl BackOff {
+    pub(super) const fn new(clock: Clock) -> Self {
+        Self {
+            clock,
+            wait: FIRST_RETRY,
+            at: Time::ZERO,
+        }
+    }
+
+    /// Begins anew: the first try comes soon.
+    pub(super) fn begin(&mut self, now: Time) {
+        self.wait = FIRST_RETRY;
+        self.again(now);
+    }
+
+    /// A try failed: the next comes later.
+    pub(super) fn again(&mut self, now: Time) {
+        self.at = now + self.clock.span_of_wall(self.wait);
+        self.wait = (self.wait * 2).min(RETRY_MAX);
+    }
+
+    /// When to try.
+    pub(super) const fn at(&self) -> Time {
+        self.at
+    }
+}
+
+/// A serial line that carries plain bytes.
+pub(super) struct SerialLine {
+    port: Port,
+    path: String,
+    settings: SerialSettings,
+    descriptor: Option<Arc<OwnedFd>>,
+    outbox: Outbox,
+    back_off: BackOff,
+    queued: VecDeque<(Time, Input)>,
+    reopened: u64,
+    refused: u64,
+}
+
+impl SerialLine {
+    pub(super) fn open(
+        clock: Clock,
+        port: Port,
+        path: &str,
+        settings: SerialSettings,
+    ) -> Result<Self, SerialError> {
+        let mut line = Self {
+            port,
+            path: path.to_owned(),
+            settings,
+            descriptor: None,
+            outbox: Outbox::new(PENDING_MAX),
+            back_off: BackOff::new(clock),
+            queued: VecDeque::new(),
+            reopened: 0,
+            refused: 0,
+        };
+        line.connect()?;
+        Ok(line)
+    }
+
+    fn connect(&mut self) -> Result<(), SerialError> {
+        let descriptor = Arc::new(open(&self.path, &self.settings)?);
+        self.outbox.connect(Some(Arc::clone(&descriptor)));
+        self.descriptor = Some(descriptor);
+        Ok(())
+    }
+
+    fn lose(&mut self, now: Time) {
+        if self.descriptor.take().is_some() {
+            self.outbox.connect(None);
+            self.back_off.begin(now);
+            self.queued.push_back((now, Input::Link(LinkState::Gone)));
+        }
+    }
+
+    fn try_again(&mut self, now: Time) {
+        match self.connect() {
+            Ok(()) => {
+                self.reopened += 1;
+                self.queued.push_back((now, Input::Link(LinkState::Up)));
+            }
+            Err(_) => self.back_off.again(now),
+        }
+    }
+
+    fn read(&mut self, now: Time) {
+        let Some(descriptor) = &self.descriptor else {
+            return;
+        };
+        match read(descriptor) {
+            Read::Bytes(bytes) => {
+                let input = Input::Payload(Payload::Bytes(bytes));
+                self.queued.push_back((now, input));
+            }
+            Read::Nothing => {}
+            Read::Gone => self.lose(now),
+        }
+        if self.outbox.flush().is_err() {
+            self.lose(now);
+        }
+    }
+}
+
+impl LivePort for SerialLine {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.descriptor.as_ref().map(|open| open.as_fd())
+    }
+
+    fn wants_write(&self) -> bool {
+        self.outbox.is_pending()
+    }
+
+    fn next_event(&self) -> Time {
+        if !self.queued.is_empty() {
+            Time::ZERO
+        } else if self.descriptor.is_none() {
+            self.back_off.at()
+        } else {
+            Time::NEVER
+        }
+    }
+
+    fn poll(&mut self, now: Time, ready: bool) -> Option<(Time, Input)> {
+        if self.queued.is_empty() && ready {
+            self.read(now);
+        } else if self.descriptor.is_none() && self.back_off.at() <= now {
+            self.try_again(now);
+        }
+        self.queued.pop_front()
+    }
+
+    fn send(&mut self, now: Time, payload: &Payload) -> Result<(), SendError> {
+        let port = self.port;
+        let Payload::Bytes(bytes) = payload else {
+            return Err(SendError::WrongKind { port });
+        };
+        let state = LinkState::Gone;
+        let gone = SendError::Unusable { port, state };
+        if self.descriptor.is_none() {
+            return Err(gone);
+        }
+        self.outbox.send(bytes).map_err(|errno| {
+            self.refused += 1;
+            if errno == Errno::EAGAIN {
+                return system(port, errno);
+            }
+            self.lose(now);
+            gone
+        })
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        vec![("reopened", self.reopened), ("refused", self.refused)]
+    }
+}

@@ -1,0 +1,286 @@
+//! The SYNC producer: a thread of its own with absolute deadlines.
+//!
+//! It sleeps by `clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME)`, so that lateness never
+//! adds up, and asks for SCHED_FIFO; a refusal is reported, not fatal. A SYNC that would be
+//! more than half a period late is left out and counted: drives take their set-points from
+//! the spacing of SYNCs, and two in quick succession are worse than one missing.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use nix::errno::Errno;
+use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::os;
+
+/// Below the kernel's own threads (50), above everything ordinary.
+const FIFO_PRIORITY: i32 = 40;
+/// Longer sleeps are cut into these, so that a thread told to stop does.
+const SLEEP_MAX: Duration = Duration::from_millis(50);
+/// How many classes [`SyncStatistics::histogram`] has.
+pub const LATENESS_CLASSES: usize = 16;
+
+/// Where SYNCs go; shared with the port that reads.
+pub(super) trait SyncSink: Send + Sync {
+    /// Sends one SYNC now or not at all.
+    fn send_sync(&self) -> Result<(), Errno>;
+}
+
+/// How the SYNC thread is scheduled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scheduling {
+    /// Not known yet.
+    #[default]
+    Starting,
+    /// SCHED_FIFO.
+    RealTime,
+    /// SCHED_FIFO was refused with this error number; allow it with `ulimit -r` or
+    /// CAP_SYS_NICE.
+    Ordinary {
+        /// The operating system's error number.
+        errno: i32,
+    },
+}
+
+/// What the SYNC thread has done so far; lateness is in wall time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SyncStatistics {
+    /// SYNCs sent.
+    pub sent: u64,
+    /// Periods left out because they were more than half a period late.
+    pub skipped: u64,
+    /// SYNCs that the port refused (queue full, interface down).
+    pub refused: u64,
+    /// The greatest lateness, of those left out too.
+    pub latest: Duration,
+    /// Class 0: less than 1 µs late; class n: less than 2^n µs; the last: anything more.
+    pub histogram: [u64; LATENESS_CLASSES],
+    /// How the thread is scheduled.
+    pub scheduling: Scheduling,
+}
+
+impl SyncStatistics {
+    fn note_lateness(&mut self, late: Duration) {
+        self.latest = self.latest.max(late);
+        let micros = late.as_micros().min(u128::from(u32::MAX)) as u32;
+        let class = (u32::BITS - micros.leading_zeros()) as usize;
+        self.histogram[class.min(LATENESS_CLASSES - 1)] += 1;
+    }
+}
+
+/// A running SYNC producer; dropping it stops it.
+pub(super) struct SyncThread {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    sink: Arc<dyn SyncSink>,
+    /// Held while a SYNC is sent: once `stop` has returned, none follows.
+    plan: Mutex<Plan>,
+    ended: AtomicBool,
+}
+
+struct Plan {
+    period: Duration,
+    running: bool,
+    statistics: SyncStatistics,
+}
+
+impl SyncThread {
+    /// Starts a thread that sends the first SYNC one (wall) period from now.
+    pub(super) fn start(sink: Arc<dyn SyncSink>, period: Duration) -> std::io::Result<Self> {
+        let plan = Plan {
+            period,
+            running: true,
+            statistics: SyncStatistics::default(),
+        };
+        let shared = Arc::new(Shared {
+            sink,
+            plan: Mutex::new(plan),
+            ended: AtomicBool::new(false),
+        });
+        let thread = Arc::clone(&shared);
+        std::thread::Builder::new()
+            .name("sync".to_owned())
+            .spawn(move || thread.run())?;
+        Ok(Self { shared })
+    }
+
+    /// Changes the period, from the SYNC after the next one on.
+    pub(super) fn set_period(&self, period: Duration) {
+        self.shared.plan().period = period;
+    }
+
+    /// Whether the thread still runs.
+    pub(super) fn is_running(&self) -> bool {
+        !self.shared.ended.load(Ordering::Acquire)
+    }
+
+    pub(super) fn statistics(&self) -> SyncStatistics {
+        self.shared.plan().statistics
+    }
+}
+
+impl Drop for SyncThread {
+    /// Does not wait for the thread; it sends nothing more.
+    fn drop(&mut self) {
+        self.shared.plan().running = false;
+    }
+}
+
+impl Shared {
+    fn plan(&self) -> MutexGuard<'_, Plan> {
+        self.plan.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn run(&self) {
+        let scheduling = match os::schedule_fifo(FIFO_PRIORITY) {
+            Ok(()) => Scheduling::RealTime,
+            Err(errno) => Scheduling::Ordinary {
+                errno: errno as i32,
+            },
+        };
+        self.plan().statistics.scheduling = scheduling;
+        let mut deadline = monotonic() + self.plan().period;
+        while self.sleep_until(deadline) {
+            let mut plan = self.plan();
+            if !plan.running {
+                break;
+            }
+            deadline = self.act(&mut plan, deadline, monotonic());
+        }
+        self.ended.store(true, Ordering::Release);
+    }
+
+    /// Sends or leaves out the SYNC of `deadline`; returns the next deadline.
+    fn act(&self, plan: &mut Plan, deadline: Duration, now: Duration) -> Duration {
+        let late = now.saturating_sub(deadline);
+        let period = plan.period;
+        plan.statistics.note_lateness(late);
+        if late * 2 <= period {
+            match self.sink.send_sync() {
+                Ok(()) => plan.statistics.sent += 1,
+                Err(_) => plan.statistics.refused += 1,
+            }
+            return deadline + period;
+        }
+        let missed = late.as_nanos() / period.as_nanos().max(1) + 1;
+        plan.statistics.skipped += missed as u64;
+        deadline + period * u32::try_from(missed).unwrap_or(u32::MAX)
+    }
+
+    /// `false` when told to stop meanwhile.
+    fn sleep_until(&self, deadline: Duration) -> bool {
+        loop {
+            let now = monotonic();
+            if now >= deadline {
+                return true;
+            }
+            let wake = deadline.min(now + SLEEP_MAX);
+            // EINTR ends the sleep early; the loop then sleeps on.
+            let _ = clock_nanosleep(
+                ClockId::CLOCK_MONOTONIC,
+                ClockNanosleepFlags::TIMER_ABSTIME,
+                &TimeSpec::from(wake),
+            );
+            if wake < deadline && !self.plan().running {
+                return false;
+            }
+        }
+    }
+}
+
+/// CLOCK_MONOTONIC.
+fn monotonic() -> Duration {
+    clock_gettime(ClockId::CLOCK_MONOTONIC)
+        .map(Duration::from)
+        .expect("CLOCK_MONOTONIC exists on every Linux")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    struct Probe(Mutex<mpsc::Sender<Duration>>);
+
+    impl SyncSink for Probe {
+        fn send_sync(&self) -> Result<(), Errno> {
+            let sender = self.0.lock().unwrap();
+            sender.send(monotonic()).map_err(|_| Errno::EPIPE)
+        }
+    }
+
+    fn probe() -> (Arc<Probe>, mpsc::Receiver<Duration>) {
+        let (sender, receiver) = mpsc::channel();
+        (Arc::new(Probe(Mutex::new(sender))), receiver)
+    }
+
+    fn shared(period: Duration) -> (Shared, mpsc::Receiver<Duration>) {
+        let (sink, receiver) = probe();
+        let plan = Plan {
+            period,
+            running: true,
+            statistics: SyncStatistics::default(),
+        };
+        let shared = Shared {
+            sink,
+            plan: Mutex::new(plan),
+            ended: AtomicBool::new(false),
+        };
+        (shared, receiver)
+    }
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn lateness_of_one_syncs_never_moves_the_next_deadline() {
+        let (shared, sent) = shared(2 * MS);
+        let mut plan = shared.plan();
+        let late = Duration::from_micros(300);
+        let next = shared.act(&mut plan, 10 * MS, 10 * MS + late);
+        assert_eq!(next, 12 * MS);
+        assert_eq!(sent.try_iter().count(), 1);
+        assert_eq!(plan.statistics.latest, late);
+        assert_eq!(plan.statistics.histogram[9], 1);
+    }
+
+    #[test]
+    fn after_a_stall_missed_periods_are_left_out_and_counted() {
+        let (shared, sent) = shared(2 * MS);
+        let mut plan = shared.plan();
+        let next = shared.act(&mut plan, 10 * MS, 19 * MS + MS / 2);
+        assert_eq!(next, 20 * MS);
+        assert_eq!(plan.statistics.skipped, 5);
+        assert_eq!(sent.try_iter().count(), 0);
+    }
+
+    #[test]
+    fn syncs_come_until_told_to_stop() {
+        let (sink, sent) = probe();
+        let thread = SyncThread::start(sink, MS).unwrap();
+        let first = sent.recv().unwrap();
+        thread.set_period(5 * MS);
+        let rest: Vec<_> = sent.iter().take(4).collect();
+        assert!(rest.iter().all(|at| *at > first));
+        assert!(thread.statistics().sent >= 5);
+        assert_ne!(thread.statistics().scheduling, Scheduling::Starting);
+        drop(thread);
+        let _ = sent.try_iter().count();
+        // The thread's end drops the sink and with it the sender.
+        assert!(sent.recv().is_err());
+    }
+
+    #[test]
+    fn a_refused_sync_is_counted_and_the_next_one_tried() {
+        let (sink, sent) = probe();
+        drop(sent);
+        let thread = SyncThread::start(sink, MS).unwrap();
+        while thread.statistics().refused < 3 {
+            std::thread::yield_now();
+        }
+        assert_eq!(thread.statistics().sent, 0);
+        assert!(thread.is_running());
+    }
+}
