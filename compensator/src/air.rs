@@ -11,7 +11,7 @@
 //! | x_v | `vapour_fraction` |
 //! | r_as, r_axs, r_vs | `dry_standard`, `vapour_standard` refractivities |
 //! | ρ_axs, ρ_vs, ρ_a, ρ_v | densities in kg/m³ |
-//! | Z, Z_a | `compressibility`, [`Z_STANDARD`] |
+//! | Z, Z_a | `compressibility`, `Z_STANDARD` |
 //!
 //! Absent: the group index, ice below 0 °C, gases other than CO₂ and water.
 
@@ -98,13 +98,31 @@ pub fn refractive_index(
     co2_umol_per_mol: f64,
 ) -> Result<f64, OutOfRange> {
     let wavelength_um = vacuum_wavelength.um();
-    within(Input::VacuumWavelength, wavelength_um * 1e3, 300.0, 1700.0, "nm")?;
+    within(
+        Input::VacuumWavelength,
+        wavelength_um * 1e3,
+        300.0,
+        1700.0,
+        "nm",
+    )?;
     within(Input::Temperature, t.value(), 0.0, 100.0, "°C")?;
     within(Input::Pressure, p.value(), 10e3, 140e3, "Pa")?;
     within(Input::Humidity, rh.value(), 0.0, 1.0, "(fraction)")?;
-    within(Input::CarbonDioxide, co2_umol_per_mol, 0.0, 2000.0, "umol/mol")?;
+    within(
+        Input::CarbonDioxide,
+        co2_umol_per_mol,
+        0.0,
+        2000.0,
+        "umol/mol",
+    )?;
     let wavenumber_squared = 1.0 / (wavelength_um * wavelength_um);
-    Ok(ciddor(wavenumber_squared, t.value(), p.value(), rh.value(), co2_umol_per_mol))
+    Ok(ciddor(
+        wavenumber_squared,
+        t.value(),
+        p.value(),
+        rh.value(),
+        co2_umol_per_mol,
+    ))
 }
 
 /// The derivatives of [`refractive_index`], by central differences.
@@ -141,7 +159,13 @@ fn within(
     if seen >= low && seen <= high {
         Ok(())
     } else {
-        Err(OutOfRange { input, seen, low, high, unit })
+        Err(OutOfRange {
+            input,
+            seen,
+            low,
+            high,
+            unit,
+        })
     }
 }
 
@@ -225,8 +249,13 @@ mod tests {
 
     #[test]
     fn the_index_agrees_with_the_shared_reference_file_where_it_is_present() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/air_index_ciddor.csv");
-        let Ok(text) = std::fs::read_to_string(path) else { return };
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../shared/data/air_index_ciddor.csv"
+        );
+        let Ok(text) = std::fs::read_to_string(path) else {
+            return;
+        };
         let rows: Vec<Vec<f64>> = text
             .lines()
             .skip(1)
@@ -256,11 +285,26 @@ mod tests {
     #[test]
     fn an_input_out_of_range_or_nan_is_named_with_its_limits() {
         let index = |t: f64, p: f64, h: f64| {
-            refractive_index(Metres(633e-9), Celsius(t), Pascals(p), RelativeHumidity(h), 450.0)
+            refractive_index(
+                Metres(633e-9),
+                Celsius(t),
+                Pascals(p),
+                RelativeHumidity(h),
+                450.0,
+            )
         };
-        assert_eq!(index(-5.0, 101e3, 0.5).unwrap_err().input, Input::Temperature);
-        assert_eq!(index(20.0, 1013.25, 0.5).unwrap_err().input, Input::Pressure);
-        assert_eq!(index(20.0, 101e3, f64::NAN).unwrap_err().input, Input::Humidity);
+        assert_eq!(
+            index(-5.0, 101e3, 0.5).unwrap_err().input,
+            Input::Temperature
+        );
+        assert_eq!(
+            index(20.0, 1013.25, 0.5).unwrap_err().input,
+            Input::Pressure
+        );
+        assert_eq!(
+            index(20.0, 101e3, f64::NAN).unwrap_err().input,
+            Input::Humidity
+        );
         assert_eq!(
             index(20.0, 101e3, 50.0).unwrap_err().to_string(),
             "refractive index of air: relative humidity 50 is outside 0 to 1 (fraction)"

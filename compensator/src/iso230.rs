@@ -165,7 +165,13 @@ pub fn evaluate(series: &LinearSeries) -> Result<Figures, EvaluationError> {
         let (forward_count, mean_forward, s_forward) = side(series, target, Approach::Forward)?;
         let (reverse_count, mean_reverse, s_reverse) = side(series, target, Approach::Reverse)?;
         runs = runs.min(forward_count).min(reverse_count);
-        targets.push(target_figures(target, mean_forward, mean_reverse, s_forward, s_reverse));
+        targets.push(target_figures(
+            target,
+            mean_forward,
+            mean_reverse,
+            s_forward,
+            s_reverse,
+        ));
     }
     Ok(axis_figures(targets, runs))
 }
@@ -175,12 +181,18 @@ fn side(
     target: Metres,
     approach: Approach,
 ) -> Result<(usize, Metres, Metres), EvaluationError> {
-    let deviations: Vec<f64> =
-        series.deviations(target, approach).map(|(_, deviation)| deviation.value()).collect();
+    let deviations: Vec<f64> = series
+        .deviations(target, approach)
+        .map(|(_, deviation)| deviation.value())
+        .collect();
     let seen = deviations.len();
     match (mean(&deviations), standard_deviation(&deviations)) {
         (Some(mean), Some(s)) => Ok((seen, Metres(mean), Metres(s))),
-        _ => Err(EvaluationError::TooFewRuns { target, approach, seen }),
+        _ => Err(EvaluationError::TooFewRuns {
+            target,
+            approach,
+            seen,
+        }),
     }
 }
 
@@ -216,8 +228,14 @@ fn axis_figures(targets: Vec<TargetFigures>, runs: usize) -> Figures {
     let lower_forward = of(|t| t.mean_forward - t.s_forward * K);
     let upper_reverse = of(|t| t.mean_reverse + t.s_reverse * K);
     let lower_reverse = of(|t| t.mean_reverse - t.s_reverse * K);
-    let band_forward = Extent { low: lower_forward.low, high: upper_forward.high };
-    let band_reverse = Extent { low: lower_reverse.low, high: upper_reverse.high };
+    let band_forward = Extent {
+        low: lower_forward.low,
+        high: upper_forward.high,
+    };
+    let band_reverse = Extent {
+        low: lower_reverse.low,
+        high: upper_reverse.high,
+    };
     let reversal = of(|t| t.reversal_value);
     let span = of(|t| t.target).range();
     let per_metre = (span.value() * TARGETS_WANTED as f64).ceil() as usize;
@@ -261,12 +279,21 @@ struct Extent {
 
 impl Extent {
     fn of(values: impl Iterator<Item = Metres>) -> Self {
-        let none = Self { low: Metres(f64::INFINITY), high: Metres(f64::NEG_INFINITY) };
-        values.fold(none, |e, v| Self { low: e.low.min(v), high: e.high.max(v) })
+        let none = Self {
+            low: Metres(f64::INFINITY),
+            high: Metres(f64::NEG_INFINITY),
+        };
+        values.fold(none, |e, v| Self {
+            low: e.low.min(v),
+            high: e.high.max(v),
+        })
     }
 
     fn with(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
     }
 
     fn range(self) -> Metres {
@@ -282,7 +309,11 @@ mod tests {
     /// A series from (target mm, deviations forward µm, deviations reverse µm).
     fn series(points: &[(f64, &[f64], &[f64])]) -> LinearSeries {
         let mut measurements = Vec::new();
-        let runs = points.iter().map(|p| p.1.len().max(p.2.len())).max().unwrap();
+        let runs = points
+            .iter()
+            .map(|p| p.1.len().max(p.2.len()))
+            .max()
+            .unwrap();
         for run in 0..runs {
             let mut push = |approach, mm: f64, deviation: Option<&f64>| {
                 if let Some(um) = deviation {
@@ -294,14 +325,23 @@ mod tests {
                     });
                 }
             };
-            points.iter().for_each(|p| push(Approach::Forward, p.0, p.1.get(run)));
-            points.iter().rev().for_each(|p| push(Approach::Reverse, p.0, p.2.get(run)));
+            points
+                .iter()
+                .for_each(|p| push(Approach::Forward, p.0, p.1.get(run)));
+            points
+                .iter()
+                .rev()
+                .for_each(|p| push(Approach::Reverse, p.0, p.2.get(run)));
         }
         LinearSeries::new(measurements).unwrap()
     }
 
     fn check_um(name: &str, seen: Metres, expected_um: f64) {
-        assert!((seen.um() - expected_um).abs() < 1e-6, "{name}: {} um", seen.um());
+        assert!(
+            (seen.um() - expected_um).abs() < 1e-6,
+            "{name}: {} um",
+            seen.um()
+        );
     }
 
     /// Two targets, two runs; with two values a ± d the standard deviation is d·√2.
@@ -382,8 +422,9 @@ mod tests {
         let few = [1.0, 2.0, 3.0, 2.0];
         let five = [1.0, 2.0, 3.0, 2.0, 1.0];
         let at = |runs: &'static [f64], targets: usize, step_mm: f64| {
-            let points: Vec<(f64, &[f64], &[f64])> =
-                (0..targets).map(|i| (i as f64 * step_mm, runs, runs)).collect();
+            let points: Vec<(f64, &[f64], &[f64])> = (0..targets)
+                .map(|i| (i as f64 * step_mm, runs, runs))
+                .collect();
             evaluate(&series(&points)).unwrap()
         };
         let few: &'static [f64] = Box::leak(Box::new(few));
@@ -400,9 +441,17 @@ mod tests {
     #[test]
     fn one_sided_data_and_single_runs_are_refused_with_the_reason() {
         let error = evaluate(&series(&[(0.0, &[1.0, 2.0], &[])])).unwrap_err();
-        assert_eq!(error, EvaluationError::OneApproach { measured: Approach::Forward });
-        let error = evaluate(&series(&[(0.0, &[1.0, 2.0], &[1.0, 1.0]), (5.0, &[1.0, 2.0], &[1.0])]))
-            .unwrap_err();
+        assert_eq!(
+            error,
+            EvaluationError::OneApproach {
+                measured: Approach::Forward
+            }
+        );
+        let error = evaluate(&series(&[
+            (0.0, &[1.0, 2.0], &[1.0, 1.0]),
+            (5.0, &[1.0, 2.0], &[1.0]),
+        ]))
+        .unwrap_err();
         assert_eq!(
             error.to_string(),
             "ISO 230-2: target 5 mm has 1 measurement(s) with approach `-`; at least 2 are \
@@ -412,14 +461,29 @@ mod tests {
 
     #[test]
     fn a_constant_added_to_every_deviation_changes_no_figure_but_the_means() {
-        let base = evaluate(&series(&[(0.0, &[1.0, 3.0], &[0.0, 1.0]), (9.0, &[2.0, 2.5], &[1.0, 4.0])]));
+        let base = evaluate(&series(&[
+            (0.0, &[1.0, 3.0], &[0.0, 1.0]),
+            (9.0, &[2.0, 2.5], &[1.0, 4.0]),
+        ]));
         let moved = evaluate(&series(&[
             (0.0, &[101.0, 103.0], &[100.0, 101.0]),
             (9.0, &[102.0, 102.5], &[101.0, 104.0]),
         ]));
         let (base, moved) = (base.unwrap(), moved.unwrap());
-        check_um("A", moved.accuracy.bidirectional, base.accuracy.bidirectional.um());
-        check_um("E", moved.systematic_deviation.reverse, base.systematic_deviation.reverse.um());
-        check_um("R", moved.repeatability.bidirectional, base.repeatability.bidirectional.um());
+        check_um(
+            "A",
+            moved.accuracy.bidirectional,
+            base.accuracy.bidirectional.um(),
+        );
+        check_um(
+            "E",
+            moved.systematic_deviation.reverse,
+            base.systematic_deviation.reverse.um(),
+        );
+        check_um(
+            "R",
+            moved.repeatability.bidirectional,
+            base.repeatability.bidirectional.um(),
+        );
     }
 }

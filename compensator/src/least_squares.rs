@@ -80,7 +80,9 @@ impl Fit {
     /// The standard uncertainty of each coefficient for a noise of standard deviation `sigma`.
     pub fn standard_uncertainties(&self, sigma: f64) -> Vec<f64> {
         let p = self.coefficients.len();
-        (0..p).map(|i| self.cofactor[i * p + i].sqrt() * sigma).collect()
+        (0..p)
+            .map(|i| self.cofactor[i * p + i].sqrt() * sigma)
+            .collect()
     }
 }
 
@@ -119,18 +121,35 @@ pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, Le
     let residuals = observed
         .iter()
         .zip(design.chunks_exact(columns))
-        .map(|(y, row)| y - row.iter().zip(&coefficients).map(|(x, b)| x * b).sum::<f64>())
+        .map(|(y, row)| {
+            y - row
+                .iter()
+                .zip(&coefficients)
+                .map(|(x, b)| x * b)
+                .sum::<f64>()
+        })
         .collect();
-    Ok(Fit { coefficients, cofactor, residuals, degrees_of_freedom: rows - columns })
+    Ok(Fit {
+        coefficients,
+        cofactor,
+        residuals,
+        degrees_of_freedom: rows - columns,
+    })
 }
 
 fn check(design: &[f64], columns: usize, observed: &[f64]) -> Result<(), LeastSquaresError> {
     let rows = observed.len();
     if columns == 0 || rows < columns {
-        return Err(LeastSquaresError::TooFew { observations: rows, coefficients: columns });
+        return Err(LeastSquaresError::TooFew {
+            observations: rows,
+            coefficients: columns,
+        });
     }
     if design.len() != rows * columns {
-        return Err(LeastSquaresError::Shape { seen: design.len(), expected: rows * columns });
+        return Err(LeastSquaresError::Shape {
+            seen: design.len(),
+            expected: rows * columns,
+        });
     }
     let bad = design
         .chunks_exact(columns)
@@ -168,7 +187,10 @@ mod tests {
 
     fn check_close(name: &str, seen: f64, certified: f64, relative: f64) {
         let error = ((seen - certified) / certified).abs();
-        assert!(error < relative, "{name}: {seen} against {certified}, off by {error:e}");
+        assert!(
+            error < relative,
+            "{name}: {seen} against {certified}, off by {error:e}"
+        );
     }
 
     /// NIST StRD, linear regression, "Norris" (lower difficulty), 36 observations.
@@ -228,8 +250,10 @@ mod tests {
             70551.0, 116.9, 554894.0, 4007.0, 2827.0, 130081.0, 1962.0,
         ];
         let y: Vec<f64> = data.chunks(7).map(|row| row[0]).collect();
-        let design: Vec<f64> =
-            data.chunks(7).flat_map(|row| [1.0].into_iter().chain(row[1..].to_vec())).collect();
+        let design: Vec<f64> = data
+            .chunks(7)
+            .flat_map(|row| [1.0].into_iter().chain(row[1..].to_vec()))
+            .collect();
         let fit = solve(&design, 7, &y).unwrap();
         let sd = fit.residual_sd().unwrap();
         let u = fit.standard_uncertainties(sd);
@@ -253,7 +277,16 @@ mod tests {
         let error = polynomial(&[0.0, 1.0, f64::NAN], &[0.0; 3], 1).unwrap_err();
         assert_eq!(error, LeastSquaresError::NotFinite { observation: 2 });
         let error = polynomial(&[0.0], &[0.0], 1).unwrap_err();
-        assert_eq!(error, LeastSquaresError::TooFew { observations: 1, coefficients: 2 });
-        assert!(matches!(solve(&[1.0], 2, &[1.0, 2.0]), Err(LeastSquaresError::Shape { .. })));
+        assert_eq!(
+            error,
+            LeastSquaresError::TooFew {
+                observations: 1,
+                coefficients: 2
+            }
+        );
+        assert!(matches!(
+            solve(&[1.0], 2, &[1.0, 2.0]),
+            Err(LeastSquaresError::Shape { .. })
+        ));
     }
 }

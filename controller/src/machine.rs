@@ -96,12 +96,11 @@ impl Machine {
     pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
         let config = loaded.config.clone();
         let ports = assemble::ports(&config);
-        let now = transport.now();
         Self {
             axes: assemble::axes(&config, &ports),
             analogs: assemble::analogs(&config, &ports),
             instruments: assemble::instruments(&config, &ports),
-            heartbeats: assemble::heartbeats(&config, &ports, now),
+            heartbeats: assemble::heartbeats(&config, &ports),
             memory: config.axis.keys().map(|name| (name.clone(), AxisMemory::default())).collect(),
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),

@@ -22,8 +22,8 @@ use std::collections::BTreeSet;
 
 use units::{Approach, Metres, Volts};
 
-use table::{Format, Table};
 pub use table::{DataError, Fault};
+use table::{Format, Table};
 
 /// One target reached once, and where the instrument saw the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,8 +119,18 @@ impl LinearSeries {
             // Adding zero turns -0 into 0, which is the same target.
             let key = (m.run, m.approach, (m.target.value() + 0.0).to_bits());
             if !seen.insert(key) {
-                let Measurement { run, approach, target, .. } = *m;
-                return Err(SeriesError::Duplicate { index, run, approach, target });
+                let Measurement {
+                    run,
+                    approach,
+                    target,
+                    ..
+                } = *m;
+                return Err(SeriesError::Duplicate {
+                    index,
+                    run,
+                    approach,
+                    target,
+                });
             }
             check_order(&measurements[..index], index, m)?;
         }
@@ -181,8 +191,11 @@ impl LinearSeries {
     pub fn to_csv(&self) -> String {
         let mut text = String::from("run,approach,target_mm,measured_mm\n");
         for m in &self.measurements {
-            let (sign, target, measured) =
-                (m.approach.symbol(), printed(m.target.mm(), m.target), m.measured);
+            let (sign, target, measured) = (
+                m.approach.symbol(),
+                printed(m.target.mm(), m.target),
+                m.measured,
+            );
             let measured = printed(measured.mm(), measured);
             text.push_str(&format!("{},{sign},{target},{measured}\n", m.run));
         }
@@ -193,18 +206,22 @@ impl LinearSeries {
 /// The shortest decimal near `mm` that reads back as exactly `length`.
 fn printed(mm: f64, length: Metres) -> String {
     let candidates = [mm, mm.next_up(), mm.next_down()];
-    let exact = candidates.into_iter().find(|&c| Metres::from_mm(c) == length);
+    let exact = candidates
+        .into_iter()
+        .find(|&c| Metres::from_mm(c) == length);
     format!("{}", exact.unwrap_or(mm))
 }
 
-fn check_order(
-    before: &[Measurement],
-    index: usize,
-    m: &Measurement,
-) -> Result<(), SeriesError> {
-    let Some(last) = before.last() else { return Ok(()) };
+fn check_order(before: &[Measurement], index: usize, m: &Measurement) -> Result<(), SeriesError> {
+    let Some(last) = before.last() else {
+        return Ok(());
+    };
     if m.run < last.run {
-        return Err(SeriesError::RunOrder { index, seen: m.run, previous: last.run });
+        return Err(SeriesError::RunOrder {
+            index,
+            seen: m.run,
+            previous: last.run,
+        });
     }
     let same = before
         .iter()
@@ -250,9 +267,8 @@ impl HallSeries {
         if points.is_empty() {
             return Err(SeriesError::Empty);
         }
-        let finite = |p: &HallPoint| {
-            p.position.is_finite() && p.peak.is_finite() && p.slope.is_finite()
-        };
+        let finite =
+            |p: &HallPoint| p.position.is_finite() && p.peak.is_finite() && p.slope.is_finite();
         match points.iter().position(|p| !finite(p)) {
             Some(index) => Err(SeriesError::NotFinite { index }),
             None => Ok(Self { points }),

@@ -210,7 +210,9 @@ impl Table {
                 }
                 Some(order) if cells.len() != order.len() => {
                     let (seen, expected) = (cells.len(), order.len());
-                    let column = cells.get(expected).map_or(line.chars().count() + 1, |c| c.column);
+                    let column = cells
+                        .get(expected)
+                        .map_or(line.chars().count() + 1, |c| c.column);
                     return Err(fail(index + 1, column, Fault::CellCount { seen, expected }));
                 }
                 Some(order) => rows.push((index + 1, sorted(cells, order))),
@@ -218,12 +220,22 @@ impl Table {
         }
         let end = text.lines().count().max(1);
         if header.is_none() {
-            return Err(fail(1, 1, Fault::Empty { expected: format.header }));
+            return Err(fail(
+                1,
+                1,
+                Fault::Empty {
+                    expected: format.header,
+                },
+            ));
         }
         if rows.is_empty() {
             return Err(fail(end, 1, Fault::NoRows));
         }
-        Ok(Self { file: file.to_owned(), format: format.columns, rows })
+        Ok(Self {
+            file: file.to_owned(),
+            format: format.columns,
+            rows,
+        })
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -232,7 +244,12 @@ impl Table {
 
     fn fail(&self, row: usize, column: usize, fault: Fault) -> DataError {
         let (line, cells) = &self.rows[row];
-        DataError { file: self.file.clone(), line: *line, column: cells[column].column, fault }
+        DataError {
+            file: self.file.clone(),
+            line: *line,
+            column: cells[column].column,
+            fault,
+        }
     }
 
     pub(super) fn number(&self, row: usize, column: usize) -> Result<f64, DataError> {
@@ -241,9 +258,18 @@ impl Table {
         let fault = match parse_number(seen) {
             Ok(value) => return Ok(value),
             Err(Number::Missing) => Fault::MissingValue { column: name },
-            Err(Number::Comma) => Fault::DecimalComma { column: name, seen: seen.to_owned() },
-            Err(Number::Infinite) => Fault::NotFinite { column: name, seen: seen.to_owned() },
-            Err(Number::Word) => Fault::NotANumber { column: name, seen: seen.to_owned() },
+            Err(Number::Comma) => Fault::DecimalComma {
+                column: name,
+                seen: seen.to_owned(),
+            },
+            Err(Number::Infinite) => Fault::NotFinite {
+                column: name,
+                seen: seen.to_owned(),
+            },
+            Err(Number::Word) => Fault::NotANumber {
+                column: name,
+                seen: seen.to_owned(),
+            },
         };
         Err(self.fail(row, column, fault))
     }
@@ -253,8 +279,12 @@ impl Table {
         let digits = !seen.is_empty() && seen.bytes().all(|b| b.is_ascii_digit());
         seen.parse().ok().filter(|_| digits).ok_or_else(|| {
             let fault = match seen {
-                "" => Fault::MissingValue { column: self.format[column] },
-                _ => Fault::NotARun { seen: seen.to_owned() },
+                "" => Fault::MissingValue {
+                    column: self.format[column],
+                },
+                _ => Fault::NotARun {
+                    seen: seen.to_owned(),
+                },
             };
             self.fail(row, column, fault)
         })
@@ -264,8 +294,12 @@ impl Table {
         let fault = match self.rows[row].1[column].text.as_str() {
             "+" => return Ok(Approach::Forward),
             "-" => return Ok(Approach::Reverse),
-            "" => Fault::MissingValue { column: self.format[column] },
-            seen => Fault::NotAnApproach { seen: seen.to_owned() },
+            "" => Fault::MissingValue {
+                column: self.format[column],
+            },
+            seen => Fault::NotAnApproach {
+                seen: seen.to_owned(),
+            },
         };
         Err(self.fail(row, column, fault))
     }
@@ -276,19 +310,54 @@ impl Table {
             SeriesError::Empty => self.fail(0, 0, Fault::NoRows),
             SeriesError::NotFinite { index } => {
                 let seen = self.rows[index].1[0].text.clone();
-                self.fail(index, 0, Fault::NotFinite { column: self.format[0], seen })
+                self.fail(
+                    index,
+                    0,
+                    Fault::NotFinite {
+                        column: self.format[0],
+                        seen,
+                    },
+                )
             }
-            SeriesError::Duplicate { index, run, approach, target } => {
+            SeriesError::Duplicate {
+                index,
+                run,
+                approach,
+                target,
+            } => {
                 let (approach, target_mm) = (approach.symbol(), target.mm());
-                self.fail(index, 2, Fault::Duplicate { run, approach, target_mm })
+                self.fail(
+                    index,
+                    2,
+                    Fault::Duplicate {
+                        run,
+                        approach,
+                        target_mm,
+                    },
+                )
             }
-            SeriesError::RunOrder { index, seen, previous } => {
-                self.fail(index, 0, Fault::RunOrder { seen, previous })
-            }
-            SeriesError::TargetOrder { index, approach, seen, previous } => {
+            SeriesError::RunOrder {
+                index,
+                seen,
+                previous,
+            } => self.fail(index, 0, Fault::RunOrder { seen, previous }),
+            SeriesError::TargetOrder {
+                index,
+                approach,
+                seen,
+                previous,
+            } => {
                 let (seen_mm, previous_mm) = (seen.mm(), previous.mm());
                 let approach = approach.symbol();
-                self.fail(index, 2, Fault::TargetOrder { approach, seen_mm, previous_mm })
+                self.fail(
+                    index,
+                    2,
+                    Fault::TargetOrder {
+                        approach,
+                        seen_mm,
+                        previous_mm,
+                    },
+                )
             }
         }
     }
@@ -304,16 +373,25 @@ fn split(line: &str) -> Option<Vec<Cell>> {
     let record = reader.records().next()?.ok()?;
     if line.contains('"') {
         // Quoted cells are legal CSV; their place is then only known to the line.
-        let whole = line.matches('"').count() % 2 == 0;
+        let whole = line.matches('"').count().is_multiple_of(2);
         return whole.then(|| {
-            record.iter().map(|text| Cell { text: text.to_owned(), column: 1 }).collect()
+            record
+                .iter()
+                .map(|text| Cell {
+                    text: text.to_owned(),
+                    column: 1,
+                })
+                .collect()
         });
     }
     let mut column = 1;
     let mut cells = Vec::with_capacity(record.len());
     for (raw, text) in line.split(',').zip(record.iter()) {
         let indent = raw.chars().take_while(|c| c.is_whitespace()).count();
-        cells.push(Cell { text: text.to_owned(), column: column + indent });
+        cells.push(Cell {
+            text: text.to_owned(),
+            column: column + indent,
+        });
         column += raw.chars().count() + 1;
     }
     Some(cells)
@@ -329,7 +407,12 @@ fn read_header(cells: &[Cell], format: &Format) -> Result<Vec<usize>, (usize, Fa
             return Err((cell.column, unknown_column(&cell.text, format)));
         };
         if order[index].replace(place).is_some() {
-            return Err((cell.column, Fault::DuplicateColumn { seen: format.columns[index] }));
+            return Err((
+                cell.column,
+                Fault::DuplicateColumn {
+                    seen: format.columns[index],
+                },
+            ));
         }
     }
     let mut places = Vec::with_capacity(order.len());
@@ -349,8 +432,14 @@ fn unknown_column(seen: &str, format: &Format) -> Fault {
         .iter()
         .find(|name| name.contains('_') && quantity(name) == quantity(seen));
     match same {
-        Some(wanted) => Fault::WrongUnit { seen: seen.to_owned(), wanted },
-        None => Fault::UnknownColumn { seen: seen.to_owned(), expected: format.header },
+        Some(wanted) => Fault::WrongUnit {
+            seen: seen.to_owned(),
+            wanted,
+        },
+        None => Fault::UnknownColumn {
+            seen: seen.to_owned(),
+            expected: format.header,
+        },
     }
 }
 
@@ -358,7 +447,11 @@ fn sorted(cells: Vec<Cell>, order: &[usize]) -> Vec<Cell> {
     let mut cells: Vec<Option<Cell>> = cells.into_iter().map(Some).collect();
     order
         .iter()
-        .map(|&place| cells[place].take().expect("the header's places are distinct"))
+        .map(|&place| {
+            cells[place]
+                .take()
+                .expect("the header's places are distinct")
+        })
         .collect()
 }
 
@@ -374,7 +467,9 @@ fn parse_number(cell: &str) -> Result<f64, Number> {
     if cell.is_empty() {
         return Err(Number::Missing);
     }
-    let plain = cell.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
+    let plain = cell
+        .bytes()
+        .all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
     if plain {
         return match cell.parse::<f64>() {
             // Some writers put 1e308 for "no value": it survives parsing but no conversion.

@@ -8,7 +8,10 @@ fn check_fault(text: &str, line: usize, column: usize, says: &str) {
     let error = LinearSeries::from_csv(text, "axis.csv").unwrap_err();
     let message = error.to_string();
     assert_eq!((error.line, error.column), (line, column), "{message}");
-    assert!(message.starts_with(&format!("axis.csv:{line}:{column}: ")), "{message}");
+    assert!(
+        message.starts_with(&format!("axis.csv:{line}:{column}: ")),
+        "{message}"
+    );
     assert!(message.contains(says), "{message}");
 }
 
@@ -20,7 +23,9 @@ fn check_rows(rows: &str, line: usize, column: usize, says: &str) {
 fn a_good_file_is_read_with_columns_in_any_order_and_comments() {
     let text = "# stage 7\nmeasured_mm, run ,approach,target_mm\n\n10.002,1,+,10\n# turn\n9.998,1,-,10\r\n";
     let series = LinearSeries::from_csv(text, "axis.csv").unwrap();
-    let [forward, reverse] = series.measurements() else { panic!("two rows") };
+    let [forward, reverse] = series.measurements() else {
+        panic!("two rows")
+    };
     assert_eq!(forward.approach, Approach::Forward);
     assert_eq!(reverse.approach, Approach::Reverse);
     assert!((forward.deviation().um() - 2.0).abs() < 1e-9);
@@ -31,26 +36,61 @@ fn a_good_file_is_read_with_columns_in_any_order_and_comments() {
 
 #[test]
 fn what_spreadsheets_do_to_numbers_is_named() {
-    check_rows("1,+,10,NaN\n", 2, 8, "`measured_mm` is `NaN`, not a finite number");
+    check_rows(
+        "1,+,10,NaN\n",
+        2,
+        8,
+        "`measured_mm` is `NaN`, not a finite number",
+    );
     check_rows("1,+,-inf,10\n", 2, 5, "not a finite number");
     check_rows("1,+,10,1e308\n", 2, 8, "not a finite number");
     check_rows("1,+,10,10,002\n", 2, 11, "decimal commas?");
-    check_rows("1,+,10,\"10,002\"\n", 2, 1, "write a decimal point, not a comma");
+    check_rows(
+        "1,+,10,\"10,002\"\n",
+        2,
+        1,
+        "write a decimal point, not a comma",
+    );
     check_rows("1,+,10,\n", 2, 8, "`measured_mm` is empty");
     check_rows("1,+,10,ten\n", 2, 8, "`ten`, not a number");
     check_rows("1,+,10,10 mm\n", 2, 8, "without units");
     check_rows("1,+,10\n", 2, 7, "the row has 3 cells, the header 4");
-    check_fault("run;approach;target_mm;measured_mm\n1;+;1;1\n", 1, 1, "separated by `;`");
+    check_fault(
+        "run;approach;target_mm;measured_mm\n1;+;1;1\n",
+        1,
+        1,
+        "separated by `;`",
+    );
 }
 
 #[test]
 fn a_wrong_header_says_what_it_must_be() {
     check_fault("", 1, 1, "`run,approach,target_mm,measured_mm`");
     check_fault(HEADER, 1, 1, "no data row");
-    check_fault("run,approach,target_um,measured_mm\n", 1, 14, "name it `target_mm`");
-    check_fault("run,approach,target_mm\n", 1, 1, "column `measured_mm` is missing");
-    check_fault("run,run,approach,target_mm,measured_mm\n", 1, 5, "`run` appears twice");
-    check_fault("run,approach,target_mm,measured_mm,note\n", 1, 36, "unknown column `note`");
+    check_fault(
+        "run,approach,target_um,measured_mm\n",
+        1,
+        14,
+        "name it `target_mm`",
+    );
+    check_fault(
+        "run,approach,target_mm\n",
+        1,
+        1,
+        "column `measured_mm` is missing",
+    );
+    check_fault(
+        "run,run,approach,target_mm,measured_mm\n",
+        1,
+        5,
+        "`run` appears twice",
+    );
+    check_fault(
+        "run,approach,target_mm,measured_mm,note\n",
+        1,
+        36,
+        "unknown column `note`",
+    );
 }
 
 #[test]
@@ -64,9 +104,19 @@ fn an_approach_or_run_that_is_none_is_named() {
 #[test]
 fn rows_out_of_order_are_an_error_not_sorted() {
     check_rows("2,+,10,10\n1,+,10,10\n", 3, 1, "run 1 comes after run 2");
-    check_rows("1,+,20,20\n1,+,10,10\n", 3, 5, "target 10 mm comes after 20 mm");
+    check_rows(
+        "1,+,20,20\n1,+,10,10\n",
+        3,
+        5,
+        "target 10 mm comes after 20 mm",
+    );
     check_rows("1,-,10,10\n1,-,20,20\n", 3, 5, "not approach `-`");
-    check_rows("1,+,10,10\n1,-,10,10\n1,+,10,10.1\n", 4, 5, "already in the file");
+    check_rows(
+        "1,+,10,10\n1,-,10,10\n1,+,10,10.1\n",
+        4,
+        5,
+        "already in the file",
+    );
     check_rows("1,+,0,0\n1,-,5,5\n1,+,-0,0\n", 4, 5, "already in the file");
 }
 
@@ -94,9 +144,17 @@ fn a_hall_sweep_may_go_back_and_forth() {
     let text = "position_um,peak_v,slope_v\n-10,1.5,2.4\n10,1.5,2.6\n-10,1.5,2.4\n";
     let series = HallSeries::from_csv(text, "hall.csv").unwrap();
     assert_eq!(series.points().len(), 3);
-    assert_eq!(HallSeries::from_csv(&series.to_csv(), "again").unwrap(), series);
+    assert_eq!(
+        HallSeries::from_csv(&series.to_csv(), "again").unwrap(),
+        series
+    );
     let error = HallSeries::from_csv("position_mm,peak_v,slope_v\n1,1,1\n", "hall.csv");
-    assert!(error.unwrap_err().to_string().contains("name it `position_um`"));
+    assert!(
+        error
+            .unwrap_err()
+            .to_string()
+            .contains("name it `position_um`")
+    );
 }
 
 proptest! {

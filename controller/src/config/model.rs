@@ -170,7 +170,7 @@ pub enum InstrumentDevice {
 pub struct InstrumentConfig {
     pub device: InstrumentDevice,
     pub line: String,
-    pub optics_factor: f64,
+    pub optics_factor: u8,
     pub sample_rate_hz: f64,
     pub reverse: bool,
     pub correct_air: bool,

@@ -330,7 +330,7 @@ fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConf
 
 fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &InstrumentConfig) {
     judge.known("line", &instrument.line, &config.serial, "serial line");
-    judge.within("optics_factor", instrument.optics_factor, 0.5, 16.0);
+    judge.within("optics_factor", instrument.optics_factor.into(), 1.0, 16.0);
     judge.within("sample_rate_hz", instrument.sample_rate_hz, 1.0, 100_000.0);
     judge.within("expansion_per_kelvin", instrument.expansion_per_kelvin, -1e-4, 1e-4);
     judge.within("dead_path_mm", instrument.dead_path_mm, 0.0, 1e5);

@@ -203,7 +203,7 @@ impl Machine {
         self.instruments[at].device.set_datum(now);
         let environment = self.instrument_environment(&plan.instrument);
         let config = &self.config.instrument[&plan.instrument];
-        let environment = assemble::correction_environment(config, &environment);
+        let environment = assemble::correction_environment(&environment);
         LengthCorrection::new(assemble::correction_settings(config), &environment).map_err(
             |source| Failure::Correction { instrument: plan.instrument.clone(), source },
         )
@@ -256,7 +256,7 @@ impl Machine {
     ) -> Result<Metres, Failure> {
         let config = &self.config.instrument[&plan.instrument];
         let failed = |source| Failure::Correction { instrument: plan.instrument.clone(), source };
-        let environment = assemble::correction_environment(config, environment);
+        let environment = assemble::correction_environment(environment);
         length
             .correct(reading.vacuum, &environment)
             .map(|corrected| corrected.displacement)

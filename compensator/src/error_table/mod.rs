@@ -1,0 +1,369 @@
+//! Linear axis: the table of its deviations, and the command that undoes them (system S3).
+//!
+//! Source: CN104076739A, steps 1–7: run step by step, read the laser interferometer at every
+//! step, negate the errors into a compensation table, and for every job coordinate P find its
+//! interval x_n and drive to P' = P + compensation(x_n). The patent holds for errors without
+//! abrupt jumps; [`ErrorTable::check_jumps`] makes that a refusal which names the interval.
+//!
+//! | symbol | name here |
+//! |---|---|
+//! | l_1 … l_n | distances between [`Node::position`]s |
+//! | x_n | the interval between two nodes |
+//! | error of x_n | [`Node::forward`], [`Node::reverse`]: deviations (actual − target) |
+//! | compensation(x_n) | −deviation |
+//! | P → P' | [`Compensation::set_point`] |
+//!
+//! Beyond the patent: both approaches apart with the lost motion between them, repeated runs
+//! with standard uncertainties and named outliers, linear and monotone cubic interpolation, and
+//! the exact inverse, proven unique when the compensation is made.
+//!
+//! Absent: periodic terms over a screw lead (system S1), storage, the machine's identity.
+
+mod compensation;
+mod curve;
+mod fit;
+mod robust;
+
+use units::{Approach, Metres};
+
+pub use crate::interpolation::Interpolation;
+pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
+pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};
+pub use robust::{MeasuredPoint, Robust};
+
+/// One position of the table. Plain data, so that a store can write its own form of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// The target at which the deviations were measured.
+    pub position: Metres,
+    /// Mean deviation (actual − target) approached forward, if measured.
+    pub forward: Option<Metres>,
+    /// Mean deviation approached in reverse, if measured.
+    pub reverse: Option<Metres>,
+    /// Standard uncertainty of `forward`.
+    pub u_forward: Option<Metres>,
+    /// Standard uncertainty of `reverse`.
+    pub u_reverse: Option<Metres>,
+}
+
+impl Node {
+    /// The mean deviation for one approach, if measured.
+    pub fn deviation(&self, approach: Approach) -> Option<Metres> {
+        match approach {
+            Approach::Forward => self.forward,
+            Approach::Reverse => self.reverse,
+        }
+    }
+
+    /// The standard uncertainty of that deviation.
+    pub fn standard_uncertainty(&self, approach: Approach) -> Option<Metres> {
+        match approach {
+            Approach::Forward => self.u_forward,
+            Approach::Reverse => self.u_reverse,
+        }
+    }
+}
+
+/// The mean difference between both approaches, reverse − forward.
+///
+/// ISO 230-2's mean reversal value is forward − reverse: the same with the other sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LostMotion {
+    /// Mean over the nodes of (reverse − forward).
+    pub mean: Metres,
+    /// Its standard uncertainty; the instrument's own cancels in the difference.
+    pub standard_uncertainty: Metres,
+    /// Smallest and largest (reverse − forward) of any node.
+    pub range: (Metres, Metres),
+}
+
+/// The deviations of a linear axis at strictly increasing positions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorTable {
+    nodes: Vec<Node>,
+}
+
+/// Why nodes do not form a table. `index` counts the nodes from 0.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// Fewer than two nodes.
+    #[error("error table: {seen} node(s); at least 2 are needed")]
+    TooFewNodes {
+        /// Nodes given.
+        seen: usize,
+    },
+    /// A NaN, an infinity or a negative uncertainty.
+    #[error("error table, node {index}: a value is not finite or an uncertainty is negative")]
+    NotFinite {
+        /// Which node.
+        index: usize,
+    },
+    /// A position not beyond the one before it.
+    #[error("error table, node {index}: position {} mm does not follow {} mm",
+        seen.mm(), previous.mm())]
+    NotIncreasing {
+        /// Which node.
+        index: usize,
+        /// Its position.
+        seen: Metres,
+        /// The position before it.
+        previous: Metres,
+    },
+    /// An approach present at some nodes only.
+    #[error("error table, node {index}: approach `{}` is measured at some nodes only",
+        approach.symbol())]
+    Gap {
+        /// The first node that differs from node 0.
+        index: usize,
+        /// The approach.
+        approach: Approach,
+    },
+    /// No approach at all.
+    #[error("error table: no deviation in either approach")]
+    Empty,
+}
+
+/// A jump of the deviation between neighbouring nodes beyond the limit.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "error table: the deviation jumps from {:.3} um at {} mm to {:.3} um at {} mm (approach \
+     `{}`), more than the limit of {:.3} um; measure finer there or find the mechanical cause",
+    deviation_from.um(), from.mm(), deviation_to.um(), to.mm(), approach.symbol(), limit.um()
+)]
+pub struct JumpError {
+    /// Where the interval begins.
+    pub from: Metres,
+    /// Where it ends.
+    pub to: Metres,
+    /// The approach in which it jumps.
+    pub approach: Approach,
+    /// Deviation at `from`.
+    pub deviation_from: Metres,
+    /// Deviation at `to`.
+    pub deviation_to: Metres,
+    /// The largest difference allowed.
+    pub limit: Metres,
+}
+
+impl ErrorTable {
+    /// Checks `nodes` and takes them.
+    ///
+    /// # Errors
+    /// When there are fewer than two, values are not finite, positions do not increase, or an
+    /// approach is measured at some nodes only.
+    pub fn new(nodes: Vec<Node>) -> Result<Self, TableError> {
+        let [first, .., _] = nodes.as_slice() else {
+            return Err(TableError::TooFewNodes { seen: nodes.len() });
+        };
+        for (index, node) in nodes.iter().enumerate() {
+            if !is_sound(node) {
+                return Err(TableError::NotFinite { index });
+            }
+            for approach in [Approach::Forward, Approach::Reverse] {
+                if node.deviation(approach).is_some() != first.deviation(approach).is_some() {
+                    return Err(TableError::Gap { index, approach });
+                }
+            }
+        }
+        if first.forward.is_none() && first.reverse.is_none() {
+            return Err(TableError::Empty);
+        }
+        for (index, pair) in nodes.windows(2).enumerate() {
+            let (previous, seen) = (pair[0].position, pair[1].position);
+            if seen <= previous {
+                return Err(TableError::NotIncreasing {
+                    index: index + 1,
+                    seen,
+                    previous,
+                });
+            }
+        }
+        Ok(Self { nodes })
+    }
+
+    /// The nodes, increasing.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// First and last position.
+    pub fn range(&self) -> (Metres, Metres) {
+        (
+            self.nodes[0].position,
+            self.nodes[self.nodes.len() - 1].position,
+        )
+    }
+
+    /// Whether the table knows this approach.
+    pub fn knows(&self, approach: Approach) -> bool {
+        self.nodes[0].deviation(approach).is_some()
+    }
+
+    /// The largest magnitude of any deviation.
+    pub fn largest(&self) -> Metres {
+        let deviations = self
+            .nodes
+            .iter()
+            .flat_map(|n| [n.forward, n.reverse])
+            .flatten();
+        deviations.fold(Metres::ZERO, |largest, d| largest.max(d.abs()))
+    }
+
+    /// The mean lost motion, or `None` when one approach is unknown.
+    ///
+    /// Its uncertainty takes the nodes' uncertainties as independent, which is on the safe side
+    /// where they contain an instrument's common part.
+    pub fn lost_motion(&self) -> Option<LostMotion> {
+        let differences: Option<Vec<f64>> = self
+            .nodes
+            .iter()
+            .map(|n| Some((n.reverse? - n.forward?).value()))
+            .collect();
+        let differences = differences?;
+        let variance: f64 = self
+            .nodes
+            .iter()
+            .flat_map(|n| [n.u_forward, n.u_reverse])
+            .flatten()
+            .map(|u| u.value() * u.value())
+            .sum();
+        let count = differences.len() as f64;
+        let low = differences.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = differences
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        Some(LostMotion {
+            mean: Metres(differences.iter().sum::<f64>() / count),
+            standard_uncertainty: Metres(variance.sqrt() / count),
+            range: (Metres(low), Metres(high)),
+        })
+    }
+
+    /// Refuses a table whose deviation differs by more than `limit` between neighbours.
+    ///
+    /// # Errors
+    /// The first such interval, with its direction, both values and the limit.
+    pub fn check_jumps(&self, limit: Metres) -> Result<(), JumpError> {
+        for pair in self.nodes.windows(2) {
+            for approach in [Approach::Forward, Approach::Reverse] {
+                let values = (pair[0].deviation(approach), pair[1].deviation(approach));
+                let (Some(deviation_from), Some(deviation_to)) = values else {
+                    continue;
+                };
+                let jump = (deviation_to - deviation_from).abs();
+                // Written so that a NaN limit refuses.
+                if jump <= limit {
+                    continue;
+                }
+                let (from, to) = (pair[0].position, pair[1].position);
+                return Err(JumpError {
+                    from,
+                    to,
+                    approach,
+                    deviation_from,
+                    deviation_to,
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn is_sound(node: &Node) -> bool {
+    let uncertainty = |u: Option<Metres>| u.is_none_or(|u| u.is_finite() && u >= Metres::ZERO);
+    let deviation = |d: Option<Metres>| d.is_none_or(Metres::is_finite);
+    node.position.is_finite()
+        && deviation(node.forward)
+        && deviation(node.reverse)
+        && uncertainty(node.u_forward)
+        && uncertainty(node.u_reverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node(mm: f64, forward: Option<f64>, reverse: Option<f64>) -> Node {
+        Node {
+            position: Metres::from_mm(mm),
+            forward: forward.map(Metres::from_um),
+            reverse: reverse.map(Metres::from_um),
+            u_forward: forward.map(|_| Metres::from_um(0.3)),
+            u_reverse: reverse.map(|_| Metres::from_um(0.4)),
+        }
+    }
+
+    fn both(mm: f64, forward: f64, reverse: f64) -> Node {
+        node(mm, Some(forward), Some(reverse))
+    }
+
+    #[test]
+    fn nodes_out_of_order_or_not_finite_or_with_gaps_are_refused() {
+        let error = |nodes| ErrorTable::new(nodes).unwrap_err();
+        assert_eq!(
+            error(vec![both(0.0, 0.0, 0.0)]),
+            TableError::TooFewNodes { seen: 1 }
+        );
+        assert!(matches!(
+            error(vec![both(0.0, 0.0, 0.0), both(0.0, 1.0, 1.0)]),
+            TableError::NotIncreasing { index: 1, .. }
+        ));
+        assert_eq!(
+            error(vec![both(0.0, 0.0, 0.0), both(1.0, f64::NAN, 0.0)]),
+            TableError::NotFinite { index: 1 }
+        );
+        assert_eq!(
+            error(vec![both(0.0, 0.0, 0.0), node(1.0, Some(1.0), None)]),
+            TableError::Gap {
+                index: 1,
+                approach: Approach::Reverse
+            }
+        );
+        assert_eq!(
+            error(vec![node(0.0, None, None), node(1.0, None, None)]),
+            TableError::Empty
+        );
+    }
+
+    /// Differences 2 and 4 µm: mean 3. Variances 0.09 + 0.16 at each of two nodes:
+    /// √0.5/2 = 0.3536 µm.
+    #[test]
+    fn the_lost_motion_is_the_mean_of_reverse_minus_forward() {
+        let table = ErrorTable::new(vec![both(0.0, 1.0, 3.0), both(3.0, -1.0, 3.0)]).unwrap();
+        let lost = table.lost_motion().unwrap();
+        assert!((lost.mean.um() - 3.0).abs() < 1e-12);
+        assert!((lost.standard_uncertainty.um() - 0.5_f64.sqrt() / 2.0).abs() < 1e-12);
+        assert!((lost.range.1.um() - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_lost_motion_of_one_sided_data_is_unknown_not_zero() {
+        let table =
+            ErrorTable::new(vec![node(0.0, Some(1.0), None), node(3.0, Some(2.0), None)]).unwrap();
+        assert_eq!(table.lost_motion(), None);
+        assert!(!table.knows(Approach::Reverse));
+    }
+
+    #[test]
+    fn a_jump_beyond_the_limit_is_refused_with_its_interval_and_both_values() {
+        let nodes = vec![
+            both(0.0, 0.0, 0.0),
+            both(3.0, 1.0, 1.0),
+            both(6.0, 1.5, 4.5),
+        ];
+        let table = ErrorTable::new(nodes).unwrap();
+        assert_eq!(table.check_jumps(Metres::from_um(3.6)), Ok(()));
+        assert_eq!(
+            table
+                .check_jumps(Metres::from_um(3.0))
+                .unwrap_err()
+                .to_string(),
+            "error table: the deviation jumps from 1.000 um at 3 mm to 4.500 um at 6 mm \
+             (approach `-`), more than the limit of 3.000 um; measure finer there or find the \
+             mechanical cause"
+        );
+        assert!(table.check_jumps(Metres(f64::NAN)).is_err());
+    }
+}

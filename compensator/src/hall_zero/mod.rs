@@ -1,0 +1,49 @@
+//! Drift-free absolute zero of a stage from two Hall sensors (system S5).
+//!
+//! Source: CN101551226A, steps 1–5 and claims 14–20 (whose sub-steps 11)–51) the search
+//! follows). Sensor 1 sits over three magnets N-S-N: its curve is even, with a maximum at the
+//! nominal zero. Sensor 2 sits over two magnets S-N: its curve is odd, steep at zero. Two points
+//! G1, G2 of equal voltage on the flanks of curve 1 are symmetric to the zero, whatever offset
+//! and gain have become; the mean of sensor 2's voltages there is its voltage at the zero. The
+//! patent's formulas (1), (3), (4), (6)–(9) are missing images, read as means of n samples and
+//! as the window (V2_P1 + V2_P2)/2 ± δ3.
+//!
+//! | symbol | name here |
+//! |---|---|
+//! | V1, V2 | [`Sample::peak`], [`Sample::slope`] |
+//! | V1max, G7 | [`Outcome::peak_max`], [`Step::Peak`] |
+//! | Vc, Vc0, δ1…δ4, n | [`Settings::vc`], [`Settings::vc0`], [`Settings::delta1`] …, [`Settings::samples`] |
+//! | G1 and P1, G2 and P2 | [`Outcome::g1`], [`Outcome::g2`] (both sensors' means) |
+//! | P0 and G8 | [`Outcome::p0`] |
+//!
+//! The method cancels drift along the voltage axis and suppresses tilt. It does not cure what
+//! moves the curves along x: uneven demagnetisation, outside magnets, expansion differences.
+//!
+//! Beyond the patent: every search is bounded in travel, time, soft limits and restarts; broken
+//! sensors are recognised and named ([`diagnose`]); [`refine`] uses every sample of the search
+//! and states its standard uncertainty.
+//!
+//! Absent: motion itself (the search says where to move and when to stand), rotational degrees
+//! of freedom (zero two points), trending of the drift between zeroings.
+
+mod diagnose;
+mod failure;
+mod profile;
+mod refine;
+mod search;
+mod settings;
+
+pub use crate::measurement::{HallPoint, HallSeries};
+pub use diagnose::{SensorFault, diagnose};
+pub use failure::{Reason, SearchFailure, Sensor, Step};
+pub use refine::{
+    Flank, Level, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
+    single_threshold_zero,
+};
+pub use search::{Held, Outcome, Progress, Sample, Search};
+pub use settings::{Settings, SettingsError};
+
+#[cfg(test)]
+mod rig;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,228 @@
+//! A function given at nodes, as polynomial pieces between them, with its extreme slopes.
+//!
+//! Source: F. N. Fritsch and R. E. Carlson, "Monotone piecewise cubic interpolation", SIAM J.
+//! Numer. Anal. 17 (1980); the node slopes are the weighted harmonic mean of F. N. Fritsch and
+//! J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984), with the one-sided three-point end slopes
+//! of PCHIP. Between two nodes a monotone cubic never leaves the interval of their values.
+//!
+//! | symbol | name here |
+//! |---|---|
+//! | x_i, f_i | `nodes`, `values` |
+//! | h_i, Δ_i | widths, secant slopes |
+//! | d_i | [`monotone_slopes`] |
+//!
+//! Absent: extrapolation; who calls decides what lies outside the nodes.
+
+/// How the values between two nodes are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Every interval has one value: that of the node which ends it (CN104076739A).
+    PiecewiseConstant,
+    /// Straight lines.
+    Linear,
+    /// Cubics with continuous slope that are monotone wherever the nodes are.
+    MonotoneCubic,
+}
+
+/// value(t) = constant + t·(linear + t·(quadratic + t·cubic)), for t = x − start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Where the piece begins.
+    pub start: f64,
+    /// Its width, > 0.
+    pub width: f64,
+    /// Coefficient of 1.
+    pub constant: f64,
+    /// Coefficient of t.
+    pub linear: f64,
+    /// Coefficient of t².
+    pub quadratic: f64,
+    /// Coefficient of t³.
+    pub cubic: f64,
+}
+
+impl Segment {
+    /// A straight piece from (x0, f0) to (x1, f1).
+    pub fn line(x0: f64, f0: f64, x1: f64, f1: f64) -> Self {
+        let width = x1 - x0;
+        let linear = (f1 - f0) / width;
+        Self {
+            start: x0,
+            width,
+            constant: f0,
+            linear,
+            quadratic: 0.0,
+            cubic: 0.0,
+        }
+    }
+
+    /// A flat piece of `value` from x0 to x1.
+    pub fn flat(x0: f64, x1: f64, value: f64) -> Self {
+        Self::line(x0, value, x1, value)
+    }
+
+    /// The cubic through both ends with slopes `d0` and `d1` there (Hermite).
+    pub fn hermite(x0: f64, f0: f64, d0: f64, x1: f64, f1: f64, d1: f64) -> Self {
+        let width = x1 - x0;
+        let secant = (f1 - f0) / width;
+        Self {
+            start: x0,
+            width,
+            constant: f0,
+            linear: d0,
+            quadratic: (3.0 * secant - 2.0 * d0 - d1) / width,
+            cubic: (d0 + d1 - 2.0 * secant) / (width * width),
+        }
+    }
+
+    /// Where the piece ends.
+    pub fn end(&self) -> f64 {
+        self.start + self.width
+    }
+
+    /// The value at distance `t` from the start.
+    #[inline]
+    pub fn value(&self, t: f64) -> f64 {
+        self.constant + t * (self.linear + t * (self.quadratic + t * self.cubic))
+    }
+
+    /// The slope at distance `t` from the start.
+    pub fn slope(&self, t: f64) -> f64 {
+        self.linear + t * (2.0 * self.quadratic + t * 3.0 * self.cubic)
+    }
+
+    /// The largest magnitude of the slope over the whole piece, in closed form: the slope is a
+    /// parabola, so its extremes are at the ends and at the vertex.
+    pub fn steepest(&self) -> f64 {
+        let ends = self.slope(0.0).abs().max(self.slope(self.width).abs());
+        let vertex = -self.quadratic / (3.0 * self.cubic);
+        if vertex > 0.0 && vertex < self.width {
+            ends.max(self.slope(vertex).abs())
+        } else {
+            ends
+        }
+    }
+}
+
+/// The pieces between strictly increasing `nodes` (at least two) with their `values`.
+pub fn segments(nodes: &[f64], values: &[f64], kind: Interpolation) -> Vec<Segment> {
+    debug_assert!(nodes.len() >= 2 && nodes.len() == values.len());
+    let slopes = match kind {
+        Interpolation::MonotoneCubic => monotone_slopes(nodes, values),
+        Interpolation::PiecewiseConstant | Interpolation::Linear => Vec::new(),
+    };
+    (0..nodes.len() - 1)
+        .map(|i| {
+            let (x0, f0, x1, f1) = (nodes[i], values[i], nodes[i + 1], values[i + 1]);
+            match kind {
+                Interpolation::PiecewiseConstant => Segment::flat(x0, x1, f1),
+                Interpolation::Linear => Segment::line(x0, f0, x1, f1),
+                Interpolation::MonotoneCubic => {
+                    Segment::hermite(x0, f0, slopes[i], x1, f1, slopes[i + 1])
+                }
+            }
+        })
+        .collect()
+}
+
+/// The slope at each node that keeps the cubics monotone.
+pub fn monotone_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
+    let last = nodes.len() - 1;
+    let width = |i: usize| nodes[i + 1] - nodes[i];
+    let secant = |i: usize| (values[i + 1] - values[i]) / width(i);
+    if last == 1 {
+        return vec![secant(0); 2];
+    }
+    (0..=last)
+        .map(|i| match i {
+            0 => end_slope(width(0), width(1), secant(0), secant(1)),
+            i if i == last => {
+                let (near, far) = (last - 1, last - 2);
+                end_slope(width(near), width(far), secant(near), secant(far))
+            }
+            i => inner_slope(width(i - 1), width(i), secant(i - 1), secant(i)),
+        })
+        .collect()
+}
+
+fn inner_slope(width_before: f64, width_after: f64, before: f64, after: f64) -> f64 {
+    if before * after <= 0.0 {
+        return 0.0;
+    }
+    let weight_before = 2.0 * width_after + width_before;
+    let weight_after = width_after + 2.0 * width_before;
+    (weight_before + weight_after) / (weight_before / before + weight_after / after)
+}
+
+fn end_slope(width_near: f64, width_far: f64, near: f64, far: f64) -> f64 {
+    let slope =
+        ((2.0 * width_near + width_far) * near - width_near * far) / (width_near + width_far);
+    if slope * near <= 0.0 {
+        0.0
+    } else if near * far <= 0.0 && slope.abs() > 3.0 * near.abs() {
+        3.0 * near
+    } else {
+        slope
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Nodes 0, 1, 3 with values 0, 1, 2: Δ = 1, 1/2; h = 1, 2.
+    /// Inner: w = 2·2 + 1 = 5 and 2 + 2·1 = 4: 9 / (5/1 + 4/(1/2)) = 9/13.
+    /// Left end: ((2·1 + 2)·1 − 1·1/2)/3 = 7/6. Right end: ((2·2 + 1)·1/2 − 2·1)/3 = 1/6.
+    #[test]
+    fn the_node_slopes_of_a_hand_worked_case_are_met() {
+        let slopes = monotone_slopes(&[0.0, 1.0, 3.0], &[0.0, 1.0, 2.0]);
+        for (seen, expected) in slopes.iter().zip([7.0 / 6.0, 9.0 / 13.0, 1.0 / 6.0]) {
+            assert!((seen - expected).abs() < 1e-15, "{slopes:?}");
+        }
+    }
+
+    #[test]
+    fn the_step_function_takes_the_value_of_the_node_that_ends_the_interval() {
+        let pieces = segments(
+            &[0.0, 3.0, 6.0],
+            &[9.0, 1.0, 2.0],
+            Interpolation::PiecewiseConstant,
+        );
+        assert_eq!((pieces[0].value(0.1), pieces[1].value(2.9)), (1.0, 2.0));
+        assert_eq!(pieces[0].steepest(), 0.0);
+    }
+
+    #[test]
+    fn the_steepest_slope_may_lie_inside_a_piece() {
+        // Flat at both ends, rising 1 over 1: the steepest slope is 3/2 in the middle.
+        let piece = Segment::hermite(0.0, 0.0, 0.0, 1.0, 1.0, 0.0);
+        assert!((piece.steepest() - 1.5).abs() < 1e-15);
+    }
+
+    proptest! {
+        #[test]
+        fn monotone_cubics_stay_between_their_nodes_and_meet_them(
+            steps in prop::collection::vec((0.1_f64..3.0, -5.0_f64..5.0), 2..12),
+        ) {
+            let (mut x, mut nodes, mut values) = (0.0, vec![], vec![]);
+            for (step, value) in steps {
+                x += step;
+                nodes.push(x);
+                values.push(value);
+            }
+            for (i, s) in segments(&nodes, &values, Interpolation::MonotoneCubic).iter().enumerate() {
+                let (low, high) = (values[i].min(values[i + 1]), values[i].max(values[i + 1]));
+                prop_assert!((s.value(s.width) - values[i + 1]).abs() < 1e-9);
+                let mut steepest = 0.0_f64;
+                for k in 0..=50 {
+                    let t = s.width * f64::from(k) / 50.0;
+                    prop_assert!(s.value(t) >= low - 1e-9 && s.value(t) <= high + 1e-9);
+                    steepest = steepest.max(s.slope(t).abs());
+                }
+                prop_assert!(steepest <= s.steepest() * (1.0 + 1e-12) + 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! From the configuration's words to the drivers' and the compensator's settings.
+//!
+//! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
+//! which do not know each other, meet. A further kind of device is one arm of a `match`.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+
+use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
+use compensator::hall_zero;
+use compensator::length_correction::{
+    self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
+};
+use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
+use drivers::device::cia401::{Cia401Analog, Cia401Settings};
+use drivers::device::cia402::{Cia402Drive, Cia402Settings};
+use drivers::device::dcon::{Dcon, DconSettings};
+use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
+use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
+use drivers::protocol::heartbeat::HeartbeatProducer;
+use drivers::transport::Port;
+use drivers::wire::canopen::NodeId;
+use units::{
+    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
+    Scale, Time, Volts,
+};
+
+use crate::config::{
+    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, CompensationConfig, EndPolicyName,
+    IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
+    ZeroConfig,
+};
+use crate::failure::Failure;
+use crate::machine::Unit;
+
+/// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
+const CO2_UMOL_PER_MOL: f64 = 450.0;
+/// Relative standard uncertainty of a stabilised HeNe laser's wavelength.
+const WAVELENGTH_U: f64 = 2e-8;
+const CHECKED: &str = "the configuration was checked when it was loaded";
+
+/// Port numbers by name: CAN buses first, then serial lines, each in the order of names.
+pub fn ports(config: &MachineConfig) -> BTreeMap<String, Port> {
+    config
+        .can
+        .keys()
+        .chain(config.serial.keys())
+        .zip(0..)
+        .map(|(name, number)| (name.clone(), Port(number)))
+        .collect()
+}
+
+pub(crate) fn axes(config: &MachineConfig, ports: &BTreeMap<String, Port>) -> Vec<Unit<dyn Axis>> {
+    config
+        .axis
+        .iter()
+        .map(|(name, axis)| {
+            let device: Box<dyn Axis> = match axis.device {
+                AxisDevice::Cia402 => {
+                    Box::new(Cia402Drive::new(cia402_settings(axis, &config.can[&axis.bus])))
+                }
+            };
+            Unit { name: name.clone(), port: ports[&axis.bus], device }
+        })
+        .collect()
+}
+
+pub(crate) fn analogs(
+    config: &MachineConfig,
+    ports: &BTreeMap<String, Port>,
+) -> Vec<Unit<dyn AnalogInput>> {
+    config
+        .analog
+        .iter()
+        .map(|(name, analog)| {
+            let (line, device): (&String, Box<dyn AnalogInput>) = match analog.device {
+                AnalogDevice::Cia401 => {
+                    let bus = analog.bus.as_ref().expect(CHECKED);
+                    let settings = cia401_settings(analog, &config.can[bus]);
+                    (bus, Box::new(Cia401Analog::new(settings)))
+                }
+                AnalogDevice::Dcon => {
+                    let line = analog.line.as_ref().expect(CHECKED);
+                    (line, Box::new(Dcon::new(dcon_settings(analog))))
+                }
+            };
+            Unit { name: name.clone(), port: ports[line], device }
+        })
+        .collect()
+}
+
+pub(crate) fn instruments(
+    config: &MachineConfig,
+    ports: &BTreeMap<String, Port>,
+) -> Vec<Unit<dyn DisplacementInstrument>> {
+    config
+        .instrument
+        .iter()
+        .map(|(name, instrument)| {
+            let device: Box<dyn DisplacementInstrument> = match instrument.device {
+                InstrumentDevice::Umd2 => Box::new(Umd2::new(umd2_settings(instrument))),
+            };
+            Unit { name: name.clone(), port: ports[&instrument.line], device }
+        })
+        .collect()
+}
+
+pub(crate) fn heartbeats(
+    config: &MachineConfig,
+    ports: &BTreeMap<String, Port>,
+) -> Vec<(Port, HeartbeatProducer)> {
+    config
+        .can
+        .iter()
+        .map(|(name, bus)| {
+            let period = Duration::from_millis(bus.master_heartbeat_ms.into());
+            (ports[name], HeartbeatProducer::new(node_id(bus.master_node_id), period))
+        })
+        .collect()
+}
+
+/// The nodes that the configuration has on CAN bus `name`: who they are and must be.
+pub(crate) fn expected_nodes(
+    config: &MachineConfig,
+    bus: &str,
+) -> BTreeMap<u8, (String, IdentityConfig)> {
+    let axes = config
+        .axis
+        .iter()
+        .filter(|(_, axis)| axis.bus == bus)
+        .map(|(name, axis)| (axis.node_id, (name.clone(), axis.identity.clone())));
+    let analogs = config
+        .analog
+        .iter()
+        .filter(|(_, analog)| analog.bus.as_deref() == Some(bus))
+        .filter_map(|(name, it)| Some((it.node_id?, (name.clone(), it.identity.clone()?))));
+    axes.chain(analogs).collect()
+}
+
+fn node_id(raw: u8) -> NodeId {
+    NodeId::new(raw).expect(CHECKED)
+}
+
+const fn millis(ms: u16) -> Duration {
+    Duration::from_millis(ms as u64)
+}
+
+fn node_settings(
+    node: u8,
+    bus: &CanBus,
+    identity: &IdentityConfig,
+    heartbeat_ms: (u16, u16, u16),
+) -> NodeSettings {
+    let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
+    let (producer, consumer, watch_master) = heartbeat_ms;
+    NodeSettings {
+        expected: ExpectedIdentity {
+            device_type: Some(identity.device_type),
+            vendor: Some(identity.vendor_id),
+            product: Some(identity.product_code),
+            revision: identity.revision,
+            serial: identity.serial_number,
+        },
+        heartbeat_period: millis(producer),
+        consumer_time: millis(consumer),
+        master_consumer_time: millis(watch_master),
+        ..NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period)
+    }
+}
+
+fn cia402_settings(axis: &AxisConfig, bus: &CanBus) -> Cia402Settings {
+    let heartbeats =
+        (axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms, axis.watch_master_ms);
+    let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats);
+    let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
+    let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
+    let acceleration = MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3);
+    let quick_stop = axis.quick_stop_deceleration_mm_per_s2 * 1e-3;
+    Cia402Settings {
+        soft_limits: Some((Metres::from_mm(axis.soft_min_mm), Metres::from_mm(axis.soft_max_mm))),
+        following_error: Some((
+            Metres::from_um(axis.following_error_limit_um),
+            millis(axis.following_error_timeout_ms),
+        )),
+        position_window: Metres::from_um(axis.position_window_um),
+        position_window_time: millis(axis.position_window_time_ms),
+        quick_stop_deceleration: Some(MetresPerSecondSquared(quick_stop)),
+        ..Cia402Settings::new(common, scale, speed_max, acceleration)
+    }
+}
+
+fn cia401_settings(analog: &AnalogConfig, bus: &CanBus) -> Cia401Settings {
+    let heartbeats = (
+        analog.heartbeat_producer_ms.expect(CHECKED),
+        analog.heartbeat_consumer_ms.expect(CHECKED),
+        analog.watch_master_ms.expect(CHECKED),
+    );
+    let identity = analog.identity.as_ref().expect(CHECKED);
+    let common = node_settings(analog.node_id.expect(CHECKED), bus, identity, heartbeats);
+    let channels = analog.channels.iter().zip(&analog.full_scale_v);
+    Cia401Settings::new(common, channels.map(|(channel, volts)| (*channel, Volts(*volts))).collect())
+}
+
+fn dcon_settings(analog: &AnalogConfig) -> DconSettings {
+    let period = analog.poll_period_ms.expect(CHECKED);
+    DconSettings {
+        checksum: analog.checksum,
+        channels: analog.channels.clone(),
+        poll_period: Duration::from_secs_f64(period * 1e-3),
+        ..DconSettings::new(analog.address.expect(CHECKED))
+    }
+}
+
+fn umd2_settings(instrument: &InstrumentConfig) -> Umd2Settings {
+    Umd2Settings {
+        optics_factor: instrument.optics_factor,
+        direction: if instrument.reverse { Direction::Reversed } else { Direction::AsCounted },
+        sample_rate_hz: instrument.sample_rate_hz,
+        ..Umd2Settings::default()
+    }
+}
+
+/// The search's settings, in a frame whose zero is the nominal zero.
+pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::Settings {
+    let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
+    hall_zero::Settings {
+        vc: Volts(zero.level_below_peak_v),
+        vc0: Volts(zero.turn_below_peak_v),
+        delta1: Volts(zero.delta1_mv * 1e-3),
+        delta2: Volts(zero.delta2_mv * 1e-3),
+        delta3: Volts(zero.delta3_mv * 1e-3),
+        delta4: Volts(zero.delta4_mv * 1e-3),
+        samples: zero.samples,
+        speed,
+        creep_speed: speed * 0.1,
+        search_limit: Metres::from_mm(zero.search_limit_mm),
+        time_limit: Duration::from_secs_f64(zero.time_limit_s),
+        soft_min: Metres::from_mm(axis.soft_min_mm),
+        soft_max: Metres::from_mm(axis.soft_max_mm),
+        rail_low: Volts(zero.rail_low_v),
+        rail_high: Volts(zero.rail_high_v),
+        noise: Volts(zero.noise_mv * 1e-3),
+        ..hall_zero::Settings::default()
+    }
+}
+
+/// Which corrections an instrument's readings get.
+pub(crate) fn correction_settings(instrument: &InstrumentConfig) -> length_correction::Settings {
+    let material = MaterialExpansion {
+        per_kelvin: instrument.expansion_per_kelvin,
+        u_per_kelvin: instrument.expansion_per_kelvin.abs() * 0.1,
+    };
+    let dead_path = DeadPath {
+        length: Metres::from_mm(instrument.dead_path_mm),
+        u_length: Metres::from_mm(1.0),
+    };
+    let cosine = Cosine {
+        angle: Radians(instrument.misalignment_mrad * 1e-3),
+        u_angle: Radians(0.2e-3),
+    };
+    length_correction::Settings {
+        air: instrument.correct_air,
+        vacuum_wavelength: Umd2Settings::default().vacuum_wavelength,
+        u_relative_wavelength: WAVELENGTH_U,
+        co2_umol_per_mol: CO2_UMOL_PER_MOL,
+        material_expansion: instrument.correct_material.then_some(material),
+        dead_path: (instrument.correct_dead_path && instrument.correct_air).then_some(dead_path),
+        cosine: instrument.correct_cosine.then_some(cosine),
+        u_environment: EnvironmentUncertainty {
+            air_temperature: Celsius(0.1),
+            pressure: Pascals(20.0),
+            humidity: RelativeHumidity(0.03),
+            material_temperature: Celsius(0.1),
+            co2_umol_per_mol: 100.0,
+        },
+    }
+}
+
+/// What the instrument's sensors say, as the corrections take it. A silent sensor becomes NaN,
+/// which they refuse by the sensor's name: no value is made up.
+pub(crate) fn correction_environment(environment: &Environment) -> length_correction::Environment {
+    length_correction::Environment {
+        air_temperature: environment.air_temperature.unwrap_or(Celsius(f64::NAN)),
+        pressure: environment.pressure.unwrap_or(Pascals(f64::NAN)),
+        humidity: environment.humidity.unwrap_or(RelativeHumidity(f64::NAN)),
+        material_temperature: environment.material_temperature.unwrap_or(Celsius(f64::NAN)),
+    }
+}
+
+/// A table made ready to be applied within the limits of the configuration.
+///
+/// # Errors
+/// When it jumps, or breaks a limit of size or slope.
+pub fn compensation(
+    config: &CompensationConfig,
+    axis: &str,
+    table: ErrorTable,
+) -> Result<Compensation, Failure> {
+    let axis = axis.to_owned();
+    if let Err(source) = table.check_jumps(Metres::from_um(config.jump_limit_um)) {
+        return Err(Failure::Jump { axis, source });
+    }
+    let interpolation = match config.interpolation {
+        InterpolationName::PiecewiseConstant => Interpolation::PiecewiseConstant,
+        InterpolationName::Linear => Interpolation::Linear,
+        InterpolationName::MonotoneCubic => Interpolation::MonotoneCubic,
+    };
+    let ends = match config.end_policy {
+        EndPolicyName::Refuse => EndPolicy::Refuse,
+        EndPolicyName::Hold => EndPolicy::Hold,
+        EndPolicyName::FadeOut => {
+            EndPolicy::FadeOut(Metres::from_mm(config.fade_out_mm.expect(CHECKED)))
+        }
+    };
+    let limits = Limits {
+        size: Metres::from_um(config.size_limit_um),
+        slope: config.slope_limit,
+        rate: MetresPerSecond(config.rate_limit_um_per_s * 1e-6),
+    };
+    Compensation::new(table, interpolation, limits, ends)
+        .map_err(|source| Failure::Compensation { axis, source })
+}

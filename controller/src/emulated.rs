@@ -1,0 +1,144 @@
+//! Emulated machines for demonstrations and for anybody's tests: in virtual time in this
+//! process, or on pseudo-terminals in real (or scaled) time.
+//!
+//! This module is the only one of the package that knows `mock-bus` (the layout test checks
+//! it): nothing of the emulator's truth can reach a procedure.
+
+use std::cell::{Ref, RefCell, RefMut};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use drivers::transport::in_process::{InProcess, World};
+use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
+use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
+use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
+use units::Time;
+
+use crate::assemble;
+use crate::config::MachineConfig;
+
+pub use mock_bus::plant::{DriftLimits, HallDrift};
+
+/// Why an emulated machine cannot be brought up.
+#[derive(Debug, thiserror::Error)]
+pub enum EmulatedError {
+    /// Its description is wrong.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// It has no port of a name that the machine's configuration uses.
+    #[error("the emulated machine has no bus or line `{name}`; it has {known}")]
+    NoPort {
+        /// What the configuration names.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// Pseudo-terminals or threads cannot be had.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+}
+
+/// A simulated machine in virtual time, shared by a transport and whoever injects faults,
+/// cycles its power or judges by its truth.
+#[derive(Clone)]
+pub struct Emulated {
+    simulation: Rc<RefCell<Simulation>>,
+    /// The controller's port numbers to the simulation's.
+    ports: BTreeMap<Port, Port>,
+}
+
+impl Emulated {
+    /// The machine that `toml` describes, with the noise and errors of `seed`, for a
+    /// controller configured by `config`.
+    ///
+    /// # Errors
+    /// When the description is wrong or lacks a port.
+    pub fn new(toml: &str, seed: u64, config: &MachineConfig) -> Result<Self, EmulatedError> {
+        let emulated = EmulatedConfig::parse(toml)?;
+        let ports = match_ports(&emulated, config)?;
+        let simulation = Simulation::new(&emulated, seed)?;
+        Ok(Self { simulation: Rc::new(RefCell::new(simulation)), ports })
+    }
+
+    /// A transport to this machine.
+    pub fn transport(&self) -> InProcess<Self> {
+        InProcess::new(self.clone())
+    }
+
+    /// The simulation, to look at.
+    pub fn simulation(&self) -> Ref<'_, Simulation> {
+        self.simulation.borrow()
+    }
+
+    /// The simulation, to meddle with.
+    pub fn simulation_mut(&self) -> RefMut<'_, Simulation> {
+        self.simulation.borrow_mut()
+    }
+
+    fn host_port(&self, simulated: Port) -> Option<Port> {
+        self.ports.iter().find(|(_, inner)| **inner == simulated).map(|(outer, _)| *outer)
+    }
+}
+
+/// Controller port to simulation port, by name.
+fn match_ports(
+    emulated: &EmulatedConfig,
+    config: &MachineConfig,
+) -> Result<BTreeMap<Port, Port>, EmulatedError> {
+    assemble::ports(config)
+        .into_iter()
+        .map(|(name, port)| {
+            let place = emulated.port(&name).ok_or_else(|| {
+                let known: Vec<_> = emulated.ports.iter().map(|port| port.name()).collect();
+                EmulatedError::NoPort { name: name.clone(), known: known.join(", ") }
+            })?;
+            let place = u8::try_from(place).expect("a machine has fewer than 256 ports");
+            Ok((port, Port(place)))
+        })
+        .collect()
+}
+
+impl World for Emulated {
+    fn next_event(&self) -> Time {
+        self.simulation.borrow().next_event()
+    }
+
+    fn advance(&mut self, to: Time) {
+        self.simulation.borrow_mut().advance(to);
+    }
+
+    fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), SendError> {
+        let inner = *self.ports.get(&port).ok_or(SendError::WrongKind { port })?;
+        self.simulation.borrow_mut().deliver(at, inner, payload).map_err(|error| match error {
+            DeliverError::NoPort { .. } | DeliverError::WrongKind { .. } => {
+                SendError::WrongKind { port }
+            }
+            DeliverError::Unusable { link, .. } => {
+                SendError::Unusable { port, state: link_state(link) }
+            }
+            DeliverError::QueueFull { .. } => SendError::QueueFull { port },
+        })
+    }
+
+    fn collect(&mut self) -> Option<Arrival> {
+        loop {
+            let delivery = self.simulation.borrow_mut().collect()?;
+            // A line that the controller's configuration does not use is nobody's business.
+            let Some(port) = self.host_port(delivery.port) else { continue };
+            let input = match delivery.event {
+                Event::Payload(payload) => Input::Payload(payload),
+                Event::BusError(error) => Input::BusError(error),
+                Event::Link(link) => Input::Link(link_state(link)),
+            };
+            return Some(Arrival { port, at: delivery.at, input });
+        }
+    }
+}
+
+const fn link_state(link: Link) -> LinkState {
+    match link {
+        Link::Up => LinkState::Up,
+        Link::Down => LinkState::Down,
+        Link::Gone => LinkState::Gone,
+    }
+}

@@ -1,0 +1,110 @@
+//! A machine on a bench: configuration, emulated devices, transport.
+
+use std::path::Path;
+
+use drivers::transport::Transport;
+use truestage::config::{self, Loaded};
+use truestage::emulated::{Emulated, HallDrift};
+use truestage::{Machine, Store};
+use units::Metres;
+
+/// The shipped configuration of the linear machine.
+pub const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
+/// The shipped description of its emulation.
+pub const EMULATED: &str = include_str!("../../configs/emulated/linear.toml");
+
+/// Which bus a test runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rig {
+    /// Virtual time, in this process.
+    InProcess,
+    /// SLCAN and serial lines on pseudo-terminals.
+    Pty,
+    /// SocketCAN on `vcan0`, serial lines on pseudo-terminals.
+    Vcan,
+}
+
+/// The buses that this run of the tests is for.
+///
+/// # Panics
+/// When `RIG` names none.
+pub fn rigs() -> Vec<Rig> {
+    match std::env::var("RIG").as_deref() {
+        Err(_) | Ok("") => vec![Rig::InProcess, Rig::Pty],
+        Ok("in-process") => vec![Rig::InProcess],
+        Ok("pty") => vec![Rig::Pty],
+        Ok("vcan") => vec![Rig::Vcan],
+        Ok(other) => panic!("RIG={other}: known are in-process, pty, vcan"),
+    }
+}
+
+/// The shipped configuration with its data below `folder`, after `change`.
+///
+/// # Panics
+/// When the changed text is no configuration.
+pub fn machine_config(folder: &Path, change: impl Fn(String) -> String) -> Loaded {
+    let text = change(MACHINE.replace("\"machine-data\"", &format!("{:?}", folder.display().to_string())));
+    config::parse(&text, "linear.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A machine in virtual time with everything a test looks at.
+pub struct Bench {
+    /// The controller's side.
+    pub machine: Machine,
+    /// The emulator's side.
+    pub emulated: Emulated,
+    /// Where calibrations and runs go.
+    pub store: Store,
+    /// What the controller was told.
+    pub loaded: Loaded,
+    /// Gone when dropped.
+    pub folder: tempfile::TempDir,
+}
+
+impl Bench {
+    /// The shipped machine with `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self::with(seed, |text| text, |text| text)
+    }
+
+    /// The shipped machine with changes to its configuration and to its emulation.
+    ///
+    /// # Panics
+    /// When a changed text is none any more.
+    pub fn with(
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+    ) -> Self {
+        Self::wrapped(seed, machine, emulated, |transport| Box::new(transport))
+    }
+
+    /// The same, with the transport wrapped (recorded, say).
+    ///
+    /// # Panics
+    /// When a changed text is none any more.
+    pub fn wrapped(
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+        wrap: impl FnOnce(drivers::transport::in_process::InProcess<Emulated>) -> Box<dyn Transport>,
+    ) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let loaded = machine_config(folder.path(), machine);
+        let emulated = Emulated::new(&emulated(EMULATED.to_owned()), seed, &loaded.config)
+            .unwrap_or_else(|error| panic!("{error}"));
+        let machine = Machine::new(&loaded, wrap(emulated.transport()));
+        let store = Store::new(folder.path(), &loaded.config.machine.name);
+        Self { machine, emulated, store, loaded, folder }
+    }
+
+    /// Where the point of the stage truly is, and where the true origin is zero.
+    pub fn true_position(&self) -> Metres {
+        self.emulated.simulation().truth().position()
+    }
+
+    /// The mains goes off and on; the Hall sensors drift meanwhile.
+    pub fn power_cycle(&self, drift: HallDrift) {
+        self.emulated.simulation_mut().power_cycle(drift);
+    }
+}

@@ -1,0 +1,3 @@
+//! Whole cycles of whole machines.
+
+mod linear;

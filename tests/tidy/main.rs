@@ -1,0 +1,171 @@
+//! Rules of the layout that the compiler does not know.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Which packages each package may import (design: "Imports").
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("units", &[]),
+    ("compensator", &["units"]),
+    ("drivers", &["units"]),
+    ("mock-bus", &["units", "drivers"]),
+    ("truestage", &["units", "drivers", "compensator", "mock-bus"]),
+    ("tests", &["units", "drivers", "compensator", "mock-bus", "truestage"]),
+];
+
+/// The only files of the controller that may name the emulator.
+const EMULATOR_USERS: &[&str] = &["controller/src/emulated.rs", "controller/src/cli/demo.rs"];
+
+const FILE_LINES_MAX: usize = 500;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ has a parent").to_owned()
+}
+
+/// Every Rust file below `folder` of the repository, by its path from the root.
+fn sources(folder: &str) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![root().join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|it| it == "rs") {
+                let name = path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned();
+                found.insert(name, fs::read_to_string(&path).unwrap());
+            }
+        }
+    }
+    assert!(!found.is_empty(), "no sources below {folder}: the rule would hold for nothing");
+    found
+}
+
+fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines()
+        .enumerate()
+        .map(|(at, line)| (at + 1, line))
+        .filter(|(_, line)| !line.trim_start().starts_with("//"))
+}
+
+/// The file without its tests: `#[cfg(test)]` ends the code in this project.
+fn without_tests(text: &str) -> &str {
+    text.split_once("\n#[cfg(test)]\nmod tests {").map_or(text, |(code, _)| code)
+}
+
+#[track_caller]
+fn nowhere(folder: &str, words: &[&str], why: &str) {
+    let mut offences = Vec::new();
+    for (name, text) in sources(folder) {
+        for (line, code) in code_lines(without_tests(&text)) {
+            if let Some(word) = words.iter().find(|word| code.contains(**word)) {
+                offences.push(format!("{name}:{line}: `{word}`"));
+            }
+        }
+    }
+    assert!(offences.is_empty(), "{why}:\n{}", offences.join("\n"));
+}
+
+#[test]
+fn packages_depend_only_on_those_below_them() {
+    let members: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
+    for folder in ["units", "drivers", "compensator", "mock-bus", "controller", "tests"] {
+        let text = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = text.parse().unwrap();
+        let package = manifest["package"]["name"].as_str().unwrap();
+        let allowed = members[package];
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
+                continue;
+            };
+            for name in dependencies.keys().filter(|name| members.contains_key(name.as_str())) {
+                assert!(allowed.contains(&name.as_str()), "{package} must not depend on {name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_emulator_shares_only_byte_codecs_with_the_drivers() {
+    for (name, text) in sources("mock-bus") {
+        for (line, code) in code_lines(&text) {
+            for (at, _) in code.match_indices("drivers::") {
+                let rest = &code[at + "drivers::".len()..];
+                assert!(rest.starts_with("wire"), "{name}:{line}: {}", code.trim());
+            }
+            assert!(!code.contains("compensator"), "{name}:{line}: {}", code.trim());
+        }
+    }
+}
+
+#[test]
+fn only_the_demonstration_knows_the_emulator() {
+    for (name, text) in sources("controller") {
+        if EMULATOR_USERS.contains(&name.as_str()) {
+            continue;
+        }
+        for (line, code) in code_lines(&text) {
+            assert!(!code.contains("mock_bus"), "{name}:{line}: {}", code.trim());
+        }
+    }
+}
+
+#[test]
+fn protocols_and_mathematics_know_no_clock_socket_thread_or_chance() {
+    let words = [
+        "std::thread", "std::net", "std::fs", "Instant::now", "SystemTime", "sleep(", "tokio",
+        "socketcan::", "rand::", "rand_",
+    ];
+    for folder in ["compensator/src", "drivers/src/wire", "drivers/src/protocol", "drivers/src/device"] {
+        nowhere(folder, &words, "sans-io code reaches outside");
+    }
+    nowhere("mock-bus/src/plant", &words[..6], "the plant lives in virtual time");
+    nowhere("mock-bus/src/node", &words[..6], "nodes live in virtual time");
+}
+
+#[test]
+fn fused_multiply_add_is_never_used() {
+    for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
+        let why = "without the fma target feature it calls libm, and results differ by machine";
+        nowhere(folder, &[".mul_add("], why);
+    }
+}
+
+#[test]
+fn no_test_waits_for_the_clock_on_the_wall() {
+    for (name, text) in sources("tests") {
+        if name == "tests/tidy/main.rs" {
+            continue;
+        }
+        for (line, code) in code_lines(&text) {
+            assert!(!code.contains("thread::sleep"), "{name}:{line}: {}", code.trim());
+        }
+    }
+}
+
+#[test]
+fn files_stay_within_a_screenful_of_ideas() {
+    for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
+        for (name, text) in sources(folder) {
+            let lines = without_tests(&text).lines().count();
+            let is_test = name.contains("test") || name.contains("rig");
+            assert!(is_test || lines <= FILE_LINES_MAX, "{name} has {lines} lines: split it");
+        }
+    }
+}
+
+#[test]
+fn code_has_no_loose_ends() {
+    for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
+        nowhere(folder, &["todo!(", "unimplemented!(", "dbg!(", "#[allow("], "loose end");
+    }
+}
+
+#[test]
+fn every_package_is_in_the_workspace() {
+    let text = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = text.parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap();
+    assert_eq!(members.len(), ALLOWED.len(), "tell this test what the new package may import");
+}
