@@ -3,6 +3,7 @@
 //! Every device is sans-io: input and time come in, payloads and events go out. The
 //! controller owns the loop (`truestage::tick`) that feeds them.
 
+pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
 pub mod dcon;
@@ -308,6 +309,17 @@ pub enum DeviceError {
         expected: u64,
         seen: u64,
         step: &'static str,
+    },
+    /// The drive's units are not those of the configuration.
+    #[error(
+        "{node}, {object}: one encoder increment is {seen} position units, the configured scale \
+         says {expected}; correct the scale or the drive's factors"
+    )]
+    WrongScale {
+        node: NodeId,
+        object: Object,
+        expected: f64,
+        seen: f64,
     },
     /// Something that was awaited did not come.
     #[error("{device}: waited {waited:?} for {awaited}, last saw {seen}")]

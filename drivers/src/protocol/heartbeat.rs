@@ -58,6 +58,11 @@ impl HeartbeatConsumer {
         self.watching = true;
     }
 
+    /// Forgets the state reported last: the next heartbeat is news, whatever it says.
+    pub const fn forget(&mut self) {
+        self.state = None;
+    }
+
     /// Stops watching, until the next heartbeat.
     pub const fn rest(&mut self) {
         self.watching = false;

@@ -329,6 +329,16 @@ impl SdoClient {
         }
     }
 
+    /// The server booted anew: whatever was under way is void on both sides, nothing older can
+    /// come any more, and no outcome comes.
+    pub fn server_restarted(&mut self) {
+        self.outcome = None;
+        self.job = None;
+        self.suspect = None;
+        self.outbox.clear();
+        self.state = State::Idle;
+    }
+
     /// The node whose server this is the client of.
     pub const fn node(&self) -> NodeId {
         self.node

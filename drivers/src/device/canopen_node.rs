@@ -1,0 +1,702 @@
+//! What every CANopen device has in common: who it is, whether it lives, how it starts.
+//!
+//! Source: CiA 301 (7.3.2 NMT, 7.2.8.3.2 heartbeat, 7.2.7 EMCY); the order of the start
+//! procedure follows CiA 302-2: boot-up or answer, device type, identity, configuration,
+//! error control, start.
+
+use core::time::Duration;
+use std::collections::VecDeque;
+
+use units::Time;
+
+use super::{Alarm, DeviceError, DeviceName, Identity, Seen};
+use crate::protocol::heartbeat::{HeartbeatConsumer, HeartbeatEvent};
+use crate::protocol::script::{Script, ScriptCause, ScriptFailure, Step};
+use crate::protocol::sdo_client::{Retry, SdoClient, SdoFailure, Timeouts as SdoTimeouts};
+use crate::transport::Input;
+use crate::wire::Payload;
+use crate::wire::can::CanFrame;
+use crate::wire::canopen::emcy::Emergency;
+use crate::wire::canopen::nmt::{NmtCommand, NmtState, consumer_heartbeat_entry};
+use crate::wire::canopen::{Function, NodeId, Object};
+
+const DEVICE_TYPE: Object = Object::new(0x1000, 0);
+const NAME: Object = Object::new(0x1008, 0);
+const VENDOR: Object = Object::new(0x1018, 1);
+const PRODUCT: Object = Object::new(0x1018, 2);
+const REVISION: Object = Object::new(0x1018, 3);
+const SERIAL: Object = Object::new(0x1018, 4);
+
+/// How often NMT start, which nobody confirms, is sent before the node counts as deaf.
+const START_COMMANDS_MAX: u8 = 3;
+
+/// What the configuration says about a device; `None` accepts anything.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExpectedIdentity {
+    /// 0x1000, all of it; the profile number in its lower half is always checked.
+    pub device_type: Option<u32>,
+    /// 0x1018:01.
+    pub vendor: Option<u32>,
+    /// 0x1018:02.
+    pub product: Option<u32>,
+    /// 0x1018:03.
+    pub revision: Option<u32>,
+    /// 0x1018:04.
+    pub serial: Option<u32>,
+}
+
+/// How long each thing is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeTimeouts {
+    /// Boot-up or the first answer: drives take up to 5 s after power-on.
+    pub boot: Duration,
+    /// One SDO response, and what belongs to it.
+    pub sdo: SdoTimeouts,
+    /// Operational, and the first process data, after NMT start.
+    pub operational: Duration,
+}
+
+impl Default for NodeTimeouts {
+    fn default() -> Self {
+        Self {
+            boot: Duration::from_secs(10),
+            sdo: SdoTimeouts::default(),
+            operational: Duration::from_secs(2),
+        }
+    }
+}
+
+/// What is set about a node, whatever its profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeSettings {
+    /// The node.
+    pub node: NodeId,
+    /// Us: the producer whose heartbeat the node watches.
+    pub master: NodeId,
+    /// Who it must be.
+    pub expected: ExpectedIdentity,
+    /// The node's own heartbeat (0x1017), whole milliseconds.
+    pub heartbeat_period: Duration,
+    /// Without a heartbeat for this long the node is lost to us.
+    pub consumer_time: Duration,
+    /// Without our heartbeat for this long we are lost to the node (0x1016:01), which then
+    /// stops; zero: the node does not watch us.
+    pub master_consumer_time: Duration,
+    /// From SYNC to SYNC; three without process data are an alarm.
+    pub sync_period: Duration,
+    /// How often reads and configuration writes are begun anew.
+    pub retry: Retry,
+    /// How long each thing is waited for.
+    pub timeouts: NodeTimeouts,
+}
+
+impl NodeSettings {
+    /// Heartbeats of 50 ms watched for 150 ms, both ways; any identity; two retries.
+    pub fn new(node: NodeId, master: NodeId, sync_period: Duration) -> Self {
+        Self {
+            node,
+            master,
+            expected: ExpectedIdentity::default(),
+            heartbeat_period: Duration::from_millis(50),
+            consumer_time: Duration::from_millis(150),
+            master_consumer_time: Duration::from_millis(150),
+            sync_period,
+            retry: Retry::UpTo(2),
+            timeouts: NodeTimeouts::default(),
+        }
+    }
+}
+
+/// What the common part tells the device's own part.
+#[derive(Debug)]
+pub(super) enum NodeEvent {
+    /// The identity is right; the profile's own objects were read. Answer with
+    /// [`CanopenNode::configure`].
+    Described(Script),
+    /// Configured and operational. Answer with [`CanopenNode::up`] when data came.
+    Operational,
+    /// A script of the device's own is done.
+    ScriptDone(Script),
+    /// The start or a script failed.
+    Failed(DeviceError),
+    /// Something is wrong.
+    Alarm(Alarm),
+    /// Process data: TPDO 1 to 4.
+    Pdo { number: u8, frame: CanFrame },
+    /// No process data for this long.
+    PdoSilent { waited: Duration, missed: u32 },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Off,
+    /// Does it answer? Until the deadline.
+    Probing { since: Time },
+    Describing,
+    /// The device's own part checks what was read.
+    Described,
+    Configuring,
+    Starting {
+        since: Time,
+        again: Time,
+        sent: u8,
+    },
+    /// Operational, waiting for data.
+    Operational { since: Time },
+    Up,
+}
+
+/// The common part of a CANopen device.
+#[derive(Debug)]
+pub(super) struct CanopenNode {
+    settings: NodeSettings,
+    profile: u16,
+    client: SdoClient,
+    consumer: HeartbeatConsumer,
+    phase: Phase,
+    description: Vec<Step>,
+    script: Option<Script>,
+    outbox: VecDeque<CanFrame>,
+    events: VecDeque<NodeEvent>,
+    identity: Option<Identity>,
+    last_pdo: Time,
+    pdo_silent: bool,
+    emergencies: u64,
+    heartbeats_lost: u64,
+    boot_ups: u64,
+}
+
+impl CanopenNode {
+    pub(super) fn new(settings: NodeSettings, profile: u16) -> Self {
+        let sdo = settings.timeouts.sdo;
+        Self {
+            client: SdoClient::new(settings.node, sdo).with_retry(settings.retry),
+            consumer: HeartbeatConsumer::new(settings.node, settings.consumer_time),
+            settings,
+            profile,
+            phase: Phase::Off,
+            description: Vec::new(),
+            script: None,
+            outbox: VecDeque::new(),
+            events: VecDeque::new(),
+            identity: None,
+            last_pdo: Time::ZERO,
+            pdo_silent: false,
+            emergencies: 0,
+            heartbeats_lost: 0,
+            boot_ups: 0,
+        }
+    }
+
+    pub(super) const fn id(&self) -> NodeId {
+        self.settings.node
+    }
+
+    pub(super) const fn name(&self) -> DeviceName {
+        DeviceName::Node(self.settings.node)
+    }
+
+    pub(super) const fn is_up(&self) -> bool {
+        matches!(self.phase, Phase::Up)
+    }
+
+    /// Whether NMT start was obeyed.
+    pub(super) const fn is_operational(&self) -> bool {
+        matches!(self.phase, Phase::Operational { .. } | Phase::Up)
+    }
+
+    pub(super) const fn identity(&self) -> Option<&Identity> {
+        self.identity.as_ref()
+    }
+
+    pub(super) fn counters(&self) -> Vec<(&'static str, u64)> {
+        let sdo = self.client.counters();
+        vec![
+            ("sdo stale", sdo.stale),
+            ("sdo mismatched", sdo.mismatched),
+            ("sdo short", sdo.short),
+            ("sdo unexpected", sdo.unexpected),
+            ("sdo duplicated", sdo.duplicated),
+            ("sdo late", sdo.late),
+            ("sdo aborts sent", sdo.aborts_sent),
+            ("sdo retries", sdo.retries),
+            ("emergencies", self.emergencies),
+            ("heartbeats lost", self.heartbeats_lost),
+            ("boot-ups", self.boot_ups),
+        ]
+    }
+
+    /// Begins the start; `description` are the profile's own reads.
+    pub(super) fn start(&mut self, now: Time, description: Vec<Step>) {
+        self.drop_script(now);
+        self.events.clear();
+        self.identity = None;
+        self.pdo_silent = false;
+        self.consumer.rest();
+        self.description = description;
+        self.phase = Phase::Probing { since: now };
+        self.probe(now);
+    }
+
+    /// Goes on with the start: configuration, error control, NMT start.
+    pub(super) fn configure(&mut self, now: Time, mut steps: Vec<Step>) {
+        let settings = &self.settings;
+        let watch = if settings.master_consumer_time.is_zero() {
+            0
+        } else {
+            consumer_heartbeat_entry(settings.master, millis(settings.master_consumer_time))
+        };
+        steps.push(Step::check(
+            Object::new(0x1017, 0),
+            millis(settings.heartbeat_period),
+            "setting the node's heartbeat",
+        ));
+        steps.push(Step::check(
+            Object::new(0x1016, 1),
+            watch,
+            "making the node watch our heartbeat",
+        ));
+        self.phase = Phase::Configuring;
+        self.run_script(now, Script::new(steps));
+    }
+
+    /// The start is over: from now on everything unexpected is an alarm.
+    pub(super) const fn up(&mut self, now: Time) {
+        self.phase = Phase::Up;
+        self.last_pdo = now;
+    }
+
+    /// The start failed in the device's own part.
+    pub(super) fn give_up(&mut self, now: Time) {
+        self.drop_script(now);
+        self.phase = Phase::Off;
+    }
+
+    /// Runs steps of the device's own; an unfinished script is given up.
+    pub(super) fn run(&mut self, now: Time, steps: Vec<Step>) {
+        self.drop_script(now);
+        self.run_script(now, Script::new(steps));
+    }
+
+    pub(super) fn drop_script(&mut self, now: Time) {
+        self.script = None;
+        self.client.cancel(now);
+    }
+
+    fn run_script(&mut self, now: Time, script: Script) {
+        self.script = Some(script);
+        self.poll_script(now);
+    }
+
+    pub(super) fn send(&mut self, frame: CanFrame) {
+        self.outbox.push_back(frame);
+    }
+
+    pub(super) fn poll_transmit(&mut self) -> Option<CanFrame> {
+        self.outbox
+            .pop_front()
+            .or_else(|| self.client.poll_transmit())
+    }
+
+    pub(super) fn poll_event(&mut self) -> Option<NodeEvent> {
+        self.events.pop_front()
+    }
+
+    pub(super) fn poll_timeout(&self) -> Time {
+        let phase = match self.phase {
+            Phase::Probing { since } => since + self.settings.timeouts.boot,
+            Phase::Starting { since, again, .. } => {
+                again.min(since + self.settings.timeouts.operational)
+            }
+            Phase::Operational { since } => since + self.settings.timeouts.operational,
+            Phase::Up if !self.pdo_silent => self.pdo_deadline(),
+            Phase::Up
+            | Phase::Off
+            | Phase::Describing
+            | Phase::Described
+            | Phase::Configuring => Time::NEVER,
+        };
+        phase
+            .min(self.client.poll_timeout())
+            .min(self.consumer.poll_timeout())
+    }
+
+    /// Half a period of grace: process data has its own place within the period.
+    fn pdo_deadline(&self) -> Time {
+        self.last_pdo + self.settings.sync_period * 7 / 2
+    }
+
+    pub(super) fn handle(&mut self, now: Time, input: &Input) {
+        let Input::Payload(Payload::Frame(frame)) = input else {
+            return;
+        };
+        if let Some(event) = self.consumer.handle_frame(now, frame) {
+            self.take_heartbeat(now, event);
+        } else if self.client.handle_frame(now, frame) {
+            self.poll_script(now);
+        } else if let Ok((node, emergency)) = Emergency::parse(frame) {
+            if node == self.settings.node {
+                self.take_emergency(emergency);
+            }
+        } else if let Some(number) = self.pdo_number(frame) {
+            self.last_pdo = now;
+            self.pdo_silent = false;
+            let frame = *frame;
+            self.events.push_back(NodeEvent::Pdo { number, frame });
+        }
+    }
+
+    fn pdo_number(&self, frame: &CanFrame) -> Option<u8> {
+        let (function, node) = Function::of(frame.standard_id()?)?;
+        if node != self.settings.node || frame.is_remote() {
+            return None;
+        }
+        match function {
+            Function::Tpdo1 => Some(1),
+            Function::Tpdo2 => Some(2),
+            Function::Tpdo3 => Some(3),
+            Function::Tpdo4 => Some(4),
+            Function::Emergency
+            | Function::Rpdo1
+            | Function::Rpdo2
+            | Function::Rpdo3
+            | Function::Rpdo4
+            | Function::SdoResponse
+            | Function::SdoRequest
+            | Function::ErrorControl => None,
+        }
+    }
+
+    pub(super) fn handle_timeout(&mut self, now: Time) {
+        self.client.handle_timeout(now);
+        self.poll_script(now);
+        if let Some(event) = self.consumer.handle_timeout(now) {
+            self.take_heartbeat(now, event);
+        }
+        let timeouts = self.settings.timeouts;
+        match self.phase {
+            Phase::Probing { since } if now >= since + timeouts.boot => {
+                self.fail_waiting(now, since, "boot-up or an answer to SDO");
+            }
+            Phase::Starting { since, .. } if now >= since + timeouts.operational => {
+                self.fail_waiting(now, since, "operational after NMT start");
+            }
+            Phase::Starting { since, again, sent } if now >= again => {
+                self.command_start(now, since, sent);
+            }
+            Phase::Operational { since } if now >= since + timeouts.operational => {
+                self.fail_waiting(now, since, "the first process data; does SYNC run?");
+            }
+            Phase::Up if !self.pdo_silent && now >= self.pdo_deadline() => {
+                self.pdo_silent = true;
+                let waited = now.since(self.last_pdo);
+                let periods = waited.as_nanos() / self.settings.sync_period.as_nanos().max(1);
+                let missed = u32::try_from(periods).unwrap_or(u32::MAX);
+                self.events
+                    .push_back(NodeEvent::PdoSilent { waited, missed });
+            }
+            Phase::Off
+            | Phase::Probing { .. }
+            | Phase::Describing
+            | Phase::Described
+            | Phase::Configuring
+            | Phase::Starting { .. }
+            | Phase::Operational { .. }
+            | Phase::Up => {}
+        }
+    }
+
+    fn probe(&mut self, now: Time) {
+        let step = Step::read(DEVICE_TYPE, "asking who it is");
+        self.run_script(now, Script::new([step]));
+    }
+
+    fn poll_script(&mut self, now: Time) {
+        let Some(script) = &mut self.script else {
+            return;
+        };
+        let Some(result) = script.poll(now, &mut self.client) else {
+            return;
+        };
+        let Some(script) = self.script.take() else {
+            return;
+        };
+        match result {
+            Ok(()) => self.script_done(now, script),
+            Err(failure) => self.script_failed(now, failure),
+        }
+    }
+
+    fn script_done(&mut self, now: Time, script: Script) {
+        match self.phase {
+            Phase::Probing { .. } => {
+                let node = self.settings.node;
+                self.outbox
+                    .push_back(NmtCommand::EnterPreOperational.emit(Some(node)));
+                self.phase = Phase::Describing;
+                let mut steps = identity_steps();
+                steps.extend(self.description.iter().copied());
+                self.run_script(now, Script::new(steps));
+            }
+            Phase::Describing => {
+                let identity = identity_from(&script);
+                let checked = self.check_identity(&identity);
+                self.identity = Some(identity);
+                match checked {
+                    Ok(()) => {
+                        self.phase = Phase::Described;
+                        self.events.push_back(NodeEvent::Described(script));
+                    }
+                    Err(error) => self.fail(now, error),
+                }
+            }
+            Phase::Configuring => {
+                // What was reported before NMT start says nothing about what follows it.
+                self.consumer.forget();
+                self.consumer.expect(now);
+                self.command_start(now, now, 0);
+            }
+            Phase::Off
+            | Phase::Described
+            | Phase::Starting { .. }
+            | Phase::Operational { .. }
+            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone(script)),
+        }
+    }
+
+    fn script_failed(&mut self, now: Time, failure: ScriptFailure) {
+        let silent = matches!(
+            failure.cause,
+            ScriptCause::Sdo(SdoFailure::TimedOut { .. } | SdoFailure::Protocol { .. })
+        );
+        if silent && let Phase::Probing { since } = self.phase {
+            // It may still be booting: asked again until the boot time-out.
+            if now < since + self.settings.timeouts.boot {
+                self.probe(now);
+                return;
+            }
+        }
+        let error = device_error(self.settings.node, failure);
+        if self.is_up() {
+            self.events.push_back(NodeEvent::Failed(error));
+        } else {
+            self.fail(now, error);
+        }
+    }
+
+    fn command_start(&mut self, now: Time, since: Time, sent: u8) {
+        if sent < START_COMMANDS_MAX {
+            let node = self.settings.node;
+            self.outbox.push_back(NmtCommand::Start.emit(Some(node)));
+        }
+        let pause = self.settings.timeouts.operational / u32::from(START_COMMANDS_MAX);
+        self.phase = Phase::Starting {
+            since,
+            again: if sent < START_COMMANDS_MAX {
+                now + pause
+            } else {
+                Time::NEVER
+            },
+            sent: sent.saturating_add(1),
+        };
+    }
+
+    fn note_operational(&mut self, now: Time) {
+        if let Phase::Starting { .. } = self.phase
+            && self.consumer.state() == Some(NmtState::Operational)
+        {
+            self.phase = Phase::Operational { since: now };
+            self.events.push_back(NodeEvent::Operational);
+        }
+    }
+
+    fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {
+        match event {
+            HeartbeatEvent::BootUp => self.take_boot_up(now),
+            HeartbeatEvent::Changed { to, .. } => {
+                self.note_operational(now);
+                if self.is_up() && to != NmtState::Operational {
+                    let node = self.settings.node;
+                    self.alarm(Alarm::UnexpectedNmtState { node, state: to });
+                }
+            }
+            HeartbeatEvent::Lost { waited } => {
+                self.heartbeats_lost += 1;
+                let node = self.settings.node;
+                let alarm = Alarm::HeartbeatLost { node, waited };
+                self.end_by(now, alarm);
+            }
+        }
+    }
+
+    fn take_boot_up(&mut self, now: Time) {
+        self.boot_ups += 1;
+        // Nothing older than the boot-up can come any more.
+        self.client.server_restarted();
+        self.script = None;
+        match self.phase {
+            Phase::Off => {}
+            Phase::Probing { .. } => self.probe(now),
+            Phase::Describing
+            | Phase::Described
+            | Phase::Configuring
+            | Phase::Starting { .. }
+            | Phase::Operational { .. }
+            | Phase::Up => {
+                let was_up = self.is_up();
+                let node = self.settings.node;
+                self.end_by(now, Alarm::UnexpectedBootUp { node });
+                if was_up {
+                    self.phase = Phase::Off;
+                }
+            }
+        }
+    }
+
+    /// An alarm that ends a start, or is told when the node is up.
+    fn end_by(&mut self, now: Time, alarm: Alarm) {
+        match self.phase {
+            Phase::Off | Phase::Probing { .. } => {}
+            Phase::Up => self.alarm(alarm),
+            Phase::Describing
+            | Phase::Described
+            | Phase::Configuring
+            | Phase::Starting { .. }
+            | Phase::Operational { .. } => {
+                let device = self.name();
+                let step = "the start";
+                self.fail(
+                    now,
+                    DeviceError::Alarmed {
+                        device,
+                        step,
+                        alarm,
+                    },
+                );
+            }
+        }
+    }
+
+    fn take_emergency(&mut self, emergency: Emergency) {
+        self.emergencies += 1;
+        // During the start it is only counted: what was wrong shows in the device's state.
+        if self.is_up() && !emergency.code.is_cleared() {
+            let node = self.settings.node;
+            self.alarm(Alarm::Emergency { node, emergency });
+        }
+    }
+
+    fn alarm(&mut self, alarm: Alarm) {
+        self.events.push_back(NodeEvent::Alarm(alarm));
+    }
+
+    fn fail_waiting(&mut self, now: Time, since: Time, awaited: &'static str) {
+        let error = DeviceError::Timeout {
+            device: self.name(),
+            awaited,
+            waited: now.since(since),
+            seen: self.consumer.state().map_or(Seen::Nothing, Seen::Nmt),
+        };
+        self.fail(now, error);
+    }
+
+    fn fail(&mut self, now: Time, error: DeviceError) {
+        self.give_up(now);
+        self.consumer.rest();
+        self.events.push_back(NodeEvent::Failed(error));
+    }
+
+    fn check_identity(&self, seen: &Identity) -> Result<(), DeviceError> {
+        let node = self.settings.node;
+        let expected = self.settings.expected;
+        let profile = u32::from(self.profile);
+        let checks = [
+            ("device profile", Some(profile), seen.device_type & 0xFFFF),
+            ("device type", expected.device_type, seen.device_type),
+            ("vendor", expected.vendor, seen.vendor),
+            ("product", expected.product, seen.product),
+            ("revision", expected.revision, seen.revision),
+            ("serial number", expected.serial, seen.serial),
+        ];
+        for (what, expected, seen) in checks {
+            if let Some(expected) = expected.filter(|expected| *expected != seen) {
+                return Err(DeviceError::WrongIdentity {
+                    node,
+                    what,
+                    expected,
+                    seen,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn identity_steps() -> Vec<Step> {
+    const TEXT: &str = "reading its identity";
+    vec![
+        Step::read(DEVICE_TYPE, TEXT),
+        Step::read(VENDOR, TEXT),
+        Step::read(PRODUCT, TEXT).optional(),
+        Step::read(REVISION, TEXT).optional(),
+        Step::read(SERIAL, TEXT).optional(),
+        Step::read(NAME, TEXT).optional(),
+    ]
+}
+
+fn identity_from(script: &Script) -> Identity {
+    let value = |object| script.value(object).unwrap_or(0);
+    let name = script.data(NAME).unwrap_or_default();
+    Identity {
+        device_type: value(DEVICE_TYPE),
+        vendor: value(VENDOR),
+        product: value(PRODUCT),
+        revision: value(REVISION),
+        serial: value(SERIAL),
+        name: String::from_utf8_lossy(name)
+            .trim_end_matches(['\0', ' '])
+            .to_owned(),
+    }
+}
+
+/// Whole milliseconds, as 0x1016 and 0x1017 hold them.
+pub(super) fn millis(span: Duration) -> u16 {
+    u16::try_from(span.as_millis()).unwrap_or(u16::MAX)
+}
+
+fn device_error(node: NodeId, failure: ScriptFailure) -> DeviceError {
+    let step = failure.text;
+    match failure.cause {
+        ScriptCause::Differs { expected, seen } => DeviceError::ReadBack {
+            node,
+            object: failure.object,
+            expected,
+            seen,
+            step,
+        },
+        ScriptCause::Sdo(SdoFailure::Aborted { object, code }) => DeviceError::SdoAbort {
+            node,
+            object,
+            code,
+            step,
+        },
+        ScriptCause::Sdo(SdoFailure::TimedOut {
+            object,
+            waited,
+            attempts,
+            ..
+        }) => DeviceError::SdoTimeout {
+            node,
+            object,
+            waited,
+            attempts,
+            step,
+        },
+        ScriptCause::Sdo(SdoFailure::Protocol { object, code, .. }) => DeviceError::SdoProtocol {
+            node,
+            object,
+            code,
+            step,
+        },
+    }
+}

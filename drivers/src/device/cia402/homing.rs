@@ -1,0 +1,255 @@
+//! Homing (CiA 402, 11): parameters, mode 6, start, status by mask, mode 1 again.
+
+use core::time::Duration;
+use units::{Metres, MetresPerSecond, Time};
+
+use super::convert::counts_i32;
+use super::settings::HomeOffset;
+use super::start::{HOME_OFFSET, MODE, homing_steps};
+use super::{Activity, Cia402Drive};
+use crate::device::{DeviceError, Seen};
+use crate::protocol::script::Step;
+use crate::wire::cia402::{Controlword, HomingStatus, OperationMode};
+
+/// So many samples after the start, "done" and "error" may still be those of the homing before.
+const STALE_SAMPLES: u8 = 5;
+
+#[derive(Clone, Debug, PartialEq)]
+enum Phase {
+    /// SDO: parameters, mode 6.
+    Preparing,
+    AwaitingHoming,
+    Running {
+        samples: u8,
+        /// "In progress" or the like was seen: what follows is about this homing.
+        begun: bool,
+    },
+    /// SDO: mode 1; then the outcome is told.
+    Restoring(Result<(), DeviceError>),
+    AwaitingProfile(Result<(), DeviceError>),
+    AwaitingPosition,
+}
+
+/// A homing under way.
+#[derive(Debug)]
+pub(super) struct Homing {
+    phase: Phase,
+    /// The coordinate at home, in counts.
+    position: i32,
+    /// Homed where it stands: the reading must become `position`.
+    here: bool,
+    since: Time,
+    deadline: Time,
+}
+
+impl Homing {
+    pub(super) const fn deadline(&self) -> Time {
+        self.deadline
+    }
+}
+
+impl Cia402Drive {
+    /// With a search speed: on the negative limit switch; without: here.
+    pub(super) fn begin_homing(
+        &mut self,
+        now: Time,
+        position: Metres,
+        search: Option<MetresPerSecond>,
+    ) {
+        if search.is_none() && !self.image.stands() {
+            self.refuse("homing here", "an axis that stands");
+            return;
+        }
+        let reversed = self.settings.scale.resolution() < Metres::ZERO;
+        let method = match search {
+            None => 37,
+            // The negative end of the axis is the drive's positive one when it counts against it.
+            Some(_) if reversed => 18,
+            Some(_) => 17,
+        };
+        let plan = counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(
+            |counts| {
+                let offset = match self.settings.home_offset {
+                    HomeOffset::IsPositionAtHome => counts,
+                    HomeOffset::IsZeroFromHome => -counts,
+                };
+                Ok((counts, homing_steps(&self.settings, method, offset, search)?))
+            },
+        );
+        match plan {
+            Err(error) => self.finish(Err(error)),
+            Ok((position, steps)) => {
+                self.reached = None;
+                self.homed = false;
+                self.image.allow_jumps(true);
+                self.activity = Activity::Homing(Homing {
+                    phase: Phase::Preparing,
+                    position,
+                    here: search.is_none(),
+                    since: now,
+                    deadline: Time::NEVER,
+                });
+                // Without a set-point bit: in homing mode it would be the start.
+                self.send_control(now, Controlword::ENABLE_COMMAND);
+                self.repeat_at = Time::NEVER;
+                self.node.run(now, steps);
+                self.pump(now);
+            }
+        }
+    }
+
+    fn enter_homing(&mut self, now: Time, phase: Phase, patience: Option<Duration>) {
+        if let Activity::Homing(homing) = &mut self.activity {
+            homing.phase = phase;
+            homing.since = now;
+            homing.deadline = patience.map_or(Time::NEVER, |patience| now + patience);
+        }
+    }
+
+    pub(super) fn homing_prepared(&mut self, now: Time) {
+        let Activity::Homing(homing) = &self.activity else {
+            return;
+        };
+        let mode = Some(self.settings.timeouts.mode);
+        match homing.phase.clone() {
+            Phase::Preparing => self.enter_homing(now, Phase::AwaitingHoming, mode),
+            Phase::Restoring(result) => {
+                self.enter_homing(now, Phase::AwaitingProfile(result), mode);
+            }
+            Phase::AwaitingHoming
+            | Phase::Running { .. }
+            | Phase::AwaitingProfile(_)
+            | Phase::AwaitingPosition => {}
+        }
+    }
+
+    /// A transfer failed, or the drive did: back to profile position, then tell.
+    pub(super) fn homing_failed(&mut self, now: Time, error: DeviceError) {
+        let Activity::Homing(homing) = &self.activity else {
+            return;
+        };
+        match &homing.phase {
+            Phase::Restoring(_) | Phase::AwaitingProfile(_) | Phase::AwaitingPosition => {
+                self.finish(Err(error));
+            }
+            Phase::Preparing | Phase::AwaitingHoming | Phase::Running { .. } => {
+                self.restore(now, Err(error));
+            }
+        }
+    }
+
+    fn restore(&mut self, now: Time, result: Result<(), DeviceError>) {
+        self.send_control(now, Controlword::ENABLE_COMMAND);
+        self.repeat_at = Time::NEVER;
+        self.enter_homing(now, Phase::Restoring(result), None);
+        let mode = OperationMode::ProfilePosition.raw();
+        let step = Step::write(MODE, mode, "going back to profile position");
+        self.node.run(now, vec![step]);
+        self.pump(now);
+    }
+
+    pub(super) fn advance_homing(&mut self, now: Time) {
+        let Some(sample) = self.image.sample().copied() else {
+            return;
+        };
+        let Activity::Homing(homing) = &mut self.activity else {
+            return;
+        };
+        match &mut homing.phase {
+            Phase::Preparing | Phase::Restoring(_) => {}
+            Phase::AwaitingHoming => {
+                if sample.mode == OperationMode::Homing {
+                    let phase = Phase::Running {
+                        samples: 0,
+                        begun: false,
+                    };
+                    self.enter_homing(now, phase, Some(self.settings.timeouts.homing));
+                    self.send_control(now, Controlword::ENABLE_COMMAND | Controlword::MODE_4);
+                }
+            }
+            Phase::Running { samples, begun } => {
+                *samples = samples.saturating_add(1);
+                let status = HomingStatus::of(sample.status);
+                let fresh = *begun || *samples > STALE_SAMPLES;
+                match status {
+                    HomingStatus::InProgress | HomingStatus::Attained => *begun = true,
+                    HomingStatus::Done if fresh => self.restore(now, Ok(())),
+                    HomingStatus::ErrorMoving | HomingStatus::ErrorStopped if fresh => {
+                        let node = self.node.id();
+                        let (step, state) = ("homing", sample.state());
+                        let error = DeviceError::DriveRefused { node, step, state };
+                        self.restore(now, Err(error));
+                    }
+                    HomingStatus::NotStarted
+                    | HomingStatus::Done
+                    | HomingStatus::ErrorMoving
+                    | HomingStatus::ErrorStopped
+                    | HomingStatus::Unknown(_) => {}
+                }
+            }
+            Phase::AwaitingProfile(result) => {
+                if sample.mode == OperationMode::ProfilePosition {
+                    match result.clone() {
+                        Err(error) => self.finish(Err(error)),
+                        Ok(()) => {
+                            let patience = Some(self.settings.timeouts.new_position);
+                            self.enter_homing(now, Phase::AwaitingPosition, patience);
+                            self.advance_homing(now);
+                        }
+                    }
+                }
+            }
+            Phase::AwaitingPosition => {
+                let away = (sample.position.0 - i64::from(homing.position)).abs();
+                if !homing.here || away <= self.settings.tolerance_counts() {
+                    self.target = homing.position;
+                    self.homed = true;
+                    self.finish(Ok(()));
+                }
+            }
+        }
+    }
+
+    pub(super) fn homing_timeout(&mut self, now: Time) {
+        let Activity::Homing(homing) = &self.activity else {
+            return;
+        };
+        if now < homing.deadline {
+            return;
+        }
+        let since = homing.since;
+        let mode = self.mode().map_or(Seen::Nothing, |mode| Seen::Mode(mode.raw()));
+        match homing.phase.clone() {
+            Phase::Preparing | Phase::Restoring(_) => {}
+            Phase::AwaitingHoming => {
+                let error = DeviceError::Timeout {
+                    device: self.node.name(),
+                    awaited: "the homing mode",
+                    waited: now.since(since),
+                    seen: mode,
+                };
+                self.restore(now, Err(error));
+            }
+            Phase::Running { .. } => {
+                let error = DeviceError::Timeout {
+                    device: self.node.name(),
+                    awaited: "the end of homing",
+                    waited: now.since(since),
+                    seen: self.seen_status(),
+                };
+                self.restore(now, Err(error));
+            }
+            // The homing's own failure is the better cause.
+            Phase::AwaitingProfile(Err(error)) => self.finish(Err(error)),
+            Phase::AwaitingProfile(Ok(())) => {
+                self.time_out(now, since, "profile position after homing", mode);
+            }
+            Phase::AwaitingPosition => {
+                let seen = self.image.sample().map_or(Seen::Nothing, |sample| {
+                    Seen::Position(self.settings.scale.to_metres(sample.position))
+                });
+                self.time_out(now, since, "the new position after homing", seen);
+            }
+        }
+    }
+}

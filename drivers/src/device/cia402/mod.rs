@@ -1,0 +1,507 @@
+//! A servo drive by CiA 402 (IEC 61800-7-201) on CANopen.
+//!
+//! Start, power, profile position, homing, halt, quick stop and supervision of one axis.
+//!
+//! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
+//! error, both at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
+//! taken over at once: no adapter that re-orders frames can part a target from the edge that
+//! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
+//! they are written by SDO, read back, before the move that needs them.
+//!
+//! Nothing is concluded from a command having been sent: each step waits for the statusword,
+//! and a controlword that seems to be without effect is sent again. All levels, no edge but the
+//! fault reset's: a repetition is harmless.
+//!
+//! Absent: cyclic synchronous modes, interpolated position, touch probe, torque.
+
+mod convert;
+mod homing;
+mod image;
+mod motion;
+mod power;
+mod settings;
+mod start;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+
+use units::Time;
+
+pub use settings::{Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes};
+
+use super::canopen_node::{CanopenNode, NodeEvent};
+use super::{Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, Identity, Seen};
+use crate::protocol::script::Script;
+use crate::transport::Input;
+use crate::wire::Payload;
+use crate::wire::can::CanFrame;
+use crate::wire::canopen::Function;
+use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
+use homing::Homing;
+use image::{Image, Judgement, SAMPLE_BYTES, Sample};
+use motion::{Halt, Move};
+use power::Power;
+
+/// The profile number in 0x1000.
+const PROFILE: u16 = 402;
+
+/// What the drive is busy with.
+#[derive(Debug)]
+enum Activity {
+    Idle,
+    Starting,
+    Power(Power),
+    Move(Move),
+    Halt(Halt),
+    Homing(Homing),
+}
+
+impl Activity {
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Idle => "nothing",
+            Self::Starting => "the start",
+            Self::Power(_) => "the change of power state",
+            Self::Move(_) => "the move",
+            Self::Halt(_) => "the halt",
+            Self::Homing(_) => "homing",
+        }
+    }
+}
+
+/// One CiA 402 drive, one axis.
+#[derive(Debug)]
+pub struct Cia402Drive {
+    settings: Cia402Settings,
+    node: CanopenNode,
+    image: Image,
+    activity: Activity,
+    /// What RPDO 1 said last.
+    control: Controlword,
+    target: i32,
+    repeat_at: Time,
+    /// Velocity and acceleration that the drive confirmed.
+    profile: Option<(u32, u32)>,
+    /// The target that the axis reached last and was not moved from since.
+    reached: Option<i32>,
+    homed: bool,
+    /// The state the drive was brought to and must keep.
+    kept: Option<PowerState>,
+    /// Alarms that were told and whose cause lasts.
+    told_state: bool,
+    told_following: bool,
+    told_short: bool,
+    outcome: Option<Result<(), DeviceError>>,
+    alarms: VecDeque<Alarm>,
+    short_pdos: u64,
+    repeated_commands: u64,
+}
+
+impl Cia402Drive {
+    /// A drive that is not started.
+    pub fn new(settings: Cia402Settings) -> Self {
+        let counts = |metres: f64| metres / settings.scale.resolution().abs().value();
+        let image = Image::new(
+            counts(settings.speed_max.value()),
+            counts(settings.jump_margin.value()) as i64,
+            settings.tolerance_counts(),
+            settings.common.sync_period,
+        );
+        Self {
+            node: CanopenNode::new(settings.common, PROFILE),
+            image,
+            settings,
+            activity: Activity::Idle,
+            control: Controlword::empty(),
+            target: 0,
+            repeat_at: Time::NEVER,
+            profile: None,
+            reached: None,
+            homed: false,
+            kept: None,
+            told_state: false,
+            told_following: false,
+            told_short: false,
+            outcome: None,
+            alarms: VecDeque::new(),
+            short_pdos: 0,
+            repeated_commands: 0,
+        }
+    }
+
+    /// What was set.
+    pub const fn settings(&self) -> &Cia402Settings {
+        &self.settings
+    }
+
+    /// The newest statusword, for a person who looks for trouble.
+    pub fn statusword(&self) -> Option<Statusword> {
+        self.image.sample().map(|sample| sample.status)
+    }
+
+    /// The newest mode display (0x6061).
+    pub fn mode(&self) -> Option<OperationMode> {
+        self.image.sample().map(|sample| sample.mode)
+    }
+
+    fn state(&self) -> Option<PowerState> {
+        self.image.sample().map(Sample::state)
+    }
+
+    /// Sends RPDO 1: controlword and target in one frame.
+    fn send_control(&mut self, now: Time, control: Controlword) {
+        self.control = control;
+        self.repeat_at = now + self.settings.timeouts.repeat;
+        let [a, b] = control.bits().to_le_bytes();
+        let [c, d, e, f] = self.target.to_le_bytes();
+        let cob_id = self.node.id().cob_id(Function::Rpdo1);
+        self.node
+            .send(CanFrame::standard(cob_id, &[a, b, c, d, e, f]));
+    }
+
+    fn finish(&mut self, result: Result<(), DeviceError>) {
+        self.activity = Activity::Idle;
+        self.repeat_at = Time::NEVER;
+        self.image.allow_jumps(false);
+        self.outcome = Some(result);
+    }
+
+    fn time_out(&mut self, now: Time, since: Time, awaited: &'static str, seen: Seen) {
+        let error = DeviceError::Timeout {
+            device: self.node.name(),
+            awaited,
+            waited: now.since(since),
+            seen,
+        };
+        self.finish(Err(error));
+    }
+
+    fn seen_status(&self) -> Seen {
+        self.statusword()
+            .map_or(Seen::Nothing, |word| Seen::Statusword(word.bits()))
+    }
+
+    fn refuse(&mut self, step: &'static str, needs: &'static str) {
+        let device = self.node.name();
+        self.finish(Err(DeviceError::NotPossible {
+            device,
+            step,
+            needs,
+        }));
+    }
+
+    fn alarm(&mut self, alarm: Alarm) {
+        self.alarms.push_back(alarm);
+        let ends_it = match (&self.activity, alarm) {
+            (Activity::Idle | Activity::Starting, _) => false,
+            // Stopping and resetting go on: they are the answer to alarms.
+            (Activity::Power(power), Alarm::UnexpectedBootUp { .. }) => !power.is_stop(),
+            (Activity::Power(_) | Activity::Halt(_), _) => false,
+            (Activity::Move(_) | Activity::Homing(_), _) => true,
+        };
+        if ends_it {
+            let step = self.activity.name();
+            let device = self.node.name();
+            self.finish(Err(DeviceError::Alarmed {
+                device,
+                step,
+                alarm,
+            }));
+        }
+    }
+
+    fn pump(&mut self, now: Time) {
+        while let Some(event) = self.node.poll_event() {
+            match event {
+                NodeEvent::Described(script) => self.take_description(now, &script),
+                NodeEvent::Operational => {}
+                NodeEvent::ScriptDone(_) => self.script_done(now),
+                NodeEvent::Failed(error) => self.script_failed(now, error),
+                NodeEvent::Alarm(alarm) => self.take_alarm(alarm),
+                NodeEvent::Pdo { number, frame } => self.take_pdo(now, number, &frame),
+                NodeEvent::PdoSilent { missed, .. } => {
+                    let node = self.node.id();
+                    self.alarm(Alarm::PdoLost { node, missed });
+                }
+            }
+        }
+    }
+
+    fn take_description(&mut self, now: Time, script: &Script) {
+        let steps = start::check_description(&self.settings, script)
+            .and_then(|()| start::configuration(&self.settings));
+        match steps {
+            Ok(steps) => self.node.configure(now, steps),
+            Err(error) => {
+                self.node.give_up(now);
+                self.finish(Err(error));
+            }
+        }
+    }
+
+    fn script_done(&mut self, now: Time) {
+        match &self.activity {
+            Activity::Move(_) => self.move_prepared(now),
+            Activity::Homing(_) => self.homing_prepared(now),
+            Activity::Idle | Activity::Starting | Activity::Power(_) | Activity::Halt(_) => {}
+        }
+    }
+
+    fn script_failed(&mut self, now: Time, error: DeviceError) {
+        match &self.activity {
+            Activity::Homing(_) => self.homing_failed(now, error),
+            Activity::Starting | Activity::Move(_) => {
+                self.profile = None;
+                self.finish(Err(error));
+            }
+            Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
+        }
+    }
+
+    fn take_alarm(&mut self, alarm: Alarm) {
+        if let Alarm::UnexpectedBootUp { .. } = alarm {
+            // Everything volatile is gone: reference, profile, state.
+            self.homed = false;
+            self.reached = None;
+            self.profile = None;
+            self.kept = None;
+            self.image.clear();
+        }
+        self.alarm(alarm);
+    }
+
+    fn take_pdo(&mut self, now: Time, number: u8, frame: &CanFrame) {
+        let payload = frame.data();
+        match number {
+            1 if payload.len() < SAMPLE_BYTES => self.take_short_pdo(SAMPLE_BYTES, payload.len()),
+            1 => {
+                if let Some(sample) = Sample::parse(now, payload) {
+                    self.told_short = false;
+                    self.take_sample(now, sample);
+                }
+            }
+            2 if !self.settings.map_following_error => {}
+            2 if payload.len() < 4 => self.take_short_pdo(4, payload.len()),
+            2 => self.image.take_following_error(payload),
+            _ => {}
+        }
+    }
+
+    fn take_short_pdo(&mut self, expected: usize, seen: usize) {
+        self.short_pdos += 1;
+        // Before the mapping is ours, anything may come.
+        if self.node.is_up() && !core::mem::replace(&mut self.told_short, true) {
+            let node = self.node.id();
+            self.alarm(Alarm::PdoTooShort {
+                node,
+                expected,
+                seen,
+            });
+        }
+    }
+
+    fn take_sample(&mut self, now: Time, sample: Sample) {
+        if !self.node.is_up() && !self.begin_service(now) {
+            return;
+        }
+        match self.image.take(sample) {
+            Judgement::Believed | Judgement::Doubted => {}
+            Judgement::Jumped { by, limit } => {
+                self.homed = false;
+                self.reached = None;
+                let node = self.node.id();
+                let (jump, limit) = (
+                    self.settings.scale.to_metres(by).abs(),
+                    self.settings.scale.to_metres(limit).abs(),
+                );
+                self.alarm(Alarm::PositionJump { node, jump, limit });
+            }
+        }
+        self.supervise(&sample);
+        match &self.activity {
+            Activity::Idle | Activity::Starting => {}
+            Activity::Power(_) => self.advance_power(now),
+            Activity::Move(_) => self.advance_move(now),
+            Activity::Halt(_) => self.advance_halt(now),
+            Activity::Homing(_) => self.advance_homing(now),
+        }
+    }
+
+    /// The first process data after NMT start ends the start.
+    fn begin_service(&mut self, now: Time) -> bool {
+        if !matches!(self.activity, Activity::Starting) || !self.node.is_operational() {
+            return false;
+        }
+        self.node.up(now);
+        self.finish(Ok(()));
+        true
+    }
+
+    fn supervise(&mut self, sample: &Sample) {
+        let node = self.node.id();
+        let seen = sample.state();
+        let changing = matches!(self.activity, Activity::Power(_));
+        match self.kept.filter(|kept| !changing && *kept != seen) {
+            Some(expected) if !self.told_state => {
+                self.told_state = true;
+                self.reached = None;
+                self.alarm(Alarm::DriveState {
+                    node,
+                    expected,
+                    seen,
+                });
+            }
+            Some(_) => {}
+            None => self.told_state = false,
+        }
+        let lagging = sample.mode == OperationMode::ProfilePosition
+            && seen == PowerState::OperationEnabled
+            && sample.status.contains(Statusword::MODE_13);
+        if lagging && !self.told_following {
+            self.alarm(Alarm::FollowingError { node });
+        }
+        self.told_following = lagging;
+    }
+
+    /// Ends whatever runs, without an outcome.
+    fn supersede(&mut self, now: Time) {
+        self.outcome = None;
+        self.repeat_at = Time::NEVER;
+        self.image.allow_jumps(false);
+        if matches!(self.activity, Activity::Starting) {
+            self.node.give_up(now);
+        } else {
+            self.node.drop_script(now);
+        }
+        self.activity = Activity::Idle;
+    }
+
+    fn repeat_control(&mut self, now: Time) {
+        if now >= self.repeat_at {
+            self.repeated_commands += 1;
+            self.send_control(now, self.control);
+        }
+    }
+}
+
+impl Device for Cia402Drive {
+    fn handle(&mut self, now: Time, input: &Input) {
+        self.node.handle(now, input);
+        self.pump(now);
+    }
+
+    fn handle_timeout(&mut self, now: Time) {
+        self.node.handle_timeout(now);
+        self.pump(now);
+        match &self.activity {
+            Activity::Idle | Activity::Starting => {}
+            Activity::Power(_) => self.power_timeout(now),
+            Activity::Move(_) => self.move_timeout(now),
+            Activity::Halt(_) => self.halt_timeout(now),
+            Activity::Homing(_) => self.homing_timeout(now),
+        }
+        self.repeat_control(now);
+    }
+
+    fn poll_timeout(&self) -> Time {
+        let activity = match &self.activity {
+            Activity::Idle | Activity::Starting => Time::NEVER,
+            Activity::Power(power) => power.poll_timeout(),
+            Activity::Move(moving) => moving.deadline(),
+            Activity::Halt(halt) => halt.deadline(),
+            Activity::Homing(homing) => homing.deadline(),
+        };
+        activity.min(self.repeat_at).min(self.node.poll_timeout())
+    }
+
+    fn poll_transmit(&mut self) -> Option<Payload> {
+        self.node.poll_transmit().map(Payload::Frame)
+    }
+
+    fn poll_alarm(&mut self) -> Option<Alarm> {
+        self.alarms.pop_front()
+    }
+
+    fn start(&mut self, now: Time) {
+        self.supersede(now);
+        self.image.clear();
+        self.alarms.clear();
+        self.profile = None;
+        self.reached = None;
+        self.kept = None;
+        self.activity = Activity::Starting;
+        self.node.start(now, start::description());
+    }
+
+    fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
+        self.outcome.take()
+    }
+
+    fn identity(&self) -> Option<Identity> {
+        self.node.identity().cloned()
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        let mut counters = self.node.counters();
+        counters.push(("pdos too short", self.short_pdos));
+        counters.push(("positions not believed", self.image.rejected()));
+        counters.push(("commands repeated", self.repeated_commands));
+        counters
+    }
+}
+
+impl Axis for Cia402Drive {
+    fn command(&mut self, now: Time, command: AxisCommand) {
+        self.supersede(now);
+        let enabled = self.state() == Some(PowerState::OperationEnabled);
+        match command {
+            AxisCommand::QuickStop => self.begin_quick_stop(now),
+            _ if !self.node.is_up() => self.refuse("a command", "a started node"),
+            AxisCommand::Enable => self.begin_enable(now),
+            AxisCommand::Disable => self.begin_disable(now),
+            AxisCommand::ResetFault => self.begin_reset(now),
+            // A drive that is not enabled does not move: nothing is left to do.
+            AxisCommand::Halt if !enabled => self.finish(Ok(())),
+            AxisCommand::Halt => self.begin_halt(now),
+            _ if !enabled => self.refuse("moving", "an enabled drive"),
+            AxisCommand::MoveTo {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, target, speed, acceleration),
+            AxisCommand::HomeNegativeLimit { position, speed } => {
+                self.begin_homing(now, position, Some(speed));
+            }
+            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+        }
+    }
+
+    fn reading(&self) -> Option<AxisReading> {
+        let sample = self.image.sample()?;
+        let scale = self.settings.scale;
+        let pending = sample.mode == OperationMode::ProfilePosition
+            && sample.status.contains(Statusword::MODE_12);
+        Some(AxisReading {
+            at: sample.at,
+            counts: sample.position,
+            position: scale.to_metres(sample.position),
+            following_error: self
+                .image
+                .following_error()
+                .map(|counts| scale.to_metres(counts)),
+            standing: sample.status.contains(Statusword::TARGET_REACHED)
+                && !pending
+                && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
+        })
+    }
+
+    fn power_state(&self) -> Option<PowerState> {
+        self.state()
+    }
+
+    fn is_homed(&self) -> bool {
+        self.homed
+    }
+}

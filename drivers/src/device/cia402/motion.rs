@@ -1,0 +1,324 @@
+//! Profile position moves and halt (CiA 402, 10 and 8.4.4).
+//!
+//! The set-point handshake is by levels, so that a repeated or late frame cannot hurt:
+//! acknowledge seen low, new set-point high, acknowledge high, new set-point low, acknowledge
+//! low. Only after that does "target reached" count, and only with the position within the
+//! window: the bit may still be set from the move before.
+
+use core::time::Duration;
+use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+
+use super::convert::{acceleration_counts, counts_i32, velocity_counts};
+use super::start::{
+    MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps,
+};
+use super::{Activity, Cia402Drive};
+use crate::device::{DeviceError, Seen};
+use crate::protocol::script::Step;
+use crate::wire::cia402::{Controlword, OperationMode, Statusword};
+
+/// "Target reached" must be seen so often in a row.
+const REACHED_SAMPLES: u8 = 2;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MovePhase {
+    /// SDO: velocity, acceleration, mode.
+    Preparing,
+    AwaitingMode,
+    /// The acknowledge of an older set-point must go.
+    Releasing,
+    Raising,
+    Lowering,
+    Running,
+}
+
+/// A move under way.
+#[derive(Debug)]
+pub(super) struct Move {
+    target: i32,
+    profile: (u32, u32),
+    phase: MovePhase,
+    since: Time,
+    deadline: Time,
+    reached: u8,
+}
+
+impl Move {
+    pub(super) const fn deadline(&self) -> Time {
+        self.deadline
+    }
+
+    const fn awaited(&self) -> &'static str {
+        match self.phase {
+            MovePhase::Preparing => "the move's parameters",
+            MovePhase::AwaitingMode => "the mode profile position",
+            MovePhase::Releasing => "the release of an older set-point",
+            MovePhase::Raising => "the acknowledge of the set-point",
+            MovePhase::Lowering => "the release of the set-point",
+            MovePhase::Running => "the target reached",
+        }
+    }
+}
+
+/// A halt under way.
+#[derive(Debug)]
+pub(super) struct Halt {
+    since: Time,
+    deadline: Time,
+}
+
+impl Halt {
+    pub(super) const fn deadline(&self) -> Time {
+        self.deadline
+    }
+}
+
+impl Cia402Drive {
+    pub(super) fn begin_move(
+        &mut self,
+        now: Time,
+        target: Metres,
+        speed: MetresPerSecond,
+        acceleration: MetresPerSecondSquared,
+    ) {
+        match self.plan_move(now, target, speed, acceleration) {
+            Err(error) => self.finish(Err(error)),
+            Ok(planned) if self.is_there(planned.target) => self.finish(Ok(())),
+            Ok(planned) => {
+                let mut steps = Vec::new();
+                if self.profile != Some(planned.profile) {
+                    let (velocity, acceleration) = planned.profile;
+                    steps.extend(profile_steps(velocity, acceleration));
+                }
+                if self.mode() != Some(OperationMode::ProfilePosition) {
+                    steps.push(Step::write(
+                        MODE,
+                        OperationMode::ProfilePosition.raw(),
+                        "choosing profile position",
+                    ));
+                }
+                self.reached = None;
+                self.activity = Activity::Move(planned);
+                if steps.is_empty() {
+                    self.move_prepared(now);
+                } else {
+                    self.node.run(now, steps);
+                    self.pump(now);
+                }
+            }
+        }
+    }
+
+    fn plan_move(
+        &self,
+        now: Time,
+        target: Metres,
+        speed: MetresPerSecond,
+        acceleration: MetresPerSecondSquared,
+    ) -> Result<Move, DeviceError> {
+        let settings = &self.settings;
+        let object = TARGET_POSITION.object;
+        let counts = counts_i32(settings, object, "target", target)?;
+        if let Some((low, high)) = settings.soft_limits {
+            let limit = if target < low { low } else { high };
+            if target < low || target > high {
+                return Err(DeviceError::OutOfRange {
+                    node: self.node.id(),
+                    object,
+                    what: "target",
+                    value: target.value(),
+                    limit: limit.value(),
+                });
+            }
+        }
+        let profile = (
+            velocity_counts(settings, PROFILE_VELOCITY, speed)?,
+            acceleration_counts(settings, PROFILE_ACCELERATION, acceleration)?,
+        );
+        Ok(Move {
+            target: counts,
+            profile,
+            phase: MovePhase::Preparing,
+            since: now,
+            // SDO has time-outs of its own.
+            deadline: Time::NEVER,
+            reached: 0,
+        })
+    }
+
+    /// Some drives ignore a target they stand at: there is nothing to do then.
+    fn is_there(&self, target: i32) -> bool {
+        self.reached == Some(target) && self.arrived_at(target)
+    }
+
+    fn arrived_at(&self, target: i32) -> bool {
+        self.image.sample().is_some_and(|sample| {
+            let away = (sample.position.0 - i64::from(target)).abs();
+            sample.status.contains(Statusword::TARGET_REACHED)
+                && away <= self.settings.tolerance_counts()
+        })
+    }
+
+    fn enter(&mut self, now: Time, phase: MovePhase, patience: Duration) {
+        if let Activity::Move(moving) = &mut self.activity {
+            moving.phase = phase;
+            moving.since = now;
+            moving.deadline = now + patience;
+        }
+    }
+
+    pub(super) fn move_prepared(&mut self, now: Time) {
+        let Activity::Move(moving) = &self.activity else {
+            return;
+        };
+        self.profile = Some(moving.profile);
+        self.enter(now, MovePhase::AwaitingMode, self.settings.timeouts.mode);
+        self.advance_move(now);
+    }
+
+    pub(super) fn advance_move(&mut self, now: Time) {
+        let Some(sample) = self.image.sample().copied() else {
+            return;
+        };
+        let Activity::Move(moving) = &mut self.activity else {
+            return;
+        };
+        let target = moving.target;
+        let patience = self.settings.timeouts.set_point;
+        let acknowledged = sample.status.contains(Statusword::MODE_12);
+        match moving.phase {
+            MovePhase::Preparing => {}
+            MovePhase::AwaitingMode => {
+                if sample.mode == OperationMode::ProfilePosition {
+                    self.enter(now, MovePhase::Releasing, patience);
+                    self.advance_move(now);
+                }
+            }
+            MovePhase::Releasing if acknowledged => {
+                if self.repeat_at == Time::NEVER {
+                    // Halt stays as it is: an older target must not be resumed.
+                    let held = self.control & Controlword::HALT;
+                    self.send_control(now, Controlword::ENABLE_COMMAND | held);
+                }
+            }
+            MovePhase::Releasing => {
+                self.target = target;
+                self.enter(now, MovePhase::Raising, patience);
+                let new = Controlword::MODE_4 | Controlword::MODE_5;
+                self.send_control(now, Controlword::ENABLE_COMMAND | new);
+            }
+            MovePhase::Raising => {
+                if acknowledged {
+                    self.enter(now, MovePhase::Lowering, patience);
+                    self.send_control(now, Controlword::ENABLE_COMMAND);
+                }
+            }
+            MovePhase::Lowering => {
+                if !acknowledged {
+                    let time = self.travel_time(target);
+                    self.enter(now, MovePhase::Running, time);
+                    self.repeat_at = Time::NEVER;
+                }
+            }
+            MovePhase::Running => self.watch_arrival(target, acknowledged),
+        }
+    }
+
+    fn watch_arrival(&mut self, target: i32, acknowledged: bool) {
+        let there = !acknowledged && self.arrived_at(target);
+        let Activity::Move(moving) = &mut self.activity else {
+            return;
+        };
+        moving.reached = if there { moving.reached + 1 } else { 0 };
+        if moving.reached >= REACHED_SAMPLES {
+            self.reached = Some(target);
+            self.finish(Ok(()));
+        }
+    }
+
+    /// Half as much again as a trapezoidal profile takes, and the settling.
+    fn travel_time(&self, target: i32) -> Duration {
+        let Activity::Move(moving) = &self.activity else {
+            return Duration::ZERO;
+        };
+        let from = self.image.sample().map_or(0, |sample| sample.position.0);
+        let way = (i64::from(target) - from).unsigned_abs() as f64;
+        let (velocity, acceleration) = moving.profile;
+        let (velocity, acceleration) = (f64::from(velocity), f64::from(acceleration));
+        // A superseded move may first have to come back from the other direction.
+        let profile_s = way / velocity + 3.0 * velocity / acceleration;
+        let profile = Duration::try_from_secs_f64(profile_s * 1.5).unwrap_or(Duration::MAX);
+        profile.saturating_add(self.settings.timeouts.settling)
+    }
+
+    pub(super) fn move_timeout(&mut self, now: Time) {
+        let Activity::Move(moving) = &self.activity else {
+            return;
+        };
+        if now < moving.deadline {
+            return;
+        }
+        let (phase, target) = (moving.phase, moving.target);
+        let (since, awaited) = (moving.since, moving.awaited());
+        if phase == MovePhase::Raising {
+            self.send_control(now, Controlword::ENABLE_COMMAND);
+            if self.arrived_at(target) {
+                self.reached = Some(target);
+                self.finish(Ok(()));
+                return;
+            }
+        }
+        let seen = match (phase, self.image.sample()) {
+            (MovePhase::Running, Some(sample)) => {
+                Seen::Position(self.settings.scale.to_metres(sample.position))
+            }
+            (MovePhase::AwaitingMode, Some(sample)) => Seen::Mode(sample.mode.raw()),
+            (
+                MovePhase::Preparing
+                | MovePhase::AwaitingMode
+                | MovePhase::Releasing
+                | MovePhase::Raising
+                | MovePhase::Lowering
+                | MovePhase::Running,
+                _,
+            ) => self.seen_status(),
+        };
+        self.time_out(now, since, awaited, seen);
+    }
+
+    pub(super) fn begin_halt(&mut self, now: Time) {
+        self.reached = None;
+        self.image.watch_rest();
+        self.activity = Activity::Halt(Halt {
+            since: now,
+            deadline: now + self.settings.timeouts.standing,
+        });
+        // The bit stays set after the halt: without it the drive would go on to its target.
+        self.send_control(now, Controlword::ENABLE_COMMAND | Controlword::HALT);
+    }
+
+    pub(super) fn advance_halt(&mut self, now: Time) {
+        let Activity::Halt(halt) = &self.activity else {
+            return;
+        };
+        // A sample from before the halt says nothing yet.
+        let fresh = now.since(halt.since) >= self.settings.common.sync_period * 2;
+        let reached = self
+            .statusword()
+            .is_some_and(|word| word.contains(Statusword::TARGET_REACHED));
+        if fresh && reached && self.image.stands() {
+            self.finish(Ok(()));
+        }
+    }
+
+    pub(super) fn halt_timeout(&mut self, now: Time) {
+        let Activity::Halt(halt) = &self.activity else {
+            return;
+        };
+        if now >= halt.deadline {
+            let since = halt.since;
+            let seen = self.seen_status();
+            self.time_out(now, since, "the axis standing after a halt", seen);
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Enable, disable, quick stop and fault reset of a drive.
+
+use units::Time;
+
+use super::{Activity, Cia402Drive};
+use crate::device::{DeviceError, Seen};
+use crate::protocol::power_state::{Goal, PowerFailure, PowerSequence, PowerStep};
+use crate::wire::cia402::{Controlword, PowerState};
+
+/// A change of the power state under way.
+#[derive(Debug)]
+pub(super) struct Power {
+    sequence: PowerSequence,
+    since: Time,
+}
+
+impl Power {
+    pub(super) fn poll_timeout(&self) -> Time {
+        self.sequence.poll_timeout()
+    }
+
+    pub(super) fn is_stop(&self) -> bool {
+        self.sequence.goal() == Goal::QuickStop
+    }
+}
+
+const fn step_name(goal: Goal) -> &'static str {
+    match goal {
+        Goal::OperationEnabled => "enabling",
+        Goal::SwitchOnDisabled => "disabling",
+        Goal::QuickStop => "the quick stop",
+        Goal::FaultReset => "the fault reset",
+    }
+}
+
+impl Cia402Drive {
+    pub(super) fn begin_enable(&mut self, now: Time) {
+        if let Some(sample) = self.image.sample() {
+            // The target in RPDO 1 counts only at an edge, but a true one is the better company.
+            self.target = i32::try_from(sample.position.0).unwrap_or(self.target);
+        }
+        self.begin_power(now, Goal::OperationEnabled);
+    }
+
+    pub(super) fn begin_disable(&mut self, now: Time) {
+        self.begin_power(now, Goal::SwitchOnDisabled);
+    }
+
+    pub(super) fn begin_reset(&mut self, now: Time) {
+        self.begin_power(now, Goal::FaultReset);
+    }
+
+    /// Goes out at once, whatever runs and whatever state the drive is in.
+    pub(super) fn begin_quick_stop(&mut self, now: Time) {
+        self.image.watch_rest();
+        self.begin_power(now, Goal::QuickStop);
+    }
+
+    fn begin_power(&mut self, now: Time, goal: Goal) {
+        self.kept = None;
+        self.reached = None;
+        let sequence = PowerSequence::new(now, goal, self.settings.timeouts.transition);
+        let first = sequence.first();
+        self.activity = Activity::Power(Power {
+            sequence,
+            since: now,
+        });
+        match first {
+            Some(control) => self.send_control(now, control),
+            None => self.advance_power(now),
+        }
+    }
+
+    pub(super) fn advance_power(&mut self, now: Time) {
+        let standing = self.image.stands();
+        let (Activity::Power(power), Some(sample)) = (&mut self.activity, self.image.sample())
+        else {
+            return;
+        };
+        let goal = power.sequence.goal();
+        let since = power.since;
+        match power.sequence.next(now, sample.status, standing) {
+            PowerStep::Command(control) if control == self.control => {
+                if self.repeat_at == Time::NEVER {
+                    self.send_control(now, control);
+                }
+            }
+            PowerStep::Command(control) => self.send_control(now, control),
+            PowerStep::Done(control) => {
+                if control != self.control {
+                    self.send_control(now, control);
+                }
+                self.kept = (goal == Goal::OperationEnabled).then_some(PowerState::OperationEnabled);
+                self.finish(Ok(()));
+            }
+            PowerStep::Failed(failure) => self.power_failed(now, goal, since, failure),
+        }
+    }
+
+    fn power_failed(&mut self, now: Time, goal: Goal, since: Time, failure: PowerFailure) {
+        let step = step_name(goal);
+        if goal == Goal::FaultReset {
+            // Bit 7 goes back, so that the next reset has an edge.
+            self.send_control(now, Controlword::empty());
+        }
+        match failure {
+            PowerFailure::Faulted { state } | PowerFailure::Wanders { state } => {
+                let node = self.node.id();
+                self.finish(Err(DeviceError::DriveRefused { node, step, state }));
+            }
+            PowerFailure::TimedOut { from, awaited, .. } => {
+                self.time_out(now, since, awaited, Seen::Power(from));
+            }
+        }
+    }
+
+    pub(super) fn power_timeout(&mut self, now: Time) {
+        let Activity::Power(power) = &self.activity else {
+            return;
+        };
+        if now < power.poll_timeout() {
+            return;
+        }
+        if self.image.sample().is_some() {
+            self.advance_power(now);
+        } else {
+            let since = power.since;
+            self.time_out(now, since, "a statusword", Seen::Nothing);
+        }
+    }
+}

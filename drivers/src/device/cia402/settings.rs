@@ -1,0 +1,148 @@
+//! What is set about a drive.
+
+use core::time::Duration;
+
+use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+
+use crate::device::canopen_node::NodeSettings;
+
+/// Everything the driver must know about one drive. [`Cia402Settings::new`] leaves to the
+/// drive what is `None`: it is then neither written nor checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cia402Settings {
+    /// Node, master, identity, heartbeats, SYNC period, start time-outs.
+    pub common: NodeSettings,
+    /// Metres per position unit of 0x6064; negative when the drive counts against the axis.
+    pub scale: Scale,
+    /// Metres per encoder increment, to check the factor objects (0x608F, 0x6091, 0x6092)
+    /// against; `None`: not checked.
+    pub increment: Option<Metres>,
+    /// Lowest and highest position (0x607D), drive coordinates.
+    pub soft_limits: Option<(Metres, Metres)>,
+    /// How far the axis may lag behind the drive's demand (0x6065), and for how long (0x6066).
+    pub following_error: Option<(Metres, Duration)>,
+    /// How near to its target the axis must be (0x6067) ...
+    pub position_window: Metres,
+    /// ... and for how long (0x6068), for the drive to call it reached.
+    pub position_window_time: Duration,
+    /// Deceleration of a quick stop (0x6085).
+    pub quick_stop_deceleration: Option<MetresPerSecondSquared>,
+    /// What the drive does of itself.
+    pub options: OptionCodes,
+    /// What the axis can do at most: faster moves are refused, faster positions not believed.
+    pub speed_max: MetresPerSecond,
+    /// Likewise.
+    pub acceleration_max: MetresPerSecondSquared,
+    /// How far a position may be from where `speed_max` could have taken it.
+    pub jump_margin: Metres,
+    /// Acceleration while homing (0x609A).
+    pub homing_acceleration: MetresPerSecondSquared,
+    /// What 0x607C means to this drive.
+    pub home_offset: HomeOffset,
+    /// Whether TPDO 2 carries the following error (0x60F4).
+    pub map_following_error: bool,
+    /// How long each thing is waited for.
+    pub timeouts: Cia402Timeouts,
+}
+
+/// The option codes of CiA 402 (8.4.6 and 8.4.7); `None` leaves the drive's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OptionCodes {
+    /// 0x605A: 1, 2 stop and disable; 5, 6 stop and stay in quick stop active.
+    pub quick_stop: Option<i16>,
+    /// 0x605B: on shutdown.
+    pub shutdown: Option<i16>,
+    /// 0x605C: on disable operation.
+    pub disable: Option<i16>,
+    /// 0x605D: on halt.
+    pub halt: Option<i16>,
+    /// 0x605E: on a fault.
+    pub fault_reaction: Option<i16>,
+    /// 0x6007: when our heartbeat is lost; 3 is a quick stop.
+    pub abort_connection: Option<i16>,
+}
+
+/// CiA 402 says that zero is the home position plus the offset; many drives take the offset
+/// for the position at home instead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum HomeOffset {
+    /// 0x6064 becomes 0x607C at home.
+    IsPositionAtHome,
+    /// 0x6064 becomes -0x607C at home.
+    IsZeroFromHome,
+}
+
+/// How long each thing is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cia402Timeouts {
+    /// One transition of the power state machine.
+    pub transition: Duration,
+    /// The mode display following the mode (0x6061 after 0x6060).
+    pub mode: Duration,
+    /// Each half of the set-point handshake.
+    pub set_point: Duration,
+    /// Settling at the target, beyond half as much again as the profile takes.
+    pub settling: Duration,
+    /// Standing still after halt or quick stop.
+    pub standing: Duration,
+    /// Homing, once started.
+    pub homing: Duration,
+    /// The new position after homing.
+    pub new_position: Duration,
+    /// After how long a controlword without effect is sent again.
+    pub repeat: Duration,
+}
+
+impl Default for Cia402Timeouts {
+    fn default() -> Self {
+        Self {
+            transition: Duration::from_secs(2),
+            mode: Duration::from_secs(1),
+            set_point: Duration::from_millis(500),
+            settling: Duration::from_secs(3),
+            standing: Duration::from_secs(3),
+            homing: Duration::from_secs(120),
+            new_position: Duration::from_secs(1),
+            repeat: Duration::from_millis(50),
+        }
+    }
+}
+
+impl Cia402Settings {
+    /// A drive whose position unit is one encoder increment; windows of 100 nm for 10 ms,
+    /// position jumps above 100 µm are not believed, a lost heartbeat is a quick stop.
+    pub fn new(
+        common: NodeSettings,
+        scale: Scale,
+        speed_max: MetresPerSecond,
+        acceleration_max: MetresPerSecondSquared,
+    ) -> Self {
+        Self {
+            common,
+            scale,
+            increment: Some(scale.resolution().abs()),
+            soft_limits: None,
+            following_error: None,
+            position_window: Metres::from_um(0.1),
+            position_window_time: Duration::from_millis(10),
+            quick_stop_deceleration: None,
+            options: OptionCodes {
+                abort_connection: Some(3),
+                ..OptionCodes::default()
+            },
+            speed_max,
+            acceleration_max,
+            jump_margin: Metres::from_um(100.0),
+            homing_acceleration: acceleration_max * 0.1,
+            home_offset: HomeOffset::IsPositionAtHome,
+            map_following_error: true,
+            timeouts: Cia402Timeouts::default(),
+        }
+    }
+
+    /// How far from its target a standing axis may be found: the window and its noise.
+    pub(super) fn tolerance_counts(&self) -> i64 {
+        let window = self.scale.to_counts(self.position_window).0;
+        window.saturating_abs().saturating_mul(2).saturating_add(1)
+    }
+}
