@@ -87,10 +87,10 @@ impl Field {
     }
 
     fn scale(&mut self, factor: f64) {
-        self.slope = self.slope * factor;
-        self.at_zero_m = self.at_zero_m * factor;
+        self.slope *= factor;
+        self.at_zero_m *= factor;
         for wave in &mut self.waves {
-            wave.amplitude_m = wave.amplitude_m * factor;
+            wave.amplitude_m *= factor;
         }
     }
 

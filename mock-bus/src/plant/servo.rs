@@ -32,6 +32,18 @@ struct Demand {
     period_s: f64,
 }
 
+impl Demand {
+    /// Position, speed and acceleration `age_s` after the demand came. The speed of the last
+    /// interval is that of its middle.
+    fn ahead(&self, demand_m: f64, age_s: f64) -> (f64, f64, f64) {
+        let age_s = age_s.min(self.period_s);
+        let at_start = self.speed_m_per_s + self.acceleration * self.period_s / 2.0;
+        let target_m = demand_m + at_start * age_s + self.acceleration * age_s * age_s / 2.0;
+        let speed = at_start + self.acceleration * age_s;
+        (target_m, speed, self.acceleration)
+    }
+}
+
 /// Mass and servo. Positions are encoder travel, 0 where the Hall zero was when built.
 #[derive(Clone, Debug)]
 pub(super) struct Mass {
@@ -80,7 +92,7 @@ impl Mass {
 
     /// Puts the mass elsewhere, as a hand does while the power is off.
     pub(super) fn push(&mut self, by_m: f64) {
-        self.position_m = self.position_m + by_m;
+        self.position_m += by_m;
         self.speed_m_per_s = 0.0;
         self.wake();
     }
@@ -163,7 +175,7 @@ impl Mass {
         let from = self.position_m;
         self.position_m =
             from + self.speed_m_per_s * GRID_S + self.acceleration * GRID_S * GRID_S / 2.0;
-        self.speed_m_per_s = self.speed_m_per_s + self.acceleration * GRID_S;
+        self.speed_m_per_s += self.acceleration * GRID_S;
         self.step += 1;
         self.stop_at_the_ends();
         self.control(Time(end), offset_m);
@@ -213,11 +225,11 @@ impl Mass {
         let age_s = (now - self.demand.at).as_secs_f64();
         // Between two demands the servo interpolates on; a silent sender's demand stands still.
         let live = age_s <= 1.5 * self.demand.period_s;
-        let (speed, acceleration) = match live {
-            true => (self.demand.speed_m_per_s, self.demand.acceleration),
-            false => (0.0, 0.0),
+        let (target_m, speed, acceleration) = if live {
+            self.demand.ahead(demand_m, age_s)
+        } else {
+            (demand_m, 0.0, 0.0)
         };
-        let target_m = demand_m + speed * age_s.min(self.demand.period_s);
         let error_m = target_m - self.position_m;
         let slow = self.speed_m_per_s.abs() < SETTLED_M_PER_S;
         if speed == 0.0 && slow && error_m.abs() < SETTLED_M {
