@@ -1,0 +1,258 @@
+//! What can go wrong, and when: injected from the configuration, the command line or a test.
+//!
+//! Every fault counts its deliveries, so that a test can prove that it really happened.
+//! Probabilities are drawn from a stream of the fault's own: one fault never shifts another.
+
+use core::time::Duration;
+use drivers::wire::can::CanFrame;
+use drivers::wire::canopen::NodeId;
+use drivers::wire::canopen::emcy::{Emergency, EmergencyCode};
+use drivers::wire::canopen::nmt::{NmtState, emit_heartbeat};
+use drivers::wire::canopen::sync::emit_sync;
+use serde::Deserialize;
+
+mod plan;
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use plan::{Edge, Plan};
+
+/// A fault, when it is there and how often it strikes.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FaultConfig {
+    /// From when on, in simulated seconds.
+    #[serde(default)]
+    pub from_s: f64,
+    /// For how long; for ever when absent.
+    #[serde(default)]
+    pub duration_s: Option<f64>,
+    /// The share of frames or messages that it strikes.
+    #[serde(default = "certain")]
+    pub probability: f64,
+    /// It strikes no more than this often.
+    #[serde(default)]
+    pub count_max: Option<u64>,
+    /// What goes wrong.
+    pub fault: Fault,
+}
+
+const fn certain() -> f64 {
+    1.0
+}
+
+impl FaultConfig {
+    /// From now on, for ever, always.
+    pub const fn permanent(fault: Fault) -> Self {
+        Self {
+            from_s: 0.0,
+            duration_s: None,
+            probability: 1.0,
+            count_max: None,
+            fault,
+        }
+    }
+
+    /// Strikes `count` times.
+    pub const fn times(fault: Fault, count: u64) -> Self {
+        let mut config = Self::permanent(fault);
+        config.count_max = Some(count);
+        config
+    }
+
+    /// For `span`, from now on.
+    pub const fn lasting(fault: Fault, span: Duration) -> Self {
+        let mut config = Self::permanent(fault);
+        config.duration_s = Some(span.as_secs_f64());
+        config
+    }
+}
+
+/// What goes wrong. Frames are chosen by `cob_id`; without one, every frame of the port.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+#[expect(
+    missing_docs,
+    reason = "ports and nodes by name; the other fields end in their unit"
+)]
+pub enum Fault {
+    /// Frames vanish from the bus.
+    Drop { port: String, cob_id: Option<u16> },
+    /// Frames come twice.
+    Duplicate { port: String, cob_id: Option<u16> },
+    /// A frame changes places with the next one.
+    Reorder { port: String, cob_id: Option<u16> },
+    /// One byte of the payload has wrong bits.
+    Corrupt { port: String, cob_id: Option<u16> },
+    /// Frames reach the host late.
+    Delay {
+        port: String,
+        cob_id: Option<u16>,
+        delay_ms: f64,
+    },
+    /// Nothing that the device sends gets out.
+    Mute { node: String },
+    /// A CANopen device's heartbeat stops, its PDOs go on.
+    StopHeartbeat { node: String },
+    /// A CANopen device's PDOs stop, its heartbeat goes on.
+    StopPdos { node: String },
+    /// Somebody fills the bus with frames of this identifier.
+    Babble { port: String, cob_id: u16 },
+    /// A second master sends SYNC.
+    ForeignSync { port: String, period_ms: f64 },
+    /// A second device with this node identifier boots.
+    DuplicateBootUp { port: String, node_id: u8 },
+    /// An emergency message goes out in the name of this node identifier.
+    Emergency {
+        port: String,
+        node_id: u8,
+        code: u16,
+        register: u8,
+    },
+    /// The device loses its power, and boots when the fault ends.
+    PowerLoss { node: String },
+    /// The host's controller goes error-passive.
+    ErrorPassive { port: String },
+    /// The host's controller goes off the bus.
+    BusOff { port: String },
+    /// The host's interface is set down, and up when the fault ends.
+    LinkDown { port: String },
+    /// The host's adapter is pulled out, and put back when the fault ends.
+    LinkGone { port: String },
+    /// The stage is held fast.
+    BlockedAxis,
+    /// The safe torque off circuit opens.
+    SafeTorqueOff,
+    /// A limit switch is stuck in a state.
+    LimitSwitch { positive: bool, pressed: bool },
+    /// Nothing of the beam comes back.
+    BeamBlocked,
+    /// Too little of the beam comes back.
+    BeamWeak,
+    /// The fringe counter slips.
+    FringeJump { half_wavelengths: i64 },
+    /// The instrument's temperature, pressure and humidity stand still.
+    FrozenEnvironment,
+    /// They show what cannot be.
+    ImpossibleEnvironment,
+    /// An analog input is tied to its rail.
+    InputRail { channel: usize },
+    /// An analog input's wire is open.
+    InputOpen { channel: usize },
+    /// An analog input is stuck at its last value.
+    InputStuck { channel: usize },
+    /// An analog input has the wrong polarity.
+    InputInverted { channel: usize },
+    /// Analog inputs 0 and 1 are exchanged.
+    InputsSwapped,
+    /// Random bytes come before an answer.
+    Garbage { port: String },
+    /// An answer comes in two parts with a pause between.
+    Split { port: String },
+    /// An answer waits for the next one.
+    Merge { port: String },
+    /// An answer comes late.
+    LateAnswer { port: String, delay_ms: f64 },
+    /// The line sends back what the host says.
+    Echo { port: String },
+    /// Nothing comes back.
+    Silence { port: String },
+}
+
+impl Fault {
+    /// The port it names, and whether that must be CAN (or serial, or either).
+    pub(crate) fn port(&self) -> Option<(&str, Option<bool>)> {
+        match self {
+            Self::Drop { port, .. }
+            | Self::Duplicate { port, .. }
+            | Self::Reorder { port, .. }
+            | Self::Corrupt { port, .. }
+            | Self::Delay { port, .. }
+            | Self::Babble { port, .. }
+            | Self::ForeignSync { port, .. }
+            | Self::DuplicateBootUp { port, .. }
+            | Self::Emergency { port, .. }
+            | Self::ErrorPassive { port }
+            | Self::BusOff { port } => Some((port, Some(true))),
+            Self::Garbage { port }
+            | Self::Split { port }
+            | Self::Merge { port }
+            | Self::LateAnswer { port, .. }
+            | Self::Echo { port }
+            | Self::Silence { port } => Some((port, Some(false))),
+            Self::LinkDown { port } | Self::LinkGone { port } => Some((port, None)),
+            _ => None,
+        }
+    }
+
+    /// The node it names.
+    pub(crate) fn node(&self) -> Option<&str> {
+        match self {
+            Self::Mute { node }
+            | Self::StopHeartbeat { node }
+            | Self::StopPdos { node }
+            | Self::PowerLoss { node } => Some(node),
+            _ => None,
+        }
+    }
+
+    /// What a stranger sends, and how often (once when `None`).
+    fn strangers_frame(&self) -> Option<(CanFrame, Option<Duration>)> {
+        // Shorter than the shortest frame at 1 Mbit/s: the next one always waits.
+        const FULL_LOAD: Duration = Duration::from_micros(50);
+        match self {
+            Self::Babble { cob_id, .. } => {
+                let frame = CanFrame::standard(cob_id & 0x7FF, &[0xBA; 8]);
+                Some((frame, Some(FULL_LOAD)))
+            }
+            Self::ForeignSync { period_ms, .. } => {
+                let period = Duration::from_secs_f64(period_ms.max(0.1) * 1e-3);
+                Some((emit_sync(None), Some(period)))
+            }
+            Self::DuplicateBootUp { node_id, .. } => {
+                let node = NodeId::new(*node_id)?;
+                Some((emit_heartbeat(node, NmtState::BootUp), None))
+            }
+            Self::Emergency {
+                node_id,
+                code,
+                register,
+                ..
+            } => {
+                let emergency = Emergency {
+                    code: EmergencyCode(*code),
+                    register: *register,
+                    detail: [0; 5],
+                };
+                Some((emergency.emit(NodeId::new(*node_id)?), None))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it changes the machine's state as long as it lasts.
+    const fn is_level(&self) -> bool {
+        !matches!(
+            self,
+            Self::Drop { .. }
+                | Self::Duplicate { .. }
+                | Self::Reorder { .. }
+                | Self::Corrupt { .. }
+                | Self::Delay { .. }
+                | Self::Mute { .. }
+                | Self::StopHeartbeat { .. }
+                | Self::StopPdos { .. }
+                | Self::Garbage { .. }
+                | Self::Split { .. }
+                | Self::Merge { .. }
+                | Self::LateAnswer { .. }
+                | Self::Echo { .. }
+                | Self::Silence { .. }
+        )
+    }
+}
+
+/// A fault that was injected, by its place in the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct FaultId(pub usize);

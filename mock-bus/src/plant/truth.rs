@@ -1,0 +1,64 @@
+//! What no device knows: for tests and reports that judge.
+
+use units::{Approach, Celsius, Metres};
+
+use super::{Environment, Plant};
+
+/// A look at the truth behind all sensors.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth<'a> {
+    plant: &'a Plant,
+}
+
+impl<'a> Truth<'a> {
+    pub(super) const fn new(plant: &'a Plant) -> Self {
+        Self { plant }
+    }
+
+    /// The stage's true position; 0 is the true origin, where the undrifted Hall curves have
+    /// their centre of symmetry.
+    pub fn position(&self) -> Metres {
+        self.plant.true_position()
+    }
+
+    /// Where the scale is read, from its own zero, without quantisation.
+    pub fn scale_position(&self) -> Metres {
+        Metres(self.plant.stage.scale_position_m(self.plant.now))
+    }
+
+    /// The scale position of the encoder's present count 0 (where it was last powered on).
+    pub fn count_zero(&self) -> Metres {
+        Metres(self.plant.stage.count_zero_m())
+    }
+
+    /// True minus scale position at a scale position, reached in a direction: the systematic
+    /// part, without the error of a single stop.
+    pub fn deviation(&self, scale_position: Metres, approach: Approach) -> Metres {
+        self.systematic(scale_position, approach.sign())
+    }
+
+    /// The same between both directions.
+    pub fn mean_deviation(&self, scale_position: Metres) -> Metres {
+        self.systematic(scale_position, 0.0)
+    }
+
+    fn systematic(&self, scale_position: Metres, sign: f64) -> Metres {
+        let Celsius(stage_c) = self.environment().stage_temperature;
+        let scale_m = scale_position.value();
+        Metres(
+            self.plant
+                .stage
+                .systematic_deviation_m(scale_m, sign, stage_c),
+        )
+    }
+
+    /// Air and machine as they are.
+    pub fn environment(&self) -> Environment {
+        self.plant.climate.at(self.plant.now)
+    }
+
+    /// Path in air between optic and reflector when the stage is at its true origin.
+    pub const fn dead_path(&self) -> Metres {
+        self.plant.interferometer.dead_path()
+    }
+}

@@ -1,0 +1,527 @@
+//! Nodes, plant, buses and faults in one virtual time.
+//!
+//! Events happen in time order; at one moment in a fixed order: faults, the mains, bytes for
+//! devices, frames that are complete, devices in the order of the configuration, and last the
+//! arbitration of each free bus, so that all who want to send at that moment take part. The
+//! same configuration, seed and calls give the same deliveries, bit by bit.
+
+mod effects;
+mod log;
+mod port;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+
+use drivers::wire::can::{BusError, CanFrame};
+use drivers::wire::{Payload, Port};
+use units::Time;
+
+use crate::bus::Sender;
+use crate::config::{ConfigError, MachineConfig};
+use crate::fault::{Edge, FaultConfig, FaultId, Plan};
+use crate::node::Node;
+use crate::plant::{HallDrift, Plant, Truth};
+use log::{Direction, Log};
+use port::{Medium, PortState};
+
+/// Whether a port can be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// Usable.
+    Up,
+    /// Set down; the same socket works when it comes up.
+    Down,
+    /// The adapter is gone; it must be opened anew.
+    Gone,
+}
+
+/// What reaches the controller.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A frame or bytes.
+    Payload(Payload),
+    /// The host's CAN controller reports an error.
+    BusError(BusError),
+    /// The port changed its state.
+    Link(Link),
+}
+
+/// One thing that reaches the controller.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Delivery {
+    /// Where.
+    pub port: Port,
+    /// When.
+    pub at: Time,
+    /// What.
+    pub event: Event,
+}
+
+/// Why the machine does not take what the controller sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DeliverError {
+    /// There is no such port.
+    #[error("there is no port {}", port.0)]
+    NoPort {
+        /// Which port.
+        port: Port,
+    },
+    /// A frame for a serial line, or bytes for a CAN bus.
+    #[error("port {} cannot carry this", port.0)]
+    WrongKind {
+        /// Which port.
+        port: Port,
+    },
+    /// The port is down or gone.
+    #[error("port {} is {link:?}", port.0)]
+    Unusable {
+        /// Which port.
+        port: Port,
+        /// Its state.
+        link: Link,
+    },
+    /// The host's transmit queue is full.
+    #[error("port {}: the transmit queue is full", port.0)]
+    QueueFull {
+        /// Which port.
+        port: Port,
+    },
+}
+
+struct Slot {
+    node: Box<dyn Node>,
+    name: String,
+    port: usize,
+    powered: bool,
+    next: Time,
+}
+
+/// A device that joins a machine without being in its configuration.
+pub struct Guest {
+    /// What faults call it.
+    pub name: String,
+    /// The port it is on.
+    pub port: String,
+    /// The device, without power yet.
+    pub node: Box<dyn Node>,
+}
+
+/// One emulated machine in virtual time.
+pub struct Simulation {
+    config: MachineConfig,
+    now: Time,
+    plant: Plant,
+    slots: Vec<Slot>,
+    ports: Vec<PortState>,
+    plan: Plan,
+    outbox: VecDeque<Delivery>,
+    mains_back: Time,
+    log: Log,
+}
+
+impl Simulation {
+    /// The machine of `config`, switched on at time 0, with the noise and errors of `seed`.
+    ///
+    /// # Errors
+    /// When the configuration contradicts itself.
+    pub fn new(config: &MachineConfig, seed: u64) -> Result<Self, ConfigError> {
+        Self::with_guests(config, seed, Vec::new())
+    }
+
+    /// The same with further devices, which the configuration does not know.
+    ///
+    /// # Errors
+    /// When the configuration contradicts itself or a guest is on a port that is not there.
+    pub fn with_guests(
+        config: &MachineConfig,
+        seed: u64,
+        guests: Vec<Guest>,
+    ) -> Result<Self, ConfigError> {
+        let mut simulation = Self {
+            now: Time::ZERO,
+            plant: Plant::new(&config.plant, seed),
+            slots: slots(config, seed, guests)?,
+            ports: config.ports.iter().map(PortState::new).collect(),
+            plan: Plan::new(seed),
+            outbox: VecDeque::new(),
+            mains_back: Time::NEVER,
+            log: Log::default(),
+            config: config.clone(),
+        };
+        for fault in &config.faults {
+            simulation.inject(fault.clone())?;
+        }
+        simulation.switch_on();
+        Ok(simulation)
+    }
+
+    /// The virtual time.
+    pub const fn now(&self) -> Time {
+        self.now
+    }
+
+    /// The machine's configuration.
+    pub const fn config(&self) -> &MachineConfig {
+        &self.config
+    }
+
+    /// The physical truth, for judges only.
+    pub const fn truth(&self) -> Truth<'_> {
+        self.plant.truth()
+    }
+
+    /// When something happens next, a delivery that waits included.
+    pub fn next_event(&self) -> Time {
+        let waiting = self.outbox.front().map_or(Time::NEVER, |first| first.at);
+        waiting.min(self.next_internal()).max(self.now)
+    }
+
+    /// Lets time pass up to `to`.
+    pub fn advance(&mut self, to: Time) {
+        while self.next_internal() <= to {
+            self.step();
+        }
+        self.move_clock(to);
+    }
+
+    /// Lets time pass until something reaches the controller, or up to `to`.
+    pub fn advance_to_delivery(&mut self, to: Time) -> Option<Delivery> {
+        loop {
+            let waiting = self.outbox.front().map_or(Time::NEVER, |first| first.at);
+            let internal = self.next_internal();
+            if waiting <= internal.min(to) {
+                self.move_clock(waiting);
+                return self.outbox.pop_front();
+            }
+            if internal > to {
+                self.move_clock(to);
+                return None;
+            }
+            self.step();
+        }
+    }
+
+    /// The next thing that has reached the controller by now, in time order.
+    pub fn collect(&mut self) -> Option<Delivery> {
+        let first = self.outbox.front()?;
+        if first.at > self.now {
+            return None;
+        }
+        self.outbox.pop_front()
+    }
+
+    /// The controller sends at `at` (now, when that has passed).
+    ///
+    /// # Errors
+    /// When the port cannot take it; nothing is sent then.
+    pub fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), DeliverError> {
+        self.advance(at);
+        let place = usize::from(port.0);
+        let state = self
+            .ports
+            .get_mut(place)
+            .ok_or(DeliverError::NoPort { port })?;
+        state.take(self.now, port, payload)?;
+        self.log
+            .payload(self.now, port, Direction::FromHost, payload);
+        if let Payload::Bytes(bytes) = payload
+            && self.plan.echoes(&self.ports[place].name)
+        {
+            self.bytes_to_host(place, core::time::Duration::ZERO, bytes.clone());
+        }
+        Ok(())
+    }
+
+    /// Adds a fault; its times count from now.
+    ///
+    /// # Errors
+    /// When it names a port or a node that is not there.
+    pub fn inject(&mut self, fault: FaultConfig) -> Result<FaultId, ConfigError> {
+        self.config
+            .check_fault(&fault, |node| self.slot(node).is_some())?;
+        Ok(self.plan.add(self.now, fault))
+    }
+
+    /// Ends a fault now.
+    pub fn end_fault(&mut self, fault: FaultId) {
+        self.plan.end(self.now, fault);
+    }
+
+    /// How often a fault has really happened.
+    pub fn fault_deliveries(&self, fault: FaultId) -> u64 {
+        self.plan.delivered(fault)
+    }
+
+    /// The mains goes off now and comes back after the configured time; meanwhile the Hall
+    /// sensors drift to `drift` and nobody holds the stage.
+    pub fn power_cycle(&mut self, drift: HallDrift) {
+        for place in 0..self.slots.len() {
+            self.power_off(place);
+        }
+        self.plant.power_cycle(drift);
+        self.mains_back = self.now + self.config.power_off();
+    }
+
+    /// Whether the port can be used.
+    pub fn link(&self, port: Port) -> Option<Link> {
+        Some(self.ports.get(usize::from(port.0))?.link)
+    }
+
+    /// The share of the time so far in which the CAN bus was occupied.
+    pub fn bus_load(&self, port: Port) -> Option<f64> {
+        let busy = self.ports.get(usize::from(port.0))?.busy()?;
+        Some(busy.as_secs_f64() / self.now.seconds().max(1e-9))
+    }
+
+    /// A number that stands for everything that was sent and received, and when.
+    pub const fn log_hash(&self) -> u64 {
+        self.log.hash()
+    }
+
+    /// Keeps the event log as text from now on.
+    pub fn keep_log(&mut self) {
+        self.log.keep_text();
+    }
+
+    /// The event log's lines, where it is kept.
+    pub fn log_lines(&self) -> &[String] {
+        self.log.lines()
+    }
+
+    fn move_clock(&mut self, to: Time) {
+        self.now = self.now.max(to);
+        self.plant.advance(self.now);
+    }
+
+    fn switch_on(&mut self) {
+        for place in 0..self.slots.len() {
+            self.power_on(place);
+        }
+    }
+
+    fn next_internal(&self) -> Time {
+        let ports = self.ports.iter().map(|port| port.next_event(self.now));
+        let slots = self.slots.iter().map(|slot| slot.next);
+        let own = self.plan.next_edge().min(self.mains_back);
+        ports.chain(slots).fold(own, Time::min)
+    }
+
+    /// Everything that is due at the next moment; an arbitration only when nothing else is.
+    fn step(&mut self) {
+        self.move_clock(self.next_internal());
+        if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
+            return;
+        }
+        for port in &mut self.ports {
+            port.arbitrate(self.now);
+        }
+    }
+
+    fn step_faults(&mut self) -> bool {
+        let mut any = false;
+        while let Some(edge) = self.plan.poll_edge(self.now) {
+            any = true;
+            match edge {
+                Edge::Begins(fault) => self.begin_fault(&fault),
+                Edge::Ends(fault) => self.finish_fault(&fault),
+                Edge::Sends(port, frame) => self.stranger_sends(&port, frame),
+            }
+        }
+        any
+    }
+
+    fn step_mains(&mut self) -> bool {
+        if self.mains_back > self.now {
+            return false;
+        }
+        self.mains_back = Time::NEVER;
+        self.switch_on();
+        true
+    }
+
+    fn step_ports(&mut self) -> bool {
+        let mut any = false;
+        for place in 0..self.ports.len() {
+            while let Some((sender, payload)) = self.ports[place].arrived(self.now) {
+                any = true;
+                match payload {
+                    Payload::Frame(frame) => self.frame_complete(place, sender, frame),
+                    Payload::Bytes(_) => self.tell_nodes(place, sender, &payload),
+                }
+            }
+        }
+        any
+    }
+
+    fn step_nodes(&mut self) -> bool {
+        let mut any = false;
+        for place in 0..self.slots.len() {
+            let slot = &mut self.slots[place];
+            if slot.next > self.now {
+                continue;
+            }
+            any = true;
+            slot.node.advance(self.now, &mut self.plant);
+            // A node that asks for this very moment again would stop the clock.
+            slot.next = slot.node.next_event().max(Time(self.now.0 + 1));
+            self.flush(place);
+        }
+        any
+    }
+
+    /// A frame has been on the wire: the faults first, then everybody else hears it.
+    fn frame_complete(&mut self, place: usize, sender: Sender, frame: CanFrame) {
+        let node = self.sender_name(sender).map(str::to_owned);
+        let name = self.ports[place].name.clone();
+        let fate = self.plan.frame_fate(&name, node.as_deref(), frame);
+        if fate.held_back && fate.copies > 0 {
+            self.ports[place].hold_back(sender, fate.frame);
+            return;
+        }
+        for _ in 0..fate.copies {
+            self.spread(place, sender, fate.frame, fate.delay);
+        }
+        if let Some((sender, frame)) = self.ports[place].held_back() {
+            self.spread(place, sender, frame, core::time::Duration::ZERO);
+        }
+    }
+
+    fn spread(
+        &mut self,
+        place: usize,
+        sender: Sender,
+        frame: CanFrame,
+        delay: core::time::Duration,
+    ) {
+        let payload = Payload::Frame(frame);
+        self.tell_nodes(place, sender, &payload);
+        if sender != Sender::Host && self.ports[place].link == Link::Up {
+            let at = self.now + delay + self.ports[place].latency;
+            self.tell_host(at, place, Event::Payload(payload));
+        }
+    }
+
+    fn slot(&self, name: &str) -> Option<usize> {
+        self.slots.iter().position(|slot| slot.name == name)
+    }
+
+    fn sender_name(&self, sender: Sender) -> Option<&str> {
+        match sender {
+            Sender::Node(place) => Some(&self.slots[place].name),
+            Sender::Host | Sender::Stranger => None,
+        }
+    }
+
+    fn tell_nodes(&mut self, port: usize, sender: Sender, payload: &Payload) {
+        for place in 0..self.slots.len() {
+            let slot = &mut self.slots[place];
+            if slot.port != port || !slot.powered || sender == Sender::Node(place) {
+                continue;
+            }
+            slot.node.handle(self.now, payload, &mut self.plant);
+            slot.next = slot.node.next_event();
+            self.flush(place);
+        }
+    }
+
+    /// What the node wants to send goes to its bus or line.
+    fn flush(&mut self, place: usize) {
+        let port = self.slots[place].port;
+        while let Some(payload) = self.slots[place].node.poll_transmit() {
+            match payload {
+                Payload::Frame(frame) => self.ports[port].send_frame(Sender::Node(place), frame),
+                Payload::Bytes(bytes) => self.node_bytes(place, port, bytes),
+            }
+        }
+    }
+
+    fn node_bytes(&mut self, place: usize, port: usize, bytes: Vec<u8>) {
+        let mut run = self.ports[port].take_kept();
+        run.extend_from_slice(&bytes);
+        let node = &self.slots[place].name;
+        let fate = self
+            .plan
+            .bytes_fate(&self.ports[port].name, Some(node), run);
+        self.ports[port].keep(fate.kept_for_later);
+        for (delay, run) in fate.runs {
+            self.bytes_to_host(port, delay, run);
+        }
+    }
+
+    fn bytes_to_host(&mut self, place: usize, delay: core::time::Duration, bytes: Vec<u8>) {
+        let port = &mut self.ports[place];
+        if port.link != Link::Up || bytes.is_empty() {
+            return;
+        }
+        let at = port.line_time(self.now + delay, bytes.len()) + port.latency;
+        self.tell_host(at, place, Event::Payload(Payload::Bytes(bytes)));
+    }
+
+    fn tell_host(&mut self, at: Time, place: usize, event: Event) {
+        let delivery = Delivery {
+            port: Port(place as u8),
+            at,
+            event,
+        };
+        self.log.delivery(&delivery);
+        let before = self.outbox.partition_point(|waiting| waiting.at <= at);
+        self.outbox.insert(before, delivery);
+    }
+
+    fn stranger_sends(&mut self, port: &str, frame: CanFrame) {
+        if let Some(place) = self.config.port(port)
+            && let Medium::Can(can) = &mut self.ports[place].medium
+            && !can.bus.has_waiting(Sender::Stranger)
+        {
+            can.bus.send(Sender::Stranger, frame);
+        }
+    }
+
+    fn power_off(&mut self, place: usize) {
+        let slot = &mut self.slots[place];
+        if !core::mem::take(&mut slot.powered) {
+            return;
+        }
+        slot.next = Time::NEVER;
+        slot.node.power_off(self.now, &mut self.plant);
+        while slot.node.poll_transmit().is_some() {}
+        let port = slot.port;
+        self.ports[port].forget(Sender::Node(place));
+    }
+
+    fn power_on(&mut self, place: usize) {
+        let slot = &mut self.slots[place];
+        if slot.powered {
+            return;
+        }
+        slot.powered = true;
+        slot.node.power_on(self.now, &mut self.plant);
+        slot.next = slot.node.next_event();
+        self.flush(place);
+    }
+}
+
+fn slots(config: &MachineConfig, seed: u64, guests: Vec<Guest>) -> Result<Vec<Slot>, ConfigError> {
+    let own = config.nodes.iter().map(|entry| Guest {
+        name: entry.name.clone(),
+        port: entry.port.clone(),
+        node: entry.device.build(seed, &entry.name),
+    });
+    own.chain(guests)
+        .map(|guest| match config.port(&guest.port) {
+            Some(port) => Ok(Slot {
+                node: guest.node,
+                name: guest.name,
+                port,
+                powered: false,
+                next: Time::NEVER,
+            }),
+            None => Err(ConfigError::NoPort {
+                user: guest.name,
+                port: guest.port,
+            }),
+        })
+        .collect()
+}
