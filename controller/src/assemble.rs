@@ -14,7 +14,7 @@ use compensator::length_correction::{
 use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use drivers::device::cia401::{Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{Cia402Drive, Cia402Settings};
-use drivers::device::dcon::{Dcon, DconSettings};
+use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
 use drivers::protocol::heartbeat::HeartbeatProducer;
@@ -203,11 +203,11 @@ fn cia401_settings(analog: &AnalogConfig, bus: &CanBus) -> Cia401Settings {
 
 fn dcon_settings(analog: &AnalogConfig) -> DconSettings {
     let period = analog.poll_period_ms.expect(CHECKED);
+    let address = analog.address.expect(CHECKED);
     DconSettings {
         checksum: analog.checksum,
-        channels: analog.channels.clone(),
-        poll_period: Duration::from_secs_f64(period * 1e-3),
-        ..DconSettings::new(analog.address.expect(CHECKED))
+        period: Duration::from_secs_f64(period * 1e-3),
+        ..DconSettings::new(address, InputRange::Volts10, analog.channels.clone())
     }
 }
 

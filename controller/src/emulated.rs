@@ -11,11 +11,13 @@ use std::rc::Rc;
 use drivers::transport::in_process::{InProcess, World};
 use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
+use mock_bus::runner::{self, RunError, Running};
 use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
 use units::Time;
 
 use crate::assemble;
 use crate::config::MachineConfig;
+use crate::ports::{Endpoint, Overrides};
 
 pub use mock_bus::plant::{DriftLimits, HallDrift};
 
@@ -33,9 +35,9 @@ pub enum EmulatedError {
         /// What there is.
         known: String,
     },
-    /// Pseudo-terminals or threads cannot be had.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
+    /// Pseudo-terminals or threads cannot be had, or the machine's thread has ended.
+    #[error(transparent)]
+    Run(#[from] RunError),
 }
 
 /// A simulated machine in virtual time, shared by a transport and whoever injects faults,
@@ -88,14 +90,77 @@ fn match_ports(
     assemble::ports(config)
         .into_iter()
         .map(|(name, port)| {
-            let place = emulated.port(&name).ok_or_else(|| {
-                let known: Vec<_> = emulated.ports.iter().map(|port| port.name()).collect();
-                EmulatedError::NoPort { name: name.clone(), known: known.join(", ") }
-            })?;
+            let place = emulated.port(&name).ok_or_else(|| no_port(&name, emulated))?;
             let place = u8::try_from(place).expect("a machine has fewer than 256 ports");
             Ok((port, Port(place)))
         })
         .collect()
+}
+
+/// A simulated machine on pseudo-terminals, living in a thread of its own.
+pub struct EmulatedOnPtys {
+    config: EmulatedConfig,
+    running: Running,
+}
+
+impl EmulatedOnPtys {
+    /// The machine that `toml` describes, `speed` times faster than the wall's clock.
+    ///
+    /// # Errors
+    /// When the description is wrong or pseudo-terminals cannot be had.
+    pub fn start(toml: &str, seed: u64, speed: f64) -> Result<Self, EmulatedError> {
+        let config = EmulatedConfig::parse(toml)?;
+        let running = runner::spawn_on_ptys(&config, seed, speed)?;
+        Ok(Self { config, running })
+    }
+
+    /// Where a controller configured by `config` finds its buses and lines.
+    ///
+    /// # Errors
+    /// When the machine lacks one of them.
+    pub fn overrides(&self, config: &MachineConfig) -> Result<Overrides, EmulatedError> {
+        let mut overrides = Overrides::default();
+        for name in assemble::ports(config).into_keys() {
+            let place = self.config.port(&name).ok_or_else(|| no_port(&name, &self.config))?;
+            let path = self.running.ports()[place].clone();
+            let endpoint = if self.config.ports[place].is_can() {
+                Endpoint::Slcan(path)
+            } else {
+                Endpoint::Serial(path)
+            };
+            overrides.set(&name, endpoint);
+        }
+        Ok(overrides)
+    }
+
+    /// A line for each port: its name and its path.
+    pub fn description(&self) -> Vec<String> {
+        let ports = self.config.ports.iter().zip(self.running.ports());
+        ports
+            .map(|(port, path)| {
+                let kind = if port.is_can() { "SLCAN" } else { "serial" };
+                format!("{:<8} {kind:<6} {}", port.name(), path.display())
+            })
+            .collect()
+    }
+
+    /// The running machine, to inject faults into and to look at.
+    pub const fn running(&self) -> &Running {
+        &self.running
+    }
+
+    /// The mains goes off now and comes back by itself; the Hall sensors drift to `drift`.
+    ///
+    /// # Errors
+    /// When the machine's thread has ended.
+    pub fn power_cycle(&self, drift: HallDrift) -> Result<(), EmulatedError> {
+        Ok(self.running.power_cycle(drift)?)
+    }
+}
+
+fn no_port(name: &str, emulated: &EmulatedConfig) -> EmulatedError {
+    let known: Vec<_> = emulated.ports.iter().map(|port| port.name()).collect();
+    EmulatedError::NoPort { name: name.to_owned(), known: known.join(", ") }
 }
 
 impl World for Emulated {

@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
+use compensator::length_correction::LengthCorrection;
 use drivers::device::{
     AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
 };
@@ -20,6 +21,7 @@ use drivers::transport::{Port, Transport};
 use units::{Metres, Time};
 
 use crate::assemble;
+use crate::cycle::RunPlan;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
@@ -59,6 +61,8 @@ pub(crate) struct AxisMemory {
     pub(crate) zeroed: bool,
     /// The calibration in use.
     pub(crate) compensation: Option<Compensation>,
+    /// What was measured last, and how lengths were corrected since its datum.
+    pub(crate) datum: Option<(RunPlan, LengthCorrection)>,
     /// The direction of the last motion.
     pub(crate) approach: ApproachTracker,
 }
@@ -86,6 +90,7 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
+    pub(crate) instruments_run: bool,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
 }
@@ -107,6 +112,7 @@ impl Machine {
             config,
             transport,
             supervision: Supervision::Off,
+            instruments_run: false,
             observer: Box::new(Silent),
             stop: StopRequest::default(),
         }
@@ -215,7 +221,8 @@ impl Machine {
             .collect()
     }
 
-    /// Starts SYNC and every device, and checks who they are. Nothing moves.
+    /// Starts SYNC and every device, and checks who they are. Nothing moves. Also after a
+    /// power cycle of the machine: instruments that run already go on, their datum stands.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
@@ -226,14 +233,16 @@ impl Machine {
             memory.approach.forget();
         }
         self.set_sync(true)?;
+        let machine_devices = self.axes.len() + self.analogs.len();
+        let last = if self.instruments_run { machine_devices } else { self.device_count() };
         let now = self.now();
-        for at in 0..self.device_count() {
+        for at in 0..last {
             self.device_mut(at).device.start(now);
         }
-        let waits = START_LIMIT;
-        for at in 0..self.device_count() {
-            self.await_outcome(at, "start", waits)?;
+        for at in 0..last {
+            self.await_outcome(at, "start", START_LIMIT)?;
         }
+        self.instruments_run = true;
         self.supervision = Supervision::On;
         Ok(())
     }

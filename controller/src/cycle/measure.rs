@@ -125,6 +125,7 @@ impl Machine {
         let per_run = plan.targets.len() * 2;
         let mut points = whole_runs(earlier, per_run);
         let correction_of_length = self.set_datum(axis, plan)?;
+        self.remember(axis).datum = Some((plan.clone(), correction_of_length));
         let counter = Counter {
             stage: options.stage,
             done: points.len() as u64,
@@ -192,6 +193,22 @@ impl Machine {
         let Counter { stage, done, total } = session.counter;
         self.observer.progress(stage, axis, done, total);
         Ok(point)
+    }
+
+    /// What the instrument of the last measurement reads at the axis's zero, approached
+    /// forward, against its datum: by how much the zero has moved since.
+    ///
+    /// # Errors
+    /// Whatever stops the machine; [`Failure::Usage`] when nothing was measured before.
+    pub fn displacement_at_zero(&mut self, axis: &str) -> Result<Metres, Failure> {
+        let (plan, length) = self.remember(axis).datum.clone().ok_or_else(|| Failure::Usage {
+            what: format!("axis {axis} has no datum"),
+            help: "calibrate or verify first".into(),
+        })?;
+        self.go_to_datum(axis, &plan)?;
+        let reading = self.read_displacement(&plan)?;
+        let environment = self.instrument_environment(&plan.instrument);
+        self.correct(&plan, &reading, &environment, &length)
     }
 
     /// Goes to the axis's zero, forward, and makes the instrument read zero there.

@@ -8,10 +8,10 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::hall_zero::{
-    Outcome, Progress, Sample, Search, Settings, ZeroEstimate,
+    Outcome, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
 };
 use drivers::device::AxisCommand;
-use units::{Metres, MetresPerSecond, Time};
+use units::{Metres, MetresPerSecond, Time, Volts};
 
 use super::calibrate::missing;
 use super::travel::Correction;
@@ -32,6 +32,16 @@ pub struct Zeroed {
     pub outcome: Outcome,
     /// Where it is recorded.
     pub journal: PathBuf,
+}
+
+impl Zeroed {
+    /// Where the zero of the art before the patent would be: at a fixed voltage of the slope
+    /// sensor. In the coordinates of [`ZeroEstimate::origin`]; `None` when the search did not
+    /// pass that voltage. For comparison only.
+    pub fn single_threshold(&self, threshold: Volts) -> Option<Metres> {
+        let points: Vec<_> = self.outcome.samples.iter().map(Sample::point).collect();
+        single_threshold_zero(&points, threshold, Metres::from_um(100.0))
+    }
 }
 
 /// The steps of zeroing that progress counts.

@@ -347,6 +347,14 @@ impl Store {
         Ok(earlier)
     }
 
+    /// Writes a page for people.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write_report(&self, path: &Path, html: &str) -> Result<(), StoreError> {
+        write_new_or_replace(path, html.as_bytes())
+    }
+
     fn write_pointer(&self, axis: &str, pointer: &ActivePointer) -> Result<(), StoreError> {
         let bytes = serde_json::to_vec_pretty(pointer).expect("plain data always serialises");
         write_new_or_replace(&self.pointer_path(axis), &bytes)

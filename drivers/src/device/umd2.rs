@@ -75,6 +75,9 @@ pub struct Umd2Settings {
     pub lost_samples_max: u64,
     /// The beam counts as lost below this signal strength; `None`: not judged.
     pub signal_strength_min: Option<i32>,
+    /// A sample may be this much older than its arrival (USB hands over in batches); an
+    /// average takes none that may be older than its beginning.
+    pub arrival_latency: Duration,
     /// The stream is silent after this.
     pub stream_timeout: Duration,
     /// The start waits this long for the stream.
@@ -96,6 +99,7 @@ impl Default for Umd2Settings {
             sample_rate_hz: DEFAULT_SAMPLE_RATE_HZ,
             lost_samples_max: 6,
             signal_strength_min: None,
+            arrival_latency: Duration::from_millis(16),
             stream_timeout: Duration::from_millis(100),
             start_timeout: Duration::from_secs(3),
             start_samples: 20,
@@ -503,7 +507,10 @@ impl DisplacementInstrument for Umd2 {
             State::Tracking { .. } | State::WantsDatum if samples == 0 => "at least one sample",
             State::Tracking { .. } | State::WantsDatum if self.is_silent => "a stream of samples",
             State::Tracking { .. } | State::WantsDatum => {
-                self.averaging = Averaging::Running(RunningAverage::new(now, samples));
+                self.averaging = Averaging::Running(RunningAverage::new(
+                    now + self.settings.arrival_latency,
+                    samples,
+                ));
                 return;
             }
             State::Lost => "a new datum, since the count was lost",

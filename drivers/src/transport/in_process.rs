@@ -18,7 +18,10 @@ pub trait World {
     fn advance(&mut self, to: Time);
 
     /// Takes what the host sends.
-    fn deliver(&mut self, at: Time, port: Port, payload: &Payload);
+    ///
+    /// # Errors
+    /// When the port cannot take it; nothing is sent then.
+    fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), SendError>;
 
     /// The next thing that reaches the host, if it has arrived by the world's present time.
     fn collect(&mut self) -> Option<Arrival>;
@@ -76,7 +79,8 @@ impl<W: World> InProcess<W> {
         for (port, sync) in &mut self.syncs {
             while sync.next <= self.now {
                 let frame = Payload::Frame(emit_sync(None));
-                self.world.deliver(sync.next, *port, &frame);
+                // A SYNC that the port cannot take is lost, as on a real bus.
+                let _ = self.world.deliver(sync.next, *port, &frame);
                 sync.next += sync.period;
             }
         }
@@ -89,8 +93,7 @@ impl<W: World> Transport for InProcess<W> {
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        self.world.deliver(self.now, port, payload);
-        Ok(())
+        self.world.deliver(self.now, port, payload)
     }
 
     /// # Panics
@@ -153,14 +156,15 @@ mod tests {
             self.now = to;
         }
 
-        fn deliver(&mut self, at: Time, port: Port, payload: &Payload) {
+        fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), SendError> {
             let Payload::Frame(frame) = payload else {
-                return;
+                return Err(SendError::WrongKind { port });
             };
             self.heard.push((at, frame.to_string()));
             let at = at + Duration::from_micros(300);
             let input = Input::Payload(payload.clone());
             self.answers.push(Arrival { port, at, input });
+            Ok(())
         }
 
         fn collect(&mut self) -> Option<Arrival> {

@@ -19,8 +19,8 @@ use units::Time;
 use super::clock::Clock;
 pub use super::serial::{Parity, SerialSettings, StopBits};
 use super::serial::{SerialError, SerialLine};
-pub use super::slcan::SlcanSettings;
-use super::slcan::{SlcanFailure, SlcanPort};
+use super::slcan::SlcanPort;
+pub use super::slcan::{SlcanFailure, SlcanSettings};
 use super::socketcan::{self, CanPort};
 use super::sync_thread::{SyncSink, SyncStatistics, SyncThread};
 use super::{Arrival, Input, Payload, Port, SendError, Transport};
@@ -410,3 +410,7 @@ pub(super) const fn system(port: Port, errno: Errno) -> SendError {
         },
     }
 }
+
+#[cfg(test)]
+#[path = "live_tests.rs"]
+mod tests;

@@ -114,6 +114,79 @@ impl Command {
     }
 }
 
+/// How a module is set: its answer `!AATTCCFF` to `$AA2`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Configuration {
+    /// Module address.
+    pub address: u8,
+    /// Input range code: 0x08 is ±10 V, 0x09 ±5 V, 0x0A ±1 V, 0x0B ±500 mV, 0x0C ±150 mV.
+    pub range: u8,
+    /// Baud rate code: 0x06 is 9600.
+    pub baud: u8,
+    /// Data format (bits 0 and 1), checksum (bit 6), integration time (bit 7).
+    pub format: u8,
+}
+
+impl Configuration {
+    const CHECKSUM: u8 = 0x40;
+    const DATA_FORMAT: u8 = 0x03;
+
+    /// The line without checksum and CR.
+    pub fn emit(&self) -> String {
+        let Self {
+            address,
+            range,
+            baud,
+            format,
+        } = self;
+        format!("!{address:02X}{range:02X}{baud:02X}{format:02X}")
+    }
+
+    /// From a line without checksum and CR.
+    ///
+    /// # Errors
+    /// When the line has another form.
+    pub fn parse(line: &str) -> Result<Self, DconError> {
+        const FORM: DconError = DconError::Syntax {
+            expected: "!AATTCCFF",
+        };
+        let digits = line.strip_prefix('!').ok_or(FORM)?;
+        if digits.len() != 8 || !digits.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+            return Err(FORM);
+        }
+        let raw = u32::from_str_radix(digits, 16).map_err(|_| FORM)?;
+        let [address, range, baud, format] = raw.to_be_bytes();
+        Ok(Self {
+            address,
+            range,
+            baud,
+            format,
+        })
+    }
+
+    /// Whether values come in engineering units (not in percent or hexadecimal).
+    pub const fn is_engineering(&self) -> bool {
+        self.format & Self::DATA_FORMAT == 0
+    }
+
+    /// Whether lines end in a checksum.
+    pub const fn has_checksum(&self) -> bool {
+        self.format & Self::CHECKSUM != 0
+    }
+}
+
+/// The text of an answer `!AA…` of the module with this address, such as its name.
+///
+/// # Errors
+/// When the line has another form, another address or refuses (`?AA`).
+pub fn parse_text(line: &str, address: u8) -> Result<&str, DconError> {
+    const FORM: DconError = DconError::Syntax { expected: "!AA…" };
+    if line == format!("?{address:02X}") {
+        return Err(DconError::Refused { address });
+    }
+    line.strip_prefix(&format!("!{address:02X}")).ok_or(FORM)
+}
+
 /// The checksum digits of a line: the sum of its characters modulo 256.
 pub fn checksum(line: &str) -> u8 {
     line.bytes().fold(0, u8::wrapping_add)
@@ -241,6 +314,33 @@ mod tests {
         }
         assert_eq!(Command::parse("#018"), None);
         assert_eq!(Command::parse("#G1"), None);
+    }
+
+    /// Advantech ADAM-4000 manual: `!01050600`, ±2.5 V, 9600 baud, engineering units.
+    #[test]
+    fn the_configuration_reads_both_ways() {
+        let configuration = Configuration::parse("!01050600").unwrap();
+        assert_eq!((configuration.range, configuration.baud), (0x05, 0x06));
+        assert!(configuration.is_engineering() && !configuration.has_checksum());
+        assert_eq!(configuration.emit(), "!01050600");
+        let other = Configuration::parse("!1F0906C2").unwrap();
+        assert!(other.has_checksum() && !other.is_engineering());
+        for line in [
+            "!0105060",
+            "!01050G00",
+            ">01050600",
+            "!01+50600",
+            "!0105060é",
+        ] {
+            assert!(Configuration::parse(line).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn an_answers_text_is_taken_from_the_asked_module_only() {
+        assert_eq!(parse_text("!014117", 1), Ok("4117"));
+        assert!(parse_text("!024117", 1).is_err());
+        assert_eq!(parse_text("?01", 1), Err(DconError::Refused { address: 1 }));
     }
 
     #[test]

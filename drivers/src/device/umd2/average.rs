@@ -39,8 +39,8 @@ impl RunningAverage {
         }
     }
 
-    /// Takes one sample; the reading when it was the last. What came before the beginning
-    /// was measured before the machine stood and is left out.
+    /// Takes one sample; the reading when it was the last. What was measured
+    /// before the beginning, before the machine stood, is left out.
     pub(super) fn add(&mut self, at: Time, displacement: Metres) -> Option<DisplacementReading> {
         if at < self.begun {
             return None;

@@ -33,8 +33,12 @@ impl Bench {
         }
     }
 
+    /// Samples that arrive at once.
     fn started() -> Self {
-        Self::started_with(Umd2Settings::default())
+        Self::started_with(Umd2Settings {
+            arrival_latency: Duration::ZERO,
+            ..Umd2Settings::default()
+        })
     }
 
     fn started_with(settings: Umd2Settings) -> Self {
@@ -204,6 +208,22 @@ fn an_average_gives_mean_and_standard_deviation() {
     let expected = (20.0_f64 / 3.0).sqrt() * HALF_NM;
     check_nm(Some(reading.standard_deviation.nm()), expected);
     assert_eq!((reading.samples, reading.at), (4, bench.now));
+}
+
+#[test]
+fn samples_that_may_be_older_than_an_averages_beginning_are_left_out() {
+    let mut bench = Bench::started_with(Umd2Settings::default());
+    bench.device.begin_average(bench.now, 2);
+    let begun = bench.now;
+    for _ in 0..9 {
+        bench.at(1_500);
+        assert_eq!(bench.device.poll_outcome(), None);
+    }
+    assert!(bench.now < begun + Duration::from_millis(16));
+    bench.at(1_010);
+    bench.at(1_010);
+    let reading = bench.device.average().unwrap();
+    check_nm(Some(reading.vacuum.nm()), 10.0 * HALF_NM);
 }
 
 #[test]
