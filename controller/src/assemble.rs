@@ -12,7 +12,7 @@ use compensator::length_correction::{
     self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
 };
 use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
-use drivers::device::cia401::{Cia401Analog, Cia401Settings};
+use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{Cia402Drive, Cia402Settings};
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
@@ -22,7 +22,7 @@ use drivers::transport::Port;
 use drivers::wire::canopen::NodeId;
 use units::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
-    Scale, Time, Volts,
+    Scale, Volts,
 };
 
 use crate::config::{
@@ -197,8 +197,13 @@ fn cia401_settings(analog: &AnalogConfig, bus: &CanBus) -> Cia401Settings {
     );
     let identity = analog.identity.as_ref().expect(CHECKED);
     let common = node_settings(analog.node_id.expect(CHECKED), bus, identity, heartbeats);
-    let channels = analog.channels.iter().zip(&analog.full_scale_v);
-    Cia401Settings::new(common, channels.map(|(channel, volts)| (*channel, Volts(*volts))).collect())
+    let channels: Vec<_> = analog
+        .channels
+        .iter()
+        .zip(&analog.full_scale_v)
+        .map(|(channel, volts)| ChannelSettings { input: channel + 1, full_scale: Volts(*volts) })
+        .collect();
+    Cia401Settings::new(common, &channels).expect(CHECKED)
 }
 
 fn dcon_settings(analog: &AnalogConfig) -> DconSettings {

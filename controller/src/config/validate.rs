@@ -26,7 +26,11 @@ struct Judge<'a> {
     findings: &'a mut Vec<Finding>,
 }
 
-impl Judge<'_> {
+impl<'a> Judge<'a> {
+    const fn at(prefix: String, findings: &'a mut Vec<Finding>) -> Self {
+        Self { prefix, findings }
+    }
+
     fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
         let key = if key.is_empty() { self.prefix.clone() } else { format!("{}.{key}", self.prefix) };
         self.findings.push(Finding { key, cause: cause.into(), help: help.into() });
@@ -63,20 +67,19 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
             help: format!("this program reads version {SCHEMA_VERSION}"),
         });
     }
-    let mut judge = |prefix: String| Judge { prefix, findings: &mut findings };
-    check_name(&mut judge("machine".into()), config);
+    check_name(&mut Judge::at("machine".into(), &mut findings), config);
     for (name, bus) in &config.can {
-        check_bus(&mut judge(format!("can.{name}")), bus);
+        check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
     }
     for (name, axis) in &config.axis {
-        check_axis(&mut judge(format!("axis.{name}")), config, axis);
-        check_cycle(&mut judge, config, name, axis);
+        check_axis(&mut Judge::at(format!("axis.{name}"), &mut findings), config, axis);
+        check_cycle(&mut findings, config, name, axis);
     }
     for (name, analog) in &config.analog {
-        check_analog(&mut judge(format!("analog.{name}")), config, analog);
+        check_analog(&mut Judge::at(format!("analog.{name}"), &mut findings), config, analog);
     }
     for (name, instrument) in &config.instrument {
-        check_instrument(&mut judge(format!("instrument.{name}")), config, instrument);
+        check_instrument(&mut Judge::at(format!("instrument.{name}"), &mut findings), config, instrument);
     }
     check_node_ids(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
@@ -171,23 +174,23 @@ fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) 
     }
 }
 
-fn check_cycle<'a>(
-    judge: &mut impl FnMut(String) -> Judge<'a>,
+fn check_cycle(
+    findings: &mut Vec<Finding>,
     config: &MachineConfig,
     name: &str,
     axis: &AxisConfig,
 ) {
     if let Some(zero) = &axis.zero {
-        check_zero(&mut judge(format!("axis.{name}.zero")), config, zero);
+        check_zero(&mut Judge::at(format!("axis.{name}.zero"), findings), config, zero);
     }
     if let Some(run) = &axis.calibrate {
-        check_calibrate(&mut judge(format!("axis.{name}.calibrate")), config, axis, run);
+        check_calibrate(&mut Judge::at(format!("axis.{name}.calibrate"), findings), config, axis, run);
     }
     if let Some(run) = &axis.verify {
-        check_verify(&mut judge(format!("axis.{name}.verify")), config, axis, run);
+        check_verify(&mut Judge::at(format!("axis.{name}.verify"), findings), config, axis, run);
     }
     if let Some(compensation) = &axis.compensation {
-        let judge = &mut judge(format!("axis.{name}.compensation"));
+        let judge = &mut Judge::at(format!("axis.{name}.compensation"), findings);
         judge.within("size_limit_um", compensation.size_limit_um, 1e-3, 1e5);
         judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
         judge.within("rate_limit_um_per_s", compensation.rate_limit_um_per_s, 1e-3, 1e9);

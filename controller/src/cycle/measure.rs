@@ -271,7 +271,6 @@ impl Machine {
         environment: &Environment,
         length: &LengthCorrection,
     ) -> Result<Metres, Failure> {
-        let config = &self.config.instrument[&plan.instrument];
         let failed = |source| Failure::Correction { instrument: plan.instrument.clone(), source };
         let environment = assemble::correction_environment(environment);
         length

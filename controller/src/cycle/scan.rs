@@ -122,8 +122,9 @@ impl Machine {
                 let now = self.now();
                 self.device_mut(at).device.start(now);
                 let started = self.await_outcome(at, "answer", Duration::from_secs(5));
+                let port = self.device_mut(at).port;
                 Found {
-                    port: self.port_names[&self.device_mut(at).port].clone(),
+                    port: self.port_names[&port].clone(),
                     node: None,
                     name: Some(self.device_name(at)),
                     identity: self.device_mut(at).device.identity().filter(|_| started.is_ok()),
