@@ -116,7 +116,7 @@ pub(super) enum NodeEvent {
     /// Configured and operational. Answer with [`CanopenNode::up`] when data came.
     Operational,
     /// A script of the device's own is done.
-    ScriptDone(Script),
+    ScriptDone,
     /// The start or a script failed.
     Failed(DeviceError),
     /// Something is wrong.
@@ -124,7 +124,7 @@ pub(super) enum NodeEvent {
     /// Process data: TPDO 1 to 4.
     Pdo { number: u8, frame: CanFrame },
     /// No process data for this long.
-    PdoSilent { waited: Duration, missed: u32 },
+    PdoSilent { waited: Duration },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -339,8 +339,11 @@ impl CanopenNode {
                 self.take_emergency(emergency);
             }
         } else if let Some(number) = self.pdo_number(frame) {
-            self.last_pdo = now;
-            self.pdo_silent = false;
+            // TPDO 1 carries the sample that the device lives by.
+            if number == 1 {
+                self.last_pdo = now;
+                self.pdo_silent = false;
+            }
             let frame = *frame;
             self.events.push_back(NodeEvent::Pdo { number, frame });
         }
@@ -390,10 +393,7 @@ impl CanopenNode {
             Phase::Up if !self.pdo_silent && now >= self.pdo_deadline() => {
                 self.pdo_silent = true;
                 let waited = now.since(self.last_pdo);
-                let periods = waited.as_nanos() / self.settings.sync_period.as_nanos().max(1);
-                let missed = u32::try_from(periods).unwrap_or(u32::MAX);
-                self.events
-                    .push_back(NodeEvent::PdoSilent { waited, missed });
+                self.events.push_back(NodeEvent::PdoSilent { waited });
             }
             Phase::Off
             | Phase::Probing { .. }
@@ -460,7 +460,7 @@ impl CanopenNode {
             | Phase::Described
             | Phase::Starting { .. }
             | Phase::Operational { .. }
-            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone(script)),
+            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone),
         }
     }
 

@@ -1,1 +1,258 @@
-//! Placeholder.
+//! Analog inputs by CiA 401 on CANopen: up to four channels, sampled together at each SYNC.
+//!
+//! TPDO 1 is mapped to 0x6401:k, 16 bits each, left-justified whatever the converter's width.
+//! The global enable 0x6423 is off after power-on by the standard: without it most modules send
+//! nothing. The module's own scaling, where it has one (offset 0x6431, factor 0x6432), is set to
+//! neutral, so that only the settings give volts. Absent: 0x6402 (32 bits), 0x6403 (floats) with
+//! their scaling 0x642F and 0x6430, output modules, digital channels.
+
+use std::collections::VecDeque;
+
+use units::{Time, Volts};
+
+use super::canopen_node::{CanopenNode, NodeEvent, NodeSettings};
+use super::{Alarm, AnalogInput, AnalogReading, Device, DeviceError, Identity};
+use crate::protocol::pdo_setup::{Pdo, PdoDirection};
+use crate::protocol::script::Step;
+use crate::transport::Input;
+use crate::wire::Payload;
+use crate::wire::canopen::Object;
+use crate::wire::canopen::pdo::{MappedObject, Transmission, extract};
+
+/// The profile number in 0x1000.
+const PROFILE: u16 = 401;
+/// What one TPDO holds.
+const CHANNELS_MAX: usize = 4;
+const FULL_SCALE: f64 = 0x7FFF as f64;
+/// "The value changed by more than delta" among the triggers of 0x6421 (CiA 401, 6.3.3).
+const TRIGGER_DELTA: u8 = 0x04;
+
+/// One channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChannelSettings {
+    /// The input, sub-index of 0x6401, from 1.
+    pub input: u8,
+    /// The voltage of 0x7FFF; negative when the sensor is wired the other way round.
+    pub full_scale: Volts,
+}
+
+/// Everything the driver must know about one module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cia401Settings {
+    /// Node, master, identity, heartbeats, SYNC period, start time-outs.
+    pub common: NodeSettings,
+    /// The channels used, 1 to 4, in the order of the readings.
+    pub channels: Vec<ChannelSettings>,
+    /// Bits of the converter: the lower bits of a sample are always 0, so the upper rail is at
+    /// 0x7FF0 for 12 bits.
+    pub converter_bits: u8,
+}
+
+impl Cia401Settings {
+    /// A 16-bit converter with these channels; `None` when there are none or more than four.
+    pub fn new(common: NodeSettings, channels: &[ChannelSettings]) -> Option<Self> {
+        (1..=CHANNELS_MAX)
+            .contains(&channels.len())
+            .then(|| Self {
+                common,
+                channels: channels.to_vec(),
+                converter_bits: 16,
+            })
+    }
+
+    const fn upper_rail(&self) -> i16 {
+        let spare = 16_u8.saturating_sub(self.converter_bits);
+        // Two bits of sign and value are the least a converter can have.
+        let spare = if spare > 14 { 14 } else { spare };
+        0x7FFF & !((1_i16 << spare) - 1)
+    }
+}
+
+/// One CiA 401 module with analog inputs.
+#[derive(Debug)]
+pub struct Cia401Analog {
+    settings: Cia401Settings,
+    node: CanopenNode,
+    starting: bool,
+    reading: Option<AnalogReading>,
+    told_short: bool,
+    short_pdos: u64,
+    outcome: Option<Result<(), DeviceError>>,
+    alarms: VecDeque<Alarm>,
+}
+
+impl Cia401Analog {
+    /// A module that is not started.
+    pub fn new(settings: Cia401Settings) -> Self {
+        Self {
+            node: CanopenNode::new(settings.common, PROFILE),
+            settings,
+            starting: false,
+            reading: None,
+            told_short: false,
+            short_pdos: 0,
+            outcome: None,
+            alarms: VecDeque::new(),
+        }
+    }
+
+    fn configuration(&self) -> Vec<Step> {
+        const SCALING: &str = "making the module's own scaling neutral";
+        let node = self.settings.common.node;
+        let pdo = |direction, number| Pdo::new(direction, number).expect("1 to 4");
+        let transmit = |number| pdo(PdoDirection::Transmit, number);
+        let mapped: Vec<MappedObject> = self
+            .settings
+            .channels
+            .iter()
+            .map(|channel| MappedObject::new(0x6401, channel.input, 16))
+            .collect();
+        let mut steps = transmit(1)
+            .configure(node, &mapped, Transmission::Synchronous(1))
+            .expect("four channels of 16 bits fit");
+        for unused in 2..=4 {
+            steps.extend(transmit(unused).disable(node));
+        }
+        for channel in &self.settings.channels {
+            let input = channel.input;
+            let object = |index| Object::new(index, input);
+            steps.push(Step::check(object(0x6431), 0_i32, SCALING).optional());
+            steps.push(Step::check(object(0x6432), 1_i32, SCALING).optional());
+            let trigger = "choosing what makes the module send";
+            steps.push(Step::check(object(0x6421), TRIGGER_DELTA, trigger).optional());
+            steps.push(Step::check(object(0x6426), 0_u32, trigger).optional());
+        }
+        steps.push(Step::check(
+            Object::new(0x6423, 0),
+            1_u8,
+            "enabling the analog inputs",
+        ));
+        steps
+    }
+
+    fn finish(&mut self, result: Result<(), DeviceError>) {
+        self.starting = false;
+        self.outcome = Some(result);
+    }
+
+    fn pump(&mut self, now: Time) {
+        while let Some(event) = self.node.poll_event() {
+            match event {
+                NodeEvent::Described(_) => {
+                    let steps = self.configuration();
+                    self.node.configure(now, steps);
+                }
+                NodeEvent::Operational | NodeEvent::ScriptDone => {}
+                NodeEvent::Failed(error) => self.finish(Err(error)),
+                NodeEvent::Alarm(alarm) => {
+                    if let Alarm::UnexpectedBootUp { .. } = alarm {
+                        self.reading = None;
+                    }
+                    self.alarms.push_back(alarm);
+                }
+                NodeEvent::Pdo { number: 1, frame } => self.take_sample(now, frame.data()),
+                NodeEvent::Pdo { .. } => {}
+                NodeEvent::PdoSilent { waited } => {
+                    self.alarms.push_back(Alarm::StaleSample { waited });
+                }
+            }
+        }
+    }
+
+    fn take_sample(&mut self, now: Time, payload: &[u8]) {
+        let expected = self.settings.channels.len() * 2;
+        if !self.node.is_up() {
+            if !self.starting || !self.node.is_operational() || payload.len() < expected {
+                return;
+            }
+            self.node.up(now);
+            self.finish(Ok(()));
+        }
+        if payload.len() < expected {
+            self.short_pdos += 1;
+            if !core::mem::replace(&mut self.told_short, true) {
+                self.alarms.push_back(Alarm::PdoTooShort {
+                    node: self.node.id(),
+                    expected,
+                    seen: payload.len(),
+                });
+            }
+            return;
+        }
+        self.told_short = false;
+        let rail = self.settings.upper_rail();
+        let raws: Vec<i16> = (0..self.settings.channels.len())
+            .filter_map(|channel| extract(payload, channel * 16, 16))
+            .map(|raw| (raw as u16).cast_signed())
+            .collect();
+        self.reading = Some(AnalogReading {
+            at: now,
+            volts: raws
+                .iter()
+                .zip(&self.settings.channels)
+                .map(|(raw, channel)| channel.full_scale * (f64::from(*raw) / FULL_SCALE))
+                .collect(),
+            saturated: raws
+                .iter()
+                .map(|raw| *raw >= rail || *raw == i16::MIN)
+                .collect(),
+        });
+    }
+}
+
+impl Device for Cia401Analog {
+    fn handle(&mut self, now: Time, input: &Input) {
+        self.node.handle(now, input);
+        self.pump(now);
+    }
+
+    fn handle_timeout(&mut self, now: Time) {
+        self.node.handle_timeout(now);
+        self.pump(now);
+    }
+
+    fn poll_timeout(&self) -> Time {
+        self.node.poll_timeout()
+    }
+
+    fn poll_transmit(&mut self) -> Option<Payload> {
+        self.node.poll_transmit().map(Payload::Frame)
+    }
+
+    fn poll_alarm(&mut self) -> Option<Alarm> {
+        self.alarms.pop_front()
+    }
+
+    fn start(&mut self, now: Time) {
+        self.outcome = None;
+        self.reading = None;
+        self.told_short = false;
+        self.alarms.clear();
+        self.starting = true;
+        self.node.start(now, Vec::new());
+    }
+
+    fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
+        self.outcome.take()
+    }
+
+    fn identity(&self) -> Option<Identity> {
+        self.node.identity().cloned()
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        let mut counters = self.node.counters();
+        counters.push(("pdos too short", self.short_pdos));
+        counters
+    }
+}
+
+impl AnalogInput for Cia401Analog {
+    fn channels(&self) -> usize {
+        self.settings.channels.len()
+    }
+
+    fn reading(&self) -> Option<&AnalogReading> {
+        self.reading.as_ref()
+    }
+}

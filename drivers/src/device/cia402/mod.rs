@@ -196,8 +196,9 @@ impl Cia402Drive {
         self.alarms.push_back(alarm);
         let ends_it = match (&self.activity, alarm) {
             (Activity::Idle | Activity::Starting, _) => false,
-            // Stopping and resetting go on: they are the answer to alarms.
-            (Activity::Power(power), Alarm::UnexpectedBootUp { .. }) => !power.is_stop(),
+            // Stopping and resetting go on: they are the answer to alarms. A drive that booted
+            // has nothing left to stop.
+            (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
             (Activity::Power(_) | Activity::Halt(_), _) => false,
             (Activity::Move(_) | Activity::Homing(_), _) => true,
         };
@@ -217,12 +218,14 @@ impl Cia402Drive {
             match event {
                 NodeEvent::Described(script) => self.take_description(now, &script),
                 NodeEvent::Operational => {}
-                NodeEvent::ScriptDone(_) => self.script_done(now),
+                NodeEvent::ScriptDone => self.script_done(now),
                 NodeEvent::Failed(error) => self.script_failed(now, error),
                 NodeEvent::Alarm(alarm) => self.take_alarm(alarm),
                 NodeEvent::Pdo { number, frame } => self.take_pdo(now, number, &frame),
-                NodeEvent::PdoSilent { missed, .. } => {
+                NodeEvent::PdoSilent { waited } => {
                     let node = self.node.id();
+                    let period = self.settings.common.sync_period.as_nanos().max(1);
+                    let missed = u32::try_from(waited.as_nanos() / period).unwrap_or(u32::MAX);
                     self.alarm(Alarm::PdoLost { node, missed });
                 }
             }

@@ -18,10 +18,6 @@ impl Power {
     pub(super) fn poll_timeout(&self) -> Time {
         self.sequence.poll_timeout()
     }
-
-    pub(super) fn is_stop(&self) -> bool {
-        self.sequence.goal() == Goal::QuickStop
-    }
 }
 
 const fn step_name(goal: Goal) -> &'static str {
