@@ -53,10 +53,10 @@ impl EventLoop {
                 endpoint.receive(now, &mut self.machine)?;
             }
             self.machine.advance(now);
-            if self.do_jobs() {
+            self.hand_out()?;
+            if self.do_jobs()? {
                 return Ok(());
             }
-            self.hand_out()?;
             self.wait()?;
         }
     }
@@ -65,14 +65,17 @@ impl EventLoop {
         Time::from_seconds(self.started.elapsed().as_secs_f64() * self.speed)
     }
 
-    /// True when it is time to stop.
-    fn do_jobs(&mut self) -> bool {
+    /// True when it is time to stop. What one job sets off has left before the next begins.
+    fn do_jobs(&mut self) -> io::Result<bool> {
         loop {
             match self.jobs.try_recv() {
                 Ok(Job::Do(work)) => work(&mut self.machine),
-                Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return true,
-                Err(TryRecvError::Empty) => return false,
+                Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return Ok(true),
+                Err(TryRecvError::Empty) => return Ok(false),
             }
+            let now = self.now();
+            self.machine.advance(now);
+            self.hand_out()?;
         }
     }
 
