@@ -3,6 +3,7 @@
 //! - [`plant`]: the physical truth in SI units; knows no bus.
 //! - [`node`]: each emulated device's own protocol behaviour over that truth.
 //! - [`simulation`]: nodes, plant, bus latency and faults in one virtual time.
+//! - [`runner`]: the same in real time, on pseudo-terminals and SocketCAN interfaces.
 //!
 //! Only the byte codecs (`drivers::wire`) are shared with the drivers, and no formula is
 //! shared with the compensator: an emulator that used either would mark its own homework.
@@ -13,4 +14,5 @@ pub mod fault;
 pub mod node;
 pub mod plant;
 pub mod random;
+pub mod runner;
 pub mod simulation;

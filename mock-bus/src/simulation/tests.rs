@@ -312,3 +312,21 @@ fn an_unknown_key_is_refused_with_its_line() {
     let text = MACHINE.replace("checksum = false", "checksums = false");
     assert!(MachineConfig::parse(&text).is_err());
 }
+
+/// The demo lives on this: a commissioning of minutes in less than a second. It asserts the
+/// amount of work, not the time it takes; `--nocapture` prints that.
+#[test]
+fn minutes_of_streaming_and_polling_pass_in_virtual_time() {
+    let started = std::time::Instant::now();
+    let mut simulation = machine(1);
+    let mut arrived = 0;
+    for tick in 1..=30_000_u64 {
+        let now = Time(tick * 5_000_000);
+        while simulation.advance_to_delivery(now).is_some() {
+            arrived += 1;
+        }
+        simulation.deliver(now, CAN, &frame(0x200)).unwrap();
+    }
+    println!("{arrived} deliveries of 150 s in {:?}", started.elapsed());
+    assert!(arrived > 55_000, "{arrived}");
+}

@@ -1,0 +1,122 @@
+//! Waits for clients and for the machine's next event, and carries between them.
+
+use std::io::{self, PipeReader, Read};
+use std::os::fd::AsFd;
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, ppoll};
+use nix::sys::time::TimeSpec;
+use units::Time;
+
+use super::Job;
+use super::endpoint::Endpoint;
+use crate::simulation::Simulation;
+
+/// Shorter waits are not worth a system call; what is due meanwhile is done together.
+const WAIT_MIN: Duration = Duration::from_micros(100);
+const WAIT_MAX: Duration = Duration::from_secs(1);
+
+pub(super) struct EventLoop {
+    machine: Simulation,
+    endpoints: Vec<Endpoint>,
+    jobs: Receiver<Job>,
+    waker: PipeReader,
+    started: Instant,
+    speed: f64,
+}
+
+impl EventLoop {
+    pub(super) fn new(
+        machine: Simulation,
+        endpoints: Vec<Endpoint>,
+        jobs: Receiver<Job>,
+        waker: PipeReader,
+        speed: f64,
+    ) -> Self {
+        Self {
+            machine,
+            endpoints,
+            jobs,
+            waker,
+            started: Instant::now(),
+            speed,
+        }
+    }
+
+    /// Until somebody stops it, or a terminal or interface fails.
+    pub(super) fn run(mut self) -> io::Result<()> {
+        loop {
+            let now = self.now();
+            for endpoint in &mut self.endpoints {
+                endpoint.receive(now, &mut self.machine)?;
+            }
+            self.machine.advance(now);
+            self.hand_out()?;
+            if self.do_jobs()? {
+                return Ok(());
+            }
+            self.wait()?;
+        }
+    }
+
+    fn now(&self) -> Time {
+        Time::from_seconds(self.started.elapsed().as_secs_f64() * self.speed)
+    }
+
+    /// True when it is time to stop. What one job sets off has left before the next begins.
+    fn do_jobs(&mut self) -> io::Result<bool> {
+        loop {
+            match self.jobs.try_recv() {
+                Ok(Job::Do(work)) => work(&mut self.machine),
+                Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return Ok(true),
+                Err(TryRecvError::Empty) => return Ok(false),
+            }
+            let now = self.now();
+            self.machine.advance(now);
+            self.hand_out()?;
+        }
+    }
+
+    fn hand_out(&mut self) -> io::Result<()> {
+        while let Some(delivery) = self.machine.collect() {
+            let place = usize::from(delivery.port.0);
+            self.endpoints[place].send(delivery.at, delivery.event)?;
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self) -> io::Result<()> {
+        let span = self.span_to(self.machine.next_event());
+        let mut fds = vec![PollFd::new(self.waker.as_fd(), PollFlags::POLLIN)];
+        for (fd, unsent) in self.endpoints.iter().filter_map(Endpoint::fd) {
+            let sending = if unsent {
+                PollFlags::POLLOUT
+            } else {
+                PollFlags::empty()
+            };
+            fds.push(PollFd::new(fd, PollFlags::POLLIN | sending));
+        }
+        match ppoll(&mut fds, Some(TimeSpec::from_duration(span)), None) {
+            Ok(_) | Err(Errno::EINTR) => {}
+            Err(errno) => return Err(errno.into()),
+        }
+        if fds[0].any() == Some(true) {
+            let mut bytes = [0; 64];
+            let _ = self.waker.read(&mut bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Wall time until the machine's clock reaches `next`.
+    fn span_to(&self, next: Time) -> Duration {
+        if next == Time::NEVER {
+            return WAIT_MAX;
+        }
+        let ahead_s = (next.seconds() - self.now().seconds()) / self.speed;
+        Duration::try_from_secs_f64(ahead_s)
+            .unwrap_or(Duration::ZERO)
+            .clamp(WAIT_MIN, WAIT_MAX)
+    }
+}

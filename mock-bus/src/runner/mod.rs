@@ -1,0 +1,278 @@
+//! The emulated machine in real time, on pseudo-terminals and SocketCAN interfaces.
+//!
+//! One thread waits for its clients and for the machine's next event, with absolute
+//! deadlines: a late wake-up is caught up, never added. Simulated time is wall time times
+//! `speed`.
+
+mod endpoint;
+mod event_loop;
+mod pty;
+mod slcan_adapter;
+mod vcan;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::io::{self, PipeWriter, Write};
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Sender};
+use std::thread::JoinHandle;
+
+use crate::config::{ConfigError, MachineConfig};
+use crate::fault::{FaultConfig, FaultId};
+use crate::plant::HallDrift;
+use crate::simulation::Simulation;
+use endpoint::Endpoint;
+use event_loop::EventLoop;
+
+/// How a machine is run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Chooses noise and errors.
+    pub seed: u64,
+    /// Simulated seconds for each second.
+    pub speed: f64,
+    /// SocketCAN interface for a CAN port, by the port's name; the others speak SLCAN.
+    pub interfaces: BTreeMap<String, String>,
+    /// Symbolic link to a port's terminal, by the port's name.
+    pub links: BTreeMap<String, PathBuf>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            speed: 1.0,
+            interfaces: BTreeMap::new(),
+            links: BTreeMap::new(),
+        }
+    }
+}
+
+/// Why a machine cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The configuration contradicts itself.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A terminal or an interface cannot be opened.
+    #[error("port {port}: {source}")]
+    Open {
+        /// The port's name.
+        port: String,
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// The clock cannot run at this speed.
+    #[error("speed {seen}: expected a positive number")]
+    Speed {
+        /// What was asked for.
+        seen: f64,
+    },
+    /// The thread or its wake-up pipe cannot be made.
+    #[error("cannot start the emulator's thread: {0}")]
+    Start(#[from] io::Error),
+    /// The machine has stopped.
+    #[error("the emulated machine has stopped")]
+    Stopped,
+}
+
+type Work = Box<dyn FnOnce(&mut Simulation) + Send>;
+
+enum Job {
+    Do(Work),
+    Stop,
+}
+
+/// A machine that runs on its own thread until it is dropped.
+pub struct Running {
+    ports: Vec<PathBuf>,
+    jobs: Sender<Job>,
+    wake: PipeWriter,
+    thread: Option<JoinHandle<io::Result<()>>>,
+}
+
+/// Runs the machine with every port on a pseudo-terminal, CAN buses behind SLCAN adapters.
+///
+/// # Errors
+/// When the configuration contradicts itself or a terminal cannot be opened.
+pub fn spawn_on_ptys(config: &MachineConfig, seed: u64, speed: f64) -> Result<Running, RunError> {
+    spawn(
+        config,
+        &Options {
+            seed,
+            speed,
+            ..Options::default()
+        },
+    )
+}
+
+/// Runs the machine with its first CAN bus on a SocketCAN interface, all else on ptys.
+///
+/// # Errors
+/// When the configuration contradicts itself, or the interface or a terminal cannot be opened.
+pub fn spawn_on_vcan(
+    config: &MachineConfig,
+    seed: u64,
+    speed: f64,
+    interface: &str,
+) -> Result<Running, RunError> {
+    let can = config.ports.iter().find(|port| port.is_can());
+    let interfaces = can.map(|port| (port.name().to_owned(), interface.to_owned()));
+    let options = Options {
+        seed,
+        speed,
+        interfaces: interfaces.into_iter().collect(),
+        ..Options::default()
+    };
+    spawn(config, &options)
+}
+
+/// Runs the machine as `options` say.
+///
+/// # Errors
+/// When the configuration contradicts itself, or an interface or a terminal cannot be opened.
+pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunError> {
+    if !(options.speed.is_finite() && options.speed > 0.0) {
+        return Err(RunError::Speed {
+            seen: options.speed,
+        });
+    }
+    // The devices are built on the machine's own thread; this one only proves that they can be.
+    Simulation::new(config, options.seed)?;
+    let (config, options) = (config.clone(), options.clone());
+    let endpoints = open_endpoints(&config, &options)?;
+    let ports = paths(&endpoints, &config, &options);
+    let (jobs, inbox) = mpsc::channel();
+    let (waker, wake) = io::pipe()?;
+    let thread = std::thread::Builder::new()
+        .name("mock-bus".to_owned())
+        .spawn(move || {
+            let machine = Simulation::new(&config, options.seed).map_err(io::Error::other)?;
+            EventLoop::new(machine, endpoints, inbox, waker, options.speed).run()
+        })?;
+    Ok(Running {
+        ports,
+        jobs,
+        wake,
+        thread: Some(thread),
+    })
+}
+
+fn open_endpoints(config: &MachineConfig, options: &Options) -> Result<Vec<Endpoint>, RunError> {
+    let open = |(place, port): (usize, &crate::config::PortConfig)| {
+        let interface = options.interfaces.get(port.name()).map(String::as_str);
+        let link = options.links.get(port.name()).map(PathBuf::as_path);
+        Endpoint::open(place, port, interface, link).map_err(|source| RunError::Open {
+            port: port.name().to_owned(),
+            source,
+        })
+    };
+    config.ports.iter().enumerate().map(open).collect()
+}
+
+fn paths(endpoints: &[Endpoint], config: &MachineConfig, options: &Options) -> Vec<PathBuf> {
+    let interface = |name: &str| options.interfaces.get(name).map(PathBuf::from);
+    endpoints
+        .iter()
+        .zip(&config.ports)
+        .map(|(endpoint, port)| match endpoint.path() {
+            Some(path) => path.to_owned(),
+            None => interface(port.name()).unwrap_or_default(),
+        })
+        .collect()
+}
+
+impl Running {
+    /// For each port of the configuration the terminal's path, or the interface's name.
+    pub fn ports(&self) -> &[PathBuf] {
+        &self.ports
+    }
+
+    /// Does something with the machine on its thread, and gives back what came of it.
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn with<R: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Simulation) -> R + Send + 'static,
+    ) -> Result<R, RunError> {
+        let (answer, result) = mpsc::channel();
+        let work: Work = Box::new(move |machine| {
+            // Whoever asked may have gone; then nobody wants the answer.
+            let _ = answer.send(work(machine));
+        });
+        self.jobs
+            .send(Job::Do(work))
+            .map_err(|_| RunError::Stopped)?;
+        self.wake_up();
+        result.recv().map_err(|_| RunError::Stopped)
+    }
+
+    /// Adds a fault; its times count from now.
+    ///
+    /// # Errors
+    /// When it names what is not there, or the machine has stopped.
+    pub fn inject(&self, fault: FaultConfig) -> Result<FaultId, RunError> {
+        Ok(self.with(move |machine| machine.inject(fault))??)
+    }
+
+    /// Ends a fault now.
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn end_fault(&self, fault: FaultId) -> Result<(), RunError> {
+        self.with(move |machine| machine.end_fault(fault))
+    }
+
+    /// How often a fault has really happened.
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn fault_deliveries(&self, fault: FaultId) -> Result<u64, RunError> {
+        self.with(move |machine| machine.fault_deliveries(fault))
+    }
+
+    /// Switches the mains off and on again; see [`Simulation::power_cycle`].
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn power_cycle(&self, drift: HallDrift) -> Result<(), RunError> {
+        self.with(move |machine| machine.power_cycle(drift))
+    }
+
+    /// Stops the machine and waits for its end.
+    ///
+    /// # Errors
+    /// When it had to stop before, because a terminal or interface failed.
+    pub fn stop(mut self) -> io::Result<()> {
+        self.end()
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        let Some(thread) = self.thread.take() else {
+            return Ok(());
+        };
+        // Both fail only when the thread has ended already.
+        let _ = self.jobs.send(Job::Stop);
+        self.wake_up();
+        match thread.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+
+    fn wake_up(&self) {
+        let _ = (&self.wake).write_all(&[0]);
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            // Nobody is left to hear of a failure.
+            let _ = self.end();
+        }
+    }
+}
