@@ -6,6 +6,8 @@
 //! old one has at that moment (re-planning on the fly); a move too short for its speed is a
 //! triangle. Absent: jerk limits (0x6086 = 0, the linear ramp).
 
+use std::time::Duration;
+
 use units::Time;
 
 /// Position and speed of a demand.
@@ -32,7 +34,6 @@ pub struct MotionLimits {
 struct Phase {
     /// Seconds after the profile's start.
     start_s: f64,
-    duration_s: f64,
     from: MotionState,
     acceleration: f64,
 }
@@ -84,6 +85,19 @@ impl Profile {
         plan.change_speed(0.0, deceleration);
         let end = plan.now.position;
         plan.finish(end)
+    }
+
+    /// Goes straight from `from` to `target` in `duration` (interpolation of CSP set-points).
+    pub fn interpolating(start: Time, from: f64, target: f64, duration: Duration) -> Self {
+        let seconds = duration.as_secs_f64();
+        let velocity = (target - from) / seconds;
+        let from = MotionState {
+            position: from,
+            velocity: if velocity.is_finite() { velocity } else { 0.0 },
+        };
+        let mut plan = Plan::new(start, from);
+        plan.phase(seconds, 0.0);
+        plan.finish(target)
     }
 
     /// The demand at `now`.
@@ -145,12 +159,11 @@ impl Plan {
     }
 
     fn phase(&mut self, duration_s: f64, acceleration: f64) {
-        if duration_s <= 0.0 {
+        if duration_s.is_nan() || duration_s <= 0.0 {
             return;
         }
         let phase = Phase {
             start_s: self.elapsed_s,
-            duration_s,
             from: self.now,
             acceleration,
         };
@@ -210,7 +223,6 @@ impl Plan {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::time::Duration;
 
     const LIMITS: MotionLimits = MotionLimits {
         velocity: 100.0,

@@ -171,8 +171,13 @@ impl CanopenServer {
         id == NMT_COB_ID
             || is_sync(frame)
             || id == self.node.cob_id(Function::SdoRequest)
-            || matches!(Function::of(id), Some((Function::ErrorControl, _)))
+            || self.watches(id)
             || self.rpdos.iter().any(|rpdo| rpdo.takes(frame))
+    }
+
+    fn watches(&self, id: u16) -> bool {
+        let mut watched = self.consumers.iter().flatten();
+        watched.any(|consumer| consumer.producer.cob_id(Function::ErrorControl) == id)
     }
 
     /// Takes a frame from the bus.
