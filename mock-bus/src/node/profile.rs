@@ -202,7 +202,9 @@ impl Plan {
         let speed = self.now.velocity.abs();
         let reserve = distance + speed * speed / (2.0 * acceleration);
         let per_square = 0.5 / acceleration + 0.5 / deceleration;
-        let peak = (reserve.max(0.0) / per_square).sqrt().clamp(speed, limit.max(speed));
+        let peak = (reserve.max(0.0) / per_square)
+            .sqrt()
+            .clamp(speed, limit.max(speed));
         let cruise = reserve - peak * peak * per_square;
         self.change_speed(direction * peak, acceleration);
         self.phase(cruise.max(0.0) / peak, 0.0);
@@ -300,7 +302,9 @@ mod tests {
     fn samples(profile: &Profile) -> Vec<(f64, MotionState)> {
         let seconds = profile.duration_s;
         let moments = (0..=400).map(|i| seconds * 1.01 * f64::from(i) / 400.0);
-        moments.map(|s| (s, profile.at(Time::from_seconds(s)))).collect()
+        moments
+            .map(|s| (s, profile.at(Time::from_seconds(s))))
+            .collect()
     }
 
     proptest! {

@@ -52,7 +52,10 @@ impl BlockUpload {
             phase: UploadPhase::Initiated,
         };
         let crc = true;
-        Ok((block, SdoResponse::BlockUploadInitiate { object, size, crc }))
+        Ok((
+            block,
+            SdoResponse::BlockUploadInitiate { object, size, crc },
+        ))
     }
 
     /// One request of the client; `true` when the transfer is over.
@@ -176,7 +179,10 @@ impl BlockDownload {
 
     /// One segment. Out of sequence it is dropped: the confirmation at the block's end names
     /// the last good one, and the client repeats from there.
-    pub(super) fn segment(&mut self, segment: BlockSegment) -> Result<Option<SdoResponse>, Refusal> {
+    pub(super) fn segment(
+        &mut self,
+        segment: BlockSegment,
+    ) -> Result<Option<SdoResponse>, Refusal> {
         let DownloadPhase::Segments { last_good } = self.phase else {
             return Ok(None);
         };

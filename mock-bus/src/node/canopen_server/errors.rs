@@ -32,7 +32,11 @@ pub(super) struct Errors {
 impl Errors {
     pub(super) fn register(&self) -> u8 {
         let bits = self.present.iter().fold(0, |all, (_, bits)| all | bits);
-        if self.present.is_empty() { 0 } else { bits | register::GENERIC }
+        if self.present.is_empty() {
+            0
+        } else {
+            bits | register::GENERIC
+        }
     }
 
     /// The message of a new error; `None` when it is already known.

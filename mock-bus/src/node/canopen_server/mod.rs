@@ -229,7 +229,11 @@ impl CanopenServer {
             self.next_process_event(),
         ];
         let consumers = self.consumers.iter().flatten().map(Consumer::deadline);
-        timers.into_iter().chain(consumers).min().unwrap_or(Time::NEVER)
+        timers
+            .into_iter()
+            .chain(consumers)
+            .min()
+            .unwrap_or(Time::NEVER)
     }
 
     /// The next frame the node sends.

@@ -67,7 +67,8 @@ impl CanopenServer {
     }
 
     pub(super) fn boot_up(&mut self, now: Time) {
-        self.outbox.send(emit_heartbeat(self.node, NmtState::BootUp));
+        self.outbox
+            .send(emit_heartbeat(self.node, NmtState::BootUp));
         self.enter(now, NmtState::PreOperational);
         self.restart_heartbeat(now);
     }
@@ -119,7 +120,10 @@ impl CanopenServer {
             return;
         }
         self.heartbeat_due = self.heartbeat_due.max(now) + self.heartbeat_period();
-        if !self.rudeness.switched("heartbeat_mute", |m| m.heartbeat_mute) {
+        if !self
+            .rudeness
+            .switched("heartbeat_mute", |m| m.heartbeat_mute)
+        {
             self.outbox.send(emit_heartbeat(self.node, state));
         }
     }
@@ -131,7 +135,11 @@ impl CanopenServer {
     /// 0x1017 was written or the node booted: the first beat comes after one period.
     pub(super) fn restart_heartbeat(&mut self, now: Time) {
         let period = self.heartbeat_period();
-        self.heartbeat_due = if period.is_zero() { Time::NEVER } else { now + period };
+        self.heartbeat_due = if period.is_zero() {
+            Time::NEVER
+        } else {
+            now + period
+        };
     }
 
     pub(super) fn reload_consumers(&mut self) {

@@ -42,7 +42,9 @@ impl Parameters {
 fn read_mapping(dictionary: &Dictionary, index: u16) -> Vec<MappedObject> {
     let count = dictionary.integer(index, 0) as u8;
     let raw = |sub| dictionary.integer(index, sub) as u32;
-    (1..=count).map(|sub| MappedObject::from_raw(raw(sub))).collect()
+    (1..=count)
+        .map(|sub| MappedObject::from_raw(raw(sub)))
+        .collect()
 }
 
 /// A TPDO.
@@ -165,13 +167,21 @@ impl Tpdo {
         if !self.is_event_driven() {
             return Time::NEVER;
         }
-        let pending = if self.pending { self.inhibited_until } else { Time::NEVER };
+        let pending = if self.pending {
+            self.inhibited_until
+        } else {
+            Time::NEVER
+        };
         pending.min(self.timer_due.max(self.inhibited_until))
     }
 }
 
 fn due(now: Time, timer: Duration) -> Time {
-    if timer.is_zero() { Time::NEVER } else { now + timer }
+    if timer.is_zero() {
+        Time::NEVER
+    } else {
+        now + timer
+    }
 }
 
 /// What an RPDO does with a frame.
@@ -214,7 +224,11 @@ impl Rpdo {
     pub(super) fn receive(&mut self, now: Time, frame: CanFrame) -> Reception {
         if frame.len() < self.parameters.bytes() {
             let known = std::mem::replace(&mut self.short, true);
-            return if known { Reception::Ignored } else { Reception::TooShort };
+            return if known {
+                Reception::Ignored
+            } else {
+                Reception::TooShort
+            };
         }
         self.short = false;
         self.deadline = due(now, self.parameters.timer);

@@ -83,7 +83,10 @@ impl CanopenServer {
     }
 
     pub(super) fn expire_rpdos(&mut self, now: Time) {
-        let expired = self.rpdos.iter_mut().filter_map(|rpdo| rpdo.expires(now).then_some(()));
+        let expired = self
+            .rpdos
+            .iter_mut()
+            .filter_map(|rpdo| rpdo.expires(now).then_some(()));
         if expired.count() > 0 && self.phase.is_operational() {
             self.raise(now, RPDO_TIMEOUT, register::COMMUNICATION, [0; 5]);
         }
@@ -110,7 +113,9 @@ impl CanopenServer {
     pub fn send_changes(&mut self, now: Time) {
         if self.phase.is_operational() {
             let dictionary = &self.dictionary;
-            self.tpdos.iter_mut().for_each(|tpdo| tpdo.note_change(dictionary));
+            self.tpdos
+                .iter_mut()
+                .for_each(|tpdo| tpdo.note_change(dictionary));
             self.send_due_tpdos(now);
         }
     }

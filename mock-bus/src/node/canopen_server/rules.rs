@@ -11,9 +11,15 @@ use super::dictionary::{Dictionary, Value};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Area {
     /// 0x1400.. (`false`) or 0x1800.. (`true`) with the PDO's number.
-    Parameters { transmit: bool, number: u16 },
+    Parameters {
+        transmit: bool,
+        number: u16,
+    },
     /// 0x1600.. or 0x1A00...
-    Mapping { transmit: bool, number: u16 },
+    Mapping {
+        transmit: bool,
+        number: u16,
+    },
     Other,
 }
 
@@ -21,10 +27,22 @@ impl Area {
     pub(super) const fn of(index: u16) -> Self {
         let number = index & 0x1FF;
         match index & 0xFE00 {
-            0x1400 => Self::Parameters { transmit: false, number },
-            0x1600 => Self::Mapping { transmit: false, number },
-            0x1800 => Self::Parameters { transmit: true, number },
-            0x1A00 => Self::Mapping { transmit: true, number },
+            0x1400 => Self::Parameters {
+                transmit: false,
+                number,
+            },
+            0x1600 => Self::Mapping {
+                transmit: false,
+                number,
+            },
+            0x1800 => Self::Parameters {
+                transmit: true,
+                number,
+            },
+            0x1A00 => Self::Mapping {
+                transmit: true,
+                number,
+            },
             _ => Self::Other,
         }
     }
@@ -68,7 +86,11 @@ pub(super) fn check(
 }
 
 fn signature(matches: bool) -> Result<(), AbortCode> {
-    if matches { Ok(()) } else { Err(AbortCode::CannotStore) }
+    if matches {
+        Ok(())
+    } else {
+        Err(AbortCode::CannotStore)
+    }
 }
 
 /// Identifiers that PDOs must not take (CiA 301, table 40).
@@ -76,11 +98,7 @@ const fn is_restricted(cob_id: u16) -> bool {
     matches!(cob_id, 0..=0x80 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..)
 }
 
-fn check_parameter(
-    dictionary: &Dictionary,
-    object: Object,
-    value: i64,
-) -> Result<(), AbortCode> {
+fn check_parameter(dictionary: &Dictionary, object: Object, value: i64) -> Result<(), AbortCode> {
     const EXTENDED: u32 = 1 << 29;
     const IDENTIFIER: u32 = 0x3FFF_FFFF;
     let old = PdoCobId(dictionary.integer(object.index, 1) as u32);
@@ -97,7 +115,11 @@ fn check_parameter(
         3 if old.is_valid() => return Err(AbortCode::DeviceState),
         _ => false,
     };
-    if refused { Err(AbortCode::InvalidValue) } else { Ok(()) }
+    if refused {
+        Err(AbortCode::InvalidValue)
+    } else {
+        Ok(())
+    }
 }
 
 /// The mapping must not change while the PDO exists (bit 31 of its COB-ID is 0).
@@ -112,7 +134,11 @@ fn check_disabled(dictionary: &Dictionary, transmit: bool, number: u16) -> Resul
 
 /// Entries can only be written after sub 0 was set to 0.
 fn check_mapping_is_open(dictionary: &Dictionary, index: u16) -> Result<(), AbortCode> {
-    if dictionary.integer(index, 0) == 0 { Ok(()) } else { Err(AbortCode::ReadOnly) }
+    if dictionary.integer(index, 0) == 0 {
+        Ok(())
+    } else {
+        Err(AbortCode::ReadOnly)
+    }
 }
 
 fn check_mapped(dictionary: &Dictionary, transmit: bool, raw: u32) -> Result<(), AbortCode> {
@@ -155,7 +181,11 @@ fn check_count(
         check_mapped(dictionary, transmit, raw)?;
         bits += u32::from(MappedObject::from_raw(raw).bits);
     }
-    if bits > 64 { Err(AbortCode::PdoTooLong) } else { Ok(()) }
+    if bits > 64 {
+        Err(AbortCode::PdoTooLong)
+    } else {
+        Ok(())
+    }
 }
 
 /// A producer may be watched by one entry only (0x06040043).

@@ -117,7 +117,11 @@ impl SdoServer {
         let result = self.dispatch(bytes, objects, out);
         self.finish(result, out);
         let busy = !matches!(self.transfer, Transfer::Idle);
-        self.deadline = if busy { self.next_deadline(now) } else { Time::NEVER };
+        self.deadline = if busy {
+            self.next_deadline(now)
+        } else {
+            Time::NEVER
+        };
     }
 
     /// A block's confirmation is due after half the time, so that the client can still repeat.
@@ -303,7 +307,9 @@ impl SdoServer {
             // Without a size the entry's own length says how many of the four bytes count.
             bytes = &bytes[..objects.length(object).unwrap_or(4).min(4)];
         }
-        objects.write(object, bytes).map_err(|code| (object, code))?;
+        objects
+            .write(object, bytes)
+            .map_err(|code| (object, code))?;
         out.push(Reply::Response(SdoResponse::DownloadInitiate { object }));
         Ok(())
     }

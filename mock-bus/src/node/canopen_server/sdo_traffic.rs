@@ -49,9 +49,8 @@ impl Objects for ServedObjects<'_> {
         let value = self.dictionary.check_value(object, data)?;
         rules::check(self.dictionary, object, &value)?;
         let mapping = matches!(Area::of(object.index), Area::Mapping { .. });
-        let ignored = |m: &mut Rudeness| {
-            m.take("mapping_ignored_writes", |m| &mut m.mapping_ignored_writes)
-        };
+        let ignored =
+            |m: &mut Rudeness| m.take("mapping_ignored_writes", |m| &mut m.mapping_ignored_writes);
         if mapping && object.sub > 0 && ignored(self.rudeness) {
             return Ok(());
         }
@@ -68,9 +67,8 @@ impl CanopenServer {
         }
         let object = self.object_of(frame);
         let concerned = self.rudeness.concerns(object.index);
-        let ignore = |m: &mut Rudeness| {
-            m.take("sdo_ignored_requests", |m| &mut m.sdo_ignored_requests)
-        };
+        let ignore =
+            |m: &mut Rudeness| m.take("sdo_ignored_requests", |m| &mut m.sdo_ignored_requests);
         if concerned && ignore(&mut self.rudeness) {
             return;
         }
@@ -81,7 +79,8 @@ impl CanopenServer {
             rudeness: &mut self.rudeness,
             written: Vec::new(),
         };
-        self.sdo.handle(now, frame.data(), &mut objects, &mut replies);
+        self.sdo
+            .handle(now, frame.data(), &mut objects, &mut replies);
         let written = objects.written;
         let mut work = Duration::ZERO;
         for object in written {
@@ -142,9 +141,8 @@ impl CanopenServer {
         let Ok(SdoRequest::Abort { .. }) = SdoRequest::parse(frame.data()) else {
             return;
         };
-        let flood = |m: &mut Rudeness| {
-            m.take("sdo_floods_after_abort", |m| &mut m.sdo_floods_after_abort)
-        };
+        let flood =
+            |m: &mut Rudeness| m.take("sdo_floods_after_abort", |m| &mut m.sdo_floods_after_abort);
         if !flood(&mut self.rudeness) {
             return;
         }
@@ -165,15 +163,17 @@ impl CanopenServer {
         let concerned = self.rudeness.concerns(object.index);
         for reply in replies {
             let (due, payloads) = match (reply, concerned) {
-                (Reply::Response(response), true) => {
-                    (start + self.rudeness.delay(), self.rudeness.spoil(*response))
-                }
+                (Reply::Response(response), true) => (
+                    start + self.rudeness.delay(),
+                    self.rudeness.spoil(*response),
+                ),
                 (Reply::Segment(_), true) if self.rudeness.loses_segment() => continue,
                 (Reply::Response(response), false) => (start, vec![response.emit().to_vec()]),
                 (Reply::Segment(segment), _) => (start, vec![segment.emit().to_vec()]),
             };
             for payload in payloads {
-                self.outbox.send_at(now, due, CanFrame::standard(id, &payload));
+                self.outbox
+                    .send_at(now, due, CanFrame::standard(id, &payload));
             }
         }
     }
@@ -181,7 +181,9 @@ impl CanopenServer {
 
 impl Rudeness {
     fn loses_segment(&mut self) -> bool {
-        self.take("sdo_lost_block_segments", |m| &mut m.sdo_lost_block_segments)
+        self.take("sdo_lost_block_segments", |m| {
+            &mut m.sdo_lost_block_segments
+        })
     }
 
     /// The payloads that go out instead of one response.
@@ -204,7 +206,9 @@ impl Rudeness {
         if self.take("sdo_short_replies", |m| &mut m.sdo_short_replies) {
             payload.truncate(3);
         }
-        if self.take("sdo_duplicate_responses", |m| &mut m.sdo_duplicate_responses) {
+        if self.take("sdo_duplicate_responses", |m| {
+            &mut m.sdo_duplicate_responses
+        }) {
             payloads.push(payload.clone());
         }
         payloads.push(payload);

@@ -146,6 +146,8 @@ where
     let raw = u8::deserialize(deserializer)?;
     let node = NodeId::new(raw);
     node.map(NodeId::raw).ok_or_else(|| {
-        D::Error::custom(format_args!("node_id {raw} is no CANopen node, these are 1 to 127"))
+        D::Error::custom(format_args!(
+            "node_id {raw} is no CANopen node, these are 1 to 127"
+        ))
     })
 }

@@ -311,7 +311,11 @@ impl Drive {
             Duration::from_millis(self.config.supervision_period_ms.max(1))
         };
         let next = now + period;
-        self.servo_due = if self.servo_due <= now { next } else { self.servo_due.min(next) };
+        self.servo_due = if self.servo_due <= now {
+            next
+        } else {
+            self.servo_due.min(next)
+        };
     }
 
     /// Acts on what the frames said, until nothing is left to act on.

@@ -41,7 +41,11 @@ impl Drive {
     /// +1, or −1 where 0x607E inverts the position.
     pub(super) fn sign(&self) -> i64 {
         const INVERT_POSITION: i64 = 0x80;
-        if self.get(0x607E) & INVERT_POSITION == 0 { 1 } else { -1 }
+        if self.get(0x607E) & INVERT_POSITION == 0 {
+            1
+        } else {
+            -1
+        }
     }
 
     /// The actual position in drive coordinates, before it is cut to 32 bits.
@@ -168,7 +172,11 @@ impl Drive {
     pub(super) fn within_soft_limits(&self, target: f64) -> f64 {
         let low = self.server.get(0x607D, 1) as f64;
         let high = self.server.get(0x607D, 2) as f64;
-        if self.homed && low < high { target.clamp(low, high) } else { target }
+        if self.homed && low < high {
+            target.clamp(low, high)
+        } else {
+            target
+        }
     }
 
     /// SYNC in cyclic synchronous position: 0x607A + 0x60B0, reached after one period (0x60C2).

@@ -4,9 +4,7 @@ use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId};
 
 use super::config::Cia402DriveConfig;
-use crate::node::canopen_server::dictionary::{
-    Access, Bounds, Dictionary, Entry, Kind, Mapping,
-};
+use crate::node::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
 use crate::node::canopen_server::{Description, PdoDefault};
 
 /// Servo drive, CiA 402.

@@ -15,7 +15,11 @@ impl Drive {
     pub(super) fn publish(&mut self, now: Time, m: &impl Mechanism) {
         let actual = self.actual(m);
         let demand = self.demand(now);
-        let shown = if self.servo_on { demand.position.round() as i64 } else { actual };
+        let shown = if self.servo_on {
+            demand.position.round() as i64
+        } else {
+            actual
+        };
         let sign = self.sign();
         let (negative, positive) = m.limit_switches();
         let inputs = i64::from(negative) | i64::from(positive) << 1;
@@ -80,7 +84,8 @@ impl Drive {
             return self.profile.is_done(now);
         }
         let time = Duration::from_millis(self.get(0x6068) as u64);
-        self.in_window_since.is_some_and(|since| since + time <= now)
+        self.in_window_since
+            .is_some_and(|since| since + time <= now)
     }
 }
 

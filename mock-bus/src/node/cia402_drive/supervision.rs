@@ -78,7 +78,11 @@ impl Drive {
     /// Negative and positive limit switch in drive coordinates.
     pub(super) fn limits(&self, m: &impl Mechanism) -> (bool, bool) {
         let (negative, positive) = m.limit_switches();
-        if self.sign() > 0 { (negative, positive) } else { (positive, negative) }
+        if self.sign() > 0 {
+            (negative, positive)
+        } else {
+            (positive, negative)
+        }
     }
 
     /// Whether a motion of this sign would go on into a pressed switch.
@@ -101,7 +105,8 @@ impl Drive {
             self.ramp(now, self.get(0x6085), After::Stay);
             let (negative, _) = self.limits(m);
             let detail = [u8::from(!negative), 0, 0, 0, 0];
-            self.server.raise(now, LIMIT_SWITCH, register::MANUFACTURER, detail);
+            self.server
+                .raise(now, LIMIT_SWITCH, register::MANUFACTURER, detail);
         }
     }
 
@@ -125,7 +130,12 @@ impl Drive {
     /// The connection to the master is gone: what 0x6007 says.
     pub(super) fn abort_connection(&mut self, now: Time, m: &mut impl Mechanism) {
         match self.get(0x6007) {
-            1 => self.fail(now, EmergencyCode::HEARTBEAT_LOST, register::COMMUNICATION, m),
+            1 => self.fail(
+                now,
+                EmergencyCode::HEARTBEAT_LOST,
+                register::COMMUNICATION,
+                m,
+            ),
             2 => self.disable_voltage(m),
             3 if self.power == Power::OperationEnabled => {
                 self.command = None;

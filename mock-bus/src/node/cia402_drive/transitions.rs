@@ -118,7 +118,11 @@ impl Drive {
             self.power = Power::SwitchOnDisabled;
             return;
         }
-        let deceleration = self.get(if option == 1 || option == 5 { 0x6084 } else { 0x6085 });
+        let deceleration = self.get(if option == 1 || option == 5 {
+            0x6084
+        } else {
+            0x6085
+        });
         let after = if self.resumable() {
             After::Stay
         } else {
