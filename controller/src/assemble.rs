@@ -212,7 +212,7 @@ fn dcon_settings(analog: &AnalogConfig) -> DconSettings {
     DconSettings {
         checksum: analog.checksum,
         period: Duration::from_secs_f64(period * 1e-3),
-        ..DconSettings::new(address, InputRange::Volts10, analog.channels.clone())
+        ..DconSettings::new(address, InputRange::V10, analog.channels.clone())
     }
 }
 
