@@ -175,7 +175,7 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus) -> Cia402Settings {
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
     let acceleration = MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3);
-    let quick_stop = axis.quick_stop_deceleration_mm_per_s2 * 1e-3;
+    let quick_stop = MetresPerSecondSquared(axis.quick_stop_deceleration_mm_per_s2 * 1e-3);
     Cia402Settings {
         soft_limits: Some((Metres::from_mm(axis.soft_min_mm), Metres::from_mm(axis.soft_max_mm))),
         following_error: Some((
@@ -184,8 +184,8 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus) -> Cia402Settings {
         )),
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
-        quick_stop_deceleration: Some(MetresPerSecondSquared(quick_stop)),
-        ..Cia402Settings::new(common, scale, speed_max, acceleration)
+        quick_stop_deceleration: Some(quick_stop),
+        ..Cia402Settings::new(common, scale, speed_max, acceleration.max(quick_stop))
     }
 }
 
