@@ -7,6 +7,8 @@ pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
 pub mod dcon;
+#[cfg(test)]
+mod fake_node;
 pub mod umd2;
 
 use core::fmt;
