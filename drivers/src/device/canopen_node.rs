@@ -131,7 +131,9 @@ pub(super) enum NodeEvent {
 enum Phase {
     Off,
     /// Does it answer? Until the deadline.
-    Probing { since: Time },
+    Probing {
+        since: Time,
+    },
     Describing,
     /// The device's own part checks what was read.
     Described,
@@ -142,7 +144,9 @@ enum Phase {
         sent: u8,
     },
     /// Operational, waiting for data.
-    Operational { since: Time },
+    Operational {
+        since: Time,
+    },
     Up,
 }
 
@@ -310,11 +314,9 @@ impl CanopenNode {
             }
             Phase::Operational { since } => since + self.settings.timeouts.operational,
             Phase::Up if !self.pdo_silent => self.pdo_deadline(),
-            Phase::Up
-            | Phase::Off
-            | Phase::Describing
-            | Phase::Described
-            | Phase::Configuring => Time::NEVER,
+            Phase::Up | Phase::Off | Phase::Describing | Phase::Described | Phase::Configuring => {
+                Time::NEVER
+            }
         };
         phase
             .min(self.client.poll_timeout())

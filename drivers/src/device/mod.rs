@@ -8,6 +8,8 @@ pub mod cia401;
 pub mod cia402;
 pub mod dcon;
 pub mod serial_line;
+#[cfg(test)]
+mod fake_node;
 pub mod umd2;
 
 use core::fmt;

@@ -9,7 +9,10 @@ use crate::wire::canopen::nmt::{NmtState, emit_heartbeat, parse_heartbeat};
 
 /// What a node's error control messages tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "from and to are NMT states, waited is a duration")]
+#[expect(
+    missing_docs,
+    reason = "from and to are NMT states, waited is a duration"
+)]
 pub enum HeartbeatEvent {
     /// The node booted.
     BootUp,
@@ -176,11 +179,7 @@ mod tests {
         Time(ms * 1_000_000)
     }
 
-    fn beat(
-        consumer: &mut HeartbeatConsumer,
-        at: Time,
-        raw: u8,
-    ) -> Option<HeartbeatEvent> {
+    fn beat(consumer: &mut HeartbeatConsumer, at: Time, raw: u8) -> Option<HeartbeatEvent> {
         consumer.handle_frame(at, &CanFrame::standard(0x705, &[raw]))
     }
 

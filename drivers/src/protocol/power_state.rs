@@ -157,7 +157,11 @@ impl PowerSequence {
             | PowerState::NotReadyToSwitchOn
             | PowerState::Unknown(_) => {
                 let high = self.reset_sent;
-                PowerStep::Command(if high { Controlword::FAULT_RESET } else { NO_EDGE })
+                PowerStep::Command(if high {
+                    Controlword::FAULT_RESET
+                } else {
+                    NO_EDGE
+                })
             }
             PowerState::SwitchOnDisabled
             | PowerState::ReadyToSwitchOn
@@ -187,10 +191,9 @@ pub const fn keep(state: PowerState) -> Controlword {
 const fn up(state: PowerState) -> (PowerStep, PowerState) {
     let command = PowerStep::Command;
     match state {
-        PowerState::NotReadyToSwitchOn | PowerState::Unknown(_) => (
-            command(Controlword::empty()),
-            PowerState::SwitchOnDisabled,
-        ),
+        PowerState::NotReadyToSwitchOn | PowerState::Unknown(_) => {
+            (command(Controlword::empty()), PowerState::SwitchOnDisabled)
+        }
         PowerState::SwitchOnDisabled => {
             (command(Controlword::SHUTDOWN), PowerState::ReadyToSwitchOn)
         }
@@ -226,9 +229,7 @@ const fn down(state: PowerState) -> (PowerStep, PowerState) {
         | PowerState::QuickStopActive
         | PowerState::NotReadyToSwitchOn
         | PowerState::FaultReactionActive
-        | PowerState::Unknown(_) => {
-            (command(Controlword::empty()), PowerState::SwitchOnDisabled)
-        }
+        | PowerState::Unknown(_) => (command(Controlword::empty()), PowerState::SwitchOnDisabled),
         // A faulted drive gives no torque: nothing is left to switch off.
         PowerState::SwitchOnDisabled | PowerState::Fault => {
             (PowerStep::Done(Controlword::empty()), state)
@@ -306,7 +307,12 @@ mod tests {
     /// Kollmorgen AKD CANopen manual, p. 145: 0x06, 0x07, 0x0F.
     #[test]
     fn enabling_walks_the_standards_transitions() {
-        let dialog = [(0x0250, 0x06), (0x0231, 0x07), (0x0233, 0x0F), (0x0237, 0x0F)];
+        let dialog = [
+            (0x0250, 0x06),
+            (0x0231, 0x07),
+            (0x0233, 0x0F),
+            (0x0237, 0x0F),
+        ];
         let last = check(Goal::OperationEnabled, &dialog);
         assert_eq!(last, PowerStep::Done(Controlword::ENABLE_COMMAND));
     }
@@ -345,7 +351,10 @@ mod tests {
             (0x0238, 0x80),
             (0x0250, 0x00),
         ];
-        assert!(matches!(check(Goal::FaultReset, &dialog), PowerStep::Done(_)));
+        assert!(matches!(
+            check(Goal::FaultReset, &dialog),
+            PowerStep::Done(_)
+        ));
     }
 
     #[test]
@@ -382,7 +391,12 @@ mod tests {
 
     #[test]
     fn disabling_goes_down_step_by_step() {
-        let dialog = [(0x0237, 0x07), (0x0233, 0x06), (0x0231, 0x00), (0x0250, 0x00)];
+        let dialog = [
+            (0x0237, 0x07),
+            (0x0233, 0x06),
+            (0x0231, 0x00),
+            (0x0250, 0x00),
+        ];
         assert!(matches!(
             check(Goal::SwitchOnDisabled, &dialog),
             PowerStep::Done(_)

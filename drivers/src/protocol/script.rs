@@ -328,3 +328,89 @@ fn compare(expected: Value, mask: u64, data: &[u8]) -> Result<(), ScriptCause> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::sdo_client::Timeouts;
+    use crate::wire::can::CanFrame;
+    use crate::wire::canopen::NodeId;
+
+    const OBJECT: Object = Object::new(0x6067, 0);
+
+    /// Runs one step; each request is answered with the next payload.
+    #[track_caller]
+    fn run(step: Step, answers: &[[u8; 8]]) -> (Script, Option<Result<(), ScriptFailure>>) {
+        let node = NodeId::new(5).unwrap();
+        let mut client = SdoClient::new(node, Timeouts::default());
+        let mut script = Script::new([step]);
+        let mut result = script.poll(Time::ZERO, &mut client);
+        for answer in answers {
+            assert_eq!(result, None);
+            assert!(client.poll_transmit().is_some(), "a request is due");
+            client.handle_frame(Time::ZERO, &CanFrame::standard(0x585, answer));
+            result = script.poll(Time::ZERO, &mut client);
+        }
+        (script, result)
+    }
+
+    const WRITTEN: [u8; 8] = [0x60, 0x67, 0x60, 0, 0, 0, 0, 0];
+    const ABSENT: [u8; 8] = [0x80, 0x67, 0x60, 0, 0x00, 0x00, 0x02, 0x06];
+
+    const fn value(command: u8, value: u8) -> [u8; 8] {
+        [command, 0x67, 0x60, 0, value, 0, 0, 0]
+    }
+
+    #[test]
+    fn a_value_read_is_kept() {
+        let (script, result) = run(Step::read(OBJECT, "reading"), &[value(0x4B, 9)]);
+        assert_eq!(result, Some(Ok(())));
+        assert_eq!(script.value(OBJECT), Some(9));
+        assert_eq!(script.data(OBJECT), Some(&[9, 0][..]));
+    }
+
+    #[test]
+    fn a_checked_write_is_read_back() {
+        let step = Step::check(OBJECT, 9_u32, "writing");
+        let (_, result) = run(step, &[WRITTEN, value(0x43, 9)]);
+        assert_eq!(result, Some(Ok(())));
+        let (_, result) = run(step, &[WRITTEN, value(0x43, 8)]);
+        let cause = ScriptCause::Differs {
+            expected: 9,
+            seen: 8,
+        };
+        assert_eq!(result.unwrap().unwrap_err().cause, cause);
+    }
+
+    #[test]
+    fn bits_outside_the_mask_may_differ() {
+        let step = Step::check_bits(OBJECT, 9_u32, 0x0F, "writing");
+        let (_, result) = run(step, &[WRITTEN, value(0x43, 0x79)]);
+        assert_eq!(result, Some(Ok(())));
+    }
+
+    #[test]
+    fn a_server_that_does_not_indicate_sizes_is_compared_by_the_values_own_bytes() {
+        let step = Step::expect(OBJECT, 9_u8, "expecting");
+        let (_, result) = run(step, &[[0x42, 0x67, 0x60, 0, 9, 0xAA, 0xBB, 0xCC]]);
+        assert_eq!(result, Some(Ok(())));
+    }
+
+    #[test]
+    fn an_absent_object_ends_the_script_unless_it_is_optional() {
+        let step = Step::read(OBJECT, "reading");
+        let (_, result) = run(step, &[ABSENT]);
+        assert_eq!(result.unwrap().unwrap_err().object, OBJECT);
+        let (script, result) = run(step.optional(), &[ABSENT]);
+        assert_eq!(result, Some(Ok(())));
+        assert_eq!(script.value(OBJECT), None);
+    }
+
+    #[test]
+    fn another_abort_ends_the_script_even_if_the_object_is_optional() {
+        let step = Step::write(OBJECT, 9_u32, "writing").optional();
+        let busy = [0x80, 0x67, 0x60, 0, 0x22, 0x00, 0x00, 0x08];
+        let (_, result) = run(step, &[busy]);
+        assert!(result.unwrap().is_err());
+    }
+}

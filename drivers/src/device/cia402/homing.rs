@@ -67,15 +67,17 @@ impl Cia402Drive {
             Some(_) if reversed => 18,
             Some(_) => 17,
         };
-        let plan = counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(
-            |counts| {
+        let plan =
+            counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(|counts| {
                 let offset = match self.settings.home_offset {
                     HomeOffset::IsPositionAtHome => counts,
                     HomeOffset::IsZeroFromHome => -counts,
                 };
-                Ok((counts, homing_steps(&self.settings, method, offset, search)?))
-            },
-        );
+                Ok((
+                    counts,
+                    homing_steps(&self.settings, method, offset, search)?,
+                ))
+            });
         match plan {
             Err(error) => self.finish(Err(error)),
             Ok((position, steps)) => {
@@ -218,7 +220,9 @@ impl Cia402Drive {
             return;
         }
         let since = homing.since;
-        let mode = self.mode().map_or(Seen::Nothing, |mode| Seen::Mode(mode.raw()));
+        let mode = self
+            .mode()
+            .map_or(Seen::Nothing, |mode| Seen::Mode(mode.raw()));
         match homing.phase.clone() {
             Phase::Preparing | Phase::Restoring(_) => {}
             Phase::AwaitingHoming => {

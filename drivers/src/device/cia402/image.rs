@@ -50,7 +50,10 @@ pub(super) enum Judgement {
     /// Too far from where the axis can be: not taken.
     Doubted,
     /// Doubted twice running: the position did jump. Taken, but to be told.
-    Jumped { by: Counts, limit: Counts },
+    Jumped {
+        by: Counts,
+        limit: Counts,
+    },
 }
 
 #[derive(Debug)]

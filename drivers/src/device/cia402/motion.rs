@@ -9,9 +9,7 @@ use core::time::Duration;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 
 use super::convert::{acceleration_counts, counts_i32, velocity_counts};
-use super::start::{
-    MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps,
-};
+use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::script::Step;

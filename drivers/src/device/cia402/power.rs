@@ -86,7 +86,8 @@ impl Cia402Drive {
                 if control != self.control {
                     self.send_control(now, control);
                 }
-                self.kept = (goal == Goal::OperationEnabled).then_some(PowerState::OperationEnabled);
+                self.kept =
+                    (goal == Goal::OperationEnabled).then_some(PowerState::OperationEnabled);
                 self.finish(Ok(()));
             }
             PowerStep::Failed(failure) => self.power_failed(now, goal, since, failure),

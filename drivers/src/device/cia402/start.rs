@@ -230,11 +230,8 @@ pub(super) fn homing_steps(
     ];
     if let Some(speed) = speed {
         let search = velocity_counts(settings, HOMING_SPEED_SEARCH, speed)?;
-        let acceleration = acceleration_counts(
-            settings,
-            HOMING_ACCELERATION,
-            settings.homing_acceleration,
-        )?;
+        let acceleration =
+            acceleration_counts(settings, HOMING_ACCELERATION, settings.homing_acceleration)?;
         steps.push(Step::check(HOMING_SPEED_SEARCH, search, TEXT));
         steps.push(Step::check(HOMING_SPEED_ZERO, (search / 5).max(1), TEXT));
         steps.push(Step::check(HOMING_ACCELERATION, acceleration, TEXT));

@@ -14,9 +14,17 @@ const REPEATS_WITHOUT_PROGRESS_MAX: u8 = 8;
 #[derive(Debug)]
 pub(super) enum Download {
     Expedited,
-    Initiate { data: Vec<u8> },
-    Segments { data: Vec<u8>, sent: usize, toggle: bool },
-    BlockInitiate { data: Vec<u8> },
+    Initiate {
+        data: Vec<u8>,
+    },
+    Segments {
+        data: Vec<u8>,
+        sent: usize,
+        toggle: bool,
+    },
+    BlockInitiate {
+        data: Vec<u8>,
+    },
     Block(Block),
     BlockEnd,
 }

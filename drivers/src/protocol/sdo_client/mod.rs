@@ -596,9 +596,9 @@ impl SdoClient {
 /// Whether a payload is the expedited value of the fence's object, or its refusal.
 fn answers_fence(payload: &[u8; 8], fence: Object) -> bool {
     match SdoResponse::parse(payload) {
-        Ok(
-            SdoResponse::UploadExpedited { object, .. } | SdoResponse::Abort { object, .. },
-        ) => object == fence,
+        Ok(SdoResponse::UploadExpedited { object, .. } | SdoResponse::Abort { object, .. }) => {
+            object == fence
+        }
         Ok(_) | Err(_) => false,
     }
 }

@@ -117,9 +117,9 @@ impl Bench {
 
     #[track_caller]
     fn fails_with(&mut self, expected: AbortCode) -> &mut Self {
-        self.fails(|failure| {
-            matches!(failure, SdoFailure::Protocol { code, .. } if *code == expected)
-        })
+        self.fails(
+            |failure| matches!(failure, SdoFailure::Protocol { code, .. } if *code == expected),
+        )
     }
 }
 
@@ -351,13 +351,9 @@ fn confirming_more_segments_than_were_sent_is_aborted() {
 #[test]
 fn a_server_that_takes_no_segment_at_all_is_given_up() {
     let mut bench = Bench::write(DATA, b"1", Method::Block);
-    bench
-        .sends(&["C6501F0101000000"])
-        .hears("A4501F017F000000");
+    bench.sends(&["C6501F0101000000"]).hears("A4501F017F000000");
     for _ in 0..8 {
-        bench
-            .sends(&["8131000000000000"])
-            .hears("A2007F0000000000");
+        bench.sends(&["8131000000000000"]).hears("A2007F0000000000");
     }
     bench
         .sends(&["8131000000000000"])
@@ -746,9 +742,7 @@ fn a_write_is_never_sent_twice_unless_it_is_called_idempotent() {
         .sends(&["8060600000000405"])
         .fails(|failure| matches!(failure, SdoFailure::TimedOut { attempts: 1, .. }));
     let now = bench.now;
-    let again = bench
-        .client
-        .write_idempotent(now, MODE, &[6], Method::Auto);
+    let again = bench.client.write_idempotent(now, MODE, &[6], Method::Auto);
     assert_eq!(again, Ok(()));
     bench
         .passes_the_fence()

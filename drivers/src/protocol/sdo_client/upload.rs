@@ -174,7 +174,10 @@ impl Segments {
                 toggle: self.toggle,
             });
         }
-        if self.size.is_some_and(|size| self.data.len() < size as usize) {
+        if self
+            .size
+            .is_some_and(|size| self.data.len() < size as usize)
+        {
             return Verdict::Break(AbortCode::LengthTooLow);
         }
         Verdict::Done(core::mem::take(&mut self.data))

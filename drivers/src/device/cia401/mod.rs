@@ -6,6 +6,9 @@
 //! neutral, so that only the settings give volts. Absent: 0x6402 (32 bits), 0x6403 (floats) with
 //! their scaling 0x642F and 0x6430, output modules, digital channels.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::VecDeque;
 
 use units::{Time, Volts};
@@ -51,13 +54,11 @@ pub struct Cia401Settings {
 impl Cia401Settings {
     /// A 16-bit converter with these channels; `None` when there are none or more than four.
     pub fn new(common: NodeSettings, channels: &[ChannelSettings]) -> Option<Self> {
-        (1..=CHANNELS_MAX)
-            .contains(&channels.len())
-            .then(|| Self {
-                common,
-                channels: channels.to_vec(),
-                converter_bits: 16,
-            })
+        (1..=CHANNELS_MAX).contains(&channels.len()).then(|| Self {
+            common,
+            channels: channels.to_vec(),
+            converter_bits: 16,
+        })
     }
 
     const fn upper_rail(&self) -> i16 {
