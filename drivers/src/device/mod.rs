@@ -466,9 +466,7 @@ impl fmt::Display for Alarm {
             Self::LaserLost => f.write_str("interferometer: no reference from the laser head"),
             Self::SlewError => f.write_str("interferometer: too fast to count; slow down"),
             Self::SamplesLost { lost } => write!(f, "interferometer: {lost} samples missing"),
-            Self::CountRestarted => {
-                f.write_str("interferometer: began to count anew (reset?); set a new datum")
-            }
+            Self::CountRestarted => f.write_str("interferometer: was reset; set a new datum"),
             Self::StreamSilent { waited } => {
                 write!(
                     f,

@@ -6,6 +6,7 @@
 //! takes deadlines in nanoseconds and costs one system call: a tokio timer is a millisecond
 //! late at the median and reads the clock several times per turn.
 
+use core::cell::Cell;
 use core::time::Duration;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -25,6 +26,8 @@ use super::socketcan::{self, CanPort};
 use super::sync_thread::{SyncSink, SyncStatistics, SyncThread};
 use super::{Arrival, Input, Payload, Port, SendError, Transport};
 
+/// Until the clock has been read, a wait is no longer than this.
+const COARSE_WAIT: Duration = Duration::from_millis(1);
 /// The longest single wait, so that a deadline of "never" needs no special case.
 const WAIT_MAX: Duration = Duration::from_secs(3_600);
 
@@ -42,10 +45,11 @@ pub(super) trait LivePort: Send {
     fn next_event(&self) -> Time;
 
     /// The next input, without waiting. `ready`: the descriptor can be read (or written).
-    fn poll(&mut self, now: Time, ready: bool) -> Option<(Time, Input)>;
+    /// It is `known` or a little later; who needs it better reads the clock.
+    fn poll(&mut self, known: Time, ready: bool) -> Option<(Time, Input)>;
 
     /// Sends without waiting.
-    fn send(&mut self, now: Time, payload: &Payload) -> Result<(), SendError>;
+    fn send(&mut self, payload: &Payload) -> Result<(), SendError>;
 
     /// Where a SYNC thread may send; `None` for a serial line.
     fn sync_sink(&self) -> Option<Arc<dyn SyncSink>> {
@@ -189,6 +193,7 @@ impl LiveBuilder {
         }
         Ok(Live {
             clock: self.clock,
+            known: Cell::new(self.clock.now()),
             ports,
             index,
         })
@@ -262,6 +267,8 @@ struct Slot {
 /// Live ports and their clock.
 pub struct Live {
     clock: Clock,
+    /// When the clock was read last, or something arrived since.
+    known: Cell<Time>,
     ports: Vec<Slot>,
     index: BTreeMap<Port, usize>,
 }
@@ -304,13 +311,15 @@ impl Live {
 
     /// Polls each port that is ready or has something due; each gives at most one input per
     /// `ppoll`, so that a babbling bus cannot starve the others.
-    fn poll_ports(&mut self, now: Time) -> Option<Arrival> {
+    fn poll_ports(&mut self) -> Option<Arrival> {
+        let known = self.known.get();
         for slot in &mut self.ports {
             let ready = core::mem::take(&mut slot.ready);
-            if !ready && slot.live.next_event() > now {
+            if !ready && slot.live.next_event() > known {
                 continue;
             }
-            if let Some((at, input)) = slot.live.poll(now, ready) {
+            if let Some((at, input)) = slot.live.poll(known, ready) {
+                self.known.set(known.max(at));
                 let port = slot.port;
                 return Some(Arrival { port, at, input });
             }
@@ -318,11 +327,14 @@ impl Live {
         None
     }
 
-    /// Waits until a port is ready or `until`; marks the ready ones.
-    fn wait(&mut self, now: Time, until: Time) {
-        let due = self.ports.iter().map(|slot| slot.live.next_event()).min();
-        let until = due.map_or(until, |due| due.min(until));
-        let timeout = self.clock.wall_span(until.since(now)).min(WAIT_MAX);
+    /// When something is to be done although nothing arrives.
+    fn next_event(&self) -> Time {
+        let events = self.ports.iter().map(|slot| slot.live.next_event());
+        events.min().unwrap_or(Time::NEVER)
+    }
+
+    /// Waits until a port is ready, and marks the ready ones; whether there are any.
+    fn wait(&mut self, timeout: Duration) -> bool {
         let mut waited = Vec::with_capacity(self.ports.len());
         let mut descriptors = Vec::with_capacity(self.ports.len());
         for (at, slot) in self.ports.iter().enumerate() {
@@ -338,40 +350,47 @@ impl Live {
                 .iter()
                 .map(|descriptor| descriptor.any().unwrap_or(true))
                 .collect(),
-            _ => return,
+            _ => return false,
         };
         for (at, ready) in waited.into_iter().zip(ready) {
             self.ports[at].ready = ready;
         }
+        true
     }
 }
 
 impl Transport for Live {
     fn now(&self) -> Time {
-        self.clock.now()
+        let now = self.clock.now().max(self.known.get());
+        self.known.set(now);
+        now
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        let now = self.clock.now();
-        self.slot_mut(port)?.live.send(now, payload)
+        self.slot_mut(port)?.live.send(payload)
     }
 
+    /// Reads the clock only when nothing comes within [`COARSE_WAIT`]: where that is a system
+    /// call (virtual machines), it would take as long as the frame.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        let mut now = self.clock.now();
+        let mut longest = COARSE_WAIT;
         loop {
-            if let Some(arrival) = self.poll_ports(now) {
+            if let Some(arrival) = self.poll_ports() {
                 return Some(arrival);
             }
-            let asked = now;
-            self.wait(asked, until);
-            now = self.clock.now();
-            if let Some(arrival) = self.poll_ports(now) {
+            let target = until.min(self.next_event());
+            let timeout = self.clock.wall_span(target.since(self.known.get()));
+            let was_over = self.known.get() >= until;
+            if self.wait(timeout.min(longest))
+                && let Some(arrival) = self.poll_ports()
+            {
                 return Some(arrival);
             }
-            // `asked`, not `now`: what came while waiting has been looked for.
-            if asked >= until {
+            if was_over {
                 return None;
             }
+            self.now();
+            longest = WAIT_MAX;
         }
     }
 

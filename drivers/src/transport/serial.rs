@@ -261,6 +261,7 @@ impl BackOff {
 /// A serial line that carries plain bytes.
 pub(super) struct SerialLine {
     port: Port,
+    clock: Clock,
     path: String,
     settings: SerialSettings,
     descriptor: Option<Arc<OwnedFd>>,
@@ -280,6 +281,7 @@ impl SerialLine {
     ) -> Result<Self, SerialError> {
         let mut line = Self {
             port,
+            clock,
             path: path.to_owned(),
             settings,
             descriptor: None,
@@ -355,16 +357,16 @@ impl LivePort for SerialLine {
         }
     }
 
-    fn poll(&mut self, now: Time, ready: bool) -> Option<(Time, Input)> {
+    fn poll(&mut self, known: Time, ready: bool) -> Option<(Time, Input)> {
         if self.queued.is_empty() && ready {
-            self.read(now);
-        } else if self.descriptor.is_none() && self.back_off.at() <= now {
-            self.try_again(now);
+            self.read(self.clock.now());
+        } else if self.descriptor.is_none() && self.back_off.at() <= known {
+            self.try_again(known);
         }
         self.queued.pop_front()
     }
 
-    fn send(&mut self, now: Time, payload: &Payload) -> Result<(), SendError> {
+    fn send(&mut self, payload: &Payload) -> Result<(), SendError> {
         let port = self.port;
         let Payload::Bytes(bytes) = payload else {
             return Err(SendError::WrongKind { port });
@@ -379,7 +381,7 @@ impl LivePort for SerialLine {
             if errno == Errno::EAGAIN {
                 return system(port, errno);
             }
-            self.lose(now);
+            self.lose(self.clock.now());
             gone
         })
     }

@@ -628,14 +628,15 @@ impl LivePort for SlcanPort {
         }
     }
 
-    fn poll(&mut self, now: Time, ready: bool) -> Option<(Time, Input)> {
+    fn poll(&mut self, known: Time, ready: bool) -> Option<(Time, Input)> {
         if self.queued.is_empty() {
+            let now = if ready { self.clock.now() } else { known };
             self.progress(now, ready);
         }
         self.queued.pop_front()
     }
 
-    fn send(&mut self, now: Time, payload: &Payload) -> Result<(), SendError> {
+    fn send(&mut self, payload: &Payload) -> Result<(), SendError> {
         let port = self.port;
         let Payload::Frame(frame) = payload else {
             return Err(SendError::WrongKind { port });
@@ -656,7 +657,7 @@ impl LivePort for SlcanPort {
                 if errno == Errno::EAGAIN {
                     return Err(system(port, errno));
                 }
-                self.lose(now);
+                self.lose(self.clock.now());
                 let state = LinkState::Gone;
                 Err(SendError::Unusable { port, state })
             }

@@ -46,6 +46,7 @@ pub(super) fn open_error(interface: String, source: std::io::Error) -> OpenError
 /// A CAN interface.
 pub(super) struct CanPort {
     port: Port,
+    clock: Clock,
     interface: String,
     /// Shared with the SYNC thread, which must follow when the interface is opened anew.
     socket: Arc<SharedSocket>,
@@ -177,6 +178,7 @@ impl CanPort {
     pub(super) fn open(clock: Clock, port: Port, interface: &str) -> std::io::Result<Self> {
         let mut can = Self {
             port,
+            clock,
             interface: interface.to_owned(),
             socket: Arc::default(),
             open: None,
@@ -222,21 +224,21 @@ impl CanPort {
         }
     }
 
-    fn read(&mut self, now: Time) {
+    fn read(&mut self) {
         let Some(socket) = &self.open else {
             return;
         };
         match read(socket, &mut self.control) {
-            Ok(message) => self.take(now, &message),
+            Ok(message) => self.take(&message),
             Err(errno) => {
                 if let Some(state) = Self::state_after(errno) {
-                    self.enter(now, state);
+                    self.enter(self.clock.now(), state);
                 }
             }
         }
     }
 
-    fn take(&mut self, now: Time, message: &Message) {
+    fn take(&mut self, message: &Message) {
         let at = self.stamps.arrival(message.stamp);
         if let Some(dropped) = message.dropped {
             let lost = dropped.wrapping_sub(core::mem::replace(&mut self.dropped, dropped));
@@ -245,7 +247,7 @@ impl CanPort {
                 self.queued.push_back((at, Input::Lost(lost)));
             }
         }
-        self.enter(now, LinkState::Up);
+        self.enter(at, LinkState::Up);
         if let Some(input) = parse(&message.bytes) {
             match input {
                 Input::BusError(_) => self.counts.error_frames += 1,
@@ -292,18 +294,18 @@ impl LivePort for CanPort {
         }
     }
 
-    fn poll(&mut self, now: Time, ready: bool) -> Option<(Time, Input)> {
+    fn poll(&mut self, known: Time, ready: bool) -> Option<(Time, Input)> {
         if self.queued.is_empty() {
             if ready {
-                self.read(now);
-            } else if self.next_look() <= now {
-                self.look(now);
+                self.read();
+            } else if self.next_look() <= known {
+                self.look(known);
             }
         }
         self.queued.pop_front()
     }
 
-    fn send(&mut self, now: Time, payload: &Payload) -> Result<(), SendError> {
+    fn send(&mut self, payload: &Payload) -> Result<(), SendError> {
         let port = self.port;
         let Payload::Frame(frame) = payload else {
             return Err(SendError::WrongKind { port });
@@ -322,7 +324,7 @@ impl LivePort for CanPort {
                 let Some(state) = Self::state_after(errno) else {
                     return Err(system(port, errno));
                 };
-                self.enter(now, state);
+                self.enter(self.clock.now(), state);
                 Err(SendError::Unusable { port, state })
             }
         }

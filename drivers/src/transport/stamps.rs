@@ -13,10 +13,11 @@ use units::Time;
 use super::clock::Clock;
 use crate::wire::slcan::TIMESTAMP_PERIOD_MS;
 
-/// The offset of the two clocks is measured anew after this.
+/// The offset of the two clocks is measured anew after this; a step of the wall clock by
+/// more (NTP slews what is less than 128 ms) shows in the stamp itself.
 const OFFSET_LIFE: Duration = Duration::from_millis(100);
-/// A younger stamp is taken with the offset at hand; an older one may be a clock step.
-const PLAUSIBLE_AGE: Duration = Duration::from_millis(20);
+/// Reading two clocks one after the other takes no longer than this, or seldom.
+const READING_TIME: Duration = Duration::from_millis(1);
 /// An older frame than this never waits in a receive queue that is being read.
 const AGE_MAX: Duration = Duration::from_secs(2);
 
@@ -24,8 +25,8 @@ const AGE_MAX: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub(super) struct KernelStamps {
     clock: Clock,
-    /// CLOCK_REALTIME minus wall time since the clock's start, and when it was measured.
-    offset: Option<(i128, Duration)>,
+    /// CLOCK_REALTIME and wall time since the clock's start, at one moment.
+    pair: Option<(i128, Duration)>,
     last: Time,
     distrusted: u64,
 }
@@ -34,7 +35,7 @@ impl KernelStamps {
     pub(super) const fn new(clock: Clock) -> Self {
         Self {
             clock,
-            offset: None,
+            pair: None,
             last: Time::ZERO,
             distrusted: 0,
         }
@@ -45,42 +46,41 @@ impl KernelStamps {
         self.distrusted
     }
 
-    /// When the frame arrived that was read just now.
+    /// When the frame arrived that was read just now. Reads the clocks only now and then.
     pub(super) fn arrival(&mut self, stamp: Option<TimeSpec>) -> Time {
-        let wall = self.clock.wall_elapsed();
-        let age = stamp.and_then(|stamp| self.age(wall, nanos(stamp)));
-        let at = self
-            .clock
-            .at_wall(wall.saturating_sub(age.unwrap_or_default()));
-        self.last = self.last.max(at);
+        let wall = stamp.and_then(|stamp| self.wall(nanos(stamp)));
+        let wall = wall.unwrap_or_else(|| self.clock.wall_elapsed());
+        self.last = self.last.max(self.clock.at_wall(wall));
         self.last
     }
 
-    /// How long ago the stamp was taken; `None` when that cannot be believed.
-    fn age(&mut self, wall: Duration, stamp: i128) -> Option<Duration> {
-        let offset = match self.offset {
-            Some((offset, measured)) if wall.saturating_sub(measured) < OFFSET_LIFE => offset,
-            _ => self.measure()?,
-        };
-        let age = |offset: i128| wall.as_nanos() as i128 - (stamp - offset);
-        if (0..PLAUSIBLE_AGE.as_nanos() as i128).contains(&age(offset)) {
-            return Some(Duration::from_nanos(age(offset) as u64));
+    /// The stamp as wall time since the clock's start; `None` when it cannot be believed.
+    fn wall(&mut self, stamp: i128) -> Option<Duration> {
+        if let Some((real, wall)) = self.pair
+            && (0..OFFSET_LIFE.as_nanos() as i128).contains(&(stamp - real))
+        {
+            return Some(wall + Duration::from_nanos((stamp - real) as u64));
         }
-        let age = age(self.measure()?);
-        if (0..AGE_MAX.as_nanos() as i128).contains(&age) {
-            return Some(Duration::from_nanos(age as u64));
-        }
-        self.distrusted += 1;
-        None
+        let (real, wall) = self.measure()?;
+        let believed = age_up_to(AGE_MAX, real - stamp);
+        self.distrusted += u64::from(believed.is_none());
+        Some(wall.saturating_sub(believed?))
     }
 
-    fn measure(&mut self) -> Option<i128> {
+    fn measure(&mut self) -> Option<(i128, Duration)> {
         let real = nanos(clock_gettime(ClockId::CLOCK_REALTIME).ok()?);
-        let wall = self.clock.wall_elapsed();
-        let offset = real - wall.as_nanos() as i128;
-        self.offset = Some((offset, wall));
-        Some(offset)
+        self.pair = Some((real, self.clock.wall_elapsed()));
+        self.pair
     }
+}
+
+/// An age of up to `limit`; a frame slightly in the future came while the clock was read.
+fn age_up_to(limit: Duration, age_ns: i128) -> Option<Duration> {
+    let just_now = -(READING_TIME.as_nanos() as i128);
+    if age_ns < just_now || age_ns > limit.as_nanos() as i128 {
+        return None;
+    }
+    Some(Duration::from_nanos(age_ns.max(0) as u64))
 }
 
 fn nanos(time: TimeSpec) -> i128 {
@@ -131,8 +131,8 @@ impl AdapterStamps {
         }
         self.previous = Some((adapter, now));
         match difference - self.offset {
-            delay if delay < Self::RESOLUTION_NS || delay > Self::DELAY_MAX_NS => 0,
-            delay => delay as u64,
+            delay if (Self::RESOLUTION_NS..=Self::DELAY_MAX_NS).contains(&delay) => delay as u64,
+            _ => 0,
         }
     }
 
@@ -186,6 +186,18 @@ mod tests {
             let at = stamps.arrival(Some(shifted(realtime(), step_s)));
             assert!(at >= before && at <= clock.now(), "{step_s}");
             assert_eq!(stamps.distrusted(), 1);
+        }
+    }
+
+    #[test]
+    fn a_step_between_two_frames_is_not_believed_either() {
+        let clock = Clock::real();
+        for step_s in [3_600, -3_600] {
+            let mut stamps = KernelStamps::new(clock);
+            stamps.arrival(Some(realtime()));
+            let before = clock.now();
+            let at = stamps.arrival(Some(shifted(realtime(), step_s)));
+            assert!(at >= before && at <= clock.now(), "{step_s}");
         }
     }
 
