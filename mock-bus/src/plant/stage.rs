@@ -30,7 +30,7 @@ impl Stage {
         let mut shift = Stream::new(seed, "start position");
         let start_m = 1e-3 * shift.between(config.motion.start_min_mm, config.motion.start_max_mm);
         let resolution_m = config.encoder.resolution_nm * 1e-9;
-        Self {
+        let mut stage = Self {
             mass: Mass::new(config.motion.clone(), start_m, seed),
             field: Field::new(&config.deviation, seed),
             path: Path::new(&config.deviation, seed),
@@ -40,7 +40,9 @@ impl Stage {
             encoder_powered: true,
             shift,
             config,
-        }
+        };
+        stage.watch_switches();
+        stage
     }
 
     pub(super) fn advance(&mut self, now: Time) {
