@@ -1,15 +1,19 @@
 //! The command `mock-bus`: an emulated machine for other programs to talk to.
 
 use std::collections::BTreeMap;
+use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
+use nix::sys::signalfd::SignalFd;
 
 use mock_bus::config::MachineConfig;
 use mock_bus::fault::FaultConfig;
-use mock_bus::runner::{self, Options};
+use mock_bus::runner::{self, Options, Running};
 
 /// Runs an emulated machine until it is interrupted, and prints where its ports are.
 #[derive(Parser)]
@@ -69,8 +73,23 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
     signals.thread_block()?;
     let machine = runner::spawn(&config, &options)?;
     print_ports(&config, &options, machine.ports());
-    signals.wait()?;
+    wait_for_the_end(&signals, &machine)?;
     Ok(machine.stop()?)
+}
+
+/// Until a signal comes or the machine has ended by itself.
+fn wait_for_the_end(signals: &SigSet, machine: &Running) -> Result<(), Errno> {
+    const LOOK_EVERY_MS: u16 = 500;
+    let signals = SignalFd::new(signals)?;
+    while !machine.has_ended() {
+        let mut fds = [PollFd::new(signals.as_fd(), PollFlags::POLLIN)];
+        match poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS)) {
+            Ok(0) | Err(Errno::EINTR) => {}
+            Ok(_) => break,
+            Err(errno) => return Err(errno),
+        }
+    }
+    Ok(())
 }
 
 fn options(config: &MachineConfig, arguments: Arguments) -> Options {

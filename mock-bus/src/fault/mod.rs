@@ -132,6 +132,8 @@ pub enum Fault {
     BeamWeak,
     /// The fringe counter slips.
     FringeJump { half_wavelengths: i64 },
+    /// The interferometer's reflector shakes (standard deviation).
+    Vibration { amplitude_um: f64 },
     /// The instrument's temperature, pressure and humidity stand still.
     FrozenEnvironment,
     /// They show what cannot be.

@@ -52,6 +52,8 @@ pub(super) struct Interferometer {
     /// Counts slipped by an injected fringe jump.
     pub(super) slipped: i64,
     pub(super) frozen: Option<Environment>,
+    /// Amplitude of a reflector that shakes, as a standard deviation.
+    pub(super) vibration_m: f64,
 }
 
 impl Interferometer {
@@ -63,6 +65,7 @@ impl Interferometer {
             beam: Beam::Good,
             slipped: 0,
             frozen: None,
+            vibration_m: 0.0,
         }
     }
 
@@ -71,7 +74,7 @@ impl Interferometer {
         let n = refractive_index(air.air_temperature, air.pressure, air.humidity);
         let per_m = 2.0 * n / VACUUM_WAVELENGTH_M;
         let path_m = self.config.dead_path_mm * 1e-3 + position_m * self.cosine;
-        let noise_m = self.config.noise_nm * 1e-9 * self.noise.gaussian();
+        let noise_m = (self.config.noise_nm * 1e-9 + self.vibration_m) * self.noise.gaussian();
         Fringes {
             half_wavelengths: (path_m + noise_m) * per_m + self.slipped as f64,
             half_wavelengths_per_s: speed * self.cosine * per_m,

@@ -217,6 +217,11 @@ impl Plant {
         self.interferometer.slipped += half_wavelengths;
     }
 
+    /// The interferometer's reflector shakes with this standard deviation.
+    pub fn set_vibration(&mut self, amplitude: Metres) {
+        self.interferometer.vibration_m = amplitude.value();
+    }
+
     /// The interferometer's sensors show this for ever (or, with `None`, the truth again).
     pub fn freeze_environment(&mut self, frozen: Option<Environment>) {
         self.interferometer.frozen = frozen;

@@ -242,6 +242,11 @@ impl Running {
         self.with(move |machine| machine.power_cycle(drift))
     }
 
+    /// Whether the machine has come to an end by itself; [`Running::stop`] says why.
+    pub fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// Stops the machine and waits for its end.
     ///
     /// # Errors

@@ -25,7 +25,7 @@ impl Vcan {
     pub(super) fn receive(&self) -> io::Result<Option<CanFrame>> {
         match self.socket.read_frame() {
             Ok(frame) => Ok(from_socket(&frame)),
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(None),
+            Err(error) if passes(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -49,14 +49,16 @@ impl Vcan {
 
 fn lossy(result: io::Result<()>) -> io::Result<()> {
     match result {
-        Err(error)
-            if error.kind() == io::ErrorKind::WouldBlock
-                || error.raw_os_error() == Some(libc::ENOBUFS) =>
-        {
-            Ok(())
-        }
+        Err(error) if passes(&error) => Ok(()),
         other => other,
     }
+}
+
+/// Nothing to read, no room to write, or an interface that is down for a while: the same
+/// socket goes on when that has passed.
+fn passes(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::WouldBlock
+        || matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::ENETDOWN))
 }
 
 fn from_socket(frame: &socketcan::CanFrame) -> Option<CanFrame> {

@@ -1,7 +1,7 @@
 //! What a fault that lasts does to the machine when it begins, and what its end undoes.
 
 use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
-use units::{Celsius, Pascals, RelativeHumidity};
+use units::{Celsius, Metres, Pascals, RelativeHumidity};
 
 use super::{Event, Link, Simulation};
 use crate::bus::Sender;
@@ -46,6 +46,11 @@ impl Simulation {
                 self.report(port, BusErrorClass::RESTARTED, ControllerProblem::empty());
             }
             Fault::LinkDown { port } | Fault::LinkGone { port } => self.set_link(port, Link::Up),
+            Fault::Reorder { port, .. } => {
+                if let Some(place) = self.config.port(port) {
+                    self.release_held_back(place);
+                }
+            }
             _ => self.set_plant_fault(fault, false),
         }
     }
@@ -60,6 +65,9 @@ impl Simulation {
             }
             Fault::BeamBlocked => plant.set_beam(if on { Beam::Blocked } else { Beam::Good }),
             Fault::BeamWeak => plant.set_beam(if on { Beam::Weak } else { Beam::Good }),
+            Fault::Vibration { amplitude_um } => {
+                plant.set_vibration(Metres::from_um(if on { amplitude_um } else { 0.0 }));
+            }
             Fault::FrozenEnvironment => {
                 let frozen = plant.sensed_environment();
                 plant.freeze_environment(on.then_some(frozen));

@@ -8,13 +8,14 @@
 mod effects;
 mod log;
 mod port;
+mod traffic;
 
 #[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
 
-use drivers::wire::can::{BusError, CanFrame};
+use drivers::wire::can::BusError;
 use drivers::wire::{Payload, Port};
 use units::Time;
 
@@ -24,7 +25,7 @@ use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
 use crate::plant::{HallDrift, Plant, Truth};
 use log::{Direction, Log};
-use port::{Medium, PortState};
+use port::PortState;
 
 /// Whether a port can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,8 +181,12 @@ impl Simulation {
 
     /// Lets time pass up to `to`.
     pub fn advance(&mut self, to: Time) {
-        while self.next_internal() <= to {
-            self.step();
+        loop {
+            let next = self.next_internal();
+            if next > to {
+                break;
+            }
+            self.step(next);
         }
         self.move_clock(to);
     }
@@ -199,7 +204,7 @@ impl Simulation {
                 self.move_clock(to);
                 return None;
             }
-            self.step();
+            self.step(internal);
         }
     }
 
@@ -308,9 +313,9 @@ impl Simulation {
         ports.chain(slots).fold(own, Time::min)
     }
 
-    /// Everything that is due at the next moment; an arbitration only when nothing else is.
-    fn step(&mut self) {
-        self.move_clock(self.next_internal());
+    /// Everything that is due at `next`; an arbitration only when nothing else is.
+    fn step(&mut self, next: Time) {
+        self.move_clock(next);
         if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
             return;
         }
@@ -371,112 +376,8 @@ impl Simulation {
         any
     }
 
-    /// A frame has been on the wire: the faults first, then everybody else hears it.
-    fn frame_complete(&mut self, place: usize, sender: Sender, frame: CanFrame) {
-        let node = self.sender_name(sender).map(str::to_owned);
-        let name = self.ports[place].name.clone();
-        let fate = self.plan.frame_fate(&name, node.as_deref(), frame);
-        if fate.held_back && fate.copies > 0 {
-            self.ports[place].hold_back(sender, fate.frame);
-            return;
-        }
-        for _ in 0..fate.copies {
-            self.spread(place, sender, fate.frame, fate.delay);
-        }
-        if let Some((sender, frame)) = self.ports[place].held_back() {
-            self.spread(place, sender, frame, core::time::Duration::ZERO);
-        }
-    }
-
-    fn spread(
-        &mut self,
-        place: usize,
-        sender: Sender,
-        frame: CanFrame,
-        delay: core::time::Duration,
-    ) {
-        let payload = Payload::Frame(frame);
-        self.tell_nodes(place, sender, &payload);
-        if sender != Sender::Host && self.ports[place].link == Link::Up {
-            let at = self.now + delay + self.ports[place].latency;
-            self.tell_host(at, place, Event::Payload(payload));
-        }
-    }
-
     fn slot(&self, name: &str) -> Option<usize> {
         self.slots.iter().position(|slot| slot.name == name)
-    }
-
-    fn sender_name(&self, sender: Sender) -> Option<&str> {
-        match sender {
-            Sender::Node(place) => Some(&self.slots[place].name),
-            Sender::Host | Sender::Stranger => None,
-        }
-    }
-
-    fn tell_nodes(&mut self, port: usize, sender: Sender, payload: &Payload) {
-        for place in 0..self.slots.len() {
-            let slot = &mut self.slots[place];
-            if slot.port != port || !slot.powered || sender == Sender::Node(place) {
-                continue;
-            }
-            slot.node.handle(self.now, payload, &mut self.plant);
-            slot.next = slot.node.next_event();
-            self.flush(place);
-        }
-    }
-
-    /// What the node wants to send goes to its bus or line.
-    fn flush(&mut self, place: usize) {
-        let port = self.slots[place].port;
-        while let Some(payload) = self.slots[place].node.poll_transmit() {
-            match payload {
-                Payload::Frame(frame) => self.ports[port].send_frame(Sender::Node(place), frame),
-                Payload::Bytes(bytes) => self.node_bytes(place, port, bytes),
-            }
-        }
-    }
-
-    fn node_bytes(&mut self, place: usize, port: usize, bytes: Vec<u8>) {
-        let mut run = self.ports[port].take_kept();
-        run.extend_from_slice(&bytes);
-        let node = &self.slots[place].name;
-        let fate = self
-            .plan
-            .bytes_fate(&self.ports[port].name, Some(node), run);
-        self.ports[port].keep(fate.kept_for_later);
-        for (delay, run) in fate.runs {
-            self.bytes_to_host(port, delay, run);
-        }
-    }
-
-    fn bytes_to_host(&mut self, place: usize, delay: core::time::Duration, bytes: Vec<u8>) {
-        let port = &mut self.ports[place];
-        if port.link != Link::Up || bytes.is_empty() {
-            return;
-        }
-        let at = port.line_time(self.now + delay, bytes.len()) + port.latency;
-        self.tell_host(at, place, Event::Payload(Payload::Bytes(bytes)));
-    }
-
-    fn tell_host(&mut self, at: Time, place: usize, event: Event) {
-        let delivery = Delivery {
-            port: Port(place as u8),
-            at,
-            event,
-        };
-        self.log.delivery(&delivery);
-        let before = self.outbox.partition_point(|waiting| waiting.at <= at);
-        self.outbox.insert(before, delivery);
-    }
-
-    fn stranger_sends(&mut self, port: &str, frame: CanFrame) {
-        if let Some(place) = self.config.port(port)
-            && let Medium::Can(can) = &mut self.ports[place].medium
-            && !can.bus.has_waiting(Sender::Stranger)
-        {
-            can.bus.send(Sender::Stranger, frame);
-        }
     }
 
     fn power_off(&mut self, place: usize) {
