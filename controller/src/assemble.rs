@@ -11,12 +11,13 @@ use compensator::hall_zero;
 use compensator::length_correction::{
     self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
 };
-use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
+use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings, NodeTimeouts};
 use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
-use drivers::device::cia402::{Cia402Drive, Cia402Settings};
+use drivers::device::cia402::{Cia402Drive, Cia402Settings, Cia402Timeouts};
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
+use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Port;
 use drivers::wire::canopen::NodeId;
@@ -50,14 +51,18 @@ pub fn ports(config: &MachineConfig) -> BTreeMap<String, Port> {
         .collect()
 }
 
-pub(crate) fn axes(config: &MachineConfig, ports: &BTreeMap<String, Port>) -> Vec<Unit<dyn Axis>> {
+pub(crate) fn axes(
+    config: &MachineConfig,
+    ports: &BTreeMap<String, Port>,
+    patience: u32,
+) -> Vec<Unit<dyn Axis>> {
     config
         .axis
         .iter()
         .map(|(name, axis)| {
             let device: Box<dyn Axis> = match axis.device {
                 AxisDevice::Cia402 => {
-                    Box::new(Cia402Drive::new(cia402_settings(axis, &config.can[&axis.bus])))
+                    Box::new(Cia402Drive::new(cia402_settings(axis, &config.can[&axis.bus], patience)))
                 }
             };
             Unit { name: name.clone(), port: ports[&axis.bus], device }
@@ -68,6 +73,7 @@ pub(crate) fn axes(config: &MachineConfig, ports: &BTreeMap<String, Port>) -> Ve
 pub(crate) fn analogs(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
+    patience: u32,
 ) -> Vec<Unit<dyn AnalogInput>> {
     config
         .analog
@@ -76,12 +82,12 @@ pub(crate) fn analogs(
             let (line, device): (&String, Box<dyn AnalogInput>) = match analog.device {
                 AnalogDevice::Cia401 => {
                     let bus = analog.bus.as_ref().expect(CHECKED);
-                    let settings = cia401_settings(analog, &config.can[bus]);
+                    let settings = cia401_settings(analog, &config.can[bus], patience);
                     (bus, Box::new(Cia401Analog::new(settings)))
                 }
                 AnalogDevice::Dcon => {
                     let line = analog.line.as_ref().expect(CHECKED);
-                    (line, Box::new(Dcon::new(dcon_settings(analog))))
+                    (line, Box::new(Dcon::new(dcon_settings(analog, patience))))
                 }
             };
             Unit { name: name.clone(), port: ports[line], device }
@@ -92,13 +98,14 @@ pub(crate) fn analogs(
 pub(crate) fn instruments(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
+    patience: u32,
 ) -> Vec<Unit<dyn DisplacementInstrument>> {
     config
         .instrument
         .iter()
         .map(|(name, instrument)| {
             let device: Box<dyn DisplacementInstrument> = match instrument.device {
-                InstrumentDevice::Umd2 => Box::new(Umd2::new(umd2_settings(instrument))),
+                InstrumentDevice::Umd2 => Box::new(Umd2::new(umd2_settings(instrument, patience))),
             };
             Unit { name: name.clone(), port: ports[&instrument.line], device }
         })
@@ -150,9 +157,11 @@ fn node_settings(
     bus: &CanBus,
     identity: &IdentityConfig,
     heartbeat_ms: (u16, u16, u16),
+    patience: u32,
 ) -> NodeSettings {
     let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
     let (producer, consumer, watch_master) = heartbeat_ms;
+    let usual = NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period);
     NodeSettings {
         expected: ExpectedIdentity {
             device_type: Some(identity.device_type),
@@ -162,20 +171,50 @@ fn node_settings(
             serial: identity.serial_number,
         },
         heartbeat_period: millis(producer),
-        consumer_time: millis(consumer),
-        master_consumer_time: millis(watch_master),
-        ..NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period)
+        consumer_time: millis(consumer) * patience,
+        // 0x1016 has 16 bits of milliseconds.
+        master_consumer_time: (millis(watch_master) * patience).min(millis(u16::MAX)),
+        missed_pdos_max: usual.missed_pdos_max * patience,
+        timeouts: patient_node(usual.timeouts, patience),
+        ..usual
     }
 }
 
-fn cia402_settings(axis: &AxisConfig, bus: &CanBus) -> Cia402Settings {
+/// See [`crate::config::Loaded::patience`].
+fn patient_node(usual: NodeTimeouts, patience: u32) -> NodeTimeouts {
+    NodeTimeouts {
+        boot: usual.boot * patience,
+        sdo: SdoTimeouts {
+            response: usual.sdo.response * patience,
+            block_segment: usual.sdo.block_segment * patience,
+            ..usual.sdo
+        },
+        operational: usual.operational * patience,
+    }
+}
+
+fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
+    Cia402Timeouts {
+        transition: usual.transition * patience,
+        mode: usual.mode * patience,
+        set_point: usual.set_point * patience,
+        settling: usual.settling * patience,
+        standing: usual.standing * patience,
+        homing: usual.homing * patience,
+        new_position: usual.new_position * patience,
+        repeat: usual.repeat * patience,
+    }
+}
+
+fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
     let heartbeats =
         (axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms, axis.watch_master_ms);
-    let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats);
+    let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats, patience);
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
     let acceleration = MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3);
     let quick_stop = MetresPerSecondSquared(axis.quick_stop_deceleration_mm_per_s2 * 1e-3);
+    let usual = Cia402Settings::new(common, scale, speed_max, acceleration.max(quick_stop));
     Cia402Settings {
         soft_limits: Some((Metres::from_mm(axis.soft_min_mm), Metres::from_mm(axis.soft_max_mm))),
         following_error: Some((
@@ -185,18 +224,19 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus) -> Cia402Settings {
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
-        ..Cia402Settings::new(common, scale, speed_max, acceleration.max(quick_stop))
+        timeouts: patient_drive(usual.timeouts, patience),
+        ..usual
     }
 }
 
-fn cia401_settings(analog: &AnalogConfig, bus: &CanBus) -> Cia401Settings {
+fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401Settings {
     let heartbeats = (
         analog.heartbeat_producer_ms.expect(CHECKED),
         analog.heartbeat_consumer_ms.expect(CHECKED),
         analog.watch_master_ms.expect(CHECKED),
     );
     let identity = analog.identity.as_ref().expect(CHECKED);
-    let common = node_settings(analog.node_id.expect(CHECKED), bus, identity, heartbeats);
+    let common = node_settings(analog.node_id.expect(CHECKED), bus, identity, heartbeats, patience);
     let channels: Vec<_> = analog
         .channels
         .iter()
@@ -206,22 +246,29 @@ fn cia401_settings(analog: &AnalogConfig, bus: &CanBus) -> Cia401Settings {
     Cia401Settings::new(common, &channels).expect(CHECKED)
 }
 
-fn dcon_settings(analog: &AnalogConfig) -> DconSettings {
+fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
     let period = analog.poll_period_ms.expect(CHECKED);
     let address = analog.address.expect(CHECKED);
+    let usual = DconSettings::new(address, InputRange::V10, analog.channels.clone());
     DconSettings {
         checksum: analog.checksum,
         period: Duration::from_secs_f64(period * 1e-3),
-        ..DconSettings::new(address, InputRange::V10, analog.channels.clone())
+        answer_timeout: usual.answer_timeout * patience,
+        stale_after: usual.stale_after * patience,
+        ..usual
     }
 }
 
-fn umd2_settings(instrument: &InstrumentConfig) -> Umd2Settings {
+fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settings {
+    let usual = Umd2Settings::default();
     Umd2Settings {
         optics_factor: instrument.optics_factor,
         direction: if instrument.reverse { Direction::Reversed } else { Direction::AsCounted },
         sample_rate_hz: instrument.sample_rate_hz,
-        ..Umd2Settings::default()
+        stream_timeout: usual.stream_timeout * patience,
+        start_timeout: usual.start_timeout * patience,
+        environment_age_max: usual.environment_age_max * patience,
+        ..usual
     }
 }
 

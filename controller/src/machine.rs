@@ -82,6 +82,7 @@ pub(crate) enum Supervision {
 pub struct Machine {
     pub(crate) config: MachineConfig,
     pub(crate) config_hash: String,
+    pub(crate) patience: u32,
     pub(crate) transport: Box<dyn Transport>,
     pub(crate) port_names: BTreeMap<Port, String>,
     pub(crate) axes: Vec<Unit<dyn Axis>>,
@@ -102,13 +103,14 @@ impl Machine {
         let config = loaded.config.clone();
         let ports = assemble::ports(&config);
         Self {
-            axes: assemble::axes(&config, &ports),
-            analogs: assemble::analogs(&config, &ports),
-            instruments: assemble::instruments(&config, &ports),
+            axes: assemble::axes(&config, &ports, loaded.patience),
+            analogs: assemble::analogs(&config, &ports, loaded.patience),
+            instruments: assemble::instruments(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
             memory: config.axis.keys().map(|name| (name.clone(), AxisMemory::default())).collect(),
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
+            patience: loaded.patience,
             config,
             transport,
             supervision: Supervision::Off,
@@ -339,6 +341,7 @@ impl Machine {
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
+        let limit = limit * self.patience;
         let deadline = self.now() + limit;
         loop {
             if let Some(outcome) = self.device_mut(at).device.poll_outcome() {

@@ -66,6 +66,16 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
     Err(usage(format!("`{name}` is no {what} of the configuration; it has {}", names.join(", "))))
 }
 
+/// The patience ([`Loaded::patience`]) that a machine needs whose clock runs `clock_speed`
+/// times as fast as the wall's: none in real time. Beyond it, a host under load pauses for
+/// tens of milliseconds, which the fastest supervision must outlast.
+///
+/// [`Loaded::patience`]: crate::config::Loaded::patience
+pub fn patience(clock_speed: f64) -> u32 {
+    const PAUSES: f64 = 6.0;
+    if clock_speed <= 1.0 { 1 } else { (clock_speed * PAUSES).min(1000.0).ceil() as u32 }
+}
+
 /// Opens every bus and line. `clock_speed` is 1 on real machines.
 ///
 /// # Errors

@@ -22,7 +22,10 @@ impl Machine {
         self.send_pending()?;
         let deadline = until.min(self.next_deadline());
         let arrival = self.transport.receive(deadline);
-        let now = self.transport.now();
+        // What has arrived is older than the clock when this thread was held up: deadlines are
+        // judged at the time of what was heard, so that nothing counts as missing that only
+        // waits behind this arrival.
+        let now = arrival.as_ref().map_or_else(|| self.transport.now(), |arrival| arrival.at);
         if let Some(arrival) = arrival {
             self.take(&arrival)?;
         }

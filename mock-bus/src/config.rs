@@ -329,6 +329,12 @@ impl MachineConfig {
 impl DeviceConfig {
     fn check(&self) -> Result<(), ConfigError> {
         match self {
+            Self::Cia402Drive(config) => {
+                positive("encoder_resolution_nm", config.encoder_resolution_nm)
+            }
+            Self::Cia401Analog(config) => {
+                config.full_scale_v.iter().try_for_each(|volts| positive("full_scale_v", *volts))
+            }
             Self::Umd2Interferometer(config) => {
                 positive("sample_rate_hz", config.sample_rate_hz)?;
                 positive("batch_samples", f64::from(config.batch_samples))

@@ -96,6 +96,7 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
         });
     }
     let mut loaded = config::parse(LINEAR, "configs/machines/linear.toml")?;
+    loaded.patience = ports::patience(args.speed);
     if let Some(folder) = &args.data_dir {
         loaded.config.machine.data_dir.clone_from(folder);
     }

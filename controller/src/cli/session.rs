@@ -24,7 +24,8 @@ pub(super) struct Session {
 impl Session {
     /// Reads the configuration, takes the lease, opens the ports. Nothing is sent.
     pub(super) fn open(args: &MachineArgs, verb: &str, output: Output) -> Result<Self, Failure> {
-        let loaded = config::load(&args.config)?;
+        let mut loaded = config::load(&args.config)?;
+        loaded.patience = ports::patience(args.clock_speed);
         let overrides = Overrides::parse(&args.ports, &loaded.config)?;
         let section = &loaded.config.machine;
         let store = Store::new(&section.data_dir, &section.name);

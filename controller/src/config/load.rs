@@ -15,6 +15,10 @@ pub struct Loaded {
     pub config: MachineConfig,
     /// BLAKE3 of everything in it that a calibration depends on, in hexadecimal.
     pub hash: String,
+    /// By how much every supervision and answer time-out is longer than configured: 1, except
+    /// for emulated machines. One that lives faster than real time still meets a host whose
+    /// own pauses do not shrink, so its time-outs must grow with its speed.
+    pub patience: u32,
 }
 
 /// Reads and judges the configuration at `path`.
@@ -36,7 +40,7 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     let config: MachineConfig = toml::from_str(text).map_err(|error| structural(text, file, &error))?;
     let findings = validate(&config);
     if findings.is_empty() {
-        return Ok(Loaded { hash: calibration_hash(&config), config });
+        return Ok(Loaded { hash: calibration_hash(&config), config, patience: 1 });
     }
     let mut findings: Vec<_> = findings.into_iter().map(|it| place(text, file, it)).collect();
     findings.sort_by_key(|it| (it.line, it.column));

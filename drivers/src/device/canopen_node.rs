@@ -82,8 +82,10 @@ pub struct NodeSettings {
     /// Without our heartbeat for this long we are lost to the node (0x1016:01), which then
     /// stops; zero: the node does not watch us.
     pub master_consumer_time: Duration,
-    /// From SYNC to SYNC; three without process data are an alarm.
+    /// From SYNC to SYNC.
     pub sync_period: Duration,
+    /// So many SYNCs without process data are an alarm.
+    pub missed_pdos_max: u32,
     /// How often reads and configuration writes are begun anew.
     pub retry: Retry,
     /// How long each thing is waited for.
@@ -101,6 +103,7 @@ impl NodeSettings {
             consumer_time: Duration::from_millis(150),
             master_consumer_time: Duration::from_millis(150),
             sync_period,
+            missed_pdos_max: 3,
             retry: Retry::UpTo(2),
             timeouts: NodeTimeouts::default(),
         }
@@ -325,7 +328,8 @@ impl CanopenNode {
 
     /// Half a period of grace: process data has its own place within the period.
     fn pdo_deadline(&self) -> Time {
-        self.last_pdo + self.settings.sync_period * 7 / 2
+        let settings = &self.settings;
+        self.last_pdo + settings.sync_period * settings.missed_pdos_max + settings.sync_period / 2
     }
 
     pub(super) fn handle(&mut self, now: Time, input: &Input) {
