@@ -7,6 +7,7 @@
 mod error;
 mod identity;
 mod settings;
+mod vigil;
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -16,7 +17,7 @@ use units::Time;
 pub use settings::{ExpectedIdentity, NodeSettings, NodeTimeouts};
 
 use super::{Alarm, DeviceError, DeviceName, Identity, Seen};
-use crate::protocol::heartbeat::{HeartbeatConsumer, HeartbeatEvent};
+use crate::protocol::heartbeat::HeartbeatConsumer;
 use crate::protocol::script::{Script, ScriptCause, ScriptFailure, Step};
 use crate::protocol::sdo_client::{SdoClient, SdoFailure};
 use crate::transport::Input;
@@ -38,7 +39,7 @@ pub(super) enum NodeEvent {
     /// Configured and operational. Answer with [`CanopenNode::up`] when data came.
     Operational,
     /// A script of the device's own is done.
-    ScriptDone,
+    ScriptDone(Script),
     /// The start or a script failed.
     Failed(DeviceError),
     /// Something is wrong.
@@ -384,7 +385,7 @@ impl CanopenNode {
             | Phase::Described
             | Phase::Starting { .. }
             | Phase::Operational { .. }
-            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone),
+            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone(script)),
         }
     }
 
@@ -432,86 +433,6 @@ impl CanopenNode {
             self.phase = Phase::Operational { since: now };
             self.events.push_back(NodeEvent::Operational);
         }
-    }
-
-    fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {
-        match event {
-            HeartbeatEvent::BootUp => self.take_boot_up(now),
-            HeartbeatEvent::Changed { to, .. } => {
-                self.note_operational(now);
-                if self.is_up() && to != NmtState::Operational {
-                    let node = self.settings.node;
-                    self.alarm(Alarm::UnexpectedNmtState { node, state: to });
-                }
-            }
-            HeartbeatEvent::Lost { waited } => {
-                self.heartbeats_lost += 1;
-                let node = self.settings.node;
-                let alarm = Alarm::HeartbeatLost { node, waited };
-                self.end_by(now, alarm);
-            }
-        }
-    }
-
-    fn take_boot_up(&mut self, now: Time) {
-        self.boot_ups += 1;
-        // Nothing older than the boot-up can come any more.
-        self.client.server_restarted();
-        self.script = None;
-        match self.phase {
-            Phase::Off => {}
-            Phase::Probing { .. } => self.probe(now),
-            Phase::Describing
-            | Phase::Described
-            | Phase::Configuring
-            | Phase::Starting { .. }
-            | Phase::Operational { .. }
-            | Phase::Up => {
-                let was_up = self.is_up();
-                let node = self.settings.node;
-                self.end_by(now, Alarm::UnexpectedBootUp { node });
-                if was_up {
-                    self.phase = Phase::Off;
-                }
-            }
-        }
-    }
-
-    /// An alarm that ends a start, or is told when the node is up.
-    fn end_by(&mut self, now: Time, alarm: Alarm) {
-        match self.phase {
-            Phase::Off | Phase::Probing { .. } => {}
-            Phase::Up => self.alarm(alarm),
-            Phase::Describing
-            | Phase::Described
-            | Phase::Configuring
-            | Phase::Starting { .. }
-            | Phase::Operational { .. } => {
-                let device = self.name();
-                let step = "the start";
-                self.fail(
-                    now,
-                    DeviceError::Alarmed {
-                        device,
-                        step,
-                        alarm,
-                    },
-                );
-            }
-        }
-    }
-
-    fn take_emergency(&mut self, emergency: Emergency) {
-        self.emergencies += 1;
-        // During the start it is only counted: what was wrong shows in the device's state.
-        if self.is_up() && !emergency.code.is_cleared() {
-            let node = self.settings.node;
-            self.alarm(Alarm::Emergency { node, emergency });
-        }
-    }
-
-    fn alarm(&mut self, alarm: Alarm) {
-        self.events.push_back(NodeEvent::Alarm(alarm));
     }
 
     fn fail_waiting(&mut self, now: Time, since: Time, awaited: &'static str) {

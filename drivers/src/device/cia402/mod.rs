@@ -92,6 +92,8 @@ pub struct Cia402Drive {
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i32>,
     homed: bool,
+    /// The newest process data of a start, not yet compared with the objects themselves.
+    first: Option<Sample>,
     /// The state the drive was brought to and must keep.
     kept: Option<PowerState>,
     /// Alarms that were told and whose cause lasts.
@@ -127,6 +129,7 @@ impl Cia402Drive {
             profile: None,
             reached: None,
             homed: false,
+            first: None,
             kept: None,
             told_state: false,
             told_following: false,
@@ -228,7 +231,7 @@ impl Cia402Drive {
             match event {
                 NodeEvent::Described(script) => self.take_description(now, &script),
                 NodeEvent::Operational => {}
-                NodeEvent::ScriptDone => self.script_done(now),
+                NodeEvent::ScriptDone(script) => self.script_done(now, &script),
                 NodeEvent::Failed(error) => self.script_failed(now, error),
                 NodeEvent::Alarm(alarm) => self.take_alarm(alarm),
                 NodeEvent::Pdo { number, frame } => self.take_pdo(now, number, &frame),
@@ -254,11 +257,12 @@ impl Cia402Drive {
         }
     }
 
-    fn script_done(&mut self, now: Time) {
+    fn script_done(&mut self, now: Time, script: &Script) {
         match &self.activity {
+            Activity::Starting => self.end_start(now, script),
             Activity::Move(_) => self.move_prepared(now),
             Activity::Homing(_) => self.homing_prepared(now),
-            Activity::Idle | Activity::Starting | Activity::Power(_) | Activity::Halt(_) => {}
+            Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
 
@@ -340,6 +344,7 @@ impl Device for Cia402Drive {
         self.commanded_mode = None;
         self.reached = None;
         self.kept = None;
+        self.first = None;
         self.activity = Activity::Starting;
         self.node.start(now, start::description());
     }

@@ -1,12 +1,16 @@
 //! What a drive says of itself, and what of it is an alarm.
 
-use units::Time;
+use units::{Counts, Time};
 
 use super::image::{Judgement, SAMPLE_BYTES, Sample};
+use super::start::POSITION_ACTUAL;
 use super::{Activity, Cia402Drive};
-use crate::device::Alarm;
+use crate::device::{Alarm, DeviceError};
+use crate::protocol::script::{Script, Step};
 use crate::wire::can::CanFrame;
 use crate::wire::cia402::{OperationMode, PowerState, Statusword};
+
+const COMPARING: &str = "comparing process data with the object it carries";
 
 impl Cia402Drive {
     pub(super) fn take_alarm(&mut self, alarm: Alarm) {
@@ -53,7 +57,8 @@ impl Cia402Drive {
     }
 
     fn take_sample(&mut self, now: Time, sample: Sample) {
-        if !self.node.is_up() && !self.begin_service(now) {
+        if !self.node.is_up() {
+            self.take_first_sample(now, sample);
             return;
         }
         match self.image.take(sample) {
@@ -79,15 +84,41 @@ impl Cia402Drive {
         }
     }
 
-    /// The first process data after NMT start ends the start.
-    fn begin_service(&mut self, now: Time) -> bool {
+    /// The first process data after NMT start is compared with the object itself: a mapping
+    /// that reads back right may still be carried out wrong.
+    fn take_first_sample(&mut self, now: Time, sample: Sample) {
         if !matches!(self.activity, Activity::Starting) || !self.node.is_operational() {
-            return false;
+            return;
+        }
+        if self.first.replace(sample).is_none() {
+            let object = POSITION_ACTUAL.object;
+            self.node.run(now, vec![Step::read(object, COMPARING)]);
+        }
+    }
+
+    /// The start is done when both agree.
+    pub(super) fn end_start(&mut self, now: Time, script: &Script) {
+        let object = POSITION_ACTUAL.object;
+        let (Some(sample), Some(raw)) = (self.first.take(), script.value(object)) else {
+            return;
+        };
+        let position = Counts(i64::from(raw.cast_signed()));
+        let apart = (sample.position - position).0.abs();
+        if apart > self.image.margin() {
+            self.node.give_up(now);
+            self.finish(Err(DeviceError::ReadBack {
+                node: self.node.id(),
+                object,
+                expected: u64::from(raw),
+                seen: u64::from(sample.position.0 as u32),
+                step: COMPARING,
+            }));
+            return;
         }
         self.node.up(now);
         self.commanded_mode = Some(OperationMode::ProfilePosition);
         self.finish(Ok(()));
-        true
+        self.take_sample(now, sample);
     }
 
     fn supervise(&mut self, sample: &Sample) {

@@ -513,6 +513,19 @@ fn an_object_that_cannot_be_mapped_is_named() {
 }
 
 #[test]
+fn a_mapping_that_is_carried_out_wrong_is_found_by_comparing() {
+    let mut rig = Rig::new();
+    rig.fake.node.manners.exchanged_objects = true;
+    let error = rig.start().unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("comparing process data with the object it carries"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_lost_request_is_survived_by_a_bounded_retry() {
     let mut rig = Rig::new();
     rig.fake.node.manners.deaf_requests = 1;

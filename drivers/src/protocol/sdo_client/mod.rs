@@ -19,7 +19,8 @@
 //! over more than the drain time defeats this; whoever fears it reads back what was written.
 //!
 //! **Retries** restart a whole transfer, after abort, drain and fence; a single request is
-//! never sent again. Only reads and writes that the caller calls idempotent are retried.
+//! never sent again. Also retried, after a pause: what a busy server refused (0x08000022,
+//! 0x08000021, 0x060A0023). Only reads and writes that the caller calls idempotent are retried.
 //!
 //! Absent: the SDO manager's dynamic channels, and network indication (remote access).
 
@@ -383,7 +384,15 @@ impl SdoClient {
             Verdict::Aborted(code) => {
                 // Some servers repeat an abort: it must not hit the next transfer.
                 self.suspect = Some(object);
-                self.state = State::Idle;
+                self.state = if types::is_busy(code) {
+                    let until = now + self.timeouts.quiet;
+                    State::Drain {
+                        until,
+                        limit: until + self.timeouts.late_reply,
+                    }
+                } else {
+                    State::Idle
+                };
                 self.fail(now, SdoFailure::Aborted { object, code });
             }
             Verdict::Break(code) => {

@@ -81,18 +81,20 @@ pub enum SdoFailure {
 }
 
 impl SdoFailure {
-    /// Whether the wire rather than the object dictionary is to blame, so that a second
-    /// attempt may go better.
+    /// Whether the wire or the moment rather than the object dictionary is to blame, so that a
+    /// second attempt may go better.
     pub(super) const fn is_transient(&self) -> bool {
         match *self {
             Self::TimedOut { .. } | Self::Protocol { .. } => true,
-            Self::Aborted { code, .. } => matches!(
-                code,
-                AbortCode::ToggleNotAlternated
-                    | AbortCode::TimedOut
-                    | AbortCode::InvalidSequence
-                    | AbortCode::CrcMismatch
-            ),
+            Self::Aborted { code, .. } => {
+                matches!(
+                    code,
+                    AbortCode::ToggleNotAlternated
+                        | AbortCode::TimedOut
+                        | AbortCode::InvalidSequence
+                        | AbortCode::CrcMismatch
+                ) || is_busy(code)
+            }
         }
     }
 }
@@ -122,3 +124,11 @@ pub struct Counters {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("an SDO transfer with this server runs already")]
 pub struct Busy;
+
+/// Whether the server cannot just now: worth another attempt after a pause.
+pub(super) const fn is_busy(code: AbortCode) -> bool {
+    matches!(
+        code,
+        AbortCode::DeviceState | AbortCode::LocalControl | AbortCode::NoResource
+    )
+}
