@@ -105,6 +105,9 @@ pub struct NodeConfig {
     pub name: String,
     /// The port it is on.
     pub port: String,
+    /// Not on the machine's mains: a power cycle of the machine leaves it running.
+    #[serde(default)]
+    pub own_mains: bool,
     /// What it is.
     pub device: DeviceConfig,
 }

@@ -19,6 +19,8 @@ pub(super) struct Manners {
     pub(super) no_heartbeat: bool,
     pub(super) no_pdos: bool,
     pub(super) short_pdos: bool,
+    /// PDOs carry their first two objects exchanged, whatever the mapping says.
+    pub(super) exchanged_objects: bool,
     pub(super) never_operational: bool,
 }
 
@@ -162,7 +164,11 @@ impl FakeNode {
                 continue;
             }
             let mut payload = Vec::new();
-            for sub in 1..=self.get(0x1A00 + pdo, 0) as u8 {
+            let mut subs: Vec<u8> = (1..=self.get(0x1A00 + pdo, 0) as u8).collect();
+            if self.manners.exchanged_objects && subs.len() > 1 {
+                subs.swap(0, 1);
+            }
+            for sub in subs {
                 let entry = self.get(0x1A00 + pdo, sub) as u32;
                 payload.extend(&self.objects[&((entry >> 16) as u16, (entry >> 8) as u8)]);
             }

@@ -263,7 +263,10 @@ impl Simulation {
     /// sensors drift to `drift` and nobody holds the stage.
     pub fn power_cycle(&mut self, drift: HallDrift) {
         for place in 0..self.slots.len() {
-            self.power_off(place);
+            let entry = self.config.nodes.get(place);
+            if !entry.is_some_and(|entry| entry.own_mains) {
+                self.power_off(place);
+            }
         }
         self.plant.power_cycle(drift);
         self.mains_back = self.now + self.config.power_off();

@@ -143,7 +143,7 @@ impl Cia401Analog {
                     let steps = self.configuration();
                     self.node.configure(now, steps);
                 }
-                NodeEvent::Operational | NodeEvent::ScriptDone => {}
+                NodeEvent::Operational | NodeEvent::ScriptDone(_) => {}
                 NodeEvent::Failed(error) => self.finish(Err(error)),
                 NodeEvent::Alarm(alarm) => {
                     if let Alarm::UnexpectedBootUp { .. } = alarm {

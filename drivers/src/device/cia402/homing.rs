@@ -91,8 +91,11 @@ impl Cia402Drive {
                     since: now,
                     deadline: Time::NEVER,
                 });
-                // Without a set-point bit: in homing mode it would be the start.
-                self.send_control(now, Controlword::ENABLE_COMMAND);
+                self.commanded_mode = None;
+                // Without a set-point bit: in homing mode it would be the start. Halt stays
+                // until then: without it an interrupted move would go on.
+                let held = self.control & Controlword::HALT;
+                self.send_control(now, Controlword::ENABLE_COMMAND | held);
                 self.repeat_at = Time::NEVER;
                 self.node.run(now, steps);
                 self.pump(now);
@@ -116,6 +119,7 @@ impl Cia402Drive {
         match homing.phase.clone() {
             Phase::Preparing => self.enter_homing(now, Phase::AwaitingHoming, mode),
             Phase::Restoring(result) => {
+                self.commanded_mode = Some(OperationMode::ProfilePosition);
                 self.enter_homing(now, Phase::AwaitingProfile(result), mode);
             }
             Phase::AwaitingHoming

@@ -104,6 +104,11 @@ impl Image {
         self.following_error
     }
 
+    /// How far two honest positions of one moment may be apart.
+    pub(super) const fn margin(&self) -> i64 {
+        self.margin
+    }
+
     pub(super) const fn rejected(&self) -> u64 {
         self.rejected
     }

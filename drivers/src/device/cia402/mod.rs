@@ -21,6 +21,7 @@ mod motion;
 mod power;
 mod settings;
 mod start;
+mod supervision;
 
 #[cfg(test)]
 mod tests;
@@ -40,7 +41,7 @@ use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 use homing::Homing;
-use image::{Image, Judgement, SAMPLE_BYTES, Sample};
+use image::{Image, Sample};
 use motion::{Halt, Move};
 use power::Power;
 
@@ -82,11 +83,17 @@ pub struct Cia402Drive {
     control: Controlword,
     target: i32,
     repeat_at: Time,
+    /// Since when the set-point bit is low.
+    lowered_at: Time,
+    /// The mode that was written last, as far as that is certain.
+    commanded_mode: Option<OperationMode>,
     /// Velocity and acceleration that the drive confirmed.
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i32>,
     homed: bool,
+    /// The newest process data of a start, not yet compared with the objects themselves.
+    first: Option<Sample>,
     /// The state the drive was brought to and must keep.
     kept: Option<PowerState>,
     /// Alarms that were told and whose cause lasts.
@@ -117,9 +124,12 @@ impl Cia402Drive {
             control: Controlword::empty(),
             target: 0,
             repeat_at: Time::NEVER,
+            lowered_at: Time::ZERO,
+            commanded_mode: None,
             profile: None,
             reached: None,
             homed: false,
+            first: None,
             kept: None,
             told_state: false,
             told_following: false,
@@ -152,6 +162,9 @@ impl Cia402Drive {
 
     /// Sends RPDO 1: controlword and target in one frame.
     fn send_control(&mut self, now: Time, control: Controlword) {
+        if (self.control - control).contains(Controlword::MODE_4) {
+            self.lowered_at = now;
+        }
         self.control = control;
         self.repeat_at = now + self.settings.timeouts.repeat;
         let [a, b] = control.bits().to_le_bytes();
@@ -218,7 +231,7 @@ impl Cia402Drive {
             match event {
                 NodeEvent::Described(script) => self.take_description(now, &script),
                 NodeEvent::Operational => {}
-                NodeEvent::ScriptDone => self.script_done(now),
+                NodeEvent::ScriptDone(script) => self.script_done(now, &script),
                 NodeEvent::Failed(error) => self.script_failed(now, error),
                 NodeEvent::Alarm(alarm) => self.take_alarm(alarm),
                 NodeEvent::Pdo { number, frame } => self.take_pdo(now, number, &frame),
@@ -244,11 +257,12 @@ impl Cia402Drive {
         }
     }
 
-    fn script_done(&mut self, now: Time) {
+    fn script_done(&mut self, now: Time, script: &Script) {
         match &self.activity {
+            Activity::Starting => self.end_start(now, script),
             Activity::Move(_) => self.move_prepared(now),
             Activity::Homing(_) => self.homing_prepared(now),
-            Activity::Idle | Activity::Starting | Activity::Power(_) | Activity::Halt(_) => {}
+            Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
 
@@ -261,111 +275,6 @@ impl Cia402Drive {
             }
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
-    }
-
-    fn take_alarm(&mut self, alarm: Alarm) {
-        if let Alarm::UnexpectedBootUp { .. } = alarm {
-            // Everything volatile is gone: reference, profile, state.
-            self.homed = false;
-            self.reached = None;
-            self.profile = None;
-            self.kept = None;
-            self.image.clear();
-        }
-        self.alarm(alarm);
-    }
-
-    fn take_pdo(&mut self, now: Time, number: u8, frame: &CanFrame) {
-        let payload = frame.data();
-        match number {
-            1 if payload.len() < SAMPLE_BYTES => self.take_short_pdo(SAMPLE_BYTES, payload.len()),
-            1 => {
-                if let Some(sample) = Sample::parse(now, payload) {
-                    self.told_short = false;
-                    self.take_sample(now, sample);
-                }
-            }
-            2 if !self.settings.map_following_error => {}
-            2 if payload.len() < 4 => self.take_short_pdo(4, payload.len()),
-            2 => self.image.take_following_error(payload),
-            _ => {}
-        }
-    }
-
-    fn take_short_pdo(&mut self, expected: usize, seen: usize) {
-        self.short_pdos += 1;
-        // Before the mapping is ours, anything may come.
-        if self.node.is_up() && !core::mem::replace(&mut self.told_short, true) {
-            let node = self.node.id();
-            self.alarm(Alarm::PdoTooShort {
-                node,
-                expected,
-                seen,
-            });
-        }
-    }
-
-    fn take_sample(&mut self, now: Time, sample: Sample) {
-        if !self.node.is_up() && !self.begin_service(now) {
-            return;
-        }
-        match self.image.take(sample) {
-            Judgement::Believed | Judgement::Doubted => {}
-            Judgement::Jumped { by, limit } => {
-                self.homed = false;
-                self.reached = None;
-                let node = self.node.id();
-                let (jump, limit) = (
-                    self.settings.scale.to_metres(by).abs(),
-                    self.settings.scale.to_metres(limit).abs(),
-                );
-                self.alarm(Alarm::PositionJump { node, jump, limit });
-            }
-        }
-        self.supervise(&sample);
-        match &self.activity {
-            Activity::Idle | Activity::Starting => {}
-            Activity::Power(_) => self.advance_power(now),
-            Activity::Move(_) => self.advance_move(now),
-            Activity::Halt(_) => self.advance_halt(now),
-            Activity::Homing(_) => self.advance_homing(now),
-        }
-    }
-
-    /// The first process data after NMT start ends the start.
-    fn begin_service(&mut self, now: Time) -> bool {
-        if !matches!(self.activity, Activity::Starting) || !self.node.is_operational() {
-            return false;
-        }
-        self.node.up(now);
-        self.finish(Ok(()));
-        true
-    }
-
-    fn supervise(&mut self, sample: &Sample) {
-        let node = self.node.id();
-        let seen = sample.state();
-        let changing = matches!(self.activity, Activity::Power(_));
-        match self.kept.filter(|kept| !changing && *kept != seen) {
-            Some(expected) if !self.told_state => {
-                self.told_state = true;
-                self.reached = None;
-                self.alarm(Alarm::DriveState {
-                    node,
-                    expected,
-                    seen,
-                });
-            }
-            Some(_) => {}
-            None => self.told_state = false,
-        }
-        let lagging = sample.mode == OperationMode::ProfilePosition
-            && seen == PowerState::OperationEnabled
-            && sample.status.contains(Statusword::MODE_13);
-        if lagging && !self.told_following {
-            self.alarm(Alarm::FollowingError { node });
-        }
-        self.told_following = lagging;
     }
 
     /// Ends whatever runs, without an outcome.
@@ -432,8 +341,10 @@ impl Device for Cia402Drive {
         self.image.clear();
         self.alarms.clear();
         self.profile = None;
+        self.commanded_mode = None;
         self.reached = None;
         self.kept = None;
+        self.first = None;
         self.activity = Activity::Starting;
         self.node.start(now, start::description());
     }

@@ -88,7 +88,9 @@ impl Cia402Drive {
                     let (velocity, acceleration) = planned.profile;
                     steps.extend(profile_steps(velocity, acceleration));
                 }
-                if self.mode() != Some(OperationMode::ProfilePosition) {
+                // The display may lag behind: what was written last counts as well.
+                let profile_position = Some(OperationMode::ProfilePosition);
+                if self.mode() != profile_position || self.commanded_mode != profile_position {
                     steps.push(Step::write(
                         MODE,
                         OperationMode::ProfilePosition.raw(),
@@ -96,10 +98,17 @@ impl Cia402Drive {
                     ));
                 }
                 self.reached = None;
+                if self.control.contains(Controlword::MODE_4) {
+                    // Of a superseded move or homing: without a low level there is no new edge.
+                    self.release_set_point(now);
+                }
                 self.activity = Activity::Move(planned);
                 if steps.is_empty() {
                     self.move_prepared(now);
                 } else {
+                    // Until all is written the drive's values are neither old nor new.
+                    self.profile = None;
+                    self.commanded_mode = None;
                     self.node.run(now, steps);
                     self.pump(now);
                 }
@@ -170,6 +179,7 @@ impl Cia402Drive {
             return;
         };
         self.profile = Some(moving.profile);
+        self.commanded_mode = Some(OperationMode::ProfilePosition);
         self.enter(now, MovePhase::AwaitingMode, self.settings.timeouts.mode);
         self.advance_move(now);
     }
@@ -178,25 +188,29 @@ impl Cia402Drive {
         let Some(sample) = self.image.sample().copied() else {
             return;
         };
-        let Activity::Move(moving) = &mut self.activity else {
+        let Activity::Move(moving) = &self.activity else {
             return;
         };
-        let target = moving.target;
+        let (phase, target) = (moving.phase, moving.target);
         let patience = self.settings.timeouts.set_point;
         let acknowledged = sample.status.contains(Statusword::MODE_12);
-        match moving.phase {
+        let in_mode = sample.mode == OperationMode::ProfilePosition;
+        match phase {
             MovePhase::Preparing => {}
             MovePhase::AwaitingMode => {
-                if sample.mode == OperationMode::ProfilePosition {
+                if in_mode {
                     self.enter(now, MovePhase::Releasing, patience);
                     self.advance_move(now);
                 }
             }
-            MovePhase::Releasing if acknowledged => {
+            // A mode that comes late: its bits 4 and 12 mean something else.
+            MovePhase::Releasing | MovePhase::Raising | MovePhase::Lowering if !in_mode => {
+                self.release_set_point(now);
+                self.enter(now, MovePhase::AwaitingMode, self.settings.timeouts.mode);
+            }
+            MovePhase::Releasing if acknowledged || !self.low_level_was_seen(now) => {
                 if self.repeat_at == Time::NEVER {
-                    // Halt stays as it is: an older target must not be resumed.
-                    let held = self.control & Controlword::HALT;
-                    self.send_control(now, Controlword::ENABLE_COMMAND | held);
+                    self.release_set_point(now);
                 }
             }
             MovePhase::Releasing => {
@@ -220,6 +234,17 @@ impl Cia402Drive {
             }
             MovePhase::Running => self.watch_arrival(target, acknowledged),
         }
+    }
+
+    /// Takes the set-point bit back. Halt stays: an older target must not be resumed.
+    fn release_set_point(&mut self, now: Time) {
+        let held = self.control & Controlword::HALT;
+        self.send_control(now, Controlword::ENABLE_COMMAND | held);
+    }
+
+    /// A drive that looks at the controlword once a cycle must have seen the bit low.
+    fn low_level_was_seen(&self, now: Time) -> bool {
+        now.since(self.lowered_at) >= self.settings.common.sync_period * 2
     }
 
     fn watch_arrival(&mut self, target: i32, acknowledged: bool) {

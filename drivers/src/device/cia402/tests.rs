@@ -513,6 +513,19 @@ fn an_object_that_cannot_be_mapped_is_named() {
 }
 
 #[test]
+fn a_mapping_that_is_carried_out_wrong_is_found_by_comparing() {
+    let mut rig = Rig::new();
+    rig.fake.node.manners.exchanged_objects = true;
+    let error = rig.start().unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("comparing process data with the object it carries"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_lost_request_is_survived_by_a_bounded_retry() {
     let mut rig = Rig::new();
     rig.fake.node.manners.deaf_requests = 1;
@@ -674,6 +687,57 @@ fn a_halt_stops_on_the_way_and_the_next_move_goes_on() {
     assert_eq!(rig.fake.position(), halted);
     assert_eq!(rig.does(move_to(0.0)), Ok(()));
     assert_eq!(rig.fake.position(), 0);
+}
+
+#[test]
+fn homing_after_a_halt_does_not_resume_the_interrupted_move() {
+    let mut rig = Rig::enabled();
+    rig.drive.command(rig.now, move_to(20_000.0));
+    rig.passes_ms(60);
+    rig.does(AxisCommand::Halt).unwrap();
+    rig.drive.command(rig.now, home_here(0.0));
+    let halted = rig.fake.position();
+    while rig.fake.node.get(0x6061, 0) != 6 {
+        rig.tick();
+        assert_eq!(rig.fake.position(), halted);
+    }
+    assert_eq!(rig.outcome(), Ok(()));
+}
+
+#[test]
+fn a_move_that_supersedes_homing_waits_for_its_own_mode() {
+    let mut rig = Rig::enabled();
+    rig.passes_ms(20);
+    rig.does(move_to(100.0)).unwrap();
+    for ms in 0..40 {
+        rig.fake.mode_lag = 5;
+        rig.drive.command(rig.now, home_here(0.0));
+        rig.passes_ms(ms);
+        assert_eq!(rig.does(move_to(300.0)), Ok(()), "after {ms} ms");
+        assert_eq!(rig.fake.position(), 30_000);
+        assert_eq!(rig.does(move_to(100.0)), Ok(()), "after {ms} ms");
+    }
+}
+
+#[test]
+fn a_superseded_moves_velocity_is_not_believed() {
+    let mut rig = Rig::enabled();
+    rig.does(move_to(100.0)).unwrap();
+    let slow = AxisCommand::MoveTo {
+        target: Metres::from_um(200.0),
+        speed: MetresPerSecond(0.01),
+        acceleration: MetresPerSecondSquared(1.0),
+    };
+    rig.drive.command(rig.now, slow);
+    // The drive takes the new velocity; its answer is lost with the superseded move.
+    let Some(Payload::Frame(frame)) = rig.drive.poll_transmit() else {
+        panic!("nothing sent")
+    };
+    rig.fake.hear(&frame);
+    rig.fake.node.sent.clear();
+    assert_eq!(rig.fake.node.get(0x6081, 0), 1_000_000);
+    assert_eq!(rig.does(move_to(300.0)), Ok(()));
+    assert_eq!(rig.fake.node.get(0x6081, 0), 10_000_000);
 }
 
 #[test]

@@ -19,12 +19,14 @@
 //! over more than the drain time defeats this; whoever fears it reads back what was written.
 //!
 //! **Retries** restart a whole transfer, after abort, drain and fence; a single request is
-//! never sent again. Only reads and writes that the caller calls idempotent are retried.
+//! never sent again. Also retried, after a pause: what a busy server refused (0x08000022,
+//! 0x08000021, 0x060A0023). Only reads and writes that the caller calls idempotent are retried.
 //!
 //! Absent: the SDO manager's dynamic channels, and network indication (remote access).
 
 mod download;
 mod transfer;
+mod types;
 mod upload;
 
 #[cfg(test)]
@@ -32,11 +34,12 @@ mod property_tests;
 #[cfg(test)]
 mod tests;
 
-use core::time::Duration;
 use std::collections::VecDeque;
 
 use transfer::{Oddity, Transfer, Verdict};
 use units::Time;
+
+pub use types::{Busy, Counters, Method, Retry, SdoFailure, Timeouts};
 
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
@@ -51,124 +54,6 @@ const FENCES: [Object; 3] = [
     Object::new(0x1001, 0),
     Object::new(0x1018, 0),
 ];
-
-/// How long each thing is waited for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timeouts {
-    /// The server's response to a request.
-    pub response: Duration,
-    /// The next segment of a block that the server sends.
-    pub block_segment: Duration,
-    /// After a time-out: how late a reply may still come before the next transfer starts.
-    pub late_reply: Duration,
-    /// After another abort of ours: the silence that must pass before the next transfer.
-    pub quiet: Duration,
-}
-
-impl Default for Timeouts {
-    fn default() -> Self {
-        Self {
-            response: Duration::from_millis(500),
-            block_segment: Duration::from_millis(100),
-            late_reply: Duration::from_millis(500),
-            quiet: Duration::from_millis(20),
-        }
-    }
-}
-
-/// How a value is carried.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Expedited up to 4 bytes, segmented above.
-    Auto,
-    /// Block transfer; segmented when the server knows no block transfer.
-    Block,
-}
-
-/// How often a failed transfer is begun anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Retry {
-    /// Not at all.
-    Never,
-    /// At most this many times after the first attempt.
-    UpTo(u32),
-}
-
-impl Retry {
-    const fn attempts(self) -> u32 {
-        match self {
-            Self::Never => 1,
-            Self::UpTo(more) => more.saturating_add(1),
-        }
-    }
-}
-
-/// Why a transfer failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the Display text says what each field is")]
-pub enum SdoFailure {
-    /// The server aborted it.
-    #[error("{object}: the server aborted with {code}")]
-    Aborted { object: Object, code: AbortCode },
-    /// The server did not answer; it was told so by an abort.
-    #[error("{object}: no {awaited} within {waited:?} ({attempts} attempts)")]
-    TimedOut {
-        object: Object,
-        awaited: &'static str,
-        waited: Duration,
-        attempts: u32,
-    },
-    /// The server broke the protocol and was aborted.
-    #[error("{object}: broken off with {code} ({attempts} attempts)")]
-    Protocol {
-        object: Object,
-        code: AbortCode,
-        attempts: u32,
-    },
-}
-
-impl SdoFailure {
-    /// Whether the wire rather than the object dictionary is to blame, so that a second
-    /// attempt may go better.
-    const fn is_transient(&self) -> bool {
-        match *self {
-            Self::TimedOut { .. } | Self::Protocol { .. } => true,
-            Self::Aborted { code, .. } => matches!(
-                code,
-                AbortCode::ToggleNotAlternated
-                    | AbortCode::TimedOut
-                    | AbortCode::InvalidSequence
-                    | AbortCode::CrcMismatch
-            ),
-        }
-    }
-}
-
-/// Frames that were ignored, by reason, and what was done about trouble.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Nothing was pending.
-    pub stale: u64,
-    /// For another object.
-    pub mismatched: u64,
-    /// Fewer than 8 bytes.
-    pub short: u64,
-    /// Of a kind that the transfer does not expect now.
-    pub unexpected: u64,
-    /// A repetition of what was taken already.
-    pub duplicated: u64,
-    /// After an own abort, before the next transfer.
-    pub late: u64,
-    /// Aborts sent.
-    pub aborts_sent: u64,
-    /// Transfers begun anew.
-    pub retries: u64,
-}
-
-/// A transfer was asked for while another one runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an SDO transfer with this server runs already")]
-pub struct Busy;
 
 #[derive(Clone, Debug)]
 pub(super) enum Direction {
@@ -499,7 +384,15 @@ impl SdoClient {
             Verdict::Aborted(code) => {
                 // Some servers repeat an abort: it must not hit the next transfer.
                 self.suspect = Some(object);
-                self.state = State::Idle;
+                self.state = if types::is_busy(code) {
+                    let until = now + self.timeouts.quiet;
+                    State::Drain {
+                        until,
+                        limit: until + self.timeouts.late_reply,
+                    }
+                } else {
+                    State::Idle
+                };
                 self.fail(now, SdoFailure::Aborted { object, code });
             }
             Verdict::Break(code) => {

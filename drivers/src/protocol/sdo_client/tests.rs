@@ -754,6 +754,24 @@ fn a_write_is_never_sent_twice_unless_it_is_called_idempotent() {
 }
 
 #[test]
+fn a_busy_server_is_asked_again_after_a_pause() {
+    let mut bench = Bench::new(Retry::UpTo(1));
+    let now = bench.now;
+    let begun = bench.client.write_idempotent(now, MODE, &[6], Method::Auto);
+    assert_eq!(begun, Ok(()));
+    bench
+        .sends(&["2F60600006000000"])
+        .hears("8060600022000008")
+        .still_waits()
+        .passes_ms(20)
+        .sends(&[FENCE_ASKED])
+        .hears(FENCE_ANSWERED)
+        .sends(&["2F60600006000000"])
+        .hears("6060600000000000")
+        .is_written();
+}
+
+#[test]
 fn an_object_that_does_not_exist_is_not_asked_for_again() {
     let mut bench = Bench::new(Retry::UpTo(5));
     bench.client.read(Time::ZERO, NAME, Method::Auto).unwrap();

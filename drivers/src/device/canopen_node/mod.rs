@@ -4,15 +4,22 @@
 //! procedure follows CiA 302-2: boot-up or answer, device type, identity, configuration,
 //! error control, start.
 
+mod error;
+mod identity;
+mod settings;
+mod vigil;
+
 use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::Time;
 
+pub use settings::{ExpectedIdentity, NodeSettings, NodeTimeouts};
+
 use super::{Alarm, DeviceError, DeviceName, Identity, Seen};
-use crate::protocol::heartbeat::{HeartbeatConsumer, HeartbeatEvent};
+use crate::protocol::heartbeat::HeartbeatConsumer;
 use crate::protocol::script::{Script, ScriptCause, ScriptFailure, Step};
-use crate::protocol::sdo_client::{Retry, SdoClient, SdoFailure, Timeouts as SdoTimeouts};
+use crate::protocol::sdo_client::{SdoClient, SdoFailure};
 use crate::transport::Input;
 use crate::wire::Payload;
 use crate::wire::can::CanFrame;
@@ -20,95 +27,8 @@ use crate::wire::canopen::emcy::Emergency;
 use crate::wire::canopen::nmt::{NmtCommand, NmtState, consumer_heartbeat_entry};
 use crate::wire::canopen::{Function, NodeId, Object};
 
-const DEVICE_TYPE: Object = Object::new(0x1000, 0);
-const NAME: Object = Object::new(0x1008, 0);
-const VENDOR: Object = Object::new(0x1018, 1);
-const PRODUCT: Object = Object::new(0x1018, 2);
-const REVISION: Object = Object::new(0x1018, 3);
-const SERIAL: Object = Object::new(0x1018, 4);
-
 /// How often NMT start, which nobody confirms, is sent before the node counts as deaf.
 const START_COMMANDS_MAX: u8 = 3;
-
-/// What the configuration says about a device; `None` accepts anything.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ExpectedIdentity {
-    /// 0x1000, all of it; the profile number in its lower half is always checked.
-    pub device_type: Option<u32>,
-    /// 0x1018:01.
-    pub vendor: Option<u32>,
-    /// 0x1018:02.
-    pub product: Option<u32>,
-    /// 0x1018:03.
-    pub revision: Option<u32>,
-    /// 0x1018:04.
-    pub serial: Option<u32>,
-}
-
-/// How long each thing is waited for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NodeTimeouts {
-    /// Boot-up or the first answer: drives take up to 5 s after power-on.
-    pub boot: Duration,
-    /// One SDO response, and what belongs to it.
-    pub sdo: SdoTimeouts,
-    /// Operational, and the first process data, after NMT start.
-    pub operational: Duration,
-}
-
-impl Default for NodeTimeouts {
-    fn default() -> Self {
-        Self {
-            boot: Duration::from_secs(10),
-            sdo: SdoTimeouts::default(),
-            operational: Duration::from_secs(2),
-        }
-    }
-}
-
-/// What is set about a node, whatever its profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NodeSettings {
-    /// The node.
-    pub node: NodeId,
-    /// Us: the producer whose heartbeat the node watches.
-    pub master: NodeId,
-    /// Who it must be.
-    pub expected: ExpectedIdentity,
-    /// The node's own heartbeat (0x1017), whole milliseconds.
-    pub heartbeat_period: Duration,
-    /// Without a heartbeat for this long the node is lost to us.
-    pub consumer_time: Duration,
-    /// Without our heartbeat for this long we are lost to the node (0x1016:01), which then
-    /// stops; zero: the node does not watch us.
-    pub master_consumer_time: Duration,
-    /// From SYNC to SYNC.
-    pub sync_period: Duration,
-    /// So many SYNCs without process data are an alarm.
-    pub missed_pdos_max: u32,
-    /// How often reads and configuration writes are begun anew.
-    pub retry: Retry,
-    /// How long each thing is waited for.
-    pub timeouts: NodeTimeouts,
-}
-
-impl NodeSettings {
-    /// Heartbeats of 50 ms watched for 150 ms, both ways; any identity; two retries.
-    pub fn new(node: NodeId, master: NodeId, sync_period: Duration) -> Self {
-        Self {
-            node,
-            master,
-            expected: ExpectedIdentity::default(),
-            heartbeat_period: Duration::from_millis(50),
-            consumer_time: Duration::from_millis(150),
-            master_consumer_time: Duration::from_millis(150),
-            sync_period,
-            missed_pdos_max: 3,
-            retry: Retry::UpTo(2),
-            timeouts: NodeTimeouts::default(),
-        }
-    }
-}
 
 /// What the common part tells the device's own part.
 #[derive(Debug)]
@@ -119,7 +39,7 @@ pub(super) enum NodeEvent {
     /// Configured and operational. Answer with [`CanopenNode::up`] when data came.
     Operational,
     /// A script of the device's own is done.
-    ScriptDone,
+    ScriptDone(Script),
     /// The start or a script failed.
     Failed(DeviceError),
     /// Something is wrong.
@@ -413,7 +333,7 @@ impl CanopenNode {
     }
 
     fn probe(&mut self, now: Time) {
-        let step = Step::read(DEVICE_TYPE, "asking who it is");
+        let step = Step::read(identity::DEVICE_TYPE, "asking who it is");
         self.run_script(now, Script::new([step]));
     }
 
@@ -440,14 +360,14 @@ impl CanopenNode {
                 self.outbox
                     .push_back(NmtCommand::EnterPreOperational.emit(Some(node)));
                 self.phase = Phase::Describing;
-                let mut steps = identity_steps();
+                let mut steps = identity::steps();
                 steps.extend(self.description.iter().copied());
                 self.run_script(now, Script::new(steps));
             }
             Phase::Describing => {
-                let identity = identity_from(&script);
-                let checked = self.check_identity(&identity);
-                self.identity = Some(identity);
+                let seen = identity::from_script(&script);
+                let checked = identity::check(&self.settings, self.profile, &seen);
+                self.identity = Some(seen);
                 match checked {
                     Ok(()) => {
                         self.phase = Phase::Described;
@@ -466,7 +386,7 @@ impl CanopenNode {
             | Phase::Described
             | Phase::Starting { .. }
             | Phase::Operational { .. }
-            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone),
+            | Phase::Up => self.events.push_back(NodeEvent::ScriptDone(script)),
         }
     }
 
@@ -482,7 +402,7 @@ impl CanopenNode {
                 return;
             }
         }
-        let error = device_error(self.settings.node, failure);
+        let error = error::device_error(self.settings.node, failure);
         if self.is_up() {
             self.events.push_back(NodeEvent::Failed(error));
         } else {
@@ -516,86 +436,6 @@ impl CanopenNode {
         }
     }
 
-    fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {
-        match event {
-            HeartbeatEvent::BootUp => self.take_boot_up(now),
-            HeartbeatEvent::Changed { to, .. } => {
-                self.note_operational(now);
-                if self.is_up() && to != NmtState::Operational {
-                    let node = self.settings.node;
-                    self.alarm(Alarm::UnexpectedNmtState { node, state: to });
-                }
-            }
-            HeartbeatEvent::Lost { waited } => {
-                self.heartbeats_lost += 1;
-                let node = self.settings.node;
-                let alarm = Alarm::HeartbeatLost { node, waited };
-                self.end_by(now, alarm);
-            }
-        }
-    }
-
-    fn take_boot_up(&mut self, now: Time) {
-        self.boot_ups += 1;
-        // Nothing older than the boot-up can come any more.
-        self.client.server_restarted();
-        self.script = None;
-        match self.phase {
-            Phase::Off => {}
-            Phase::Probing { .. } => self.probe(now),
-            Phase::Describing
-            | Phase::Described
-            | Phase::Configuring
-            | Phase::Starting { .. }
-            | Phase::Operational { .. }
-            | Phase::Up => {
-                let was_up = self.is_up();
-                let node = self.settings.node;
-                self.end_by(now, Alarm::UnexpectedBootUp { node });
-                if was_up {
-                    self.phase = Phase::Off;
-                }
-            }
-        }
-    }
-
-    /// An alarm that ends a start, or is told when the node is up.
-    fn end_by(&mut self, now: Time, alarm: Alarm) {
-        match self.phase {
-            Phase::Off | Phase::Probing { .. } => {}
-            Phase::Up => self.alarm(alarm),
-            Phase::Describing
-            | Phase::Described
-            | Phase::Configuring
-            | Phase::Starting { .. }
-            | Phase::Operational { .. } => {
-                let device = self.name();
-                let step = "the start";
-                self.fail(
-                    now,
-                    DeviceError::Alarmed {
-                        device,
-                        step,
-                        alarm,
-                    },
-                );
-            }
-        }
-    }
-
-    fn take_emergency(&mut self, emergency: Emergency) {
-        self.emergencies += 1;
-        // During the start it is only counted: what was wrong shows in the device's state.
-        if self.is_up() && !emergency.code.is_cleared() {
-            let node = self.settings.node;
-            self.alarm(Alarm::Emergency { node, emergency });
-        }
-    }
-
-    fn alarm(&mut self, alarm: Alarm) {
-        self.events.push_back(NodeEvent::Alarm(alarm));
-    }
-
     fn fail_waiting(&mut self, now: Time, since: Time, awaited: &'static str) {
         let error = DeviceError::Timeout {
             device: self.name(),
@@ -611,98 +451,9 @@ impl CanopenNode {
         self.consumer.rest();
         self.events.push_back(NodeEvent::Failed(error));
     }
-
-    fn check_identity(&self, seen: &Identity) -> Result<(), DeviceError> {
-        let node = self.settings.node;
-        let expected = self.settings.expected;
-        let profile = u32::from(self.profile);
-        let checks = [
-            ("device profile", Some(profile), seen.device_type & 0xFFFF),
-            ("device type", expected.device_type, seen.device_type),
-            ("vendor", expected.vendor, seen.vendor),
-            ("product", expected.product, seen.product),
-            ("revision", expected.revision, seen.revision),
-            ("serial number", expected.serial, seen.serial),
-        ];
-        for (what, expected, seen) in checks {
-            if let Some(expected) = expected.filter(|expected| *expected != seen) {
-                return Err(DeviceError::WrongIdentity {
-                    node,
-                    what,
-                    expected,
-                    seen,
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-fn identity_steps() -> Vec<Step> {
-    const TEXT: &str = "reading its identity";
-    vec![
-        Step::read(DEVICE_TYPE, TEXT),
-        Step::read(VENDOR, TEXT),
-        Step::read(PRODUCT, TEXT).optional(),
-        Step::read(REVISION, TEXT).optional(),
-        Step::read(SERIAL, TEXT).optional(),
-        Step::read(NAME, TEXT).optional(),
-    ]
-}
-
-fn identity_from(script: &Script) -> Identity {
-    let value = |object| script.value(object).unwrap_or(0);
-    let name = script.data(NAME).unwrap_or_default();
-    Identity {
-        device_type: value(DEVICE_TYPE),
-        vendor: value(VENDOR),
-        product: value(PRODUCT),
-        revision: value(REVISION),
-        serial: value(SERIAL),
-        name: String::from_utf8_lossy(name)
-            .trim_end_matches(['\0', ' '])
-            .to_owned(),
-    }
 }
 
 /// Whole milliseconds, as 0x1016 and 0x1017 hold them.
 pub(super) fn millis(span: Duration) -> u16 {
     u16::try_from(span.as_millis()).unwrap_or(u16::MAX)
-}
-
-fn device_error(node: NodeId, failure: ScriptFailure) -> DeviceError {
-    let step = failure.text;
-    match failure.cause {
-        ScriptCause::Differs { expected, seen } => DeviceError::ReadBack {
-            node,
-            object: failure.object,
-            expected,
-            seen,
-            step,
-        },
-        ScriptCause::Sdo(SdoFailure::Aborted { object, code }) => DeviceError::SdoAbort {
-            node,
-            object,
-            code,
-            step,
-        },
-        ScriptCause::Sdo(SdoFailure::TimedOut {
-            object,
-            waited,
-            attempts,
-            ..
-        }) => DeviceError::SdoTimeout {
-            node,
-            object,
-            waited,
-            attempts,
-            step,
-        },
-        ScriptCause::Sdo(SdoFailure::Protocol { object, code, .. }) => DeviceError::SdoProtocol {
-            node,
-            object,
-            code,
-            step,
-        },
-    }
 }

@@ -1,0 +1,91 @@
+//! What a node says unasked: heartbeats, boot-ups, emergencies.
+
+use units::Time;
+
+use super::{CanopenNode, NodeEvent, Phase};
+use crate::device::{Alarm, DeviceError};
+use crate::protocol::heartbeat::HeartbeatEvent;
+use crate::wire::canopen::emcy::Emergency;
+use crate::wire::canopen::nmt::NmtState;
+
+impl CanopenNode {
+    pub(super) fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {
+        match event {
+            HeartbeatEvent::BootUp => self.take_boot_up(now),
+            HeartbeatEvent::Changed { to, .. } => {
+                self.note_operational(now);
+                if self.is_up() && to != NmtState::Operational {
+                    let node = self.settings.node;
+                    self.alarm(Alarm::UnexpectedNmtState { node, state: to });
+                }
+            }
+            HeartbeatEvent::Lost { waited } => {
+                self.heartbeats_lost += 1;
+                let node = self.settings.node;
+                let alarm = Alarm::HeartbeatLost { node, waited };
+                self.end_by(now, alarm);
+            }
+        }
+    }
+
+    fn take_boot_up(&mut self, now: Time) {
+        self.boot_ups += 1;
+        // Nothing older than the boot-up can come any more.
+        self.client.server_restarted();
+        self.script = None;
+        match self.phase {
+            Phase::Off => {}
+            Phase::Probing { .. } => self.probe(now),
+            Phase::Describing
+            | Phase::Described
+            | Phase::Configuring
+            | Phase::Starting { .. }
+            | Phase::Operational { .. }
+            | Phase::Up => {
+                let was_up = self.is_up();
+                let node = self.settings.node;
+                self.end_by(now, Alarm::UnexpectedBootUp { node });
+                if was_up {
+                    self.phase = Phase::Off;
+                }
+            }
+        }
+    }
+
+    /// An alarm that ends a start, or is told when the node is up.
+    fn end_by(&mut self, now: Time, alarm: Alarm) {
+        match self.phase {
+            Phase::Off | Phase::Probing { .. } => {}
+            Phase::Up => self.alarm(alarm),
+            Phase::Describing
+            | Phase::Described
+            | Phase::Configuring
+            | Phase::Starting { .. }
+            | Phase::Operational { .. } => {
+                let device = self.name();
+                let step = "the start";
+                self.fail(
+                    now,
+                    DeviceError::Alarmed {
+                        device,
+                        step,
+                        alarm,
+                    },
+                );
+            }
+        }
+    }
+
+    pub(super) fn take_emergency(&mut self, emergency: Emergency) {
+        self.emergencies += 1;
+        // During the start it is only counted: what was wrong shows in the device's state.
+        if self.is_up() && !emergency.code.is_cleared() {
+            let node = self.settings.node;
+            self.alarm(Alarm::Emergency { node, emergency });
+        }
+    }
+
+    fn alarm(&mut self, alarm: Alarm) {
+        self.events.push_back(NodeEvent::Alarm(alarm));
+    }
+}

@@ -1,0 +1,149 @@
+//! What a drive says of itself, and what of it is an alarm.
+
+use units::{Counts, Time};
+
+use super::image::{Judgement, SAMPLE_BYTES, Sample};
+use super::start::POSITION_ACTUAL;
+use super::{Activity, Cia402Drive};
+use crate::device::{Alarm, DeviceError};
+use crate::protocol::script::{Script, Step};
+use crate::wire::can::CanFrame;
+use crate::wire::cia402::{OperationMode, PowerState, Statusword};
+
+const COMPARING: &str = "comparing process data with the object it carries";
+
+impl Cia402Drive {
+    pub(super) fn take_alarm(&mut self, alarm: Alarm) {
+        if let Alarm::UnexpectedBootUp { .. } = alarm {
+            // Everything volatile is gone: reference, profile, state.
+            self.homed = false;
+            self.reached = None;
+            self.profile = None;
+            self.commanded_mode = None;
+            self.kept = None;
+            self.image.clear();
+        }
+        self.alarm(alarm);
+    }
+
+    pub(super) fn take_pdo(&mut self, now: Time, number: u8, frame: &CanFrame) {
+        let payload = frame.data();
+        match number {
+            1 if payload.len() < SAMPLE_BYTES => self.take_short_pdo(SAMPLE_BYTES, payload.len()),
+            1 => {
+                if let Some(sample) = Sample::parse(now, payload) {
+                    self.told_short = false;
+                    self.take_sample(now, sample);
+                }
+            }
+            2 if !self.settings.map_following_error => {}
+            2 if payload.len() < 4 => self.take_short_pdo(4, payload.len()),
+            2 => self.image.take_following_error(payload),
+            _ => {}
+        }
+    }
+
+    fn take_short_pdo(&mut self, expected: usize, seen: usize) {
+        self.short_pdos += 1;
+        // Before the mapping is ours, anything may come.
+        if self.node.is_up() && !core::mem::replace(&mut self.told_short, true) {
+            let node = self.node.id();
+            self.alarm(Alarm::PdoTooShort {
+                node,
+                expected,
+                seen,
+            });
+        }
+    }
+
+    fn take_sample(&mut self, now: Time, sample: Sample) {
+        if !self.node.is_up() {
+            self.take_first_sample(now, sample);
+            return;
+        }
+        match self.image.take(sample) {
+            Judgement::Believed | Judgement::Doubted => {}
+            Judgement::Jumped { by, limit } => {
+                self.homed = false;
+                self.reached = None;
+                let node = self.node.id();
+                let (jump, limit) = (
+                    self.settings.scale.to_metres(by).abs(),
+                    self.settings.scale.to_metres(limit).abs(),
+                );
+                self.alarm(Alarm::PositionJump { node, jump, limit });
+            }
+        }
+        self.supervise(&sample);
+        match &self.activity {
+            Activity::Idle | Activity::Starting => {}
+            Activity::Power(_) => self.advance_power(now),
+            Activity::Move(_) => self.advance_move(now),
+            Activity::Halt(_) => self.advance_halt(now),
+            Activity::Homing(_) => self.advance_homing(now),
+        }
+    }
+
+    /// The first process data after NMT start is compared with the object itself: a mapping
+    /// that reads back right may still be carried out wrong.
+    fn take_first_sample(&mut self, now: Time, sample: Sample) {
+        if !matches!(self.activity, Activity::Starting) || !self.node.is_operational() {
+            return;
+        }
+        if self.first.replace(sample).is_none() {
+            let object = POSITION_ACTUAL.object;
+            self.node.run(now, vec![Step::read(object, COMPARING)]);
+        }
+    }
+
+    /// The start is done when both agree.
+    pub(super) fn end_start(&mut self, now: Time, script: &Script) {
+        let object = POSITION_ACTUAL.object;
+        let (Some(sample), Some(raw)) = (self.first.take(), script.value(object)) else {
+            return;
+        };
+        let position = Counts(i64::from(raw.cast_signed()));
+        let apart = (sample.position - position).0.abs();
+        if apart > self.image.margin() {
+            self.node.give_up(now);
+            self.finish(Err(DeviceError::ReadBack {
+                node: self.node.id(),
+                object,
+                expected: u64::from(raw),
+                seen: u64::from(sample.position.0 as u32),
+                step: COMPARING,
+            }));
+            return;
+        }
+        self.node.up(now);
+        self.commanded_mode = Some(OperationMode::ProfilePosition);
+        self.finish(Ok(()));
+        self.take_sample(now, sample);
+    }
+
+    fn supervise(&mut self, sample: &Sample) {
+        let node = self.node.id();
+        let seen = sample.state();
+        let changing = matches!(self.activity, Activity::Power(_));
+        match self.kept.filter(|kept| !changing && *kept != seen) {
+            Some(expected) if !self.told_state => {
+                self.told_state = true;
+                self.reached = None;
+                self.alarm(Alarm::DriveState {
+                    node,
+                    expected,
+                    seen,
+                });
+            }
+            Some(_) => {}
+            None => self.told_state = false,
+        }
+        let lagging = sample.mode == OperationMode::ProfilePosition
+            && seen == PowerState::OperationEnabled
+            && sample.status.contains(Statusword::MODE_13);
+        if lagging && !self.told_following {
+            self.alarm(Alarm::FollowingError { node });
+        }
+        self.told_following = lagging;
+    }
+}
