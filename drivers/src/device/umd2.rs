@@ -265,20 +265,20 @@ impl Umd2 {
                 let good = good + 1;
                 self.state = State::Starting { since, good };
                 if good >= self.settings.start_samples {
-                    self.state = State::Tracking {
-                        datum: half_wavelengths,
-                    };
+                    self.track_from(half_wavelengths);
                     self.outcome = Some(Ok(()));
                 }
             }
             State::WantsDatum => {
-                self.state = State::Tracking {
-                    datum: half_wavelengths,
-                };
+                self.track_from(half_wavelengths);
                 self.average(now, 0.0);
             }
             State::Tracking { datum } => self.average(now, half_wavelengths - datum),
         }
+    }
+
+    const fn track_from(&mut self, datum: f64) {
+        self.state = State::Tracking { datum };
     }
 
     fn average(&mut self, now: Time, half_wavelengths: f64) {
@@ -391,10 +391,8 @@ impl Device for Umd2 {
     }
 
     fn start(&mut self, now: Time) {
-        self.state = State::Starting {
-            since: now,
-            good: 0,
-        };
+        let (since, good) = (now, 0);
+        self.state = State::Starting { since, good };
         self.outcome = None;
         self.averaging = Averaging::Never;
         self.newest = None;
@@ -483,8 +481,7 @@ impl DisplacementInstrument for Umd2 {
             (State::Tracking { .. } | State::WantsDatum, Some((sample, at)))
                 if now.since(*at) < self.settings.stream_timeout =>
             {
-                let datum = sample.half_wavelengths();
-                self.state = State::Tracking { datum };
+                self.track_from(sample.half_wavelengths());
             }
             (State::Tracking { .. } | State::WantsDatum | State::Lost, _) => {
                 self.newest = None;
