@@ -13,6 +13,7 @@
 
 mod average;
 mod sequence;
+mod settings;
 mod weather;
 
 use core::time::Duration;
@@ -21,6 +22,7 @@ use units::{Metres, Time};
 
 use self::average::{Averaging, RunningAverage};
 use self::sequence::{Continuity, Sequence};
+pub use self::settings::{Direction, Umd2Settings};
 use self::weather::Weather;
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{
@@ -29,7 +31,7 @@ use super::{
 };
 use crate::transport::{Input, LinkState};
 use crate::wire::Payload;
-use crate::wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, Line, LowSpeed, Sample, VACUUM_WAVELENGTH_M};
+use crate::wire::umd2::{Line, LowSpeed, Sample};
 
 const NAME: DeviceName = DeviceName::Serial("interferometer");
 /// Sixteen fields of at most 20 characters.
@@ -40,74 +42,6 @@ const SLOW_BEAT: u32 = 32;
 const GAP_MAX_S: f64 = 600.0;
 /// Impossible jumps in a row that are no damaged lines any more.
 const JUMPS_MAX: u32 = 3;
-
-/// Which way the displacement counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Direction {
-    /// As the instrument counts.
-    #[default]
-    AsCounted,
-    /// The other way: the beam's path shortens while the axis goes forward.
-    Reversed,
-}
-
-impl Direction {
-    const fn sign(self) -> f64 {
-        match self {
-            Self::AsCounted => 1.0,
-            Self::Reversed => -1.0,
-        }
-    }
-}
-
-/// How an interferometer is used.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Umd2Settings {
-    /// The laser's wavelength in vacuum.
-    pub vacuum_wavelength: Metres,
-    /// Passes of the beam over the measured length: 1, 2 or 4; more divide finer.
-    pub optics_factor: u8,
-    /// Which way the displacement counts.
-    pub direction: Direction,
-    /// Samples per second, as the firmware is set.
-    pub sample_rate_hz: f64,
-    /// An average fails when more samples than this are missing or unusable in it.
-    pub lost_samples_max: u64,
-    /// The beam counts as lost below this signal strength; `None`: not judged.
-    pub signal_strength_min: Option<i32>,
-    /// A sample may be this much older than its arrival (USB hands over in batches); an
-    /// average takes none that may be older than its beginning.
-    pub arrival_latency: Duration,
-    /// The stream is silent after this.
-    pub stream_timeout: Duration,
-    /// The start waits this long for the stream.
-    pub start_timeout: Duration,
-    /// The stream is good after this many good samples in a row.
-    pub start_samples: u32,
-    /// This many damaged lines in a row raise an alarm.
-    pub garbage_lines_max: u64,
-    /// Temperature, pressure and humidity older than this are not given.
-    pub environment_age_max: Duration,
-}
-
-impl Default for Umd2Settings {
-    fn default() -> Self {
-        Self {
-            vacuum_wavelength: Metres(VACUUM_WAVELENGTH_M),
-            optics_factor: 1,
-            direction: Direction::AsCounted,
-            sample_rate_hz: DEFAULT_SAMPLE_RATE_HZ,
-            lost_samples_max: 6,
-            signal_strength_min: None,
-            arrival_latency: Duration::from_millis(16),
-            stream_timeout: Duration::from_millis(100),
-            start_timeout: Duration::from_secs(3),
-            start_samples: 20,
-            garbage_lines_max: 20,
-            environment_age_max: Duration::from_secs(10),
-        }
-    }
-}
 
 /// Whether the count means anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -331,20 +265,20 @@ impl Umd2 {
                 let good = good + 1;
                 self.state = State::Starting { since, good };
                 if good >= self.settings.start_samples {
-                    self.state = State::Tracking {
-                        datum: half_wavelengths,
-                    };
+                    self.track_from(half_wavelengths);
                     self.outcome = Some(Ok(()));
                 }
             }
             State::WantsDatum => {
-                self.state = State::Tracking {
-                    datum: half_wavelengths,
-                };
+                self.track_from(half_wavelengths);
                 self.average(now, 0.0);
             }
             State::Tracking { datum } => self.average(now, half_wavelengths - datum),
         }
+    }
+
+    const fn track_from(&mut self, datum: f64) {
+        self.state = State::Tracking { datum };
     }
 
     fn average(&mut self, now: Time, half_wavelengths: f64) {
@@ -457,10 +391,8 @@ impl Device for Umd2 {
     }
 
     fn start(&mut self, now: Time) {
-        self.state = State::Starting {
-            since: now,
-            good: 0,
-        };
+        let (since, good) = (now, 0);
+        self.state = State::Starting { since, good };
         self.outcome = None;
         self.averaging = Averaging::Never;
         self.newest = None;
@@ -549,8 +481,7 @@ impl DisplacementInstrument for Umd2 {
             (State::Tracking { .. } | State::WantsDatum, Some((sample, at)))
                 if now.since(*at) < self.settings.stream_timeout =>
             {
-                let datum = sample.half_wavelengths();
-                self.state = State::Tracking { datum };
+                self.track_from(sample.half_wavelengths());
             }
             (State::Tracking { .. } | State::WantsDatum | State::Lost, _) => {
                 self.newest = None;

@@ -370,8 +370,9 @@ impl Transport for Live {
         self.slot_mut(port)?.live.send(payload)
     }
 
-    /// Reads the clock only when nothing comes within [`COARSE_WAIT`]: where that is a system
-    /// call (virtual machines), it would take as long as the frame.
+    /// Reads the clock only when nothing comes at once: where that is a system call (virtual
+    /// machines), it would take as long as the frame. A caller that has not read it for long
+    /// may get up to a millisecond more than it asked for.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
         let mut longest = COARSE_WAIT;
         loop {

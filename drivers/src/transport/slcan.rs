@@ -6,139 +6,30 @@
 //! transmit overflow. Its status flags are read now and then: they show lost frames and an
 //! ailing bus, and their absence shows a dead adapter.
 
-use core::fmt;
+mod health;
+mod lines;
+mod start;
+
 use core::time::Duration;
 use nix::errno::Errno;
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use units::Time;
 
+use self::lines::{Asked, SharedLines};
+use self::start::Step;
+pub use self::start::{SlcanFailure, SlcanSettings};
 use super::clock::Clock;
 use super::live::{LivePort, OpenError, system};
-use super::serial::{self, BackOff, Outbox, Read, SerialSettings};
+use super::serial::{self, BackOff, Read};
 use super::stamps::AdapterStamps;
 use super::sync_thread::SyncSink;
 use super::{Input, LinkState, Payload, Port, SendError};
-use crate::wire::can::{BusError, BusErrorClass, ControllerProblem};
-use crate::wire::canopen::sync::emit_sync;
-use crate::wire::slcan::{BitrateCode, BusState, Command, LineBuffer, Reply, StatusFlags};
+use crate::wire::slcan::{BitrateCode, Command, LineBuffer, Reply, StatusFlags};
 
-/// Lines that wait for a slow adapter: some twenty frames, as a CAN interface's queue.
-const PENDING_MAX: usize = 512;
-/// Unanswered commands that are kept in mind.
-const ASKED_MAX: usize = 256;
 /// After something was heard, an adapter that does not know `V` gets no longer than this.
 const VERSION_WAIT: Duration = Duration::from_millis(200);
-
-/// How an SLCAN adapter is set up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlcanSettings {
-    /// The CAN bus's bit/s.
-    pub bitrate: u32,
-    /// The serial line.
-    pub serial: SerialSettings,
-    /// Ask for the adapter's millisecond time stamps; done without when it refuses.
-    pub timestamps: bool,
-    /// How often the status flags are read; `None` for never.
-    pub status_interval: Option<Duration>,
-    /// How long an answer may take (wall time).
-    pub answer_timeout: Duration,
-    /// `false` for adapters that answer nothing (some firmware does not): nothing can be
-    /// checked then.
-    pub answers: bool,
-}
-
-impl SlcanSettings {
-    /// Usual settings for a bus of `bitrate` bit/s.
-    pub const fn new(bitrate: u32) -> Self {
-        Self {
-            bitrate,
-            serial: SerialSettings::new(115_200),
-            timestamps: true,
-            status_interval: Some(Duration::from_millis(500)),
-            answer_timeout: Duration::from_secs(2),
-            answers: true,
-        }
-    }
-}
-
-/// Why an adapter could not be brought to work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SlcanFailure {
-    /// It answered nothing.
-    Silent {
-        /// To which step.
-        step: &'static str,
-        /// For how long (wall time).
-        waited: Duration,
-    },
-    /// It refused a step.
-    Refused {
-        /// Which.
-        step: &'static str,
-    },
-    /// Its device vanished meanwhile.
-    Gone,
-}
-
-impl fmt::Display for SlcanFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Silent { step, waited } => write!(
-                f,
-                "did not answer to `{step}` within {waited:?}; is it an SLCAN adapter, is \
-                 its baud rate right?"
-            ),
-            Self::Refused { step } => write!(f, "refused `{step}`; unplug it and try again"),
-            Self::Gone => f.write_str("vanished while it was set up"),
-        }
-    }
-}
-
-/// The steps of the start, in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    /// Clears the adapter's line, closes the channel; `V` marks the end of old answers.
-    Close,
-    Bitrate,
-    Timestamps,
-    Open,
-}
-
-impl Step {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Close => "C",
-            Self::Bitrate => "S",
-            Self::Timestamps => "Z",
-            Self::Open => "O",
-        }
-    }
-
-    const fn next(self) -> Option<Self> {
-        match self {
-            Self::Close => Some(Self::Bitrate),
-            Self::Bitrate => Some(Self::Timestamps),
-            Self::Timestamps => Some(Self::Open),
-            Self::Open => None,
-        }
-    }
-
-    fn lines(self, settings: &SlcanSettings, bitrate: BitrateCode) -> Vec<u8> {
-        match self {
-            Self::Close => [
-                b"\r\r".as_slice(),
-                &Command::Close.emit(),
-                &Command::ReadVersion.emit(),
-            ]
-            .concat(),
-            Self::Bitrate => Command::Bitrate(bitrate).emit(),
-            Self::Timestamps => Command::Timestamps(settings.timestamps).emit(),
-            Self::Open => Command::Open.emit(),
-        }
-    }
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
@@ -146,59 +37,6 @@ enum State {
     Open,
     Failed(SlcanFailure),
     Gone,
-}
-
-/// What an answer will belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Asked {
-    Transmit,
-    Status,
-}
-
-/// The line out: commands and what they still owe an answer for, in one order.
-struct Lines {
-    clock: Clock,
-    outbox: Outbox,
-    asked: VecDeque<(Asked, Time)>,
-    answers: bool,
-    open: bool,
-}
-
-impl Lines {
-    fn send(&mut self, asked: Asked, line: &[u8]) -> Result<(), Errno> {
-        if !self.open {
-            return Err(Errno::ENETDOWN);
-        }
-        if self.asked.len() >= ASKED_MAX {
-            return Err(Errno::EAGAIN);
-        }
-        self.outbox.send(line)?;
-        if self.answers {
-            self.asked.push_back((asked, self.clock.now()));
-        }
-        Ok(())
-    }
-}
-
-/// The writing side, shared with the SYNC thread: whole lines, one after the other.
-struct SharedLines(Mutex<Lines>);
-
-impl SharedLines {
-    fn lock(&self) -> MutexGuard<'_, Lines> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl SyncSink for SharedLines {
-    fn send_sync(&self) -> Result<(), Errno> {
-        let mut lines = self.lock();
-        lines.outbox.flush()?;
-        // A SYNC behind waiting lines would be late: rather none.
-        if lines.outbox.is_pending() {
-            return Err(Errno::EAGAIN);
-        }
-        lines.send(Asked::Transmit, &Command::Transmit(emit_sync(None)).emit())
-    }
 }
 
 /// An SLCAN adapter.
@@ -247,13 +85,6 @@ impl SlcanPort {
             path: path.to_owned(),
             bitrate: settings.bitrate,
         })?;
-        let lines = Lines {
-            clock,
-            outbox: Outbox::new(PENDING_MAX),
-            asked: VecDeque::new(),
-            answers: settings.answers,
-            open: false,
-        };
         let mut slcan = Self {
             port,
             clock,
@@ -261,7 +92,7 @@ impl SlcanPort {
             settings,
             bitrate,
             descriptor: None,
-            lines: Arc::new(SharedLines(Mutex::new(lines))),
+            lines: Arc::new(SharedLines::new(clock, settings.answers)),
             buffer: LineBuffer::default(),
             state: State::Gone,
             reported: LinkState::Up,
@@ -475,7 +306,7 @@ impl SlcanPort {
                 self.answered(Asked::Status);
                 self.status(now, flags);
             }
-            Reply::BusState(state) => self.bus_state(now, state),
+            Reply::BusState(state) => self.queued.push_back((now, health::of_state(state))),
             Reply::Version(_) | Reply::Serial(_) => {}
             Reply::Unknown(_) => {
                 self.counts.unknown_lines += 1;
@@ -499,65 +330,17 @@ impl SlcanPort {
         let asked = self.lines.lock().asked.pop_front();
         self.counts.refused_by_adapter += 1;
         if matches!(asked, Some((Asked::Transmit, _))) {
-            self.controller_problem(now, ControllerProblem::TX_OVERFLOW);
+            self.queued.push_back((now, health::transmit_overflow()));
             // The flags say why.
             self.next_status = now;
         }
     }
 
-    fn controller_problem(&mut self, now: Time, controller: ControllerProblem) {
-        let class = BusErrorClass::CONTROLLER;
-        self.bus_error(now, class, controller);
-    }
-
-    fn bus_error(&mut self, now: Time, class: BusErrorClass, controller: ControllerProblem) {
-        let error = BusError { class, controller };
-        self.queued.push_back((now, Input::BusError(error)));
-    }
-
-    /// Events are reported each time, lasting states when they begin or end.
     fn status(&mut self, now: Time, flags: StatusFlags) {
         let before = core::mem::replace(&mut self.flags, flags);
-        let passive = ControllerProblem::RX_PASSIVE | ControllerProblem::TX_PASSIVE;
-        let warning = ControllerProblem::RX_WARNING | ControllerProblem::TX_WARNING;
-        if flags.intersects(StatusFlags::RX_FULL | StatusFlags::OVERRUN) {
-            // How many, the protocol does not say: at least one.
-            self.queued.push_back((now, Input::Lost(1)));
-        }
-        if flags.contains(StatusFlags::TX_FULL) {
-            self.controller_problem(now, ControllerProblem::TX_OVERFLOW);
-        }
-        if flags.contains(StatusFlags::BUS_ERROR) {
-            self.bus_error(now, BusErrorClass::BUS_ERROR, ControllerProblem::empty());
-        }
-        let lasting = StatusFlags::PASSIVE | StatusFlags::WARNING;
-        if (flags ^ before).intersects(lasting) {
-            let controller = if flags.contains(StatusFlags::PASSIVE) {
-                passive
-            } else if flags.contains(StatusFlags::WARNING) {
-                warning
-            } else {
-                ControllerProblem::ACTIVE
-            };
-            self.controller_problem(now, controller);
-        }
-    }
-
-    fn bus_state(&mut self, now: Time, state: BusState) {
-        match state {
-            BusState::Active => self.controller_problem(now, ControllerProblem::ACTIVE),
-            BusState::Warning => self.controller_problem(
-                now,
-                ControllerProblem::RX_WARNING | ControllerProblem::TX_WARNING,
-            ),
-            BusState::Passive => self.controller_problem(
-                now,
-                ControllerProblem::RX_PASSIVE | ControllerProblem::TX_PASSIVE,
-            ),
-            BusState::Off | BusState::Stopped => {
-                self.bus_error(now, BusErrorClass::BUS_OFF, ControllerProblem::empty());
-            }
-        }
+        let inputs = health::of_flags(before, flags);
+        self.queued
+            .extend(inputs.into_iter().map(|input| (now, input)));
     }
 
     /// Looks after answers that do not come, and asks for the status flags.
