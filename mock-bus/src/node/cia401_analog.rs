@@ -1,1 +1,476 @@
-//! Placeholder.
+//! An emulated CiA 401 module with analog inputs.
+//!
+//! Purpose: the ADC that reads the Hall sensors. Channels are sampled when they are asked
+//! for: at the SYNC of a synchronous TPDO, by SDO, and, once 0x6423 enables it, at the
+//! sampling period of the event-driven TPDO.
+//!
+//! Source: CiA 401 (V3), clause "analog inputs"; default PDOs and the disabled 0x6423 as in
+//! SYSTEC's Chip F40. Absent: digital inputs and outputs, 0x6403 and other float inputs,
+//! negative and positive deltas apart.
+//!
+//! | object | name |
+//! |---|---|
+//! | 0x6401 | reading = (raw + 0x6431) · 0x6432, an i16 that saturates; raw is left-justified |
+//! | 0x6424, 0x6425, 0x6426 | upper limit, lower limit, delta of the event, in 0x6401's unit |
+
+use std::time::Duration;
+
+use drivers::wire::Payload;
+use drivers::wire::can::CanFrame;
+use drivers::wire::canopen::nmt::NmtState;
+use drivers::wire::canopen::pdo::MappedObject;
+use drivers::wire::canopen::{Function, NodeId, Object};
+use serde::{Deserialize, Serialize};
+use units::Time;
+
+use super::Node;
+use super::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
+use super::canopen_server::{
+    CanopenServer, Deliveries, Description, Identity, Manners, PdoDefault, ServerEvent,
+};
+use super::cia402_drive::checked_node_id;
+use crate::plant::Plant;
+
+/// CiA 401 with analog inputs.
+const DEVICE_TYPE: u32 = 0x0004_0191;
+/// Channels per TPDO: 8 bytes of i16.
+const PER_PDO: usize = 4;
+
+/// An emulated analog module; every key has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Cia401AnalogConfig {
+    /// CANopen node identifier, 1 to 127.
+    #[serde(deserialize_with = "checked_node_id")]
+    pub node_id: u8,
+    /// 0x1018.
+    pub identity: Identity,
+    /// 0x1008.
+    pub device_name: String,
+    /// 0x1009.
+    pub hardware_version: String,
+    /// 0x100A.
+    pub software_version: String,
+    /// From power-on to the boot-up message.
+    pub boot_delay_ms: u64,
+    /// 0x1017 at power-on.
+    pub heartbeat_ms: u16,
+    /// Which of the plant's analog inputs each channel is wired to.
+    pub plant_channels: Vec<usize>,
+    /// What 32768 would read, per channel; a missing one is as the last.
+    pub full_scale_v: Vec<f64>,
+    /// Bits of the converter; the others are 0.
+    pub resolution_bits: u8,
+    /// How often the channels are sampled for the event-driven TPDO.
+    pub sampling_period_ms: u64,
+    /// How badly it behaves.
+    pub manners: Manners,
+}
+
+impl Default for Cia401AnalogConfig {
+    fn default() -> Self {
+        Self {
+            node_id: 2,
+            identity: Identity {
+                product_code: 0x0040_0001,
+                ..Identity::default()
+            },
+            device_name: "truestage mock analog input".into(),
+            hardware_version: "mock-bus 1".into(),
+            software_version: concat!("mock-bus ", env!("CARGO_PKG_VERSION")).into(),
+            boot_delay_ms: 50,
+            heartbeat_ms: 0,
+            plant_channels: vec![0, 1],
+            full_scale_v: vec![10.0],
+            resolution_bits: 16,
+            sampling_period_ms: 10,
+            manners: Manners::default(),
+        }
+    }
+}
+
+/// What the terminals are wired to.
+trait Terminals {
+    /// Volts at an input of the plant.
+    fn volts(&mut self, channel: usize) -> f64;
+}
+
+impl Terminals for Plant {
+    fn volts(&mut self, channel: usize) -> f64 {
+        self.analog_volts(channel)
+    }
+}
+
+/// An emulated analog module on the bus.
+#[derive(Debug)]
+pub struct Cia401AnalogNode {
+    config: Cia401AnalogConfig,
+    server: CanopenServer,
+    sample_due: Time,
+    /// What the last event reported, per channel.
+    reported: Vec<Option<i64>>,
+}
+
+impl Cia401AnalogNode {
+    /// A module that was powered at [`Time::ZERO`] and boots.
+    ///
+    /// # Panics
+    /// When `config.node_id` is not 1 to 127, which reading a configuration file refuses.
+    pub fn new(config: Cia401AnalogConfig) -> Self {
+        let node = NodeId::new(config.node_id).expect("node_id is 1 to 127");
+        let server = CanopenServer::new(
+            node,
+            Duration::from_millis(config.boot_delay_ms),
+            &description(&config, node),
+            dictionary(&config),
+            config.manners.clone(),
+        );
+        let reported = vec![None; config.plant_channels.len()];
+        Self {
+            config,
+            server,
+            sample_due: Time::NEVER,
+            reported,
+        }
+    }
+
+    /// What it still spoils; writing it spoils what comes next.
+    pub fn manners_mut(&mut self) -> &mut Manners {
+        self.server.manners_mut()
+    }
+
+    /// Which faults were delivered, and how often.
+    pub const fn deliveries(&self) -> &Deliveries {
+        self.server.deliveries()
+    }
+
+    fn handle_frame(&mut self, now: Time, frame: &CanFrame, terminals: &mut impl Terminals) {
+        if !self.server.is_powered() || !self.server.concerns(frame) {
+            return;
+        }
+        let own_request = self.server.node().cob_id(Function::SdoRequest);
+        if frame.standard_id() == Some(own_request) {
+            self.sample(terminals);
+        }
+        self.server.handle(now, frame);
+        self.settle(now, terminals);
+    }
+
+    fn pass_time(&mut self, now: Time, terminals: &mut impl Terminals) {
+        if !self.server.is_powered() {
+            return;
+        }
+        if self.sample_due <= now {
+            self.sample_due = now + self.sampling_period();
+            self.sample(terminals);
+            self.report_events(now);
+        }
+        self.server.advance(now);
+        self.settle(now, terminals);
+    }
+
+    fn settle(&mut self, now: Time, terminals: &mut impl Terminals) {
+        while let Some(event) = self.server.poll_event() {
+            match event {
+                ServerEvent::Synchronised => {
+                    if self.server.has_synchronous_tpdo() {
+                        self.sample(terminals);
+                    }
+                    self.server.send_synchronous(now);
+                }
+                ServerEvent::Written(_) | ServerEvent::Nmt(_) | ServerEvent::ResetNode => {
+                    self.schedule(now);
+                }
+                ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
+            }
+        }
+    }
+
+    fn sampling_period(&self) -> Duration {
+        Duration::from_millis(self.config.sampling_period_ms.max(1))
+    }
+
+    /// The converter runs by itself only while events are enabled and may be sent.
+    fn schedule(&mut self, now: Time) {
+        let enabled = self.server.get(0x6423, 0) != 0;
+        let operational = self.server.nmt_state() == Some(NmtState::Operational);
+        if !(enabled && operational) {
+            self.sample_due = Time::NEVER;
+            self.reported.fill(None);
+        } else if self.sample_due == Time::NEVER {
+            self.sample_due = now;
+        }
+    }
+
+    fn sample(&mut self, terminals: &mut impl Terminals) {
+        for (place, wired) in self.config.plant_channels.iter().enumerate() {
+            let full_scale = full_scale(&self.config, place);
+            let volts = terminals.volts(*wired);
+            let raw = convert(volts, full_scale, self.config.resolution_bits);
+            let sub = place as u8 + 1;
+            let offset = self.server.get(0x6431, sub);
+            let scaled = (raw + offset) * self.server.get(0x6432, sub);
+            let reading = scaled.clamp(i64::from(i16::MIN), i64::from(i16::MAX));
+            self.server.set(0x6401, sub, reading);
+        }
+    }
+
+    /// Which channels have an event, and the TPDOs that carry them.
+    fn report_events(&mut self, now: Time) {
+        for place in 0..self.reported.len() {
+            let sub = place as u8 + 1;
+            let reading = self.server.get(0x6401, sub);
+            let cause = self.interrupt_cause(sub, reading, self.reported[place]);
+            if cause != 0 {
+                self.reported[place] = Some(reading);
+                self.server.trigger(now, Object::new(0x6401, sub));
+            }
+        }
+    }
+
+    /// The bits of 0x6421 that hold: 0 above the upper limit, 1 below the lower one, 2 changed
+    /// by more than delta. A limit repeats only after a change by more than delta.
+    fn interrupt_cause(&self, sub: u8, reading: i64, reported: Option<i64>) -> i64 {
+        let delta = self.server.get(0x6426, sub);
+        let changed = reported.is_none_or(|last| (reading - last).abs() > delta);
+        let above = reading >= self.server.get(0x6424, sub);
+        let below = reading < self.server.get(0x6425, sub);
+        let causes = i64::from(above) | i64::from(below) << 1 | 1 << 2;
+        if changed {
+            causes & self.server.get(0x6421, sub)
+        } else {
+            0
+        }
+    }
+}
+
+fn full_scale(config: &Cia401AnalogConfig, place: usize) -> f64 {
+    let own = config.full_scale_v.get(place);
+    *own.or(config.full_scale_v.last()).unwrap_or(&10.0)
+}
+
+/// Volts to a left-justified 16-bit reading; beyond its range the converter stays at the rail.
+fn convert(volts: f64, full_scale: f64, resolution_bits: u8) -> i64 {
+    let step = 1_i64 << (16 - resolution_bits.clamp(1, 16));
+    let steps = (volts / full_scale * 32768.0 / step as f64).round() as i64;
+    let highest = 32768 / step - 1;
+    steps.clamp(-highest - 1, highest) * step
+}
+
+fn dictionary(config: &Cia401AnalogConfig) -> Dictionary {
+    use Kind::{I16, I32, U8, U32};
+    const REAL32_ONE: i64 = 0x3F80_0000;
+    let mut dictionary = Dictionary::default();
+    let channels = config.plant_channels.len();
+    let mut array = |index, entry: Entry| dictionary.insert_array(index, vec![entry; channels]);
+    array(0x6401, Entry::read_only(I16, 0).mapped(Mapping::Transmit));
+    let trigger = Entry::read_write(U8, 7).bounded(Bounds::Between(0, 7));
+    array(0x6421, trigger);
+    array(0x6424, Entry::read_write(I32, 0));
+    array(0x6425, Entry::read_write(I32, 0));
+    array(0x6426, Entry::read_write(U32, 0));
+    array(0x642F, Entry::read_write(U32, REAL32_ONE));
+    array(0x6431, Entry::read_write(I32, 0));
+    array(0x6432, Entry::read_write(I32, 1));
+    let enable = Entry::number(U8, Access::ReadWrite, 0).bounded(Bounds::Between(0, 1));
+    dictionary.insert(0x6423, 0, enable);
+    dictionary
+}
+
+/// TPDO1 is the digital inputs' and switched off here; TPDO2 and 3 carry four channels each.
+fn description(config: &Cia401AnalogConfig, node: NodeId) -> Description {
+    const OFF: u32 = 1 << 31;
+    let channels = config.plant_channels.len();
+    let mapped = |first: usize| {
+        let last = channels.min(first + PER_PDO - 1);
+        (first..=last).map(|sub| MappedObject::new(0x6401, sub as u8, 16))
+    };
+    let tpdo = |function, flags: u32, mapping: Vec<MappedObject>| PdoDefault {
+        cob_id: flags | u32::from(node.cob_id(function)),
+        transmission: 255,
+        inhibit_100us: 500,
+        event_timer_ms: 0,
+        mapping,
+    };
+    let third = if channels > PER_PDO { 0 } else { OFF };
+    Description {
+        device_type: DEVICE_TYPE,
+        device_name: config.device_name.clone(),
+        hardware_version: config.hardware_version.clone(),
+        software_version: config.software_version.clone(),
+        identity: config.identity,
+        heartbeat_ms: config.heartbeat_ms,
+        rpdos: Vec::new(),
+        tpdos: vec![
+            tpdo(Function::Tpdo1, OFF, Vec::new()),
+            tpdo(Function::Tpdo2, 0, mapped(1).collect()),
+            tpdo(Function::Tpdo3, third, mapped(PER_PDO + 1).collect()),
+        ],
+    }
+}
+
+impl Node for Cia401AnalogNode {
+    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
+        if let Payload::Frame(frame) = payload {
+            self.handle_frame(now, frame, plant);
+        }
+    }
+
+    fn advance(&mut self, now: Time, plant: &mut Plant) {
+        self.pass_time(now, plant);
+    }
+
+    fn next_event(&self) -> Time {
+        self.sample_due.min(self.server.next_event())
+    }
+
+    fn poll_transmit(&mut self) -> Option<Payload> {
+        self.server.poll_transmit().map(Payload::Frame)
+    }
+
+    fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
+        self.sample_due = Time::NEVER;
+        self.server.power_off();
+    }
+
+    fn power_on(&mut self, now: Time, _plant: &mut Plant) {
+        self.reported.fill(None);
+        self.server.power_on(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Bench(Vec<f64>);
+
+    impl Terminals for Bench {
+        fn volts(&mut self, channel: usize) -> f64 {
+            self.0[channel]
+        }
+    }
+
+    fn module() -> Cia401AnalogNode {
+        let mut module = Cia401AnalogNode::new(Cia401AnalogConfig::default());
+        module.pass_time(Time::from_seconds(0.1), &mut Bench(vec![0.0; 2]));
+        let _ = frames(&mut module);
+        module
+    }
+
+    fn frames(module: &mut Cia401AnalogNode) -> Vec<String> {
+        std::iter::from_fn(|| module.server.poll_transmit())
+            .map(|frame| frame.to_string())
+            .collect()
+    }
+
+    fn send(
+        module: &mut Cia401AnalogNode,
+        seconds: f64,
+        id: u16,
+        data: &[u8],
+        volts: [f64; 2],
+    ) -> Vec<String> {
+        let now = Time::from_seconds(seconds);
+        let frame = CanFrame::standard(id, data);
+        module.handle_frame(now, &frame, &mut Bench(volts.to_vec()));
+        frames(module)
+    }
+
+    const START: [u8; 2] = [1, 2];
+    const ENABLE_EVENTS: [u8; 8] = [0x2F, 0x23, 0x64, 0, 1, 0, 0, 0];
+
+    #[test]
+    fn volts_become_left_justified_readings_that_stop_at_the_rails() {
+        assert_eq!(convert(5.0, 10.0, 16), 16384);
+        assert_eq!(convert(-5.0, 10.0, 16), -16384);
+        assert_eq!(convert(11.0, 10.0, 16), 32767);
+        assert_eq!(convert(-11.0, 10.0, 16), -32768);
+        assert_eq!(convert(11.0, 10.0, 12), 32752);
+        assert_eq!(convert(0.0049, 10.0, 12) % 16, 0);
+    }
+
+    #[test]
+    fn no_analog_pdo_comes_before_6423_enables_it() {
+        let mut module = module();
+        assert!(send(&mut module, 0.2, 0, &START, [1.0, 2.0]).is_empty());
+        assert_eq!(module.next_event(), Time::NEVER);
+        let reply = send(&mut module, 0.3, 0x602, &ENABLE_EVENTS, [5.0, -5.0]);
+        assert_eq!(reply, ["582#6023640000000000"]);
+        module.pass_time(Time::from_seconds(0.3), &mut Bench(vec![5.0, -5.0]));
+        assert_eq!(frames(&mut module), ["282#004000C0"]);
+    }
+
+    #[test]
+    fn an_event_needs_more_than_delta_and_waits_for_the_inhibit_time() {
+        let mut module = module();
+        let _ = send(&mut module, 0.2, 0, &START, [0.0; 2]);
+        let delta = [0x23, 0x26, 0x64, 1, 100, 0, 0, 0];
+        let _ = send(&mut module, 0.3, 0x602, &delta, [0.0; 2]);
+        let _ = send(&mut module, 0.3, 0x602, &ENABLE_EVENTS, [0.0; 2]);
+        module.pass_time(Time::from_seconds(0.30), &mut Bench(vec![0.0; 2]));
+        assert_eq!(frames(&mut module), ["282#00000000"]);
+        module.pass_time(Time::from_seconds(0.31), &mut Bench(vec![0.03, 0.0]));
+        assert!(
+            frames(&mut module).is_empty(),
+            "98 digits are less than delta"
+        );
+        module.pass_time(Time::from_seconds(0.32), &mut Bench(vec![5.0, 0.0]));
+        assert!(frames(&mut module).is_empty(), "inhibited for 50 ms");
+        module.pass_time(Time::from_seconds(0.35), &mut Bench(vec![5.0, 0.0]));
+        assert_eq!(frames(&mut module), ["282#00400000"]);
+    }
+
+    #[test]
+    fn remapped_to_synchronous_it_samples_at_every_sync() {
+        let mut module = module();
+        let off = [0x23, 0x01, 0x18, 1, 0x82, 0x02, 0, 0x80];
+        let synchronous = [0x2F, 0x01, 0x18, 2, 1, 0, 0, 0];
+        let on = [0x23, 0x01, 0x18, 1, 0x82, 0x02, 0, 0x00];
+        for request in [off, synchronous, on] {
+            let reply = send(&mut module, 0.2, 0x602, &request, [0.0; 2]);
+            assert!(reply[0].starts_with("582#60"), "{reply:?}");
+        }
+        let _ = send(&mut module, 0.3, 0, &START, [0.0; 2]);
+        assert_eq!(
+            send(&mut module, 0.4, 0x80, &[], [2.5, 0.0]),
+            ["282#00200000"]
+        );
+        assert_eq!(
+            send(&mut module, 0.5, 0x80, &[], [0.0, 2.5]),
+            ["282#00000020"]
+        );
+    }
+
+    #[test]
+    fn an_upload_reads_the_present_voltage() {
+        let mut module = module();
+        let read = [0x40, 0x01, 0x64, 1, 0, 0, 0, 0];
+        let reply = send(&mut module, 0.2, 0x602, &read, [5.0, 0.0]);
+        assert_eq!(reply, ["582#4B01640100400000"]);
+        let beyond = [0x40, 0x01, 0x64, 3, 0, 0, 0, 0];
+        let reply = send(&mut module, 0.2, 0x602, &beyond, [5.0, 0.0]);
+        assert_eq!(reply, ["582#8001640311000906"]);
+    }
+
+    #[test]
+    fn offset_and_scaling_change_the_reading() {
+        let mut module = module();
+        let offset = [0x23, 0x31, 0x64, 1, 0x9C, 0xFF, 0xFF, 0xFF];
+        let scaling = [0x23, 0x32, 0x64, 1, 0xFF, 0xFF, 0xFF, 0xFF];
+        let _ = send(&mut module, 0.2, 0x602, &offset, [0.0; 2]);
+        let _ = send(&mut module, 0.2, 0x602, &scaling, [0.0; 2]);
+        let read = [0x40, 0x01, 0x64, 1, 0, 0, 0, 0];
+        let reply = send(&mut module, 0.2, 0x602, &read, [0.0; 2]);
+        assert_eq!(reply, ["582#4B01640164000000"]);
+    }
+
+    #[test]
+    fn a_node_id_of_zero_and_an_unknown_key_are_refused_when_the_file_is_read() {
+        let zero = toml::from_str::<Cia401AnalogConfig>("node_id = 0");
+        assert!(zero.unwrap_err().to_string().contains("1 to 127"));
+        assert!(toml::from_str::<Cia401AnalogConfig>("full_scale = 10").is_err());
+        let two = toml::from_str::<Cia401AnalogConfig>("full_scale_v = [10.0, 5.0]");
+        assert_eq!(full_scale(&two.unwrap(), 1), 5.0);
+    }
+}

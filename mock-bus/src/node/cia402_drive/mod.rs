@@ -1,0 +1,391 @@
+//! An emulated CiA 402 servo drive over one axis of the plant.
+//!
+//! Purpose: the drive as a master meets it: power state machine, profile position with its
+//! set-point handshake, homing, quick stop, limits, following error, heartbeat reaction, and
+//! the default PDOs of a real drive. Its position loop is the plant's; the drive gives it a
+//! demand at the servo rate while something moves, and none while nothing does.
+//!
+//! Source: CiA 402-2 and -3 (IEC 61800-7-201), CiA 301; the quirks are those of the drives in
+//! protocols.md, 3.4. Absent: velocity and torque modes, touch probes, jerk, index pulses.
+//!
+//! | symbol | name |
+//! |---|---|
+//! | 0x6064 | actual = sign · encoder counts + offset, as i32 (it wraps) |
+//! | 0x6062 | demand, from the [profile](super::profile) |
+//! | 0x60F4 | following error = demand − actual |
+
+mod config;
+mod homing;
+mod mechanism;
+mod motion;
+mod objects;
+mod positioning;
+mod power;
+mod status;
+mod supervision;
+#[cfg(test)]
+mod tests;
+mod transitions;
+
+use std::time::Duration;
+
+use drivers::wire::Payload;
+use drivers::wire::can::CanFrame;
+use drivers::wire::canopen::NodeId;
+use drivers::wire::canopen::emcy::EmergencyCode;
+use drivers::wire::canopen::nmt::NmtState;
+use drivers::wire::cia402::{Controlword, HomingStatus};
+use units::Time;
+
+pub(in crate::node) use config::checked_node_id;
+pub use config::{Cia402DriveConfig, DriveQuirks};
+
+use super::Node;
+use super::canopen_server::{CanopenServer, Deliveries, Manners, ServerEvent};
+use super::profile::Profile;
+use crate::plant::Plant;
+use mechanism::{Mechanism, PlantAxis};
+use motion::Activity;
+use positioning::Positioning;
+use power::{Command, Power};
+
+const PROFILE_POSITION: i64 = 1;
+const HOMING: i64 = 6;
+const CYCLIC_POSITION: i64 = 8;
+
+/// An emulated drive on the bus.
+#[derive(Debug)]
+pub struct Cia402DriveNode {
+    drive: Drive,
+}
+
+impl Cia402DriveNode {
+    /// A drive that was powered at [`Time::ZERO`] and boots.
+    ///
+    /// # Panics
+    /// When `config.node_id` is not 1 to 127, which reading a configuration file refuses.
+    pub fn new(config: Cia402DriveConfig) -> Self {
+        Self {
+            drive: Drive::new(config),
+        }
+    }
+
+    /// Opens (`true`) or closes the safe torque off input; it takes effect when the node is
+    /// advanced next.
+    pub fn set_safe_torque_off(&mut self, open: bool) {
+        self.drive.safe_torque_off = open;
+        self.drive.look_now();
+    }
+
+    /// Local control (`true`): the statusword's remote bit is 0 and controlwords are ignored.
+    pub fn set_local_control(&mut self, local: bool) {
+        self.drive.local_control = local;
+        self.drive.look_now();
+    }
+
+    /// The drive finds an error of its own (`Some`), or its cause goes away (`None`).
+    pub fn set_internal_error(&mut self, code: Option<EmergencyCode>) {
+        self.drive.internal_error = code;
+        self.drive.look_now();
+    }
+
+    /// What the communication still spoils; writing it spoils what comes next.
+    pub fn manners_mut(&mut self) -> &mut Manners {
+        self.drive.server.manners_mut()
+    }
+
+    /// How the drive itself misbehaves.
+    pub fn quirks_mut(&mut self) -> &mut DriveQuirks {
+        &mut self.drive.config.quirks
+    }
+
+    /// Which faults were delivered, and how often.
+    pub fn deliveries(&self) -> &Deliveries {
+        self.drive.server.deliveries()
+    }
+
+    fn axis<'a>(&self, plant: &'a mut Plant) -> PlantAxis<'a> {
+        let axis = self.drive.config.axis;
+        PlantAxis { plant, axis }
+    }
+}
+
+impl Node for Cia402DriveNode {
+    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
+        if let Payload::Frame(frame) = payload {
+            let mut axis = self.axis(plant);
+            self.drive.handle(now, frame, &mut axis);
+        }
+    }
+
+    fn advance(&mut self, now: Time, plant: &mut Plant) {
+        let mut axis = self.axis(plant);
+        self.drive.advance(now, &mut axis);
+    }
+
+    fn next_event(&self) -> Time {
+        self.drive.next_event()
+    }
+
+    fn poll_transmit(&mut self) -> Option<Payload> {
+        self.drive.server.poll_transmit().map(Payload::Frame)
+    }
+
+    fn power_off(&mut self, _now: Time, plant: &mut Plant) {
+        let mut axis = self.axis(plant);
+        self.drive.power_off(&mut axis);
+    }
+
+    fn power_on(&mut self, now: Time, plant: &mut Plant) {
+        let mut axis = self.axis(plant);
+        self.drive.power_on(now, &mut axis);
+    }
+}
+
+/// The drive over any mechanism.
+#[derive(Debug)]
+struct Drive {
+    config: Cia402DriveConfig,
+    server: CanopenServer,
+    power: Power,
+    /// What the last controlword asks for; `None` once the drive changed state by itself.
+    command: Option<Command>,
+    /// The next transition is not before this.
+    power_free: Time,
+    controlword: Controlword,
+    mode_due: Time,
+    /// Actual position = sign · encoder counts + offset.
+    offset: i64,
+    homed: bool,
+    profile: Profile,
+    activity: Activity,
+    positioning: Positioning,
+    homing: HomingStatus,
+    /// Whether the power stage controls the motor.
+    servo_on: bool,
+    /// The last demand given to the plant, in metres.
+    sent_demand: Option<f64>,
+    /// Where the demand was when the power stage was switched on.
+    enabled_at: f64,
+    servo_due: Time,
+    following_since: Option<Time>,
+    in_window_since: Option<Time>,
+    internal_limit: bool,
+    fault: Option<EmergencyCode>,
+    safe_torque_off: bool,
+    local_control: bool,
+    heartbeat_lost: bool,
+    internal_error: Option<EmergencyCode>,
+}
+
+impl Drive {
+    fn new(config: Cia402DriveConfig) -> Self {
+        let node = NodeId::new(config.node_id).expect("node_id is 1 to 127");
+        let server = CanopenServer::new(
+            node,
+            Duration::from_millis(config.boot_delay_ms),
+            &objects::description(&config, node),
+            objects::dictionary(&config),
+            config.manners.clone(),
+        );
+        Self {
+            config,
+            server,
+            power: Power::NotReady,
+            command: None,
+            power_free: Time::ZERO,
+            controlword: Controlword::empty(),
+            mode_due: Time::NEVER,
+            offset: 0,
+            homed: false,
+            profile: Profile::resting(0.0),
+            activity: Activity::Standing,
+            positioning: Positioning::default(),
+            homing: HomingStatus::NotStarted,
+            servo_on: false,
+            sent_demand: None,
+            enabled_at: 0.0,
+            servo_due: Time::ZERO,
+            following_since: None,
+            in_window_since: None,
+            internal_limit: false,
+            fault: None,
+            safe_torque_off: false,
+            local_control: false,
+            heartbeat_lost: false,
+            internal_error: None,
+        }
+    }
+
+    /// The processor starts: everything volatile has its power-on value, also the position
+    /// counter, which knows no origin.
+    fn boot(&mut self, m: &mut impl Mechanism) {
+        self.switch_off(m);
+        self.power = Power::NotReady;
+        self.command = None;
+        self.controlword = Controlword::empty();
+        self.mode_due = Time::NEVER;
+        self.homed = false;
+        self.offset = -self.sign() * m.counts();
+        self.profile = Profile::resting(0.0);
+        self.positioning = Positioning::default();
+        self.homing = HomingStatus::NotStarted;
+        self.internal_limit = false;
+        self.fault = None;
+        self.heartbeat_lost = false;
+        self.following_since = None;
+        self.in_window_since = None;
+        self.server.set(0x6040, 0, 0);
+        let mode = self.server.get(0x6060, 0);
+        self.server.set(0x6061, 0, mode);
+        self.look_now();
+    }
+
+    fn power_on(&mut self, now: Time, m: &mut impl Mechanism) {
+        m.encoder_power(true);
+        self.server.power_on(now);
+        self.boot(m);
+    }
+
+    fn power_off(&mut self, m: &mut impl Mechanism) {
+        self.switch_off(m);
+        m.encoder_power(false);
+        self.server.power_off();
+    }
+
+    /// Looks after itself as soon as it is advanced.
+    fn look_now(&mut self) {
+        self.servo_due = Time::ZERO;
+    }
+
+    fn handle(&mut self, now: Time, frame: &CanFrame, m: &mut impl Mechanism) {
+        if !self.server.is_powered() || !self.server.concerns(frame) {
+            return;
+        }
+        self.publish(now, m);
+        self.server.handle(now, frame);
+        self.settle(now, m);
+    }
+
+    fn advance(&mut self, now: Time, m: &mut impl Mechanism) {
+        if !self.server.is_powered() {
+            return;
+        }
+        if self.own_event() <= now {
+            self.step(now, m);
+        }
+        self.publish(now, m);
+        self.server.advance(now);
+        self.settle(now, m);
+    }
+
+    fn next_event(&self) -> Time {
+        if !self.server.is_powered() {
+            return Time::NEVER;
+        }
+        self.own_event().min(self.server.next_event())
+    }
+
+    fn own_event(&self) -> Time {
+        let transition = match self.pending_transition() {
+            Some(_) => self.power_free,
+            None => Time::NEVER,
+        };
+        self.servo_due.min(self.mode_due).min(transition)
+    }
+
+    /// One round of the drive's own work.
+    fn step(&mut self, now: Time, m: &mut impl Mechanism) {
+        self.follow_mode(now);
+        self.supervise(now, m);
+        self.proceed(now, m);
+        self.pass_power(now, m);
+        self.command_servo(now, m);
+        self.schedule(now);
+    }
+
+    fn schedule(&mut self, now: Time) {
+        let period = if self.is_busy(now) {
+            Duration::from_micros(self.config.servo_period_us.max(1))
+        } else {
+            Duration::from_millis(self.config.supervision_period_ms.max(1))
+        };
+        let next = now + period;
+        self.servo_due = if self.servo_due <= now {
+            next
+        } else {
+            self.servo_due.min(next)
+        };
+    }
+
+    /// Acts on what the frames said, until nothing is left to act on.
+    fn settle(&mut self, now: Time, m: &mut impl Mechanism) {
+        while let Some(event) = self.server.poll_event() {
+            self.on_event(now, event, m);
+        }
+        self.publish(now, m);
+        self.server.send_changes(now);
+    }
+
+    fn on_event(&mut self, now: Time, event: ServerEvent, m: &mut impl Mechanism) {
+        match event {
+            ServerEvent::Written(object) => match object.index {
+                0x6040 => self.on_controlword(now, m),
+                0x6060 => self.change_mode(now),
+                _ => {}
+            },
+            ServerEvent::Synchronised => {
+                self.on_sync(now, m);
+                self.publish(now, m);
+                self.server.send_synchronous(now);
+            }
+            ServerEvent::Nmt(state) => {
+                if self.power == Power::NotReady {
+                    self.power = Power::SwitchOnDisabled;
+                }
+                if state == NmtState::Stopped {
+                    self.abort_connection(now, m);
+                }
+            }
+            ServerEvent::ResetNode => self.boot(m),
+            ServerEvent::HeartbeatLost(_) => {
+                self.heartbeat_lost = true;
+                self.abort_connection(now, m);
+            }
+            ServerEvent::HeartbeatBack(_) => self.heartbeat_lost = false,
+        }
+    }
+
+    fn get(&self, index: u16) -> i64 {
+        self.server.get(index, 0)
+    }
+
+    /// 0x6061, the mode in force.
+    fn mode(&self) -> i64 {
+        self.get(0x6061)
+    }
+
+    fn change_mode(&mut self, now: Time) {
+        let lag = Duration::from_millis(self.config.mode_lag_ms);
+        self.mode_due = now + lag;
+    }
+
+    /// 0x6061 follows 0x6060; what the old mode was doing is slowed down and given up.
+    fn follow_mode(&mut self, now: Time) {
+        if now < self.mode_due {
+            return;
+        }
+        self.mode_due = Time::NEVER;
+        let mode = self.get(0x6060);
+        if mode == self.mode() {
+            return;
+        }
+        self.server.set(0x6061, 0, mode);
+        self.homing = HomingStatus::NotStarted;
+        self.positioning = Positioning::at(self.profile.end_position());
+        if self.power == Power::OperationEnabled && self.is_moving_itself() {
+            let deceleration = self.get(0x6084);
+            self.ramp(now, deceleration, motion::After::Stay);
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The demand: coordinates, ramps, what the motor is doing and why.
+
+use std::time::Duration;
+
+use units::Time;
+
+use super::homing::HomingRun;
+use super::mechanism::Mechanism;
+use super::power::Power;
+use super::{CYCLIC_POSITION, Drive, PROFILE_POSITION};
+use crate::node::profile::{MotionState, Profile};
+use crate::plant::Servo;
+
+/// Why the demand is what it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Activity {
+    /// It rests.
+    Standing,
+    /// A set-point of profile position.
+    Positioning,
+    /// A homing run.
+    Homing(HomingRun),
+    /// It slows down.
+    Ramp(After),
+    /// Set-points of every SYNC.
+    Cyclic,
+}
+
+/// What comes at the end of a ramp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum After {
+    /// The drive stays as it is.
+    Stay,
+    /// A failed homing has stopped.
+    HomingError,
+    /// The motor is switched off and the drive enters this state.
+    Off(Power),
+}
+
+impl Drive {
+    /// +1, or −1 where 0x607E inverts the position.
+    pub(super) fn sign(&self) -> i64 {
+        const INVERT_POSITION: i64 = 0x80;
+        if self.get(0x607E) & INVERT_POSITION == 0 {
+            1
+        } else {
+            -1
+        }
+    }
+
+    /// The actual position in drive coordinates, before it is cut to 32 bits.
+    pub(super) fn actual(&self, m: &impl Mechanism) -> i64 {
+        self.sign() * m.counts() + self.offset
+    }
+
+    pub(super) fn demand(&self, now: Time) -> MotionState {
+        self.profile.at(now)
+    }
+
+    /// A position from the bus, in the 2³² counts the axis is in.
+    pub(super) fn unwrapped(&self, raw: i64, m: &impl Mechanism) -> f64 {
+        let actual = self.actual(m);
+        let turn = actual - i64::from(actual as i32);
+        (turn + raw) as f64
+    }
+
+    /// Whether a ramp is needed before the drive does something else.
+    pub(super) const fn is_moving_itself(&self) -> bool {
+        match self.activity {
+            Activity::Positioning | Activity::Homing(_) | Activity::Cyclic => true,
+            Activity::Standing | Activity::Ramp(_) => false,
+        }
+    }
+
+    /// Whether the servo rate is needed.
+    pub(super) fn is_busy(&self, now: Time) -> bool {
+        let arriving = self.power == Power::OperationEnabled
+            && self.mode() == PROFILE_POSITION
+            && self.in_window_since.is_some()
+            && !self.target_reached(now);
+        let active = match self.activity {
+            Activity::Standing | Activity::Cyclic => !self.profile.is_done(now),
+            Activity::Positioning | Activity::Homing(_) | Activity::Ramp(_) => true,
+        };
+        active || arriving || self.following_since.is_some()
+    }
+
+    /// Slows down from the present demand.
+    pub(super) fn ramp(&mut self, now: Time, deceleration: i64, after: After) {
+        self.profile = Profile::stopping(now, self.demand(now), deceleration as f64);
+        self.activity = Activity::Ramp(after);
+        self.look_now();
+    }
+
+    /// No torque; the demand follows the actual position until the drive is enabled again.
+    pub(super) fn switch_off(&mut self, m: &mut impl Mechanism) {
+        self.servo_on = false;
+        self.sent_demand = None;
+        self.activity = Activity::Standing;
+        self.profile = Profile::resting(self.actual(m) as f64);
+        self.positioning.abandon();
+        m.set_servo(Servo::Off);
+    }
+
+    /// The motor holds where it stands.
+    pub(super) fn switch_on(&mut self, now: Time, m: &mut impl Mechanism) {
+        let here = self.actual(m) as f64;
+        self.profile = Profile::resting(here);
+        self.activity = Activity::Standing;
+        self.positioning = super::Positioning::at(here);
+        self.servo_on = true;
+        self.enabled_at = here;
+        self.in_window_since = None;
+        self.internal_limit = false;
+        self.look_now();
+        self.command_servo(now, m);
+    }
+
+    /// Gives the plant the demand, when it changed.
+    pub(super) fn command_servo(&mut self, now: Time, m: &mut impl Mechanism) {
+        if !self.servo_on {
+            self.profile = Profile::resting(self.actual(m) as f64);
+            return;
+        }
+        let mut position = self.demand(now).position;
+        if self.config.quirks.direction_reversed {
+            position = 2.0 * self.enabled_at - position;
+        }
+        let counts = self.sign() as f64 * (position - self.offset as f64);
+        let demand_m = counts * m.resolution_m();
+        if self.sent_demand != Some(demand_m) {
+            self.sent_demand = Some(demand_m);
+            m.set_servo(Servo::Follow { demand_m });
+        }
+    }
+
+    /// What the demand's profile was for may be over.
+    pub(super) fn proceed(&mut self, now: Time, m: &mut impl Mechanism) {
+        match self.activity {
+            Activity::Standing | Activity::Cyclic => {}
+            Activity::Homing(run) => self.home_on(now, run, m),
+            Activity::Positioning if self.profile.is_done(now) => self.next_set_point(now, m),
+            Activity::Ramp(after) if self.profile.is_done(now) => {
+                self.activity = Activity::Standing;
+                self.after_ramp(after, m);
+            }
+            Activity::Positioning | Activity::Ramp(_) => {}
+        }
+    }
+
+    fn after_ramp(&mut self, after: After, m: &mut impl Mechanism) {
+        match after {
+            After::Stay => {}
+            After::HomingError => self.homing_error_stopped(),
+            After::Off(power) => {
+                self.switch_off(m);
+                self.power = power;
+            }
+        }
+    }
+
+    /// Moves the zero of the coordinates: everything that is a position moves along.
+    pub(super) fn shift(&mut self, counts: i64) {
+        self.offset += counts;
+        self.enabled_at += counts as f64;
+        self.profile = self.profile.clone().shifted(counts as f64);
+        self.positioning = super::Positioning::at(self.profile.end_position());
+    }
+
+    /// The nearest position inside the soft limits 0x607D. They count from the machine's zero,
+    /// so they are in force only once it is known.
+    pub(super) fn within_soft_limits(&self, target: f64) -> f64 {
+        let low = self.server.get(0x607D, 1) as f64;
+        let high = self.server.get(0x607D, 2) as f64;
+        if self.homed && low < high {
+            target.clamp(low, high)
+        } else {
+            target
+        }
+    }
+
+    /// SYNC in cyclic synchronous position: 0x607A + 0x60B0, reached after one period (0x60C2).
+    pub(super) fn on_sync(&mut self, now: Time, m: &mut impl Mechanism) {
+        let enabled = self.power == Power::OperationEnabled && self.servo_on;
+        let ramping = matches!(self.activity, Activity::Ramp(_));
+        if !enabled || ramping || self.mode() != CYCLIC_POSITION {
+            return;
+        }
+        let wanted = self.unwrapped(self.get(0x607A), m) + self.get(0x60B0) as f64;
+        let target = self.within_soft_limits(wanted);
+        self.internal_limit = target != wanted;
+        let from = self.demand(now).position;
+        self.profile = Profile::interpolating(now, from, target, self.interpolation_time());
+        self.activity = Activity::Cyclic;
+        self.command_servo(now, m);
+        self.schedule(now);
+    }
+
+    fn interpolation_time(&self) -> Duration {
+        let units = self.server.get(0x60C2, 1) as f64;
+        let exponent = self.server.get(0x60C2, 2) as i32;
+        Duration::from_secs_f64(units * 10.0_f64.powi(exponent))
+    }
+}

@@ -1,0 +1,218 @@
+//! The drive's object dictionary (CiA 402-2) and its default PDOs.
+
+use drivers::wire::canopen::pdo::MappedObject;
+use drivers::wire::canopen::{Function, NodeId};
+
+use super::config::Cia402DriveConfig;
+use crate::node::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
+use crate::node::canopen_server::{Description, PdoDefault};
+
+/// Servo drive, CiA 402.
+const DEVICE_TYPE: u32 = 0x0002_0192;
+/// PP, HM, CSP (CiA 402-2, 0x6502).
+const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7;
+/// The homing methods this drive knows.
+const HOMING_METHODS: &[i64] = &[0, 17, 18, 35, 37];
+/// "increments" as an SI unit (CiA 303-2).
+const UNIT_INCREMENTS: i64 = 0x00B5_0000;
+/// Bytes of 0x2000, enough for a block upload of several blocks of ordinary clients.
+const LOG_BYTES: usize = 889;
+/// The most bytes 0x2001 takes.
+const NOTEBOOK_BYTES: usize = 4096;
+
+/// The values the drive itself owns.
+pub(super) fn dictionary(config: &Cia402DriveConfig) -> Dictionary {
+    let mut dictionary = Dictionary::default();
+    insert_control(&mut dictionary, config);
+    insert_positions(&mut dictionary, config);
+    insert_profile(&mut dictionary, config);
+    insert_homing(&mut dictionary, config);
+    insert_factors(&mut dictionary, config);
+    insert_motor(&mut dictionary);
+    insert_manufacturer(&mut dictionary);
+    dictionary
+}
+
+fn transmit(kind: Kind) -> Entry {
+    Entry::read_only(kind, 0).mapped(Mapping::Transmit)
+}
+
+fn both(kind: Kind, value: i64) -> Entry {
+    Entry::read_write(kind, value).mapped(Mapping::Both)
+}
+
+fn option(known: &'static [i64], value: i64) -> Entry {
+    Entry::read_write(Kind::I16, value).bounded(Bounds::OneOf(known))
+}
+
+fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::{I8, U16, U32};
+    let abort = i64::from(config.abort_connection_option);
+    dictionary.insert(0x6007, 0, option(&[0, 1, 2, 3], abort));
+    dictionary.insert(0x603F, 0, transmit(U16));
+    dictionary.insert(0x6040, 0, both(U16, 0));
+    dictionary.insert(0x6041, 0, transmit(U16));
+    let quick_stop = i64::from(config.quick_stop_option);
+    dictionary.insert(0x605A, 0, option(&[0, 1, 2, 5, 6], quick_stop));
+    dictionary.insert(0x605B, 0, option(&[0, 1], 0));
+    dictionary.insert(0x605C, 0, option(&[0, 1], 1));
+    dictionary.insert(0x605D, 0, option(&[1, 2], 1));
+    dictionary.insert(0x605E, 0, option(&[0, 1, 2], 2));
+    let mode = both(I8, 1).bounded(Bounds::OneOf(&[0, 1, 6, 8]));
+    dictionary.insert(0x6060, 0, mode);
+    dictionary.insert(0x6061, 0, transmit(I8));
+    dictionary.insert(0x6502, 0, Entry::constant(U32, SUPPORTED_MODES));
+    dictionary.insert(0x60FD, 0, transmit(U32));
+}
+
+fn insert_positions(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::{I16, I32, U8, U16, U32};
+    for index in [0x6062, 0x6063, 0x6064, 0x606B, 0x606C, 0x60F4, 0x60FC] {
+        dictionary.insert(index, 0, transmit(I32));
+    }
+    let window = config.counts_of_um(config.following_error_window_um);
+    dictionary.insert(0x6065, 0, both(U32, window));
+    let timeout = i64::from(config.following_error_timeout_ms);
+    dictionary.insert(0x6066, 0, both(U16, timeout));
+    let window = config.counts_of_um(config.position_window_um);
+    dictionary.insert(0x6067, 0, both(U32, window));
+    let time = i64::from(config.position_window_time_ms);
+    dictionary.insert(0x6068, 0, both(U16, time));
+    dictionary.insert(0x6077, 0, transmit(I16));
+    dictionary.insert(0x607A, 0, both(I32, 0));
+    let limit = |value: i32| Entry::read_write(I32, i64::from(value));
+    dictionary.insert_array(0x607D, vec![limit(i32::MIN), limit(i32::MAX)]);
+    let polarity = Entry::read_write(U8, 0).bounded(Bounds::OneOf(&[0, 0x40, 0x80, 0xC0]));
+    dictionary.insert(0x607E, 0, polarity);
+    dictionary.insert(0x60B0, 0, both(I32, 0));
+}
+
+fn insert_profile(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::{I8, I32, U8, U32};
+    let positive = |mm: f64| {
+        let counts = config.counts_of_mm(mm);
+        both(U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
+    };
+    let acceleration = config.profile_acceleration_mm_per_s2;
+    let quick_stop = config.quick_stop_deceleration_mm_per_s2;
+    dictionary.insert(0x607F, 0, positive(config.max_profile_velocity_mm_per_s));
+    dictionary.insert(0x6081, 0, positive(config.profile_velocity_mm_per_s));
+    dictionary.insert(0x6083, 0, positive(acceleration));
+    dictionary.insert(0x6084, 0, positive(acceleration));
+    dictionary.insert(0x6085, 0, positive(quick_stop));
+    dictionary.insert(0x6086, 0, option(&[0], 0));
+    dictionary.insert(0x60FF, 0, both(I32, 0));
+    let units = Entry::read_write(U8, 0);
+    let exponent = Entry::read_write(I8, -3).bounded(Bounds::Between(-6, 0));
+    dictionary.insert_array(0x60C2, vec![units, exponent]);
+    dictionary.insert(0x60F2, 0, Entry::read_write(Kind::U16, 0));
+    dictionary.insert(0x6072, 0, both(Kind::U16, 1000));
+    dictionary.insert(0x6402, 0, Entry::constant(Kind::U16, 0x000A));
+}
+
+fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::{I8, I32, U32};
+    dictionary.insert(0x607C, 0, both(I32, 0));
+    let method = both(I8, 0).bounded(Bounds::OneOf(HOMING_METHODS));
+    dictionary.insert(0x6098, 0, method);
+    let positive = |mm: f64| {
+        let counts = config.counts_of_mm(mm);
+        both(U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
+    };
+    let switch = positive(config.homing_switch_speed_mm_per_s);
+    let zero = positive(config.homing_zero_speed_mm_per_s);
+    dictionary.insert_array(0x6099, vec![switch, zero]);
+    dictionary.insert(0x609A, 0, positive(config.homing_acceleration_mm_per_s2));
+    let known = HOMING_METHODS[1..].iter();
+    let known = known.map(|method| Entry::constant(I8, *method));
+    dictionary.insert_array(0x60E3, known.collect());
+}
+
+/// Increments are the user unit, so that 0x6064 counts encoder increments; 0x60A8 says how
+/// long one is wherever SI can say it. All ratios of the position factor are 1.
+fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::U32;
+    const PER_TURN: i64 = 100_000;
+    let ratio = |a: i64, b: i64| vec![Entry::read_write(U32, a), Entry::read_write(U32, b)];
+    dictionary.insert_array(0x608F, ratio(PER_TURN, 1));
+    dictionary.insert_array(0x6091, ratio(1, 1));
+    dictionary.insert_array(0x6092, ratio(PER_TURN, 1));
+    let (position, velocity) = units(config.encoder_resolution_nm);
+    dictionary.insert(0x60A8, 0, Entry::read_write(U32, position));
+    dictionary.insert(0x60A9, 0, Entry::read_write(U32, velocity));
+}
+
+/// 0x60A8 and 0x60A9 (CiA 303-2: prefix, numerator, denominator, 0): metre 0x01, second 0x03.
+fn units(resolution_nm: f64) -> (i64, i64) {
+    const METRE: i64 = 0x0001_0000;
+    const PER_SECOND: i64 = 0x0000_0300;
+    let exponent = (resolution_nm * 1e-9).log10();
+    let rounded = exponent.round();
+    if (exponent - rounded).abs() > 1e-9 {
+        return (UNIT_INCREMENTS, UNIT_INCREMENTS | PER_SECOND);
+    }
+    let prefix = i64::from((rounded as i8).cast_unsigned()) << 24;
+    (prefix | METRE, prefix | METRE | PER_SECOND)
+}
+
+fn insert_motor(dictionary: &mut Dictionary) {
+    dictionary.insert(0x6403, 0, Entry::text("mock linear motor LM-60, ironless"));
+    dictionary.insert(0x6404, 0, Entry::text("truestage"));
+    dictionary.insert(0x6505, 0, Entry::text("https://example.invalid/mock-servo"));
+}
+
+/// Objects of more than a few bytes, for segmented and block transfers.
+fn insert_manufacturer(dictionary: &mut Dictionary) {
+    let log = (0..LOG_BYTES).map(|place| (place * 7 + place / 256) as u8);
+    let log = Entry::octets(Access::ReadOnly, LOG_BYTES, log.collect());
+    dictionary.insert(0x2000, 0, log);
+    let notebook = Entry::octets(Access::ReadWrite, NOTEBOOK_BYTES, b"notebook".to_vec());
+    dictionary.insert(0x2001, 0, notebook);
+}
+
+/// Communication objects; the default PDOs are those of EPOS4, so that a driver must remap.
+pub(super) fn description(config: &Cia402DriveConfig, node: NodeId) -> Description {
+    const OFF: u32 = 1 << 31;
+    const NO_REMOTE: u32 = 1 << 30;
+    let second = [(0x6060, 8), (0x607A, 32), (0x60FF, 32)];
+    let receive = [Function::Rpdo2, Function::Rpdo3, Function::Rpdo4];
+    let mut rpdos = vec![pdo(node, Function::Rpdo1, 0, 0, 0x6040, None)];
+    for (function, extra) in receive.into_iter().zip(second) {
+        rpdos.push(pdo(node, function, OFF, 0, 0x6040, Some(extra)));
+    }
+    let second = [(0x6061, 8), (0x6064, 32), (0x606C, 32)];
+    let transmit = [Function::Tpdo2, Function::Tpdo3, Function::Tpdo4];
+    let mut tpdos = vec![pdo(node, Function::Tpdo1, NO_REMOTE, 10, 0x6041, None)];
+    for (function, extra) in transmit.into_iter().zip(second) {
+        tpdos.push(pdo(node, function, NO_REMOTE, 10, 0x6041, Some(extra)));
+    }
+    Description {
+        device_type: DEVICE_TYPE,
+        device_name: config.device_name.clone(),
+        hardware_version: config.hardware_version.clone(),
+        software_version: config.software_version.clone(),
+        identity: config.identity,
+        heartbeat_ms: config.heartbeat_ms,
+        rpdos,
+        tpdos,
+    }
+}
+
+fn pdo(
+    node: NodeId,
+    function: Function,
+    flags: u32,
+    inhibit_100us: u16,
+    word: u16,
+    extra: Option<(u16, u8)>,
+) -> PdoDefault {
+    let mut mapping = vec![MappedObject::new(word, 0, 16)];
+    mapping.extend(extra.map(|(index, bits)| MappedObject::new(index, 0, bits)));
+    PdoDefault {
+        cob_id: flags | u32::from(node.cob_id(function)),
+        transmission: 255,
+        inhibit_100us,
+        event_timer_ms: 0,
+        mapping,
+    }
+}

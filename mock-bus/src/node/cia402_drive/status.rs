@@ -1,0 +1,103 @@
+//! What the drive shows: statusword and process values.
+
+use std::time::Duration;
+
+use drivers::wire::cia402::{HomingStatus, Statusword};
+use units::Time;
+
+use super::mechanism::Mechanism;
+use super::motion::Activity;
+use super::power::Power;
+use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION};
+
+impl Drive {
+    /// Brings the process values in the dictionary up to date.
+    pub(super) fn publish(&mut self, now: Time, m: &impl Mechanism) {
+        let actual = self.actual(m);
+        let demand = self.demand(now);
+        let shown = if self.servo_on {
+            demand.position.round() as i64
+        } else {
+            actual
+        };
+        let sign = self.sign();
+        let (negative, positive) = m.limit_switches();
+        let inputs = i64::from(negative) | i64::from(positive) << 1;
+        let interlock = i64::from(self.safe_torque_off) << 3;
+        let values = [
+            (0x6062, shown),
+            (0x6063, m.counts()),
+            (0x6064, actual),
+            (0x606B, demand.velocity.round() as i64),
+            (0x606C, sign * m.speed().round() as i64),
+            (0x60F4, shown - actual),
+            (0x60FC, sign * (shown - self.offset)),
+            (0x60FD, inputs | interlock),
+        ];
+        for (index, value) in values {
+            self.server.set(index, 0, value);
+        }
+        let fault = self.fault.map_or(0, |code| i64::from(code.0));
+        self.server.set(0x603F, 0, fault);
+        if !self.config.quirks.statusword_stuck {
+            let status = self.statusword(now);
+            self.server.set(0x6041, 0, i64::from(status.bits()));
+        }
+    }
+
+    fn statusword(&self, now: Time) -> Statusword {
+        let state = Statusword::from_bits_retain(self.power.wire().bits());
+        let mut status = state | Statusword::VOLTAGE_ENABLED;
+        status.set(Statusword::REMOTE, !self.local_control);
+        status.set(Statusword::INTERNAL_LIMIT, self.internal_limit);
+        let enabled = self.power == Power::OperationEnabled;
+        match self.mode() {
+            HOMING if enabled => status | homing_bits(self.homing),
+            PROFILE_POSITION if enabled => {
+                status.set(Statusword::TARGET_REACHED, self.target_reached(now));
+                status.set(Statusword::MODE_12, self.positioning.bit_12());
+                status.set(Statusword::MODE_13, self.following_since.is_some());
+                status
+            }
+            CYCLIC_POSITION if enabled => {
+                let follows = !matches!(self.activity, Activity::Ramp(_));
+                status.set(Statusword::MODE_12, follows);
+                status.set(Statusword::MODE_13, self.following_since.is_some());
+                status
+            }
+            _ => {
+                let stopped = self.power == Power::QuickStopActive && self.profile.is_done(now);
+                status.set(Statusword::TARGET_REACHED, stopped);
+                status
+            }
+        }
+    }
+
+    /// Bit 10 in profile position: in the window 0x6067 for the time 0x6068, or halted.
+    /// It stays 1 from the move before until a new set-point is taken.
+    pub(super) fn target_reached(&self, now: Time) -> bool {
+        use drivers::wire::cia402::Controlword;
+        if self.config.quirks.target_never_reached {
+            return false;
+        }
+        if self.controlword.contains(Controlword::HALT) {
+            return self.profile.is_done(now);
+        }
+        let time = Duration::from_millis(self.get(0x6068) as u64);
+        self.in_window_since
+            .is_some_and(|since| since + time <= now)
+    }
+}
+
+/// Bits 10, 12 and 13 of the statusword in homing mode.
+fn homing_bits(status: HomingStatus) -> Statusword {
+    Statusword::from_bits_retain(match status {
+        HomingStatus::InProgress => 0x0000,
+        HomingStatus::NotStarted => 0x0400,
+        HomingStatus::Attained => 0x1000,
+        HomingStatus::Done => 0x1400,
+        HomingStatus::ErrorMoving => 0x2000,
+        HomingStatus::ErrorStopped => 0x2400,
+        HomingStatus::Unknown(bits) => bits,
+    })
+}
