@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::fault::FaultConfig;
 use crate::node::Node;
+use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
+use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
@@ -111,6 +113,10 @@ pub struct NodeConfig {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum DeviceConfig {
+    /// CiA 402 servo drive, on a CAN bus.
+    Cia402Drive(Cia402DriveConfig),
+    /// CiA 401 analog inputs, on a CAN bus.
+    Cia401Analog(Cia401AnalogConfig),
     /// µMD2 laser interferometer, on a serial line.
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
@@ -121,6 +127,8 @@ impl DeviceConfig {
     /// The device, without power yet.
     pub(crate) fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
         match self {
+            Self::Cia402Drive(config) => Box::new(Cia402DriveNode::new(config.clone())),
+            Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
         }
@@ -128,6 +136,7 @@ impl DeviceConfig {
 
     const fn wants_can(&self) -> bool {
         match self {
+            Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
             Self::Umd2Interferometer(_) | Self::DconModule(_) => false,
         }
     }
@@ -313,13 +322,25 @@ impl MachineConfig {
                 positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
             }
         }
-        self.nodes.iter().try_for_each(|node| node.device.check())
+        let resolution_nm = stage.encoder.resolution_nm;
+        self.nodes
+            .iter()
+            .try_for_each(|node| node.device.check(resolution_nm))
     }
 }
 
 impl DeviceConfig {
-    fn check(&self) -> Result<(), ConfigError> {
+    /// `resolution_nm` is the plant's encoder's.
+    fn check(&self, resolution_nm: f64) -> Result<(), ConfigError> {
         match self {
+            Self::Cia402Drive(config) if config.encoder_resolution_nm != resolution_nm => {
+                Err(ConfigError::Value {
+                    key: "encoder_resolution_nm",
+                    seen: config.encoder_resolution_nm,
+                    expected: "the plant's resolution_nm",
+                })
+            }
+            Self::Cia402Drive(_) | Self::Cia401Analog(_) => Ok(()),
             Self::Umd2Interferometer(config) => {
                 positive("sample_rate_hz", config.sample_rate_hz)?;
                 positive("batch_samples", f64::from(config.batch_samples))
