@@ -152,12 +152,12 @@ impl Umd2InterferometerNode {
     }
 
     fn low_speed(&self, beam: Beam, plant: &Plant) -> LowSpeed {
-        let environment = plant.sensed_environment();
+        let sensed = || plant.sensed_environment();
         match self.sequence % LOW_SPEED_TURNS {
-            0 => LowSpeed::Temperature1(scaled(environment.air_temperature.value(), 100.0)),
-            1 => LowSpeed::Temperature2(scaled(environment.stage_temperature.value(), 100.0)),
-            2 => LowSpeed::Pressure(scaled(environment.pressure.value() / 100.0, 100.0)),
-            3 => LowSpeed::Humidity(scaled(environment.humidity.value() * 100.0, 10.0)),
+            0 => LowSpeed::Temperature1(scaled(sensed().air_temperature.value(), 100.0)),
+            1 => LowSpeed::Temperature2(scaled(sensed().stage_temperature.value(), 100.0)),
+            2 => LowSpeed::Pressure(scaled(sensed().pressure.value() / 100.0, 100.0)),
+            3 => LowSpeed::Humidity(scaled(sensed().humidity.value() * 100.0, 10.0)),
             4 => LowSpeed::SampleRate(scaled(self.config.sample_rate_hz, 100.0)),
             5 => LowSpeed::Firmware(self.config.firmware),
             6 => LowSpeed::SignalStrength(match beam {

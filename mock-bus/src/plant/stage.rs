@@ -61,6 +61,9 @@ impl Stage {
     /// The switches' own place varies by more than the scale grows: expansion is left out.
     fn watch_switches(&mut self) {
         let encoder_m = self.mass.position_at(Time::ZERO);
+        if !self.switches.iter().any(|switch| switch.is_near(encoder_m)) {
+            return;
+        }
         let true_m = encoder_m + self.field.at(encoder_m);
         for switch in &mut self.switches {
             switch.watch(true_m);
@@ -186,6 +189,12 @@ impl Switch {
             switch(-1.0, config.negative_mm, "negative limit"),
             switch(1.0, config.positive_mm, "positive limit"),
         ]
+    }
+
+    /// Whether it may change its state here, by a generous margin; saves looking closer.
+    fn is_near(&self, encoder_m: f64) -> bool {
+        const MARGIN_M: f64 = 1e-3;
+        self.pressed || self.side * encoder_m - self.at_m > -MARGIN_M
     }
 
     fn watch(&mut self, true_m: f64) {

@@ -184,8 +184,12 @@ impl Simulation {
 
     /// Lets time pass up to `to`.
     pub fn advance(&mut self, to: Time) {
-        while self.next_internal() <= to {
-            self.step();
+        loop {
+            let next = self.next_internal();
+            if next > to {
+                break;
+            }
+            self.step(next);
         }
         self.move_clock(to);
     }
@@ -203,7 +207,7 @@ impl Simulation {
                 self.move_clock(to);
                 return None;
             }
-            self.step();
+            self.step(internal);
         }
     }
 
@@ -324,9 +328,9 @@ impl Simulation {
         ports.chain(slots).fold(own, Time::min)
     }
 
-    /// Everything that is due at the next moment; an arbitration only when nothing else is.
-    fn step(&mut self) {
-        self.move_clock(self.next_internal());
+    /// Everything that is due at `next`; an arbitration only when nothing else is.
+    fn step(&mut self, next: Time) {
+        self.move_clock(next);
         if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
             return;
         }

@@ -13,9 +13,11 @@ use crate::bus::Sender;
 impl Simulation {
     /// A frame has been on the wire: the faults first, then everybody else hears it.
     pub(super) fn frame_complete(&mut self, place: usize, sender: Sender, frame: CanFrame) {
-        let node = self.sender_name(sender).map(str::to_owned);
-        let name = self.ports[place].name.clone();
-        let fate = self.plan.frame_fate(&name, node.as_deref(), frame);
+        let node = match sender {
+            Sender::Node(place) => Some(self.slots[place].name.as_str()),
+            Sender::Host | Sender::Stranger => None,
+        };
+        let fate = self.plan.frame_fate(&self.ports[place].name, node, frame);
         if fate.held_back && fate.copies > 0 {
             self.ports[place].hold_back(sender, fate.frame);
             return;
@@ -34,13 +36,6 @@ impl Simulation {
         if sender != Sender::Host && self.ports[place].link == Link::Up {
             let at = self.now + delay + self.ports[place].latency;
             self.tell_host(at, place, Event::Payload(payload));
-        }
-    }
-
-    fn sender_name(&self, sender: Sender) -> Option<&str> {
-        match sender {
-            Sender::Node(place) => Some(&self.slots[place].name),
-            Sender::Host | Sender::Stranger => None,
         }
     }
 
