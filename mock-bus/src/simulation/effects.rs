@@ -46,6 +46,11 @@ impl Simulation {
                 self.report(port, BusErrorClass::RESTARTED, ControllerProblem::empty());
             }
             Fault::LinkDown { port } | Fault::LinkGone { port } => self.set_link(port, Link::Up),
+            Fault::Reorder { port, .. } => {
+                if let Some(place) = self.config.port(port) {
+                    self.release_held_back(place);
+                }
+            }
             _ => self.set_plant_fault(fault, false),
         }
     }

@@ -25,6 +25,11 @@ impl Simulation {
         for _ in 0..fate.copies {
             self.spread(place, sender, fate.frame, fate.delay);
         }
+        self.release_held_back(place);
+    }
+
+    /// A frame that was held back comes now, after its successor or because nothing holds it.
+    pub(super) fn release_held_back(&mut self, place: usize) {
         if let Some((sender, frame)) = self.ports[place].held_back() {
             self.spread(place, sender, frame, Duration::ZERO);
         }
