@@ -304,6 +304,7 @@ impl Drive {
         self.follow_mode(now);
         self.supervise(now, m);
         self.proceed(now, m);
+        self.watch_window(now, m);
         self.pass_power(now, m);
         self.command_servo(now, m);
         self.schedule(now);

@@ -76,7 +76,7 @@ impl Drive {
     pub(super) fn is_busy(&self, now: Time) -> bool {
         let arriving = self.power == Power::OperationEnabled
             && self.mode() == PROFILE_POSITION
-            && self.in_window_since.is_some()
+            && !self.positioning.missed
             && !self.target_reached(now);
         let active = match self.activity {
             Activity::Standing | Activity::Cyclic => !self.profile.is_done(now),

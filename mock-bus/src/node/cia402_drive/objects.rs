@@ -60,7 +60,8 @@ fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     dictionary.insert(0x605E, 0, option(&[0, 1, 2], 2));
     let mode = both(I8, 1).bounded(Bounds::OneOf(&[0, 1, 6, 8]));
     dictionary.insert(0x6060, 0, mode);
-    dictionary.insert(0x6061, 0, transmit(I8));
+    let display = Entry::read_only(I8, 1).mapped(Mapping::Transmit);
+    dictionary.insert(0x6061, 0, display);
     dictionary.insert(0x6502, 0, Entry::constant(U32, SUPPORTED_MODES));
     dictionary.insert(0x60FD, 0, transmit(U32));
 }

@@ -23,7 +23,6 @@ impl Drive {
         self.watch_itself(now, m);
         self.watch_following_error(now, m);
         self.watch_limit_switches(now, m);
-        self.watch_window(now, m);
     }
 
     /// Without torque there is no ramp: the motor coasts, and the position is not held.
@@ -111,7 +110,7 @@ impl Drive {
     }
 
     /// Since when the axis stands at its target, within 0x6067.
-    fn watch_window(&mut self, now: Time, m: &impl Mechanism) {
+    pub(super) fn watch_window(&mut self, now: Time, m: &impl Mechanism) {
         let window = self.get(0x6067);
         let target = self.profile.end_position();
         let distance = (target - self.actual(m) as f64).abs();
