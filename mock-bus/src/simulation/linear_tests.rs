@@ -90,6 +90,25 @@ impl Client {
 }
 
 #[test]
+fn the_file_says_what_the_defaults_are() {
+    let machine = machine(1);
+    assert_eq!(
+        machine.config().plant,
+        crate::plant::config::PlantConfig::default()
+    );
+}
+
+#[test]
+fn the_files_example_of_faults_is_right() {
+    let text = include_str!("../../../configs/emulated/linear.toml");
+    let (_, example) = text.split_once("#   [[faults]]").unwrap();
+    let example = format!("[[faults]]{}", example.replace("#  ", ""));
+    let whole = format!("{text}\n{}", example.replace('#', ""));
+    let config = MachineConfig::parse(&whole).unwrap();
+    assert_eq!(config.faults.len(), 2);
+}
+
+#[test]
 fn a_drive_that_is_enabled_moves_the_stage_to_its_target() {
     let mut client = Client::new(1);
     let from = client.machine.truth().position();
