@@ -118,7 +118,7 @@ pub struct NodeConfig {
 pub enum DeviceConfig {
     /// CiA 402 servo drive, on a CAN bus.
     Cia402Drive(Cia402DriveConfig),
-    /// CiA 401 analog input module, on a CAN bus.
+    /// CiA 401 analog inputs, on a CAN bus.
     Cia401Analog(Cia401AnalogConfig),
     /// µMD2 laser interferometer, on a serial line.
     Umd2Interferometer(Umd2InterferometerConfig),
@@ -325,19 +325,25 @@ impl MachineConfig {
                 positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
             }
         }
-        self.nodes.iter().try_for_each(|node| node.device.check())
+        let resolution_nm = stage.encoder.resolution_nm;
+        self.nodes
+            .iter()
+            .try_for_each(|node| node.device.check(resolution_nm))
     }
 }
 
 impl DeviceConfig {
-    fn check(&self) -> Result<(), ConfigError> {
+    /// `resolution_nm` is the plant's encoder's.
+    fn check(&self, resolution_nm: f64) -> Result<(), ConfigError> {
         match self {
-            Self::Cia402Drive(config) => {
-                positive("encoder_resolution_nm", config.encoder_resolution_nm)
+            Self::Cia402Drive(config) if config.encoder_resolution_nm != resolution_nm => {
+                Err(ConfigError::Value {
+                    key: "encoder_resolution_nm",
+                    seen: config.encoder_resolution_nm,
+                    expected: "the plant's resolution_nm",
+                })
             }
-            Self::Cia401Analog(config) => {
-                config.full_scale_v.iter().try_for_each(|volts| positive("full_scale_v", *volts))
-            }
+            Self::Cia402Drive(_) | Self::Cia401Analog(_) => Ok(()),
             Self::Umd2Interferometer(config) => {
                 positive("sample_rate_hz", config.sample_rate_hz)?;
                 positive("batch_samples", f64::from(config.batch_samples))

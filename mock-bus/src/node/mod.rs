@@ -9,13 +9,17 @@ pub mod dcon_module;
 pub mod profile;
 pub mod umd2_interferometer;
 
+use core::any::Any;
+
 use drivers::wire::Payload;
 use units::Time;
 
 use crate::plant::Plant;
 
 /// One emulated device.
-pub trait Node {
+///
+/// It is [`Any`], so that a test can reach a device's own faults through the simulation.
+pub trait Node: Any {
     /// Takes what was sent on the node's port; CAN nodes see every frame of their bus.
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant);
 

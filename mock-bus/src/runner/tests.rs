@@ -141,3 +141,20 @@ fn a_speed_of_nothing_is_refused() {
     let refused = spawn_on_ptys(&config, 1, 0.0);
     assert!(matches!(refused, Err(RunError::Speed { .. })));
 }
+
+#[test]
+fn the_linear_machines_drive_says_what_it_is_through_the_adapter() {
+    let text = include_str!("../../../configs/emulated/linear.toml");
+    let machine = spawn_on_ptys(&MachineConfig::parse(text).unwrap(), 1, 10.0).unwrap();
+    let mut can = open(&machine.ports()[0]);
+    can.write_all(b"C\rS8\rO\r").unwrap();
+    machine.power_cycle(HallDrift::default()).unwrap();
+    while !read_until(&mut can, b'\r').unwrap().ends_with("t701100\r") {}
+    // SDO upload of 0x1000: the answer is device type 402 with servo drive.
+    can.write_all(b"t60184000100000000000\r").unwrap();
+    let mut line = read_until(&mut can, b'\r').unwrap();
+    while !line.starts_with("t581") {
+        line = read_until(&mut can, b'\r').unwrap();
+    }
+    assert_eq!(line, "t58184300100092010200\r");
+}

@@ -11,8 +11,11 @@ mod port;
 mod traffic;
 
 #[cfg(test)]
+mod linear_tests;
+#[cfg(test)]
 mod tests;
 
+use core::any::Any;
 use std::collections::VecDeque;
 
 use drivers::wire::can::BusError;
@@ -270,6 +273,18 @@ impl Simulation {
         }
         self.plant.power_cycle(drift);
         self.mains_back = self.now + self.config.power_off();
+    }
+
+    /// The device called `name`, when it is a `T`: for the faults that only it knows. It is
+    /// advanced at the next step.
+    pub fn node_mut<T: Node>(&mut self, name: &str) -> Option<&mut T> {
+        let place = self.slot(name)?;
+        let slot = &mut self.slots[place];
+        if slot.powered {
+            slot.next = self.now;
+        }
+        let node: &mut dyn Any = &mut *slot.node;
+        node.downcast_mut()
     }
 
     /// Whether the port can be used.

@@ -57,6 +57,8 @@ const CYCLIC_POSITION: i64 = 8;
 #[derive(Debug)]
 pub struct Cia402DriveNode {
     drive: Drive,
+    /// Opened here, apart from the plant's own circuit.
+    safe_torque_off: bool,
 }
 
 impl Cia402DriveNode {
@@ -67,13 +69,14 @@ impl Cia402DriveNode {
     pub fn new(config: Cia402DriveConfig) -> Self {
         Self {
             drive: Drive::new(config),
+            safe_torque_off: false,
         }
     }
 
     /// Opens (`true`) or closes the safe torque off input; it takes effect when the node is
     /// advanced next.
     pub fn set_safe_torque_off(&mut self, open: bool) {
-        self.drive.safe_torque_off = open;
+        self.safe_torque_off = open;
         self.drive.look_now();
     }
 
@@ -119,6 +122,8 @@ impl Node for Cia402DriveNode {
     }
 
     fn advance(&mut self, now: Time, plant: &mut Plant) {
+        let wired = plant.safe_torque_off(self.drive.config.axis);
+        self.drive.safe_torque_off = self.safe_torque_off || wired;
         let mut axis = self.axis(plant);
         self.drive.advance(now, &mut axis);
     }
