@@ -17,8 +17,8 @@ use drivers::device::cia402::{Cia402Drive, Cia402Settings, Cia402Timeouts};
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
-use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use drivers::protocol::heartbeat::HeartbeatProducer;
+use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use drivers::transport::Port;
 use drivers::wire::canopen::NodeId;
 use units::{
@@ -61,11 +61,17 @@ pub(crate) fn axes(
         .iter()
         .map(|(name, axis)| {
             let device: Box<dyn Axis> = match axis.device {
-                AxisDevice::Cia402 => {
-                    Box::new(Cia402Drive::new(cia402_settings(axis, &config.can[&axis.bus], patience)))
-                }
+                AxisDevice::Cia402 => Box::new(Cia402Drive::new(cia402_settings(
+                    axis,
+                    &config.can[&axis.bus],
+                    patience,
+                ))),
             };
-            Unit { name: name.clone(), port: ports[&axis.bus], device }
+            Unit {
+                name: name.clone(),
+                port: ports[&axis.bus],
+                device,
+            }
         })
         .collect()
 }
@@ -90,7 +96,11 @@ pub(crate) fn analogs(
                     (line, Box::new(Dcon::new(dcon_settings(analog, patience))))
                 }
             };
-            Unit { name: name.clone(), port: ports[line], device }
+            Unit {
+                name: name.clone(),
+                port: ports[line],
+                device,
+            }
         })
         .collect()
 }
@@ -107,7 +117,11 @@ pub(crate) fn instruments(
             let device: Box<dyn DisplacementInstrument> = match instrument.device {
                 InstrumentDevice::Umd2 => Box::new(Umd2::new(umd2_settings(instrument, patience))),
             };
-            Unit { name: name.clone(), port: ports[&instrument.line], device }
+            Unit {
+                name: name.clone(),
+                port: ports[&instrument.line],
+                device,
+            }
         })
         .collect()
 }
@@ -121,7 +135,10 @@ pub(crate) fn heartbeats(
         .iter()
         .map(|(name, bus)| {
             let period = Duration::from_millis(bus.master_heartbeat_ms.into());
-            (ports[name], HeartbeatProducer::new(node_id(bus.master_node_id), period))
+            (
+                ports[name],
+                HeartbeatProducer::new(node_id(bus.master_node_id), period),
+            )
         })
         .collect()
 }
@@ -207,8 +224,11 @@ fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
 }
 
 fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
-    let heartbeats =
-        (axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms, axis.watch_master_ms);
+    let heartbeats = (
+        axis.heartbeat_producer_ms,
+        axis.heartbeat_consumer_ms,
+        axis.watch_master_ms,
+    );
     let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats, patience);
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
@@ -216,7 +236,10 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Sett
     let quick_stop = MetresPerSecondSquared(axis.quick_stop_deceleration_mm_per_s2 * 1e-3);
     let usual = Cia402Settings::new(common, scale, speed_max, acceleration.max(quick_stop));
     Cia402Settings {
-        soft_limits: Some((Metres::from_mm(axis.soft_min_mm), Metres::from_mm(axis.soft_max_mm))),
+        soft_limits: Some((
+            Metres::from_mm(axis.soft_min_mm),
+            Metres::from_mm(axis.soft_max_mm),
+        )),
         following_error: Some((
             Metres::from_um(axis.following_error_limit_um),
             millis(axis.following_error_timeout_ms),
@@ -236,12 +259,21 @@ fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401
         analog.watch_master_ms.expect(CHECKED),
     );
     let identity = analog.identity.as_ref().expect(CHECKED);
-    let common = node_settings(analog.node_id.expect(CHECKED), bus, identity, heartbeats, patience);
+    let common = node_settings(
+        analog.node_id.expect(CHECKED),
+        bus,
+        identity,
+        heartbeats,
+        patience,
+    );
     let channels: Vec<_> = analog
         .channels
         .iter()
         .zip(&analog.full_scale_v)
-        .map(|(channel, volts)| ChannelSettings { input: channel + 1, full_scale: Volts(*volts) })
+        .map(|(channel, volts)| ChannelSettings {
+            input: channel + 1,
+            full_scale: Volts(*volts),
+        })
         .collect();
     Cia401Settings::new(common, &channels).expect(CHECKED)
 }
@@ -263,7 +295,11 @@ fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settings {
     let usual = Umd2Settings::default();
     Umd2Settings {
         optics_factor: instrument.optics_factor,
-        direction: if instrument.reverse { Direction::Reversed } else { Direction::AsCounted },
+        direction: if instrument.reverse {
+            Direction::Reversed
+        } else {
+            Direction::AsCounted
+        },
         sample_rate_hz: instrument.sample_rate_hz,
         stream_timeout: usual.stream_timeout * patience,
         start_timeout: usual.start_timeout * patience,
@@ -335,7 +371,9 @@ pub(crate) fn correction_environment(environment: &Environment) -> length_correc
         air_temperature: environment.air_temperature.unwrap_or(Celsius(f64::NAN)),
         pressure: environment.pressure.unwrap_or(Pascals(f64::NAN)),
         humidity: environment.humidity.unwrap_or(RelativeHumidity(f64::NAN)),
-        material_temperature: environment.material_temperature.unwrap_or(Celsius(f64::NAN)),
+        material_temperature: environment
+            .material_temperature
+            .unwrap_or(Celsius(f64::NAN)),
     }
 }
 

@@ -24,9 +24,15 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, sync_period)
         .with_heartbeat(ms(bus.master_heartbeat_ms));
     for axis in config.axis.values().filter(|axis| axis.bus == name) {
-        plan = plan.with_pdos(&DRIVE_PDO_BYTES).with_heartbeat(ms(axis.heartbeat_producer_ms));
+        plan = plan
+            .with_pdos(&DRIVE_PDO_BYTES)
+            .with_heartbeat(ms(axis.heartbeat_producer_ms));
     }
-    for analog in config.analog.values().filter(|analog| analog.bus.as_deref() == Some(name)) {
+    for analog in config
+        .analog
+        .values()
+        .filter(|analog| analog.bus.as_deref() == Some(name))
+    {
         // Two bytes a channel; four channels fill a PDO, more are refused by the check.
         let bytes = analog.channels.len().min(4) as u8 * 2;
         plan = plan.with_pdos(&[bytes]);

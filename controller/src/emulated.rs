@@ -59,7 +59,10 @@ impl Emulated {
         let emulated = EmulatedConfig::parse(toml)?;
         let ports = match_ports(&emulated, config)?;
         let simulation = Simulation::new(&emulated, seed)?;
-        Ok(Self { simulation: Rc::new(RefCell::new(simulation)), ports })
+        Ok(Self {
+            simulation: Rc::new(RefCell::new(simulation)),
+            ports,
+        })
     }
 
     /// A transport to this machine.
@@ -78,7 +81,10 @@ impl Emulated {
     }
 
     fn host_port(&self, simulated: Port) -> Option<Port> {
-        self.ports.iter().find(|(_, inner)| **inner == simulated).map(|(outer, _)| *outer)
+        self.ports
+            .iter()
+            .find(|(_, inner)| **inner == simulated)
+            .map(|(outer, _)| *outer)
     }
 }
 
@@ -90,7 +96,9 @@ fn match_ports(
     assemble::ports(config)
         .into_iter()
         .map(|(name, port)| {
-            let place = emulated.port(&name).ok_or_else(|| no_port(&name, emulated))?;
+            let place = emulated
+                .port(&name)
+                .ok_or_else(|| no_port(&name, emulated))?;
             let place = u8::try_from(place).expect("a machine has fewer than 256 ports");
             Ok((port, Port(place)))
         })
@@ -114,7 +122,11 @@ impl EmulatedOnPtys {
     pub fn start(toml: &str, seed: u64, speed: f64) -> Result<Self, EmulatedError> {
         let config = EmulatedConfig::parse(toml)?;
         let running = runner::spawn_on_ptys(&config, seed, speed)?;
-        Ok(Self { config, running, interface: None })
+        Ok(Self {
+            config,
+            running,
+            interface: None,
+        })
     }
 
     /// The same with the first CAN bus on the SocketCAN interface `name` (`vcan0`, say).
@@ -131,7 +143,11 @@ impl EmulatedOnPtys {
         let running = runner::spawn_on_vcan(&config, seed, speed, name)?;
         let place = config.ports.iter().position(|port| port.is_can());
         let interface = place.map(|place| (place, name.to_owned()));
-        Ok(Self { config, running, interface })
+        Ok(Self {
+            config,
+            running,
+            interface,
+        })
     }
 
     /// Where a controller configured by `config` finds its buses and lines.
@@ -141,7 +157,10 @@ impl EmulatedOnPtys {
     pub fn overrides(&self, config: &MachineConfig) -> Result<Overrides, EmulatedError> {
         let mut overrides = Overrides::default();
         for name in assemble::ports(config).into_keys() {
-            let place = self.config.port(&name).ok_or_else(|| no_port(&name, &self.config))?;
+            let place = self
+                .config
+                .port(&name)
+                .ok_or_else(|| no_port(&name, &self.config))?;
             overrides.set(&name, self.endpoint(place));
         }
         Ok(overrides)
@@ -158,7 +177,12 @@ impl EmulatedOnPtys {
 
     /// A line for each port: its name and its path.
     pub fn description(&self) -> Vec<String> {
-        let ports = self.config.ports.iter().zip(self.running.ports()).enumerate();
+        let ports = self
+            .config
+            .ports
+            .iter()
+            .zip(self.running.ports())
+            .enumerate();
         ports
             .map(|(place, (port, path))| {
                 let kind = match self.endpoint(place) {
@@ -187,7 +211,10 @@ impl EmulatedOnPtys {
 
 fn no_port(name: &str, emulated: &EmulatedConfig) -> EmulatedError {
     let known: Vec<_> = emulated.ports.iter().map(|port| port.name()).collect();
-    EmulatedError::NoPort { name: name.to_owned(), known: known.join(", ") }
+    EmulatedError::NoPort {
+        name: name.to_owned(),
+        known: known.join(", "),
+    }
 }
 
 impl World for Emulated {
@@ -201,28 +228,38 @@ impl World for Emulated {
 
     fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), SendError> {
         let inner = *self.ports.get(&port).ok_or(SendError::WrongKind { port })?;
-        self.simulation.borrow_mut().deliver(at, inner, payload).map_err(|error| match error {
-            DeliverError::NoPort { .. } | DeliverError::WrongKind { .. } => {
-                SendError::WrongKind { port }
-            }
-            DeliverError::Unusable { link, .. } => {
-                SendError::Unusable { port, state: link_state(link) }
-            }
-            DeliverError::QueueFull { .. } => SendError::QueueFull { port },
-        })
+        self.simulation
+            .borrow_mut()
+            .deliver(at, inner, payload)
+            .map_err(|error| match error {
+                DeliverError::NoPort { .. } | DeliverError::WrongKind { .. } => {
+                    SendError::WrongKind { port }
+                }
+                DeliverError::Unusable { link, .. } => SendError::Unusable {
+                    port,
+                    state: link_state(link),
+                },
+                DeliverError::QueueFull { .. } => SendError::QueueFull { port },
+            })
     }
 
     fn collect(&mut self) -> Option<Arrival> {
         loop {
             let delivery = self.simulation.borrow_mut().collect()?;
             // A line that the controller's configuration does not use is nobody's business.
-            let Some(port) = self.host_port(delivery.port) else { continue };
+            let Some(port) = self.host_port(delivery.port) else {
+                continue;
+            };
             let input = match delivery.event {
                 Event::Payload(payload) => Input::Payload(payload),
                 Event::BusError(error) => Input::BusError(error),
                 Event::Link(link) => Input::Link(link_state(link)),
             };
-            return Some(Arrival { port, at: delivery.at, input });
+            return Some(Arrival {
+                port,
+                at: delivery.at,
+                input,
+            });
         }
     }
 }

@@ -21,8 +21,8 @@ use drivers::transport::{Port, Transport};
 use units::{Metres, Time};
 
 use crate::assemble;
-use crate::cycle::RunPlan;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::cycle::RunPlan;
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 
@@ -107,7 +107,11 @@ impl Machine {
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
-            memory: config.axis.keys().map(|name| (name.clone(), AxisMemory::default())).collect(),
+            memory: config
+                .axis
+                .keys()
+                .map(|name| (name.clone(), AxisMemory::default()))
+                .collect(),
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
@@ -160,10 +164,13 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn axis_config(&self, axis: &str) -> Result<&AxisConfig, Failure> {
-        self.config.axis.get(axis).ok_or_else(|| Failure::NoSuchAxis {
-            axis: axis.to_owned(),
-            known: self.axis_names().join(", "),
-        })
+        self.config
+            .axis
+            .get(axis)
+            .ok_or_else(|| Failure::NoSuchAxis {
+                axis: axis.to_owned(),
+                known: self.axis_names().join(", "),
+            })
     }
 
     /// Whether `axis` was zeroed since its drive was last powered.
@@ -201,9 +208,18 @@ impl Machine {
 
     /// What every device said it is, by its name in the configuration.
     pub fn identities(&self) -> BTreeMap<String, Identity> {
-        let axes = self.axes.iter().map(|unit| (&unit.name, unit.device.identity()));
-        let analogs = self.analogs.iter().map(|unit| (&unit.name, unit.device.identity()));
-        let instruments = self.instruments.iter().map(|unit| (&unit.name, unit.device.identity()));
+        let axes = self
+            .axes
+            .iter()
+            .map(|unit| (&unit.name, unit.device.identity()));
+        let analogs = self
+            .analogs
+            .iter()
+            .map(|unit| (&unit.name, unit.device.identity()));
+        let instruments = self
+            .instruments
+            .iter()
+            .map(|unit| (&unit.name, unit.device.identity()));
         axes.chain(analogs)
             .chain(instruments)
             .filter_map(|(name, identity)| Some((name.clone(), identity?)))
@@ -212,13 +228,24 @@ impl Machine {
 
     /// Counters of every device: dropped, late, mismatched and the like.
     pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
-        let axes = self.axes.iter().map(|unit| (&unit.name, unit.device.counters()));
-        let analogs = self.analogs.iter().map(|unit| (&unit.name, unit.device.counters()));
-        let instruments = self.instruments.iter().map(|unit| (&unit.name, unit.device.counters()));
+        let axes = self
+            .axes
+            .iter()
+            .map(|unit| (&unit.name, unit.device.counters()));
+        let analogs = self
+            .analogs
+            .iter()
+            .map(|unit| (&unit.name, unit.device.counters()));
+        let instruments = self
+            .instruments
+            .iter()
+            .map(|unit| (&unit.name, unit.device.counters()));
         axes.chain(analogs)
             .chain(instruments)
             .flat_map(|(name, counters)| {
-                counters.into_iter().map(move |(what, count)| (name.clone(), what, count))
+                counters
+                    .into_iter()
+                    .map(move |(what, count)| (name.clone(), what, count))
             })
             .collect()
     }
@@ -236,7 +263,11 @@ impl Machine {
         }
         self.set_sync(true)?;
         let machine_devices = self.axes.len() + self.analogs.len();
-        let last = if self.instruments_run { machine_devices } else { self.device_count() };
+        let last = if self.instruments_run {
+            machine_devices
+        } else {
+            self.device_count()
+        };
         let now = self.now();
         for at in 0..last {
             self.device_mut(at).device.start(now);
@@ -325,11 +356,16 @@ impl Machine {
 
     fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
         for (port, name) in &self.port_names {
-            let Some(bus) = self.config.can.get(name) else { continue };
+            let Some(bus) = self.config.can.get(name) else {
+                continue;
+            };
             let period = on.then(|| Duration::from_secs_f64(bus.sync_period_ms * 1e-3));
             self.transport
                 .set_sync(*port, period)
-                .map_err(|source| Failure::Send { device: format!("SYNC on {name}"), source })?;
+                .map_err(|source| Failure::Send {
+                    device: format!("SYNC on {name}"),
+                    source,
+                })?;
         }
         Ok(())
     }
@@ -349,7 +385,11 @@ impl Machine {
                 return outcome.map_err(|source| Failure::Device { device, source });
             }
             if self.now() >= deadline {
-                return Err(Failure::Overdue { device: self.device_name(at), step, waited: limit });
+                return Err(Failure::Overdue {
+                    device: self.device_name(at),
+                    step,
+                    waited: limit,
+                });
             }
             self.tick(deadline)?;
         }
@@ -365,10 +405,13 @@ impl Machine {
     }
 
     pub(crate) fn axis_index(&self, axis: &str) -> Result<usize, Failure> {
-        self.axes.iter().position(|unit| unit.name == axis).ok_or_else(|| Failure::NoSuchAxis {
-            axis: axis.to_owned(),
-            known: self.axis_names().join(", "),
-        })
+        self.axes
+            .iter()
+            .position(|unit| unit.name == axis)
+            .ok_or_else(|| Failure::NoSuchAxis {
+                axis: axis.to_owned(),
+                known: self.axis_names().join(", "),
+            })
     }
 
     /// The number of a named instrument among all devices.
@@ -405,20 +448,32 @@ impl Machine {
         let (axes, analogs) = (self.axes.len(), self.analogs.len());
         if at < axes {
             let unit = &mut self.axes[at];
-            UnitMut { port: unit.port, device: &mut *unit.device }
+            UnitMut {
+                port: unit.port,
+                device: &mut *unit.device,
+            }
         } else if at < axes + analogs {
             let unit = &mut self.analogs[at - axes];
-            UnitMut { port: unit.port, device: &mut *unit.device }
+            UnitMut {
+                port: unit.port,
+                device: &mut *unit.device,
+            }
         } else {
             let unit = &mut self.instruments[at - axes - analogs];
-            UnitMut { port: unit.port, device: &mut *unit.device }
+            UnitMut {
+                port: unit.port,
+                device: &mut *unit.device,
+            }
         }
     }
 
     /// Where `axis` should be sent so that the point arrives at `target`.
     pub(crate) fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
         let config = self.axis_config(axis)?;
-        Ok((Metres::from_mm(config.soft_min_mm), Metres::from_mm(config.soft_max_mm)))
+        Ok((
+            Metres::from_mm(config.soft_min_mm),
+            Metres::from_mm(config.soft_max_mm),
+        ))
     }
 }
 

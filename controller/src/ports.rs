@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use drivers::transport::Port;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, LiveBuilder, SerialSettings, SlcanSettings};
-use drivers::transport::Port;
 
 use crate::assemble;
 use crate::config::{CanBus, CanTransport, MachineConfig};
@@ -48,7 +48,10 @@ impl Overrides {
 }
 
 fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), Failure> {
-    let usage = |help: String| Failure::Usage { what: format!("`--port {word}`"), help };
+    let usage = |help: String| Failure::Usage {
+        what: format!("`--port {word}`"),
+        help,
+    };
     let form = "write NAME=slcan:PATH, NAME=socketcan:INTERFACE or NAME=PATH";
     let (name, endpoint) = word.split_once('=').ok_or_else(|| usage(form.into()))?;
     let endpoint = match endpoint.split_once(':') {
@@ -57,13 +60,25 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
         _ => Endpoint::Serial(endpoint.into()),
     };
     let is_can = !matches!(endpoint, Endpoint::Serial(_));
-    let known = if is_can { config.can.contains_key(name) } else { config.serial.contains_key(name) };
+    let known = if is_can {
+        config.can.contains_key(name)
+    } else {
+        config.serial.contains_key(name)
+    };
     if known {
         return Ok((name.to_owned(), endpoint));
     }
-    let names: Vec<_> = config.can.keys().chain(config.serial.keys()).cloned().collect();
+    let names: Vec<_> = config
+        .can
+        .keys()
+        .chain(config.serial.keys())
+        .cloned()
+        .collect();
     let what = if is_can { "CAN bus" } else { "serial line" };
-    Err(usage(format!("`{name}` is no {what} of the configuration; it has {}", names.join(", "))))
+    Err(usage(format!(
+        "`{name}` is no {what} of the configuration; it has {}",
+        names.join(", ")
+    )))
 }
 
 /// The patience ([`Loaded::patience`]) that a machine needs whose clock runs `clock_speed`
@@ -73,7 +88,11 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
 /// [`Loaded::patience`]: crate::config::Loaded::patience
 pub fn patience(clock_speed: f64) -> u32 {
     const PAUSES: f64 = 6.0;
-    if clock_speed <= 1.0 { 1 } else { (clock_speed * PAUSES).min(1000.0).ceil() as u32 }
+    if clock_speed <= 1.0 {
+        1
+    } else {
+        (clock_speed * PAUSES).min(1000.0).ceil() as u32
+    }
 }
 
 /// Opens every bus and line. `clock_speed` is 1 on real machines.
@@ -116,7 +135,9 @@ fn add_can(
     let checked = "the check asks for the key that its transport needs";
     match (replacement, bus.transport) {
         (Some(Endpoint::SocketCan(interface)), _) => builder.socketcan(port, interface),
-        (Some(Endpoint::Slcan(path) | Endpoint::Serial(path)), _) => builder.slcan(port, path, slcan),
+        (Some(Endpoint::Slcan(path) | Endpoint::Serial(path)), _) => {
+            builder.slcan(port, path, slcan)
+        }
         (None, CanTransport::SocketCan) => {
             builder.socketcan(port, bus.interface.as_deref().expect(checked))
         }

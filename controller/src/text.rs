@@ -7,14 +7,26 @@ use units::Metres;
 pub(crate) type Row = (&'static str, &'static str, fn(&Figures) -> Metres);
 
 pub(crate) const ROWS: &[Row] = &[
-    ("accuracy, bidirectional", "A", |it| it.accuracy.bidirectional),
+    ("accuracy, bidirectional", "A", |it| {
+        it.accuracy.bidirectional
+    }),
     ("accuracy, forward", "A↑", |it| it.accuracy.forward),
     ("accuracy, reverse", "A↓", |it| it.accuracy.reverse),
-    ("repeatability, bidirectional", "R", |it| it.repeatability.bidirectional),
-    ("repeatability, forward", "R↑", |it| it.repeatability.forward),
-    ("repeatability, reverse", "R↓", |it| it.repeatability.reverse),
-    ("systematic deviation", "E", |it| it.systematic_deviation.bidirectional),
-    ("range of the mean deviation", "M", |it| it.mean_bidirectional_deviation_range),
+    ("repeatability, bidirectional", "R", |it| {
+        it.repeatability.bidirectional
+    }),
+    ("repeatability, forward", "R↑", |it| {
+        it.repeatability.forward
+    }),
+    ("repeatability, reverse", "R↓", |it| {
+        it.repeatability.reverse
+    }),
+    ("systematic deviation", "E", |it| {
+        it.systematic_deviation.bidirectional
+    }),
+    ("range of the mean deviation", "M", |it| {
+        it.mean_bidirectional_deviation_range
+    }),
     ("reversal value", "B", |it| it.reversal_value),
     ("mean reversal value", "B̄", |it| it.mean_reversal_value),
 ];
@@ -42,7 +54,9 @@ pub fn largest_deviation(figures: &Figures) -> Metres {
         .targets
         .iter()
         .flat_map(|target| [target.mean_forward, target.mean_reverse])
-        .fold(Metres::ZERO, |largest, deviation| largest.max(deviation.abs()))
+        .fold(Metres::ZERO, |largest, deviation| {
+            largest.max(deviation.abs())
+        })
 }
 
 /// One line: `A = 1.234 µm (↑ 1.0, ↓ 1.1)`.

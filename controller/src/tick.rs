@@ -25,7 +25,9 @@ impl Machine {
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only
         // waits behind this arrival.
-        let now = arrival.as_ref().map_or_else(|| self.transport.now(), |arrival| arrival.at);
+        let now = arrival
+            .as_ref()
+            .map_or_else(|| self.transport.now(), |arrival| arrival.at);
         if let Some(arrival) = arrival {
             self.take(&arrival)?;
         }
@@ -50,7 +52,10 @@ impl Machine {
     }
 
     fn next_deadline(&mut self) -> Time {
-        let beats = self.heartbeats.iter().map(|(_, producer)| producer.poll_timeout());
+        let beats = self
+            .heartbeats
+            .iter()
+            .map(|(_, producer)| producer.poll_timeout());
         let first = beats.min().unwrap_or(Time::NEVER);
         (0..self.device_count())
             .map(|at| self.device_mut(at).device.poll_timeout())
@@ -68,11 +73,14 @@ impl Machine {
             return Ok(());
         }
         match arrival.input {
-            Input::Link(state @ (LinkState::Down | LinkState::Gone)) => {
-                Err(Failure::Link { port: self.port_name(arrival.port), state })
-            }
+            Input::Link(state @ (LinkState::Down | LinkState::Gone)) => Err(Failure::Link {
+                port: self.port_name(arrival.port),
+                state,
+            }),
             Input::BusError(error) if error.class.contains(BusErrorClass::BUS_OFF) => {
-                Err(Failure::BusOff { port: self.port_name(arrival.port) })
+                Err(Failure::BusOff {
+                    port: self.port_name(arrival.port),
+                })
             }
             Input::Link(LinkState::Up)
             | Input::BusError(_)
@@ -104,7 +112,9 @@ impl Machine {
             loop {
                 let unit = self.device_mut(at);
                 let port = unit.port;
-                let Some(payload) = unit.device.poll_transmit() else { break };
+                let Some(payload) = unit.device.poll_transmit() else {
+                    break;
+                };
                 let name = self.device_name(at);
                 self.send(port, &payload, &name)?;
             }
@@ -117,7 +127,10 @@ impl Machine {
             Ok(()) => Ok(()),
             // While stopping, what can be sent is sent; the drives' watchdogs do the rest.
             Err(_) if self.supervision == Supervision::Stopping => Ok(()),
-            Err(source) => Err(Failure::Send { device: device.to_owned(), source }),
+            Err(source) => Err(Failure::Send {
+                device: device.to_owned(),
+                source,
+            }),
         }
     }
 
@@ -130,9 +143,10 @@ impl Machine {
             }
         }
         match first {
-            Some((at, alarm)) if self.supervision == Supervision::On => {
-                Err(Failure::Alarm { device: self.device_name(at), alarm })
-            }
+            Some((at, alarm)) if self.supervision == Supervision::On => Err(Failure::Alarm {
+                device: self.device_name(at),
+                alarm,
+            }),
             _ => Ok(()),
         }
     }
@@ -147,6 +161,9 @@ impl Machine {
     }
 
     fn port_name(&self, port: Port) -> String {
-        self.port_names.get(&port).cloned().unwrap_or_else(|| format!("port {}", port.0))
+        self.port_names
+            .get(&port)
+            .cloned()
+            .unwrap_or_else(|| format!("port {}", port.0))
     }
 }

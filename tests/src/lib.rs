@@ -6,4 +6,4 @@
 
 mod rig;
 
-pub use rig::{Bench, MACHINE, EMULATED, Rig, machine_config, rigs};
+pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};

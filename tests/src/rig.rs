@@ -43,7 +43,10 @@ pub fn rigs() -> Vec<Rig> {
 /// # Panics
 /// When the changed text is no configuration.
 pub fn machine_config(folder: &Path, change: impl Fn(String) -> String) -> Loaded {
-    let text = change(MACHINE.replace("\"machine-data\"", &format!("{:?}", folder.display().to_string())));
+    let text = change(MACHINE.replace(
+        "\"machine-data\"",
+        &format!("{:?}", folder.display().to_string()),
+    ));
     config::parse(&text, "linear.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -95,7 +98,13 @@ impl Bench {
             .unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
         let store = Store::new(folder.path(), &loaded.config.machine.name);
-        Self { machine, emulated, store, loaded, folder }
+        Self {
+            machine,
+            emulated,
+            store,
+            loaded,
+            folder,
+        }
     }
 
     /// Where the point of the stage truly is, and where the true origin is zero.

@@ -1,3 +1,4 @@
-//! Whole cycles of whole machines.
+//! Whole cycles of whole machines, in virtual time.
 
 mod linear;
+mod linear_zero;

@@ -10,8 +10,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("compensator", &["units"]),
     ("drivers", &["units"]),
     ("mock-bus", &["units", "drivers"]),
-    ("truestage", &["units", "drivers", "compensator", "mock-bus"]),
-    ("tests", &["units", "drivers", "compensator", "mock-bus", "truestage"]),
+    (
+        "truestage",
+        &["units", "drivers", "compensator", "mock-bus"],
+    ),
+    (
+        "tests",
+        &["units", "drivers", "compensator", "mock-bus", "truestage"],
+    ),
 ];
 
 /// The only files of the controller that may name the emulator.
@@ -20,7 +26,10 @@ const EMULATOR_USERS: &[&str] = &["controller/src/emulated.rs", "controller/src/
 const FILE_LINES_MAX: usize = 500;
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ has a parent").to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("tests/ has a parent")
+        .to_owned()
 }
 
 /// Every Rust file below `folder` of the repository, by its path from the root.
@@ -33,12 +42,20 @@ fn sources(folder: &str) -> BTreeMap<String, String> {
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|it| it == "rs") {
-                let name = path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned();
+                let name = path
+                    .strip_prefix(root())
+                    .unwrap()
+                    .to_str()
+                    .unwrap()
+                    .to_owned();
                 found.insert(name, fs::read_to_string(&path).unwrap());
             }
         }
     }
-    assert!(!found.is_empty(), "no sources below {folder}: the rule would hold for nothing");
+    assert!(
+        !found.is_empty(),
+        "no sources below {folder}: the rule would hold for nothing"
+    );
     found
 }
 
@@ -51,7 +68,8 @@ fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// The file without its tests: `#[cfg(test)]` ends the code in this project.
 fn without_tests(text: &str) -> &str {
-    text.split_once("\n#[cfg(test)]\nmod tests {").map_or(text, |(code, _)| code)
+    text.split_once("\n#[cfg(test)]\nmod tests {")
+        .map_or(text, |(code, _)| code)
 }
 
 #[track_caller]
@@ -70,7 +88,14 @@ fn nowhere(folder: &str, words: &[&str], why: &str) {
 #[test]
 fn packages_depend_only_on_those_below_them() {
     let members: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
-    for folder in ["units", "drivers", "compensator", "mock-bus", "controller", "tests"] {
+    for folder in [
+        "units",
+        "drivers",
+        "compensator",
+        "mock-bus",
+        "controller",
+        "tests",
+    ] {
         let text = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
         let manifest: toml::Table = text.parse().unwrap();
         let package = manifest["package"]["name"].as_str().unwrap();
@@ -79,8 +104,14 @@ fn packages_depend_only_on_those_below_them() {
             let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
                 continue;
             };
-            for name in dependencies.keys().filter(|name| members.contains_key(name.as_str())) {
-                assert!(allowed.contains(&name.as_str()), "{package} must not depend on {name}");
+            for name in dependencies
+                .keys()
+                .filter(|name| members.contains_key(name.as_str()))
+            {
+                assert!(
+                    allowed.contains(&name.as_str()),
+                    "{package} must not depend on {name}"
+                );
             }
         }
     }
@@ -94,7 +125,11 @@ fn the_emulator_shares_only_byte_codecs_with_the_drivers() {
                 let rest = &code[at + "drivers::".len()..];
                 assert!(rest.starts_with("wire"), "{name}:{line}: {}", code.trim());
             }
-            assert!(!code.contains("compensator"), "{name}:{line}: {}", code.trim());
+            assert!(
+                !code.contains("compensator"),
+                "{name}:{line}: {}",
+                code.trim()
+            );
         }
     }
 }
@@ -114,14 +149,35 @@ fn only_the_demonstration_knows_the_emulator() {
 #[test]
 fn protocols_and_mathematics_know_no_clock_socket_thread_or_chance() {
     let words = [
-        "std::thread", "std::net", "std::fs", "Instant::now", "SystemTime", "sleep(", "tokio",
-        "socketcan::", "rand::", "rand_",
+        "std::thread",
+        "std::net",
+        "std::fs",
+        "Instant::now",
+        "SystemTime",
+        "sleep(",
+        "tokio",
+        "socketcan::",
+        "rand::",
+        "rand_",
     ];
-    for folder in ["compensator/src", "drivers/src/wire", "drivers/src/protocol", "drivers/src/device"] {
+    for folder in [
+        "compensator/src",
+        "drivers/src/wire",
+        "drivers/src/protocol",
+        "drivers/src/device",
+    ] {
         nowhere(folder, &words, "sans-io code reaches outside");
     }
-    nowhere("mock-bus/src/plant", &words[..6], "the plant lives in virtual time");
-    nowhere("mock-bus/src/node", &words[..6], "nodes live in virtual time");
+    nowhere(
+        "mock-bus/src/plant",
+        &words[..6],
+        "the plant lives in virtual time",
+    );
+    nowhere(
+        "mock-bus/src/node",
+        &words[..6],
+        "nodes live in virtual time",
+    );
 }
 
 #[test]
@@ -139,7 +195,11 @@ fn no_test_waits_for_the_clock_on_the_wall() {
             continue;
         }
         for (line, code) in code_lines(&text) {
-            assert!(!code.contains("thread::sleep"), "{name}:{line}: {}", code.trim());
+            assert!(
+                !code.contains("thread::sleep"),
+                "{name}:{line}: {}",
+                code.trim()
+            );
         }
     }
 }
@@ -150,7 +210,10 @@ fn files_stay_within_a_screenful_of_ideas() {
         for (name, text) in sources(folder) {
             let lines = without_tests(&text).lines().count();
             let is_test = name.contains("test") || name.contains("rig");
-            assert!(is_test || lines <= FILE_LINES_MAX, "{name} has {lines} lines: split it");
+            assert!(
+                is_test || lines <= FILE_LINES_MAX,
+                "{name} has {lines} lines: split it"
+            );
         }
     }
 }
@@ -158,7 +221,11 @@ fn files_stay_within_a_screenful_of_ideas() {
 #[test]
 fn code_has_no_loose_ends() {
     for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
-        nowhere(folder, &["todo!(", "unimplemented!(", "dbg!(", "#[allow("], "loose end");
+        nowhere(
+            folder,
+            &["todo!(", "unimplemented!(", "dbg!(", "#[allow("],
+            "loose end",
+        );
     }
 }
 
@@ -167,5 +234,9 @@ fn every_package_is_in_the_workspace() {
     let text = fs::read_to_string(root().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = text.parse().unwrap();
     let members = manifest["workspace"]["members"].as_array().unwrap();
-    assert_eq!(members.len(), ALLOWED.len(), "tell this test what the new package may import");
+    assert_eq!(
+        members.len(),
+        ALLOWED.len(),
+        "tell this test what the new package may import"
+    );
 }

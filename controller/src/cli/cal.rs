@@ -55,9 +55,11 @@ pub(super) fn run(command: &CalCommand, output: Output) -> Result<(), Failure> {
     match command {
         CalCommand::List { config } => list(&store_of(config)?, output),
         CalCommand::Show { config, id } => show(&store_of(config)?, id, output),
-        CalCommand::Diff { config, before, after } => {
-            diff(&store_of(config)?, before, after, output)
-        }
+        CalCommand::Diff {
+            config,
+            before,
+            after,
+        } => diff(&store_of(config)?, before, after, output),
         CalCommand::Activate { config, id } => activate(config, id, output),
         CalCommand::Rollback { config, axis } => rollback(&store_of(config)?, axis, output),
     }
@@ -139,22 +141,29 @@ fn node_line(node: &NodeRecord) -> String {
 }
 
 fn diff(store: &Store, before: &str, after: &str, output: Output) -> Result<(), Failure> {
-    let load = |id: &str| -> Result<CalibrationRecord, Failure> {
-        Ok(store.load(&store.resolve(id)?)?)
-    };
+    let load =
+        |id: &str| -> Result<CalibrationRecord, Failure> { Ok(store.load(&store.resolve(id)?)?) };
     let (before, after) = (load(before)?, load(after)?);
     let mut lines = vec!["  position (mm)   Δ forward (µm)   Δ reverse (µm)".to_owned()];
     let mut values = Vec::new();
     for new in &after.nodes {
-        let Some(old) = before.nodes.iter().find(|old| old.position_m == new.position_m) else {
+        let Some(old) = before
+            .nodes
+            .iter()
+            .find(|old| old.position_m == new.position_m)
+        else {
             continue;
         };
         let change = |new: Option<f64>, old: Option<f64>| Some(new? - old?);
-        let (forward, reverse) =
-            (change(new.forward_m, old.forward_m), change(new.reverse_m, old.reverse_m));
+        let (forward, reverse) = (
+            change(new.forward_m, old.forward_m),
+            change(new.reverse_m, old.reverse_m),
+        );
         let position = Metres(new.position_m).mm();
         let (forward_um, reverse_um) = (micrometres(forward), micrometres(reverse));
-        lines.push(format!("  {position:>13.3}   {forward_um:>14}   {reverse_um:>14}"));
+        lines.push(format!(
+            "  {position:>13.3}   {forward_um:>14}   {reverse_um:>14}"
+        ));
         values.push(json!({
             "position_mm": position,
             "forward_um": forward.map(|it| Metres(it).um()),
@@ -182,8 +191,17 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Result<(), Fail
     };
     record.belongs_to(&id, &here)?;
     if !loaded.config.axis.contains_key(&record.axis) {
-        let known = loaded.config.axis.keys().cloned().collect::<Vec<_>>().join(", ");
-        return Err(Failure::NoSuchAxis { axis: record.axis, known });
+        let known = loaded
+            .config
+            .axis
+            .keys()
+            .cloned()
+            .collect::<Vec<_>>()
+            .join(", ");
+        return Err(Failure::NoSuchAxis {
+            axis: record.axis,
+            known,
+        });
     }
     store.activate(&record.axis, &id)?;
     let text = format!("axis {}: {} is in use", record.axis, short(&id));

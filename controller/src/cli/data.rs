@@ -38,8 +38,10 @@ pub(super) enum FitCommand {
 }
 
 fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|source| Failure::File { path: path.to_owned(), source })
+    std::fs::read_to_string(path).map_err(|source| Failure::File {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 pub(super) fn iso230(path: &Path, output: Output) -> Result<(), Failure> {
@@ -89,7 +91,10 @@ fn linear(
     }
     if let Some(config) = save {
         let id = store_fit(config, axis, path, &series, &fitted)?;
-        text += &format!("\nstored as {}; use it with `truestage cal activate`", short(&id));
+        text += &format!(
+            "\nstored as {}; use it with `truestage cal activate`",
+            short(&id)
+        );
         value["calibration"] = json!(id);
     }
     output.result(&text, &value);
@@ -113,9 +118,10 @@ fn store_fit(
         (None, _) => String::new(),
     };
     let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
-    let axis = axes
-        .get(&name)
-        .ok_or_else(|| Failure::NoSuchAxis { axis: name.clone(), known: known() })?;
+    let axis = axes.get(&name).ok_or_else(|| Failure::NoSuchAxis {
+        axis: name.clone(),
+        known: known(),
+    })?;
     if let Some(limits) = &axis.compensation {
         assemble::compensation(limits, &name, fitted.table.clone())?;
     }
@@ -139,8 +145,15 @@ fn store_fit(
         resolution_m: axis.resolution_nm * 1e-9,
         created: utc_now(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
-        source: data.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        instrument: InstrumentRecord { name: "measured elsewhere".into(), ..Default::default() },
+        source: data
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        instrument: InstrumentRecord {
+            name: "measured elsewhere".into(),
+            ..Default::default()
+        },
         environment: EnvironmentRecord::default(),
         runs: series.runs().len() as u32,
         closure_m: None,
@@ -153,8 +166,10 @@ fn store_fit(
 
 fn hall(path: &Path, output: Output) -> Result<(), Failure> {
     let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
-    let estimate = fit_hall(&series)
-        .map_err(|source| Failure::Refine { axis: path.display().to_string(), source })?;
+    let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
+        axis: path.display().to_string(),
+        source,
+    })?;
     let text = format!(
         "origin {:.4} µm, standard uncertainty {:.4} µm ({} points)\nflanks at {:.1} and {:.1} µm, \
          mid voltage {:.4} V",

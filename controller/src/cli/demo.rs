@@ -26,8 +26,11 @@ const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
 const LINEAR_EMULATED: &str = include_str!("../../../configs/emulated/linear.toml");
 const AXIS: &str = "x";
 /// What aged, warmed and disturbed Hall sensors may do between two power-ups.
-const DRIFT: DriftLimits =
-    DriftLimits { offset: Volts(0.1), gain: 0.03, gain_per_m: 0.0 };
+const DRIFT: DriftLimits = DriftLimits {
+    offset: Volts(0.1),
+    gain: 0.03,
+    gain_per_m: 0.0,
+};
 /// How long the mains stays off, and what the drives take to boot, in machine time.
 const POWER_OFF: Duration = Duration::from_millis(800);
 
@@ -76,9 +79,15 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Result<(), Failure> {
     let store = Store::new(&section.data_dir, &section.name);
     let _lease = Lease::take(&store, "demo")?;
     let emulated = EmulatedOnPtys::start(LINEAR_EMULATED, args.seed, args.speed)?;
-    let transport = ports::open(&loaded.config, &emulated.overrides(&loaded.config)?, args.speed)?;
+    let transport = ports::open(
+        &loaded.config,
+        &emulated.overrides(&loaded.config)?,
+        args.speed,
+    )?;
     let mut machine = Machine::new(&loaded, Box::new(transport));
-    machine.observe(Box::new(Bars::new(output.is_json() || !std::io::stderr().is_terminal())));
+    machine.observe(Box::new(Bars::new(
+        output.is_json() || !std::io::stderr().is_terminal(),
+    )));
     stop_on_signals(&machine.stop_request())?;
     announce(args, &loaded, &emulated, output);
     let story = machine.guarded(|machine| tell(machine, &store, &emulated, args, output))?;
@@ -141,11 +150,22 @@ fn tell(
     output.note("7 as left, after the power cycles");
     let after = machine.verify(AXIS, store, &compensated)?;
     machine.shut_down()?;
-    Ok(Story { first_zero, found, calibrated, left, rezeros, after })
+    Ok(Story {
+        first_zero,
+        found,
+        calibrated,
+        left,
+        rezeros,
+        after,
+    })
 }
 
 const fn options(compensated: bool, calibration: Option<String>) -> VerifyOptions {
-    VerifyOptions { compensated, calibration, resume: None }
+    VerifyOptions {
+        compensated,
+        calibration,
+        resume: None,
+    }
 }
 
 fn rezero(
@@ -164,7 +184,11 @@ fn rezero(
     let shift = machine.displacement_at_zero(AXIS)?;
     let threshold = zeroed.single_threshold(first.estimate.mid_voltage);
     let single_threshold_shift = threshold.map(|at| at - zeroed.estimate.origin + shift);
-    Ok(Rezero { zeroed, shift, single_threshold_shift })
+    Ok(Rezero {
+        zeroed,
+        shift,
+        single_threshold_shift,
+    })
 }
 
 fn judge(story: &Story) -> Result<(), Failure> {
@@ -209,7 +233,9 @@ fn summary(story: &Story, report: &std::path::Path, wall: Duration, speed: f64) 
     for (at, rezero) in story.rezeros.iter().enumerate() {
         let single = rezero
             .single_threshold_shift
-            .map_or("beyond the search".to_owned(), |shift| format!("{:+.1} µm", shift.um()));
+            .map_or("beyond the search".to_owned(), |shift| {
+                format!("{:+.1} µm", shift.um())
+            });
         lines.push(format!(
             "  power cycle {}: moved by {:+.0} nm (u = {:.0} nm); a single threshold: {single}",
             at + 1,
@@ -221,7 +247,10 @@ fn summary(story: &Story, report: &std::path::Path, wall: Duration, speed: f64) 
         String::new(),
         format!("calibration  {} (active)", story.calibrated.path.display()),
         format!("report       {}", report.display()),
-        format!("took {:.1} s; the emulated machine lived {speed}× faster", wall.as_secs_f64()),
+        format!(
+            "took {:.1} s; the emulated machine lived {speed}× faster",
+            wall.as_secs_f64()
+        ),
     ]);
     lines.join("\n")
 }

@@ -23,7 +23,11 @@ impl Output {
 
     /// The result: `text` for people, `value` with `--json`.
     pub(super) fn result(self, text: &str, value: &Value) {
-        let line = if self.json { value.to_string() } else { text.to_owned() };
+        let line = if self.json {
+            value.to_string()
+        } else {
+            text.to_owned()
+        };
         // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
         let _ = writeln!(std::io::stdout().lock(), "{line}");
     }

@@ -39,10 +39,18 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Result<(), Failure> {
         calibration: None,
         zeros: journal.zeros.clone(),
     };
-    let path = args.output.clone().unwrap_or_else(|| args.run.with_extension("html"));
-    std::fs::write(&path, report::render(&page))
-        .map_err(|source| Failure::File { path: path.clone(), source })?;
-    output.result(&format!("report in {}", path.display()), &json!({"report": path}));
+    let path = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.run.with_extension("html"));
+    std::fs::write(&path, report::render(&page)).map_err(|source| Failure::File {
+        path: path.clone(),
+        source,
+    })?;
+    output.result(
+        &format!("report in {}", path.display()),
+        &json!({"report": path}),
+    );
     Ok(())
 }
 

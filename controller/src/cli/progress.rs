@@ -14,12 +14,18 @@ pub(super) struct Bars {
 impl Bars {
     /// Drawn on stderr, and only where that is a terminal.
     pub(super) const fn new(hidden: bool) -> Self {
-        Self { current: None, hidden }
+        Self {
+            current: None,
+            hidden,
+        }
     }
 
     fn start(&self, stage: Stage, axis: &str, total: u64) -> ProgressBar {
-        let target =
-            if self.hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let target = if self.hidden {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        };
         let bar = ProgressBar::with_draw_target(Some(total), target);
         let template = "  {msg:<14} [{bar:32}] {pos:>4}/{len:<4} {eta:>4} left";
         let style = ProgressStyle::with_template(template).expect("the template is constant");
@@ -32,11 +38,14 @@ impl Bars {
 
 impl Observer for Bars {
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64) {
-        let running = matches!(&self.current, Some((shown, bar)) if *shown == stage && !bar.is_finished());
+        let running =
+            matches!(&self.current, Some((shown, bar)) if *shown == stage && !bar.is_finished());
         if !running {
             self.current = Some((stage, self.start(stage, axis, total)));
         }
-        let Some((_, bar)) = &self.current else { return };
+        let Some((_, bar)) = &self.current else {
+            return;
+        };
         bar.set_position(done);
         if done >= total {
             bar.finish_and_clear();

@@ -14,7 +14,10 @@ pub(super) fn run(args: &MachineArgs, output: Output) -> Result<(), Failure> {
     let lines: Vec<_> = found.iter().map(line).collect();
     let values: Vec<_> = found.iter().map(value).collect();
     let all_match = found.iter().all(|it| it.mismatches.is_empty());
-    output.result(&lines.join("\n"), &json!({"devices": values, "matches": all_match}));
+    output.result(
+        &lines.join("\n"),
+        &json!({"devices": values, "matches": all_match}),
+    );
     if all_match {
         return Ok(());
     }
@@ -23,7 +26,9 @@ pub(super) fn run(args: &MachineArgs, output: Output) -> Result<(), Failure> {
 }
 
 fn line(found: &Found) -> String {
-    let node = found.node.map_or(String::new(), |node| format!(" node {node}"));
+    let node = found
+        .node
+        .map_or(String::new(), |node| format!(" node {node}"));
     let name = found.name.as_deref().unwrap_or("?");
     let identity = match &found.identity {
         None => String::new(),
@@ -33,7 +38,11 @@ fn line(found: &Found) -> String {
             it.device_type, it.vendor, it.product, it.revision, it.serial
         ),
     };
-    let verdict = if found.mismatches.is_empty() { "ok" } else { "!!" };
+    let verdict = if found.mismatches.is_empty() {
+        "ok"
+    } else {
+        "!!"
+    };
     let mut text = format!("{verdict} {}{node:<9} {name:<8} {identity}", found.port);
     for mismatch in &found.mismatches {
         text += &format!("\n     {mismatch}");

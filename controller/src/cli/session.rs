@@ -35,7 +35,11 @@ impl Session {
         let mut machine = Machine::new(&loaded, transport);
         machine.observe(Box::new(Bars::new(output.is_json())));
         stop_on_signals(&machine.stop_request())?;
-        Ok(Self { machine, store, _lease: lease })
+        Ok(Self {
+            machine,
+            store,
+            _lease: lease,
+        })
     }
 }
 
@@ -44,21 +48,35 @@ fn recorded(
     args: &MachineArgs,
     loaded: &Loaded,
 ) -> Result<Box<dyn Transport>, Failure> {
-    let Some(path) = &args.record else { return Ok(Box::new(transport)) };
-    let failed = |source| Failure::File { path: path.clone(), source };
+    let Some(path) = &args.record else {
+        return Ok(Box::new(transport));
+    };
+    let failed = |source| Failure::File {
+        path: path.clone(),
+        source,
+    };
     let log = BufWriter::new(File::create(path).map_err(failed)?);
     let ports = assemble::ports(&loaded.config);
-    let names: Vec<_> = ports.iter().map(|(name, port)| (*port, name.as_str())).collect();
-    Ok(Box::new(Recorder::new(transport, log, &names).map_err(failed)?))
+    let names: Vec<_> = ports
+        .iter()
+        .map(|(name, port)| (*port, name.as_str()))
+        .collect();
+    Ok(Box::new(
+        Recorder::new(transport, log, &names).map_err(failed)?,
+    ))
 }
 
 /// Ctrl-C and termination ask for a controlled stop; a second one ends the process at once,
 /// and the drives, which watch our heartbeat, stop by themselves.
 pub(super) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let failed = |source| Failure::File { path: "signal handler".into(), source };
+    let failed = |source| Failure::File {
+        path: "signal handler".into(),
+        source,
+    };
     for signal in [SIGINT, SIGTERM, SIGHUP] {
-        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.flag()).map_err(failed)?;
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.flag())
+            .map_err(failed)?;
         signal_hook::flag::register(signal, stop.flag()).map_err(failed)?;
     }
     Ok(())

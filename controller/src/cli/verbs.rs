@@ -26,7 +26,10 @@ pub(super) fn check(path: &Path, output: Output) -> Result<(), Failure> {
         loaded.config.instrument.len(),
         &loaded.hash[..12],
     );
-    output.result(&text, &json!({"ok": true, "machine": machine.name, "hash": loaded.hash}));
+    output.result(
+        &text,
+        &json!({"ok": true, "machine": machine.name, "hash": loaded.hash}),
+    );
     Ok(())
 }
 
@@ -43,8 +46,11 @@ fn with_zeroed_axis<R>(
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
-        let calibration =
-            if load_calibration { machine.load_active(&axis, &store)? } else { None };
+        let calibration = if load_calibration {
+            machine.load_active(&axis, &store)?
+        } else {
+            None
+        };
         machine.zero(&axis, &store)?;
         let result = procedure(machine, &axis, &store, calibration)?;
         machine.shut_down()?;
@@ -77,13 +83,19 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Result<(), Failure> {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Result<(), Failure> {
-    let calibrated = with_zeroed_axis(&args.axis, "calibrate", output, false, |machine, axis, store, _| {
-        let options = CalibrateOptions {
-            resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
-            accept_drift: args.accept_drift,
-        };
-        machine.calibrate(axis, store, &options)
-    })?;
+    let calibrated = with_zeroed_axis(
+        &args.axis,
+        "calibrate",
+        output,
+        false,
+        |machine, axis, store, _| {
+            let options = CalibrateOptions {
+                resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
+                accept_drift: args.accept_drift,
+            };
+            machine.calibrate(axis, store, &options)
+        },
+    )?;
     let fitted = &calibrated.fitted;
     let mut text = format!(
         "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, \
@@ -126,8 +138,15 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Result<(), Failure> {
             });
         }
         let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
-        let verified =
-            machine.verify(axis, store, &VerifyOptions { compensated, calibration, resume })?;
+        let verified = machine.verify(
+            axis,
+            store,
+            &VerifyOptions {
+                compensated,
+                calibration,
+                resume,
+            },
+        )?;
         Ok((axis.to_owned(), verified))
     };
     let (axis, verified) = with_zeroed_axis(&args.axis, "verify", output, compensated, run)?;
@@ -147,22 +166,38 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Result<(), Failure> {
             output.result(&text, &value);
         }
         let seen = verified.figures.accuracy.bidirectional;
-        return Err(Failure::OutOfTolerance { axis, seen, limit: verified.tolerance });
+        return Err(Failure::OutOfTolerance {
+            axis,
+            seen,
+            limit: verified.tolerance,
+        });
     }
     output.result(&text, &value);
     Ok(())
 }
 
 pub(super) fn move_to(args: &MoveArgs, output: Output) -> Result<(), Failure> {
-    let targets = args.targets.iter().map(|text| parse_target(text)).collect::<Result<Vec<_>, _>>()?;
+    let targets = args
+        .targets
+        .iter()
+        .map(|text| parse_target(text))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut session = Session::open(&args.machine, "move", output)?;
     for (axis, target) in &targets {
         let (min, max) = {
             let config = session.machine.axis_config(axis)?;
-            (Metres::from_mm(config.soft_min_mm), Metres::from_mm(config.soft_max_mm))
+            (
+                Metres::from_mm(config.soft_min_mm),
+                Metres::from_mm(config.soft_max_mm),
+            )
         };
         if !(*target >= min && *target <= max) {
-            return Err(Failure::SoftLimit { axis: axis.clone(), target: *target, min, max });
+            return Err(Failure::SoftLimit {
+                axis: axis.clone(),
+                target: *target,
+                min,
+                max,
+            });
         }
     }
     let store = session.store.clone();
@@ -181,7 +216,9 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Result<(), Failure> {
     let lines: Vec<_> = moved
         .iter()
         .map(|(axis, target, set_point, calibration)| {
-            let by = calibration.as_ref().map_or("no calibration".to_owned(), |id| id[..12].to_owned());
+            let by = calibration
+                .as_ref()
+                .map_or("no calibration".to_owned(), |id| id[..12].to_owned());
             format!(
                 "axis {axis}: at {:.6} mm (set-point {:.6} mm, {by})",
                 target.mm(),
@@ -207,7 +244,13 @@ fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
         help: "write AXIS=LENGTH with a unit: x=12.5mm, x=-300um, x=0.1m".into(),
     };
     let (axis, length) = text.split_once('=').ok_or_else(usage)?;
-    let units = [("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("nm", 1e-9), ("m", 1.0)];
+    let units = [
+        ("mm", 1e-3),
+        ("um", 1e-6),
+        ("µm", 1e-6),
+        ("nm", 1e-9),
+        ("m", 1.0),
+    ];
     let (digits, scale) = units
         .iter()
         .find_map(|(unit, scale)| Some((length.strip_suffix(unit)?, *scale)))
@@ -253,7 +296,9 @@ mod tests {
         let (axis, target) = parse_target("x=12.5mm").unwrap();
         assert_eq!((axis.as_str(), target), ("x", Metres(12.5 * 1e-3)));
         assert_eq!(parse_target("y=-300um").unwrap().1, Metres(-300.0 * 1e-6));
-        for text in ["x=12.5", "x", "=1mm", "x=1,5mm", "x=nanmm", "x=infm", "x=mm"] {
+        for text in [
+            "x=12.5", "x", "=1mm", "x=1,5mm", "x=nanmm", "x=infm", "x=mm",
+        ] {
             assert!(parse_target(text).is_err(), "{text}");
         }
     }

@@ -34,7 +34,14 @@ impl Diagnostic {
         let before = text.get(..span.start).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-        Self { file: file.to_owned(), line, column, key: key.to_owned(), cause, help }
+        Self {
+            file: file.to_owned(),
+            line,
+            column,
+            key: key.to_owned(),
+            cause,
+            help,
+        }
     }
 }
 
@@ -72,5 +79,9 @@ pub enum ConfigError {
 }
 
 fn show(findings: &[Diagnostic]) -> String {
-    findings.iter().map(Diagnostic::to_string).collect::<Vec<_>>().join("\n")
+    findings
+        .iter()
+        .map(Diagnostic::to_string)
+        .collect::<Vec<_>>()
+        .join("\n")
 }

@@ -27,8 +27,10 @@ pub struct Loaded {
 /// When the file cannot be read, is no TOML, has unknown or missing keys, or asks for
 /// something impossible; every finding names line and column.
 pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
+    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
     parse(&text, &path.display().to_string())
 }
 
@@ -37,12 +39,20 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
-    let config: MachineConfig = toml::from_str(text).map_err(|error| structural(text, file, &error))?;
+    let config: MachineConfig =
+        toml::from_str(text).map_err(|error| structural(text, file, &error))?;
     let findings = validate(&config);
     if findings.is_empty() {
-        return Ok(Loaded { hash: calibration_hash(&config), config, patience: 1 });
+        return Ok(Loaded {
+            hash: calibration_hash(&config),
+            config,
+            patience: 1,
+        });
     }
-    let mut findings: Vec<_> = findings.into_iter().map(|it| place(text, file, it)).collect();
+    let mut findings: Vec<_> = findings
+        .into_iter()
+        .map(|it| place(text, file, it))
+        .collect();
     findings.sort_by_key(|it| (it.line, it.column));
     Err(ConfigError::Invalid { findings })
 }
@@ -70,9 +80,16 @@ fn calibration_hash(config: &MachineConfig) -> String {
 
 fn structural(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let span = error.span().unwrap_or(0..0);
-    let message = error.message().lines().next().unwrap_or("not valid").to_owned();
+    let message = error
+        .message()
+        .lines()
+        .next()
+        .unwrap_or("not valid")
+        .to_owned();
     let finding = Diagnostic::at(file, text, &span, "", message.clone(), advice(&message));
-    ConfigError::Invalid { findings: vec![finding] }
+    ConfigError::Invalid {
+        findings: vec![finding],
+    }
 }
 
 /// The words between backquotes: the key that was seen, then those that were expected.
@@ -93,9 +110,14 @@ fn advice(message: &str) -> String {
 }
 
 fn unknown_key_advice(words: &[&str]) -> String {
-    let Some((seen, expected)) = words.split_first() else { return String::new() };
+    let Some((seen, expected)) = words.split_first() else {
+        return String::new();
+    };
     let stem = |key: &str| key.split('_').next().unwrap_or("").to_owned();
-    let same_stem: Vec<_> = expected.iter().filter(|key| stem(key) == stem(seen)).collect();
+    let same_stem: Vec<_> = expected
+        .iter()
+        .filter(|key| stem(key) == stem(seen))
+        .collect();
     let near = same_stem
         .into_iter()
         .max_by_key(|key| common_prefix(key, seen))
@@ -154,7 +176,11 @@ mod tests {
 
     #[track_caller]
     fn line_of(needle: &str) -> usize {
-        LINEAR.lines().position(|line| line.starts_with(needle)).expect(needle) + 1
+        LINEAR
+            .lines()
+            .position(|line| line.starts_with(needle))
+            .expect(needle)
+            + 1
     }
 
     #[test]
@@ -187,7 +213,12 @@ mod tests {
     #[test]
     fn two_devices_with_one_node_id_are_refused() {
         let text = LINEAR.replace("node_id = 2", "node_id = 1");
-        assert!(findings(&text).iter().any(|it| it.cause.contains("already")), "{text}");
+        assert!(
+            findings(&text)
+                .iter()
+                .any(|it| it.cause.contains("already")),
+            "{text}"
+        );
     }
 
     #[test]

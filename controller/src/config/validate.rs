@@ -32,27 +32,54 @@ impl<'a> Judge<'a> {
     }
 
     fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
-        let key = if key.is_empty() { self.prefix.clone() } else { format!("{}.{key}", self.prefix) };
-        self.findings.push(Finding { key, cause: cause.into(), help: help.into() });
+        let key = if key.is_empty() {
+            self.prefix.clone()
+        } else {
+            format!("{}.{key}", self.prefix)
+        };
+        self.findings.push(Finding {
+            key,
+            cause: cause.into(),
+            help: help.into(),
+        });
     }
 
     fn within(&mut self, key: &str, value: f64, low: f64, high: f64) {
         if !(low..=high).contains(&value) {
-            self.say(key, format!("{value} is impossible"), format!("give {low} to {high}"));
+            self.say(
+                key,
+                format!("{value} is impossible"),
+                format!("give {low} to {high}"),
+            );
         }
     }
 
     fn below(&mut self, low: (&str, f64), high: (&str, f64)) {
         if low.1 >= high.1 {
-            let cause = format!("{} must be greater than {} ({} ≤ {})", high.0, low.0, high.1, low.1);
-            self.say(high.0, cause, format!("raise {} or lower {}", high.0, low.0));
+            let cause = format!(
+                "{} must be greater than {} ({} ≤ {})",
+                high.0, low.0, high.1, low.1
+            );
+            self.say(
+                high.0,
+                cause,
+                format!("raise {} or lower {}", high.0, low.0),
+            );
         }
     }
 
     fn known<T>(&mut self, key: &str, name: &str, table: &BTreeMap<String, T>, kind: &str) {
         if !table.contains_key(name) {
-            let names = table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-            self.say(key, format!("there is no {kind} `{name}`"), format!("known: {names}"));
+            let names = table
+                .keys()
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", ");
+            self.say(
+                key,
+                format!("there is no {kind} `{name}`"),
+                format!("known: {names}"),
+            );
         }
     }
 }
@@ -72,14 +99,26 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
     }
     for (name, axis) in &config.axis {
-        check_axis(&mut Judge::at(format!("axis.{name}"), &mut findings), config, axis);
+        check_axis(
+            &mut Judge::at(format!("axis.{name}"), &mut findings),
+            config,
+            axis,
+        );
         check_cycle(&mut findings, config, name, axis);
     }
     for (name, analog) in &config.analog {
-        check_analog(&mut Judge::at(format!("analog.{name}"), &mut findings), config, analog);
+        check_analog(
+            &mut Judge::at(format!("analog.{name}"), &mut findings),
+            config,
+            analog,
+        );
     }
     for (name, instrument) in &config.instrument {
-        check_instrument(&mut Judge::at(format!("instrument.{name}"), &mut findings), config, instrument);
+        check_instrument(
+            &mut Judge::at(format!("instrument.{name}"), &mut findings),
+            config,
+            instrument,
+        );
     }
     check_node_ids(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
@@ -93,10 +132,18 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
     let name = &config.machine.name;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(plain) {
-        judge.say("name", format!("`{name}` cannot name a folder"), "use letters, digits, - and _");
+        judge.say(
+            "name",
+            format!("`{name}` cannot name a folder"),
+            "use letters, digits, - and _",
+        );
     }
     if config.machine.stage_serial.is_empty() {
-        judge.say("stage_serial", "is empty", "give the serial number on the stage's plate");
+        judge.say(
+            "stage_serial",
+            "is empty",
+            "give the serial number on the stage's plate",
+        );
     }
     if config.axis.is_empty() {
         judge.say("", "the machine has no axis", "add an [axis.NAME] section");
@@ -109,11 +156,15 @@ fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
         CanTransport::Slcan => ("path", bus.path.is_some(), bus.interface.is_some()),
     };
     if !given || other {
-        let cause = format!("transport {:?} takes `{wanted}` and only that", bus.transport);
+        let cause = format!(
+            "transport {:?} takes `{wanted}` and only that",
+            bus.transport
+        );
         judge.say("transport", cause, format!("give `{wanted}`"));
     }
-    const BITRATES: [u32; 8] =
-        [10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
+    const BITRATES: [u32; 8] = [
+        10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000,
+    ];
     if !BITRATES.contains(&bus.bitrate_bit_per_s) {
         judge.say(
             "bitrate_bit_per_s",
@@ -123,7 +174,12 @@ fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
     }
     judge.within("sync_period_ms", bus.sync_period_ms, 0.25, 1000.0);
     judge.within("master_node_id", bus.master_node_id.into(), 1.0, 127.0);
-    judge.within("master_heartbeat_ms", bus.master_heartbeat_ms.into(), 5.0, 10_000.0);
+    judge.within(
+        "master_heartbeat_ms",
+        bus.master_heartbeat_ms.into(),
+        5.0,
+        10_000.0,
+    );
 }
 
 fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u16) {
@@ -138,13 +194,20 @@ fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u16) {
 }
 
 fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_master_ms: u16) {
-    let Some(bus) = config.can.get(bus) else { return };
+    let Some(bus) = config.can.get(bus) else {
+        return;
+    };
     let least = bus.master_heartbeat_ms.saturating_mul(2);
     if watch_master_ms < least {
         judge.say(
             "watch_master_ms",
-            format!("{watch_master_ms} ms with a master heartbeat every {} ms", bus.master_heartbeat_ms),
-            format!("give at least {least}; without it a killed controller would not stop the stage"),
+            format!(
+                "{watch_master_ms} ms with a master heartbeat every {} ms",
+                bus.master_heartbeat_ms
+            ),
+            format!(
+                "give at least {least}; without it a killed controller would not stop the stage"
+            ),
         );
     }
 }
@@ -153,18 +216,41 @@ fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) 
     judge.known("bus", &axis.bus, &config.can, "CAN bus");
     judge.within("node_id", axis.node_id.into(), 1.0, 127.0);
     judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);
-    judge.below(("soft_min_mm", axis.soft_min_mm), ("soft_max_mm", axis.soft_max_mm));
+    judge.below(
+        ("soft_min_mm", axis.soft_min_mm),
+        ("soft_max_mm", axis.soft_max_mm),
+    );
     judge.within("speed_max_mm_per_s", axis.speed_max_mm_per_s, 1e-3, 1e5);
-    judge.within("speed_mm_per_s", axis.speed_mm_per_s, 1e-3, axis.speed_max_mm_per_s);
-    judge.within("acceleration_mm_per_s2", axis.acceleration_mm_per_s2, 1e-2, 1e6);
+    judge.within(
+        "speed_mm_per_s",
+        axis.speed_mm_per_s,
+        1e-3,
+        axis.speed_max_mm_per_s,
+    );
+    judge.within(
+        "acceleration_mm_per_s2",
+        axis.acceleration_mm_per_s2,
+        1e-2,
+        1e6,
+    );
     let quick_stop = axis.quick_stop_deceleration_mm_per_s2;
     judge.within("quick_stop_deceleration_mm_per_s2", quick_stop, 1e-2, 1e7);
-    judge.within("following_error_limit_um", axis.following_error_limit_um, 1e-3, 1e5);
+    judge.within(
+        "following_error_limit_um",
+        axis.following_error_limit_um,
+        1e-3,
+        1e5,
+    );
     judge.within("position_window_um", axis.position_window_um, 1e-4, 1e4);
     judge.within("move_timeout_s", axis.move_timeout_s, 0.01, 1e5);
-    check_heartbeat(judge, axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms);
+    check_heartbeat(
+        judge,
+        axis.heartbeat_producer_ms,
+        axis.heartbeat_consumer_ms,
+    );
     check_watch(judge, config, &axis.bus, axis.watch_master_ms);
-    let counts = axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
+    let counts =
+        axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
     if counts > f64::from(i32::MAX) {
         judge.say(
             "resolution_nm",
@@ -174,30 +260,48 @@ fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) 
     }
 }
 
-fn check_cycle(
-    findings: &mut Vec<Finding>,
-    config: &MachineConfig,
-    name: &str,
-    axis: &AxisConfig,
-) {
+fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, axis: &AxisConfig) {
     if let Some(zero) = &axis.zero {
-        check_zero(&mut Judge::at(format!("axis.{name}.zero"), findings), config, zero);
+        check_zero(
+            &mut Judge::at(format!("axis.{name}.zero"), findings),
+            config,
+            zero,
+        );
     }
     if let Some(run) = &axis.calibrate {
-        check_calibrate(&mut Judge::at(format!("axis.{name}.calibrate"), findings), config, axis, run);
+        check_calibrate(
+            &mut Judge::at(format!("axis.{name}.calibrate"), findings),
+            config,
+            axis,
+            run,
+        );
     }
     if let Some(run) = &axis.verify {
-        check_verify(&mut Judge::at(format!("axis.{name}.verify"), findings), config, axis, run);
+        check_verify(
+            &mut Judge::at(format!("axis.{name}.verify"), findings),
+            config,
+            axis,
+            run,
+        );
     }
     if let Some(compensation) = &axis.compensation {
         let judge = &mut Judge::at(format!("axis.{name}.compensation"), findings);
         judge.within("size_limit_um", compensation.size_limit_um, 1e-3, 1e5);
         judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
-        judge.within("rate_limit_um_per_s", compensation.rate_limit_um_per_s, 1e-3, 1e9);
+        judge.within(
+            "rate_limit_um_per_s",
+            compensation.rate_limit_um_per_s,
+            1e-3,
+            1e9,
+        );
         judge.within("jump_limit_um", compensation.jump_limit_um, 1e-3, 1e5);
         let fades = compensation.end_policy == EndPolicyName::FadeOut;
         if fades != compensation.fade_out_mm.is_some() {
-            judge.say("end_policy", "fade_out and `fade_out_mm` go together", "give both or neither");
+            judge.say(
+                "end_policy",
+                "fade_out and `fade_out_mm` go together",
+                "give both or neither",
+            );
         }
     }
 }
@@ -207,10 +311,24 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) 
     if let Some(analog) = config.analog.get(&zero.analog)
         && analog.channels.len() != 2
     {
-        judge.say("analog", "zeroing needs two channels, peak and slope", "list both in `channels`");
+        judge.say(
+            "analog",
+            "zeroing needs two channels, peak and slope",
+            "list both in `channels`",
+        );
     }
-    judge.within("reference_speed_mm_per_s", zero.reference_speed_mm_per_s, 1e-3, 1e3);
-    judge.within("search_speed_mm_per_s", zero.search_speed_mm_per_s, 1e-3, 100.0);
+    judge.within(
+        "reference_speed_mm_per_s",
+        zero.reference_speed_mm_per_s,
+        1e-3,
+        1e3,
+    );
+    judge.within(
+        "search_speed_mm_per_s",
+        zero.search_speed_mm_per_s,
+        1e-3,
+        100.0,
+    );
     judge.within("search_limit_mm", zero.search_limit_mm, 0.01, 1000.0);
     judge.within("time_limit_s", zero.time_limit_s, 0.1, 1e5);
     judge.within("samples", zero.samples as f64, 2.0, 100_000.0);
@@ -222,9 +340,16 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) 
     ] {
         judge.within(key, value, 1e-3, 1e4);
     }
-    judge.below(("rail_low_v", zero.rail_low_v), ("rail_high_v", zero.rail_high_v));
+    judge.below(
+        ("rail_low_v", zero.rail_low_v),
+        ("rail_high_v", zero.rail_high_v),
+    );
     if zero.level_below_peak_v * 1e3 <= zero.delta1_mv {
-        judge.say("level_below_peak_v", "is not above delta1", "the flanks lie well below the peak");
+        judge.say(
+            "level_below_peak_v",
+            "is not above delta1",
+            "the flanks lie well below the peak",
+        );
     }
 }
 
@@ -236,7 +361,10 @@ fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, o
             judge.say(
                 key,
                 format!("with its overrun reaches {value} mm"),
-                format!("stay within {} to {} mm", axis.soft_min_mm, axis.soft_max_mm),
+                format!(
+                    "stay within {} to {} mm",
+                    axis.soft_min_mm, axis.soft_max_mm
+                ),
             );
         }
     }
@@ -248,9 +376,19 @@ fn check_calibrate(
     axis: &AxisConfig,
     run: &CalibrateConfig,
 ) {
-    judge.known("instrument", &run.instrument, &config.instrument, "instrument");
+    judge.known(
+        "instrument",
+        &run.instrument,
+        &config.instrument,
+        "instrument",
+    );
     check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
-    judge.within("step_mm", run.step_mm, 1e-3, (run.end_mm - run.start_mm).max(1e-3));
+    judge.within(
+        "step_mm",
+        run.step_mm,
+        1e-3,
+        (run.end_mm - run.start_mm).max(1e-3),
+    );
     judge.within("runs", run.runs.into(), 2.0, 1000.0);
     judge.within("average_samples", run.average_samples.into(), 1.0, 1e6);
     judge.within("closure_limit_um", run.closure_limit_um, 1e-3, 1e5);
@@ -263,12 +401,22 @@ fn check_verify(
     axis: &AxisConfig,
     run: &VerifyConfig,
 ) {
-    judge.known("instrument", &run.instrument, &config.instrument, "instrument");
+    judge.known(
+        "instrument",
+        &run.instrument,
+        &config.instrument,
+        "instrument",
+    );
     check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
     judge.within("targets", run.targets.into(), 2.0, 10_000.0);
     judge.within("runs", run.runs.into(), 2.0, 1000.0);
     judge.within("average_samples", run.average_samples.into(), 1.0, 1e6);
-    judge.within("accuracy_tolerance_um", run.accuracy_tolerance_um, 1e-3, 1e6);
+    judge.within(
+        "accuracy_tolerance_um",
+        run.accuracy_tolerance_um,
+        1e-3,
+        1e6,
+    );
 }
 
 fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {
@@ -276,7 +424,11 @@ fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
     seen.sort_unstable();
     seen.dedup();
     if seen.len() != analog.channels.len() || seen.is_empty() {
-        judge.say("channels", "is empty or names a channel twice", "list each used channel once");
+        judge.say(
+            "channels",
+            "is empty or names a channel twice",
+            "list each used channel once",
+        );
     }
     match analog.device {
         AnalogDevice::Cia401 => check_cia401(judge, config, analog),
@@ -290,13 +442,25 @@ fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
             judge.known("bus", bus, &config.can, "CAN bus");
             judge.within("node_id", node_id.into(), 1.0, 127.0);
         }
-        _ => judge.say("device", "a cia401 module needs `bus` and `node_id`", "add them"),
+        _ => judge.say(
+            "device",
+            "a cia401 module needs `bus` and `node_id`",
+            "add them",
+        ),
     }
     if analog.channels.iter().any(|channel| *channel >= 4) {
-        judge.say("channels", "one process data object carries channels 0 to 3", "use those");
+        judge.say(
+            "channels",
+            "one process data object carries channels 0 to 3",
+            "use those",
+        );
     }
     if analog.full_scale_v.len() != analog.channels.len() {
-        judge.say("full_scale_v", "must have one value per channel", "list as many as `channels`");
+        judge.say(
+            "full_scale_v",
+            "must have one value per channel",
+            "list as many as `channels`",
+        );
     }
     for value in &analog.full_scale_v {
         judge.within("full_scale_v", *value, 1e-3, 1e3);
@@ -313,14 +477,22 @@ fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
         ),
     }
     if analog.identity.is_none() {
-        judge.say("device", "a cia401 module needs an `identity` section", "add it");
+        judge.say(
+            "device",
+            "a cia401 module needs an `identity` section",
+            "add it",
+        );
     }
 }
 
 fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {
     match (&analog.line, analog.address) {
         (Some(line), Some(_)) => judge.known("line", line, &config.serial, "serial line"),
-        _ => judge.say("device", "a dcon module needs `line` and `address`", "add them"),
+        _ => judge.say(
+            "device",
+            "a dcon module needs `line` and `address`",
+            "add them",
+        ),
     }
     if analog.channels.iter().any(|channel| *channel >= 8) {
         judge.say("channels", "a dcon module has channels 0 to 7", "use those");
@@ -335,9 +507,19 @@ fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &
     judge.known("line", &instrument.line, &config.serial, "serial line");
     judge.within("optics_factor", instrument.optics_factor.into(), 1.0, 16.0);
     judge.within("sample_rate_hz", instrument.sample_rate_hz, 1.0, 100_000.0);
-    judge.within("expansion_per_kelvin", instrument.expansion_per_kelvin, -1e-4, 1e-4);
+    judge.within(
+        "expansion_per_kelvin",
+        instrument.expansion_per_kelvin,
+        -1e-4,
+        1e-4,
+    );
     judge.within("dead_path_mm", instrument.dead_path_mm, 0.0, 1e5);
-    judge.within("misalignment_mrad", instrument.misalignment_mrad.abs(), 0.0, 100.0);
+    judge.within(
+        "misalignment_mrad",
+        instrument.misalignment_mrad.abs(),
+        0.0,
+        100.0,
+    );
     let uncertainty = instrument.instrument_standard_uncertainty_nm;
     judge.within("instrument_standard_uncertainty_nm", uncertainty, 0.0, 1e6);
 }
@@ -346,12 +528,19 @@ fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &
 fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let mut taken: BTreeMap<(&str, u8), String> = BTreeMap::new();
     for (name, bus) in &config.can {
-        taken.insert((name, bus.master_node_id), format!("can.{name}.master_node_id"));
+        taken.insert(
+            (name, bus.master_node_id),
+            format!("can.{name}.master_node_id"),
+        );
     }
-    let axes = config.axis.iter().map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
-    let analogs = config.analog.iter().filter_map(|(name, it)| {
-        Some((it.bus.as_deref()?, it.node_id?, format!("analog.{name}")))
-    });
+    let axes = config
+        .axis
+        .iter()
+        .map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
+    let analogs = config
+        .analog
+        .iter()
+        .filter_map(|(name, it)| Some((it.bus.as_deref()?, it.node_id?, format!("analog.{name}"))));
     for (bus, node, owner) in axes.chain(analogs) {
         let key = format!("{owner}.node_id");
         if let Some(other) = taken.insert((bus, node), key.clone()) {
@@ -368,7 +557,9 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
     for name in config.can.keys() {
         if let Err(overload) = bus_plan::load(config, name) {
             let help = match overload {
-                BusLoadError::DoesNotFit { shortest_period, .. } => {
+                BusLoadError::DoesNotFit {
+                    shortest_period, ..
+                } => {
                     format!("{:.2} ms would fit", shortest_period.as_secs_f64() * 1e3)
                 }
                 BusLoadError::NoRoom { .. } | BusLoadError::Senseless { .. } => String::new(),

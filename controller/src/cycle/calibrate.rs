@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
-use super::measure::{Measured, MeasureOptions, RunPlan};
+use super::measure::{MeasureOptions, Measured, RunPlan};
 use super::utc_now;
 use crate::assemble;
 use crate::config::CalibrateConfig;
@@ -14,8 +14,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader,
-    PointEntry, SCHEMA_VERSION, Store,
+    CalibrationRecord, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader, PointEntry,
+    SCHEMA_VERSION, Store,
 };
 
 /// How a calibration is made.
@@ -60,17 +60,26 @@ impl Machine {
         let config = self.axis_config(axis)?.calibrate.clone();
         let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
         if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed { axis: axis.to_owned() });
+            return Err(Failure::NotZeroed {
+                axis: axis.to_owned(),
+            });
         }
         let plan = run_plan(&config);
         let header = self.journal_header("calibrate", axis, &plan, None);
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
-        let measuring = MeasureOptions { stage: Stage::Calibrate, compensated: false };
+        let measuring = MeasureOptions {
+            stage: Stage::Calibrate,
+            compensated: false,
+        };
         let measured = self.measure_runs(axis, &plan, measuring, &mut journal, &earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
         let limit = Metres::from_um(config.closure_limit_um);
         if measured.closure.abs() > limit && !options.accept_drift {
-            return Err(Failure::Closure { axis: axis.to_owned(), seen: measured.closure, limit });
+            return Err(Failure::Closure {
+                axis: axis.to_owned(),
+                seen: measured.closure,
+                limit,
+            });
         }
         let fitted = self.fit_table(axis, &plan, &measured)?;
         let compensation = self.prepare(axis, fitted.table.clone())?;
@@ -94,7 +103,9 @@ impl Machine {
     /// # Errors
     /// When it is damaged, belongs to another machine or set-up, or breaks a limit.
     pub fn load_active(&mut self, axis: &str, store: &Store) -> Result<Option<String>, Failure> {
-        let Some(id) = store.active(axis)?.current else { return Ok(None) };
+        let Some(id) = store.active(axis)?.current else {
+            return Ok(None);
+        };
         let record = store.load(&id)?;
         record.belongs_to(&id, &self.this_machine(axis))?;
         let compensation = self.prepare(axis, record.table(&id)?)?;
@@ -102,14 +113,21 @@ impl Machine {
         Ok(Some(id))
     }
 
-    fn fit_table(&self, axis: &str, plan: &RunPlan, measured: &Measured) -> Result<Fitted, Failure> {
+    fn fit_table(
+        &self,
+        axis: &str,
+        plan: &RunPlan,
+        measured: &Measured,
+    ) -> Result<Fitted, Failure> {
         let instrument = &self.config.instrument[&plan.instrument];
         let options = FitOptions {
             u_instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
             ..FitOptions::default()
         };
-        error_table::analyse(&measured.series()?, &options)
-            .map_err(|source| Failure::Fit { axis: axis.to_owned(), source })
+        error_table::analyse(&measured.series()?, &options).map_err(|source| Failure::Fit {
+            axis: axis.to_owned(),
+            source,
+        })
     }
 
     /// Proves that a table can be applied within the limits of the configuration.
@@ -134,7 +152,12 @@ impl Machine {
         let lost_motion = fitted.table.lost_motion();
         CalibrationRecord {
             created: utc_now(),
-            source: journal.path().file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            source: journal
+                .path()
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
             instrument: self.instrument_record(&plan.instrument),
             environment: measured.environment,
             runs: plan.runs,
@@ -148,7 +171,11 @@ impl Machine {
 
     /// A record without measurements that says who this machine is.
     pub fn this_machine(&self, axis: &str) -> CalibrationRecord {
-        let resolution_nm = self.config.axis.get(axis).map_or(0.0, |axis| axis.resolution_nm);
+        let resolution_nm = self
+            .config
+            .axis
+            .get(axis)
+            .map_or(0.0, |axis| axis.resolution_nm);
         CalibrationRecord {
             schema_version: SCHEMA_VERSION,
             kind: "linear_error_table".into(),
@@ -173,7 +200,10 @@ impl Machine {
 
     fn drive_record(&self, axis: &str) -> IdentityRecord {
         let identity = self.axis(axis).ok().and_then(|unit| unit.device.identity());
-        identity.as_ref().map(IdentityRecord::from).unwrap_or_default()
+        identity
+            .as_ref()
+            .map(IdentityRecord::from)
+            .unwrap_or_default()
     }
 
     fn instrument_record(&self, name: &str) -> InstrumentRecord {
@@ -215,13 +245,18 @@ impl Machine {
 }
 
 pub(super) fn missing(axis: &str, section: &'static str) -> Failure {
-    Failure::NotConfigured { axis: axis.to_owned(), section }
+    Failure::NotConfigured {
+        axis: axis.to_owned(),
+        section,
+    }
 }
 
 pub(super) fn note_failure(journal: &mut Journal, failure: &Failure) {
     // The failure itself is on its way to the operator; a journal that cannot take the note
     // as well changes nothing about it.
-    let _ = journal.write(&Entry::Failed { cause: failure.to_string() });
+    let _ = journal.write(&Entry::Failed {
+        cause: failure.to_string(),
+    });
 }
 
 pub(super) fn open_journal(

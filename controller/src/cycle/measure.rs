@@ -12,7 +12,7 @@ use crate::assemble;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::{EnvironmentRecord, Entry, Journal, PointEntry};
+use crate::store::{Entry, EnvironmentRecord, Journal, PointEntry};
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +131,19 @@ impl Machine {
             done: points.len() as u64,
             total: per_run as u64 * u64::from(plan.runs),
         };
-        let correction = if options.compensated { Correction::On } else { Correction::Off };
-        let mut session = Session { axis, plan, correction, correction_of_length, journal, counter };
+        let correction = if options.compensated {
+            Correction::On
+        } else {
+            Correction::Off
+        };
+        let mut session = Session {
+            axis,
+            plan,
+            correction,
+            correction_of_length,
+            journal,
+            counter,
+        };
         let first = points.last().map_or(1, |point| point.run + 1);
         for run in first..=plan.runs {
             points.extend(self.measure_run(&mut session, run)?);
@@ -141,7 +152,11 @@ impl Machine {
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
         let environment = mean_environment(&points);
-        Ok(Measured { points, closure, environment })
+        Ok(Measured {
+            points,
+            closure,
+            environment,
+        })
     }
 
     fn measure_run(
@@ -173,10 +188,17 @@ impl Machine {
     ) -> Result<PointEntry, Failure> {
         let axis = session.axis;
         let set_point = self.travel(axis, target, session.correction)?;
-        let reading = self.read_displacement(session.plan)?;
+        let reading = self.read_displacement(session.axis, session.plan)?;
         let environment = self.instrument_environment(&session.plan.instrument);
-        let measured = self.correct(session.plan, &reading, &environment, &session.correction_of_length)?;
-        let encoder = self.reading(axis)?.map_or(Metres(f64::NAN), |sample| sample.position);
+        let measured = self.correct(
+            session.plan,
+            &reading,
+            &environment,
+            &session.correction_of_length,
+        )?;
+        let encoder = self
+            .reading(axis)?
+            .map_or(Metres(f64::NAN), |sample| sample.position);
         let point = PointEntry {
             run,
             approach: approach.symbol(),
@@ -201,12 +223,16 @@ impl Machine {
     /// # Errors
     /// Whatever stops the machine; [`Failure::Usage`] when nothing was measured before.
     pub fn displacement_at_zero(&mut self, axis: &str) -> Result<Metres, Failure> {
-        let (plan, length) = self.remember(axis).datum.clone().ok_or_else(|| Failure::Usage {
-            what: format!("axis {axis} has no datum"),
-            help: "calibrate or verify first".into(),
-        })?;
+        let (plan, length) = self
+            .remember(axis)
+            .datum
+            .clone()
+            .ok_or_else(|| Failure::Usage {
+                what: format!("axis {axis} has no datum"),
+                help: "calibrate or verify first".into(),
+            })?;
         self.go_to_datum(axis, &plan)?;
-        let reading = self.read_displacement(&plan)?;
+        let reading = self.read_displacement(axis, &plan)?;
         let environment = self.instrument_environment(&plan.instrument);
         self.correct(&plan, &reading, &environment, &length)
     }
@@ -214,7 +240,7 @@ impl Machine {
     /// Goes to the axis's zero, forward, and makes the instrument read zero there.
     fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
         self.go_to_datum(axis, plan)?;
-        self.rest(plan.settle)?;
+        self.stand_still(axis, plan.settle)?;
         let now = self.now();
         let at = self.instrument_index(&plan.instrument);
         self.instruments[at].device.set_datum(now);
@@ -222,7 +248,10 @@ impl Machine {
         let config = &self.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
         LengthCorrection::new(assemble::correction_settings(config), &environment).map_err(
-            |source| Failure::Correction { instrument: plan.instrument.clone(), source },
+            |source| Failure::Correction {
+                instrument: plan.instrument.clone(),
+                source,
+            },
         )
     }
 
@@ -234,34 +263,42 @@ impl Machine {
 
     fn measure_closure(&mut self, session: &Session<'_>) -> Result<Metres, Failure> {
         self.go_to_datum(session.axis, session.plan)?;
-        let reading = self.read_displacement(session.plan)?;
+        let reading = self.read_displacement(session.axis, session.plan)?;
         let environment = self.instrument_environment(&session.plan.instrument);
-        self.correct(session.plan, &reading, &environment, &session.correction_of_length)
+        self.correct(
+            session.plan,
+            &reading,
+            &environment,
+            &session.correction_of_length,
+        )
     }
 
     /// Lets the stage stand, then averages.
     pub(crate) fn read_displacement(
         &mut self,
+        axis: &str,
         plan: &RunPlan,
     ) -> Result<DisplacementReading, Failure> {
-        self.rest(plan.settle)?;
+        self.stand_still(axis, plan.settle)?;
         let at = self.instrument_index(&plan.instrument);
         let now = self.now();
-        self.instruments[at].device.begin_average(now, plan.average_samples);
+        self.instruments[at]
+            .device
+            .begin_average(now, plan.average_samples);
         let rate = self.config.instrument[&plan.instrument].sample_rate_hz;
         // Four times the nominal time: the stream comes in batches over USB.
         let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(plan.average_samples) / rate);
         self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        Ok(self.instruments[at].device.average().expect("an average that ended well is there"))
-    }
-
-    pub(crate) fn rest(&mut self, span: Duration) -> Result<(), Failure> {
-        let until = self.now() + span;
-        self.run_until(until)
+        Ok(self.instruments[at]
+            .device
+            .average()
+            .expect("an average that ended well is there"))
     }
 
     pub(crate) fn instrument_environment(&self, instrument: &str) -> Environment {
-        self.instruments[self.instrument_index(instrument)].device.environment()
+        self.instruments[self.instrument_index(instrument)]
+            .device
+            .environment()
     }
 
     fn correct(
@@ -271,7 +308,10 @@ impl Machine {
         environment: &Environment,
         length: &LengthCorrection,
     ) -> Result<Metres, Failure> {
-        let failed = |source| Failure::Correction { instrument: plan.instrument.clone(), source };
+        let failed = |source| Failure::Correction {
+            instrument: plan.instrument.clone(),
+            source,
+        };
         let environment = assemble::correction_environment(environment);
         length
             .correct(reading.vacuum, &environment)
@@ -283,7 +323,11 @@ impl Machine {
 /// The points of the runs that are whole.
 fn whole_runs(points: &[PointEntry], per_run: usize) -> Vec<PointEntry> {
     let count = |run: u32| points.iter().filter(|point| point.run == run).count();
-    points.iter().filter(|point| count(point.run) == per_run).copied().collect()
+    points
+        .iter()
+        .filter(|point| count(point.run) == per_run)
+        .copied()
+        .collect()
 }
 
 /// Judges instrument against encoder over the longest travel of a run (fault class 31).
@@ -321,7 +365,10 @@ fn likely_cause(ratio: f64) -> &'static str {
 
 fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {
     let mean = |of: fn(&EnvironmentRecord) -> Option<f64>| {
-        let values: Vec<f64> = points.iter().filter_map(|point| of(&point.environment)).collect();
+        let values: Vec<f64> = points
+            .iter()
+            .filter_map(|point| of(&point.environment))
+            .collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };
     EnvironmentRecord {

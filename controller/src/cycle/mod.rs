@@ -10,7 +10,7 @@ mod verify;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
-pub use measure::{Measured, MeasureOptions, RunPlan};
+pub use measure::{MeasureOptions, Measured, RunPlan};
 pub use scan::Found;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;

@@ -54,7 +54,11 @@ impl Machine {
     /// When a bus or line cannot be used.
     pub fn scan(&mut self) -> Result<Vec<Found>, Failure> {
         let mut found = Vec::new();
-        let ports: Vec<_> = self.port_names.iter().map(|(port, name)| (*port, name.clone())).collect();
+        let ports: Vec<_> = self
+            .port_names
+            .iter()
+            .map(|(port, name)| (*port, name.clone()))
+            .collect();
         for (port, name) in ports {
             if self.config.can.contains_key(&name) {
                 found.extend(self.scan_can(port, &name)?);
@@ -96,9 +100,12 @@ impl Machine {
             for node in batch {
                 let request = SdoRequest::UploadInitiate { object }.emit();
                 let frame = CanFrame::standard(node.cob_id(Function::SdoRequest), &request);
-                self.transport.send(port, &Payload::Frame(frame)).map_err(|source| {
-                    Failure::Send { device: format!("{node} while scanning"), source }
-                })?;
+                self.transport
+                    .send(port, &Payload::Frame(frame))
+                    .map_err(|source| Failure::Send {
+                        device: format!("{node} while scanning"),
+                        source,
+                    })?;
             }
             self.collect(port, Duration::from_millis(10), answers);
         }
@@ -127,8 +134,16 @@ impl Machine {
                     port: self.port_names[&port].clone(),
                     node: None,
                     name: Some(self.device_name(at)),
-                    identity: self.device_mut(at).device.identity().filter(|_| started.is_ok()),
-                    mismatches: started.err().map(|error| error.to_string()).into_iter().collect(),
+                    identity: self
+                        .device_mut(at)
+                        .device
+                        .identity()
+                        .filter(|_| started.is_ok()),
+                    mismatches: started
+                        .err()
+                        .map(|error| error.to_string())
+                        .into_iter()
+                        .collect(),
                 }
             })
             .collect()
@@ -136,7 +151,9 @@ impl Machine {
 }
 
 fn note_answer(arrival: &Arrival, port: Port, answers: &mut Answers) {
-    let Input::Payload(Payload::Frame(frame)) = &arrival.input else { return };
+    let Input::Payload(Payload::Frame(frame)) = &arrival.input else {
+        return;
+    };
     if arrival.port != port {
         return;
     }
@@ -147,7 +164,10 @@ fn note_answer(arrival: &Arrival, port: Port, answers: &mut Answers) {
         Ok(SdoResponse::UploadExpedited { object, data }) => {
             let mut bytes = [0; 4];
             bytes[..data.data().len()].copy_from_slice(data.data());
-            answers.entry(node).or_default().insert(object, u32::from_le_bytes(bytes));
+            answers
+                .entry(node)
+                .or_default()
+                .insert(object, u32::from_le_bytes(bytes));
         }
         // An abort is an answer too: somebody is there.
         Ok(SdoResponse::Abort { .. }) => {

@@ -7,7 +7,7 @@ use compensator::iso230::{self, Figures};
 use units::Metres;
 
 use super::calibrate::{missing, note_failure, open_journal};
-use super::measure::{Measured, MeasureOptions, RunPlan};
+use super::measure::{MeasureOptions, Measured, RunPlan};
 use crate::config::VerifyConfig;
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -63,12 +63,17 @@ impl Machine {
         let config = self.axis_config(axis)?.verify.clone();
         let config = config.ok_or_else(|| missing(axis, "verify"))?;
         if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed { axis: axis.to_owned() });
+            return Err(Failure::NotZeroed {
+                axis: axis.to_owned(),
+            });
         }
         let plan = run_plan(&config);
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
-        let measuring = MeasureOptions { stage: Stage::Verify, compensated: options.compensated };
+        let measuring = MeasureOptions {
+            stage: Stage::Verify,
+            compensated: options.compensated,
+        };
         let measured = self
             .measure_runs(axis, &plan, measuring, &mut journal, &earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;

@@ -21,7 +21,9 @@ use crate::config::ZeroConfig;
 use crate::failure::Failure;
 use crate::machine::{Machine, STOP_LIMIT};
 use crate::observer::Stage;
-use crate::store::{Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry};
+use crate::store::{
+    Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry,
+};
 
 /// A zero that was found.
 #[derive(Clone, Debug)]
@@ -44,6 +46,8 @@ impl Zeroed {
     }
 }
 
+/// How long the axis stands before its drive's coordinates are set.
+const REST: Duration = Duration::from_millis(30);
 /// The steps of zeroing that progress counts.
 const STEPS: u64 = 4;
 
@@ -62,12 +66,18 @@ impl Machine {
         let found = self.find_zero(axis, &config, &mut journal);
         if let Err(failure) = &found {
             // The cause is on its way to the operator; the journal is only a second place.
-            let _ = journal.write(&Entry::Failed { cause: failure.to_string() });
+            let _ = journal.write(&Entry::Failed {
+                cause: failure.to_string(),
+            });
         }
         let (outcome, estimate) = found?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
-        Ok(Zeroed { estimate, outcome, journal: journal.path().to_owned() })
+        Ok(Zeroed {
+            estimate,
+            outcome,
+            journal: journal.path().to_owned(),
+        })
     }
 
     fn find_zero(
@@ -97,9 +107,15 @@ impl Machine {
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
         let axis_config = self.axis_config(axis)?;
         let travel_mm = axis_config.soft_max_mm - axis_config.soft_min_mm + 50.0;
-        let limit = Duration::from_secs_f64(10.0 + 2.0 * travel_mm / config.reference_speed_mm_per_s);
+        let limit =
+            Duration::from_secs_f64(10.0 + 2.0 * travel_mm / config.reference_speed_mm_per_s);
         let position = Metres::from_mm(config.negative_limit_mm);
-        self.command(axis, AxisCommand::HomeNegativeLimit { position, speed }, "reference", limit)?;
+        self.command(
+            axis,
+            AxisCommand::HomeNegativeLimit { position, speed },
+            "reference",
+            limit,
+        )?;
         self.remember(axis).approach.forget();
         Ok(())
     }
@@ -111,12 +127,17 @@ impl Machine {
         config: &ZeroConfig,
         settings: Settings,
     ) -> Result<Outcome, Failure> {
-        let failed = |source| Failure::SearchSettings { axis: axis.to_owned(), source };
+        let failed = |source| Failure::SearchSettings {
+            axis: axis.to_owned(),
+            source,
+        };
         let mut search = Search::new(settings, Metres::ZERO, self.now()).map_err(failed)?;
         let mut pairing = self.pairing(axis, config)?;
         let mut motion = None;
         loop {
-            let deadline = search.poll_timeout().min(self.now() + Duration::from_millis(100));
+            let deadline = search
+                .poll_timeout()
+                .min(self.now() + Duration::from_millis(100));
             self.tick(deadline)?;
             self.check_motion(axis)?;
             let progress = match self.paired_sample(axis, config, &mut pairing)? {
@@ -128,7 +149,10 @@ impl Machine {
                 Some(Progress::Found(outcome)) => return Ok(*outcome),
                 Some(Progress::Failed(source)) => {
                     self.command(axis, AxisCommand::Halt, "halt", STOP_LIMIT)?;
-                    return Err(Failure::Search { axis: axis.to_owned(), source });
+                    return Err(Failure::Search {
+                        axis: axis.to_owned(),
+                        source,
+                    });
                 }
                 Some(step) => self.obey(axis, &step, &mut motion)?,
             }
@@ -145,7 +169,11 @@ impl Machine {
         let command = match *progress {
             Progress::Move { to, speed } => {
                 let acceleration = self.acceleration(axis)?;
-                AxisCommand::MoveTo { target: to, speed, acceleration }
+                AxisCommand::MoveTo {
+                    target: to,
+                    speed,
+                    acceleration,
+                }
             }
             _ => AxisCommand::Halt,
         };
@@ -162,7 +190,10 @@ impl Machine {
     fn check_motion(&mut self, axis: &str) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
         match self.axes[at].device.poll_outcome() {
-            Some(Err(source)) => Err(Failure::Device { device: axis.to_owned(), source }),
+            Some(Err(source)) => Err(Failure::Device {
+                device: axis.to_owned(),
+                source,
+            }),
             Some(Ok(())) | None => Ok(()),
         }
     }
@@ -174,13 +205,18 @@ impl Machine {
         settings: &Settings,
         outcome: &Outcome,
     ) -> Result<ZeroEstimate, Failure> {
-        let estimate = outcome
-            .refine(settings)
-            .map_err(|source| Failure::Refine { axis: axis.to_owned(), source })?;
+        let estimate = outcome.refine(settings).map_err(|source| Failure::Refine {
+            axis: axis.to_owned(),
+            source,
+        })?;
         let limit = Metres::from_um(config.standard_uncertainty_limit_um);
         if estimate.standard_uncertainty > limit {
             let seen = estimate.standard_uncertainty;
-            return Err(Failure::ZeroUncertain { axis: axis.to_owned(), seen, limit });
+            return Err(Failure::ZeroUncertain {
+                axis: axis.to_owned(),
+                seen,
+                limit,
+            });
         }
         Ok(estimate)
     }
@@ -188,9 +224,17 @@ impl Machine {
     /// Goes to the origin and makes it the drive's zero.
     fn adopt_zero(&mut self, axis: &str, origin: Metres) -> Result<(), Failure> {
         self.travel(axis, origin, Correction::Off)?;
-        let reading = self.reading(axis)?.expect("an axis that moved has been read");
+        self.stand_still(axis, REST)?;
+        let reading = self
+            .reading(axis)?
+            .expect("an axis that moved has been read");
         let position = reading.position - origin;
-        self.command(axis, AxisCommand::HomeHere { position }, "set origin", Duration::from_secs(5))?;
+        self.command(
+            axis,
+            AxisCommand::HomeHere { position },
+            "set origin",
+            Duration::from_secs(5),
+        )?;
         let memory = self.remember(axis);
         memory.zeroed = true;
         memory.approach.forget();
@@ -229,9 +273,15 @@ impl Machine {
     fn pairing(&self, axis: &str, config: &ZeroConfig) -> Result<Pairing, Failure> {
         let bus = &self.axis_config(axis)?.bus;
         let sync_s = self.config.can[bus].sync_period_ms * 1e-3;
-        let poll_s = self.config.analog[&config.analog].poll_period_ms.map_or(0.0, |ms| ms * 1e-3);
+        let poll_s = self.config.analog[&config.analog]
+            .poll_period_ms
+            .map_or(0.0, |ms| ms * 1e-3);
         let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
-        Ok(Pairing { window, used_axis: Time::ZERO, used_analog: Time::ZERO })
+        Ok(Pairing {
+            window,
+            used_axis: Time::ZERO,
+            used_analog: Time::ZERO,
+        })
     }
 
     /// The newest position and voltages that belong together and were not used before.
@@ -245,13 +295,17 @@ impl Machine {
         pairing: &mut Pairing,
     ) -> Result<Option<Sample>, Failure> {
         let analog = &self.analogs[self.analog_index(&config.analog)];
-        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.device.reading()) else {
+        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.device.reading())
+        else {
             return Ok(None);
         };
         if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {
             return Ok(None);
         }
-        let apart = position.at.since(voltages.at).max(voltages.at.since(position.at));
+        let apart = position
+            .at
+            .since(voltages.at)
+            .max(voltages.at.since(position.at));
         if apart > pairing.window {
             return Ok(None);
         }

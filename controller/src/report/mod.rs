@@ -48,7 +48,10 @@ pub fn render(page: &Page<'_>) -> String {
     let mut html = String::new();
     html += "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">";
     html += "<meta name=\"viewport\" content=\"width=device-width\">";
-    html += &format!("<title>{}</title><style>{STYLE}</style></head><body>", escape(&page.title));
+    html += &format!(
+        "<title>{}</title><style>{STYLE}</style></head><body>",
+        escape(&page.title)
+    );
     html += &format!("<h1>{}</h1>", escape(&page.title));
     html += &facts(&page.facts);
     if !page.sections.is_empty() {
@@ -77,16 +80,31 @@ pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
     let header = &journal.header;
     let drive = &header.drive;
     let mut facts = vec![
-        ("machine".to_owned(), format!("{} (stage {})", header.machine, header.stage_serial)),
+        (
+            "machine".to_owned(),
+            format!("{} (stage {})", header.machine, header.stage_serial),
+        ),
         ("axis".to_owned(), header.axis.clone()),
-        ("run".to_owned(), format!("{}, started {}", header.verb, header.started)),
+        (
+            "run".to_owned(),
+            format!("{}, started {}", header.verb, header.started),
+        ),
         (
             "drive".to_owned(),
-            format!("{} {:#X}:{:#X}, serial {}", drive.name, drive.vendor, drive.product, drive.serial),
+            format!(
+                "{} {:#X}:{:#X}, serial {}",
+                drive.name, drive.vendor, drive.product, drive.serial
+            ),
         ),
-        ("calibration in use".to_owned(), header.calibration.clone().unwrap_or("none".into())),
+        (
+            "calibration in use".to_owned(),
+            header.calibration.clone().unwrap_or("none".into()),
+        ),
         ("points".to_owned(), journal.points.len().to_string()),
-        ("complete".to_owned(), if journal.complete { "yes" } else { "no" }.to_owned()),
+        (
+            "complete".to_owned(),
+            if journal.complete { "yes" } else { "no" }.to_owned(),
+        ),
     ];
     if !header.instrument.name.is_empty() {
         let it = &header.instrument;
@@ -96,8 +114,16 @@ pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
             ("dead path", it.dead_path_corrected),
             ("cosine", it.cosine_corrected),
         ];
-        let on: Vec<_> = on.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
-        let corrected = if on.is_empty() { "nothing".to_owned() } else { on.join(", ") };
+        let on: Vec<_> = on
+            .iter()
+            .filter(|(_, on)| *on)
+            .map(|(name, _)| *name)
+            .collect();
+        let corrected = if on.is_empty() {
+            "nothing".to_owned()
+        } else {
+            on.join(", ")
+        };
         let value = format!("{} ({}), corrected for {corrected}", it.name, it.identity);
         facts.push(("instrument".to_owned(), value));
     }
@@ -107,7 +133,11 @@ pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
 fn facts(facts: &[(String, String)]) -> String {
     let rows = facts.iter().fold(String::new(), |mut rows, (name, value)| {
         let value = escape(value);
-        let _ = write!(rows, "<tr><th>{}</th><td style=\"text-align:left\">{value}</td></tr>", escape(name));
+        let _ = write!(
+            rows,
+            "<tr><th>{}</th><td style=\"text-align:left\">{value}</td></tr>",
+            escape(name)
+        );
         rows
     });
     format!("<table>{rows}</table>")
@@ -131,7 +161,9 @@ fn figures(sections: &[Section<'_>]) -> String {
 
 fn calibration_table(record: &CalibrationRecord) -> String {
     let cell = |value: Option<f64>| {
-        value.map_or("–".to_owned(), |metres| format!("{:.3}", Metres(metres).um()))
+        value.map_or("–".to_owned(), |metres| {
+            format!("{:.3}", Metres(metres).um())
+        })
     };
     let mut html = String::from(
         "<table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
@@ -171,7 +203,10 @@ fn zeros(zeros: &[ZeroEntry]) -> String {
 }
 
 pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -180,7 +215,10 @@ mod tests {
 
     #[test]
     fn what_a_person_typed_cannot_become_markup() {
-        let page = Page { title: "<script>\"x\"&".into(), ..Page::default() };
+        let page = Page {
+            title: "<script>\"x\"&".into(),
+            ..Page::default()
+        };
         let html = render(&page);
         assert!(!html.contains("<script>"));
         assert!(html.contains("&lt;script&gt;&quot;x&quot;&amp;"));

@@ -70,7 +70,10 @@ fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
 fn step(range: f64, wanted: f64) -> f64 {
     let raw = range / wanted;
     let power = 10_f64.powf(raw.log10().floor());
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|it| it * power >= raw).unwrap_or(10.0);
+    let factor = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|it| it * power >= raw)
+        .unwrap_or(10.0);
     factor * power
 }
 
@@ -93,18 +96,34 @@ fn grid(axes: &Axes) -> String {
     let y_step = step(axes.y.1 - axes.y.0, 6.0);
     for y in ticks(axes.y, 6.0) {
         let py = axes.py(y);
-        let colour = if y.abs() < y_step * 1e-6 { "#8794a3" } else { "#e4e9ef" };
-        let _ = write!(svg, "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>");
+        let colour = if y.abs() < y_step * 1e-6 {
+            "#8794a3"
+        } else {
+            "#e4e9ef"
+        };
+        let _ = write!(
+            svg,
+            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>"
+        );
         let (x, y_text, text) = (LEFT - 8.0, py + 4.0, label(y, y_step));
-        let _ = write!(svg, "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>");
+        let _ = write!(
+            svg,
+            "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>"
+        );
     }
     let x_step = step(axes.x.1 - axes.x.0, 10.0);
     for x in ticks(axes.x, 10.0) {
         let (px, y, text) = (axes.px(x), bottom + 18.0, label(x, x_step));
-        let _ = write!(svg, "<text x=\"{px:.1}\" y=\"{y}\" text-anchor=\"middle\">{text}</text>");
+        let _ = write!(
+            svg,
+            "<text x=\"{px:.1}\" y=\"{y}\" text-anchor=\"middle\">{text}</text>"
+        );
     }
     let (middle, base) = ((LEFT + right) / 2.0, HEIGHT - 6.0);
-    let _ = write!(svg, "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">target (mm)</text>");
+    let _ = write!(
+        svg,
+        "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">target (mm)</text>"
+    );
     let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">deviation (µm)</text></g>");
     svg
 }
@@ -131,9 +150,15 @@ fn means(axes: &Axes, section: &Section<'_>) -> String {
             let px = axes.px(target.target.mm());
             let _ = write!(line, "{px:.1},{:.1} ", axes.py(mean));
             let (low, high) = (axes.py(mean - 2.0 * s), axes.py(mean + 2.0 * s));
-            let _ = write!(svg, "<line x1=\"{px:.1}\" x2=\"{px:.1}\" y1=\"{low:.1}\" y2=\"{high:.1}\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+            let _ = write!(
+                svg,
+                "<line x1=\"{px:.1}\" x2=\"{px:.1}\" y1=\"{low:.1}\" y2=\"{high:.1}\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+            );
         }
-        let _ = write!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>");
+        let _ = write!(
+            svg,
+            "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>"
+        );
     }
     svg
 }

@@ -16,7 +16,9 @@ pub(crate) fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), Stor
         .tempfile_in(folder)
         .map_err(io_error("create a temporary file beside", path))?;
     file.write_all(bytes).map_err(io_error("write", path))?;
-    file.as_file().sync_all().map_err(io_error("flush to disk", path))?;
+    file.as_file()
+        .sync_all()
+        .map_err(io_error("flush to disk", path))?;
     file.persist(path)
         .map_err(|error| io_error("rename into place", path)(error.error))?;
     sync_folder(folder)

@@ -56,7 +56,10 @@ pub struct CalibrationRecord {
 /// The identity of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the fields of objects 0x1000, 0x1018 and 0x1008")]
+#[expect(
+    missing_docs,
+    reason = "the fields of objects 0x1000, 0x1018 and 0x1008"
+)]
 pub struct IdentityRecord {
     pub device_type: u32,
     pub vendor: u32,
@@ -160,7 +163,10 @@ impl CalibrationRecord {
                 u_reverse: node.reverse_u_m.map(Metres),
             })
             .collect();
-        ErrorTable::new(nodes).map_err(|source| StoreError::Table { id: id.to_owned(), source })
+        ErrorTable::new(nodes).map_err(|source| StoreError::Table {
+            id: id.to_owned(),
+            source,
+        })
     }
 
     fn bytes(&self) -> Vec<u8> {
@@ -179,15 +185,32 @@ impl CalibrationRecord {
             format!("{:#X}:{:#X} serial {}", it.vendor, it.product, it.serial)
         };
         let comparisons = [
-            ("the stage's serial number", self.stage_serial.clone(), here.stage_serial.clone()),
+            (
+                "the stage's serial number",
+                self.stage_serial.clone(),
+                here.stage_serial.clone(),
+            ),
             ("the axis", self.axis.clone(), here.axis.clone()),
             ("the drive", drive(self), drive(here)),
-            ("one encoder count (m)", self.resolution_m.to_string(), here.resolution_m.to_string()),
-            ("the configuration's hash", self.config_hash.clone(), here.config_hash.clone()),
+            (
+                "one encoder count (m)",
+                self.resolution_m.to_string(),
+                here.resolution_m.to_string(),
+            ),
+            (
+                "the configuration's hash",
+                self.config_hash.clone(),
+                here.config_hash.clone(),
+            ),
         ];
         for (what, expected, seen) in comparisons {
             if expected != seen {
-                return Err(StoreError::Foreign { id: short(id), what, expected, seen });
+                return Err(StoreError::Foreign {
+                    id: short(id),
+                    what,
+                    expected,
+                    seen,
+                });
             }
         }
         Ok(())
@@ -215,7 +238,9 @@ pub struct Store {
 impl Store {
     /// The store of `machine` below `data_dir`.
     pub fn new(data_dir: &Path, machine: &str) -> Self {
-        Self { root: data_dir.join(machine) }
+        Self {
+            root: data_dir.join(machine),
+        }
     }
 
     /// The machine's folder.
@@ -286,9 +311,14 @@ impl Store {
         let mut fitting = self.list()?;
         fitting.retain(|id| id.starts_with(prefix));
         match fitting.len() {
-            0 => Err(StoreError::Unknown { id: prefix.to_owned() }),
+            0 => Err(StoreError::Unknown {
+                id: prefix.to_owned(),
+            }),
             1 => Ok(fitting.swap_remove(0)),
-            count => Err(StoreError::Ambiguous { id: prefix.to_owned(), count }),
+            count => Err(StoreError::Ambiguous {
+                id: prefix.to_owned(),
+                count,
+            }),
         }
     }
 
@@ -328,7 +358,9 @@ impl Store {
     pub fn activate(&self, axis: &str, id: &str) -> Result<(), StoreError> {
         self.load(id)?;
         let mut pointer = self.active(axis)?;
-        pointer.history.extend(pointer.current.take().filter(|current| current != id));
+        pointer
+            .history
+            .extend(pointer.current.take().filter(|current| current != id));
         pointer.current = Some(id.to_owned());
         self.write_pointer(axis, &pointer)
     }
@@ -339,8 +371,9 @@ impl Store {
     /// When there is none, or it cannot be loaded.
     pub fn rollback(&self, axis: &str) -> Result<String, StoreError> {
         let mut pointer = self.active(axis)?;
-        let earlier =
-            pointer.history.pop().ok_or_else(|| StoreError::NoEarlier { axis: axis.to_owned() })?;
+        let earlier = pointer.history.pop().ok_or_else(|| StoreError::NoEarlier {
+            axis: axis.to_owned(),
+        })?;
         self.load(&earlier)?;
         pointer.current = Some(earlier.clone());
         self.write_pointer(axis, &pointer)?;
@@ -396,7 +429,10 @@ fn parse_versioned<T: for<'de> Deserialize<'de>>(
     };
     let version: Version = serde_json::from_slice(bytes).map_err(format)?;
     if version.schema_version > SCHEMA_VERSION {
-        return Err(StoreError::Newer { path: path.to_owned(), seen: version.schema_version });
+        return Err(StoreError::Newer {
+            path: path.to_owned(),
+            seen: version.schema_version,
+        });
     }
     serde_json::from_slice(bytes).map_err(format)
 }
@@ -420,7 +456,11 @@ mod tests {
             stage_serial: serial.into(),
             config_hash: "h".into(),
             axis: "x".into(),
-            drive: IdentityRecord { vendor: 1, serial: 7, ..IdentityRecord::default() },
+            drive: IdentityRecord {
+                vendor: 1,
+                serial: 7,
+                ..IdentityRecord::default()
+            },
             resolution_m: 1e-8,
             created: "2026-01-01T00:00:00Z".into(),
             program: "test".into(),
@@ -447,8 +487,14 @@ mod tests {
         let id = store.save(&record("A")).unwrap();
         assert_eq!(store.resolve(&id[..6]).unwrap(), id);
         assert_eq!(store.load(&id).unwrap(), record("A"));
-        assert_eq!(store.load(&id).unwrap().table(&id).unwrap().nodes().len(), 2);
-        assert!(matches!(store.resolve("zz"), Err(StoreError::Unknown { .. })));
+        assert_eq!(
+            store.load(&id).unwrap().table(&id).unwrap().nodes().len(),
+            2
+        );
+        assert!(matches!(
+            store.resolve("zz"),
+            Err(StoreError::Unknown { .. })
+        ));
     }
 
     #[test]
@@ -461,7 +507,10 @@ mod tests {
             let mut bad = good.clone();
             bad[at] ^= 0x04;
             fs::write(&path, &bad).unwrap();
-            assert!(matches!(store.load(&id), Err(StoreError::Damaged { .. })), "byte {at}");
+            assert!(
+                matches!(store.load(&id), Err(StoreError::Damaged { .. })),
+                "byte {at}"
+            );
         }
         fs::write(&path, &good[..good.len() / 2]).unwrap();
         assert!(matches!(store.load(&id), Err(StoreError::Damaged { .. })));
@@ -472,7 +521,10 @@ mod tests {
         let (_folder, store) = store();
         let first = store.save(&record("A")).unwrap();
         let second = store.save(&record("B")).unwrap();
-        assert!(matches!(store.rollback("x"), Err(StoreError::NoEarlier { .. })));
+        assert!(matches!(
+            store.rollback("x"),
+            Err(StoreError::NoEarlier { .. })
+        ));
         store.activate("x", &first).unwrap();
         store.activate("x", &second).unwrap();
         assert_eq!(store.active("x").unwrap().current, Some(second));
@@ -486,7 +538,10 @@ mod tests {
         let mut other = record("B");
         assert!(mine.belongs_to("id", &mine).is_ok());
         let error = mine.belongs_to("id", &other).unwrap_err().to_string();
-        assert!(error.contains("serial number") && error.contains("`A`"), "{error}");
+        assert!(
+            error.contains("serial number") && error.contains("`A`"),
+            "{error}"
+        );
         other = record("A");
         other.drive.serial = 8;
         let error = mine.belongs_to("id", &other).unwrap_err().to_string();
@@ -498,6 +553,9 @@ mod tests {
         let (_folder, store) = store();
         let path = store.pointer_path("x");
         write_new_or_replace(&path, br#"{"schema_version":2,"future":1}"#).unwrap();
-        assert!(matches!(store.active("x"), Err(StoreError::Newer { seen: 2, .. })));
+        assert!(matches!(
+            store.active("x"),
+            Err(StoreError::Newer { seen: 2, .. })
+        ));
     }
 }

@@ -147,10 +147,19 @@ impl Journal {
     pub fn resume(path: &Path, header: &JournalHeader) -> Result<(Self, ReadJournal), StoreError> {
         let read = read_journal(path)?;
         same_run(path, &read.header, header)?;
-        let file = OpenOptions::new().append(true).open(path).map_err(io_error("open", path))?;
-        file.set_len(read.valid_bytes).map_err(io_error("cut the torn line of", path))?;
-        let mut journal = Self { path: path.to_owned(), file };
-        journal.write(&Entry::Resumed { at: header.started.clone() })?;
+        let file = OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(io_error("open", path))?;
+        file.set_len(read.valid_bytes)
+            .map_err(io_error("cut the torn line of", path))?;
+        let mut journal = Self {
+            path: path.to_owned(),
+            file,
+        };
+        journal.write(&Entry::Resumed {
+            at: header.started.clone(),
+        })?;
         Ok((journal, read))
     }
 
@@ -167,7 +176,9 @@ impl Journal {
     pub fn write(&mut self, entry: &Entry) -> Result<(), StoreError> {
         let json = serde_json::to_string(entry).expect("plain data always serialises");
         let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
-        self.file.write_all(line.as_bytes()).map_err(io_error("append to", &self.path))
+        self.file
+            .write_all(line.as_bytes())
+            .map_err(io_error("append to", &self.path))
     }
 
     /// Forces everything to the disk; called where the axis stands and time does not matter.
@@ -175,7 +186,9 @@ impl Journal {
     /// # Errors
     /// When the disk refuses.
     pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
-        self.file.sync_data().map_err(io_error("flush to disk", &self.path))
+        self.file
+            .sync_data()
+            .map_err(io_error("flush to disk", &self.path))
     }
 }
 
@@ -199,16 +212,41 @@ pub struct ReadJournal {
 fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(), StoreError> {
     let comparisons = [
         ("verb", old.verb.clone(), new.verb.clone()),
-        ("stage serial", old.stage_serial.clone(), new.stage_serial.clone()),
-        ("configuration hash", old.config_hash.clone(), new.config_hash.clone()),
+        (
+            "stage serial",
+            old.stage_serial.clone(),
+            new.stage_serial.clone(),
+        ),
+        (
+            "configuration hash",
+            old.config_hash.clone(),
+            new.config_hash.clone(),
+        ),
         ("axis", old.axis.clone(), new.axis.clone()),
-        ("drive", format!("{:?}", old.drive), format!("{:?}", new.drive)),
-        ("calibration", format!("{:?}", old.calibration), format!("{:?}", new.calibration)),
-        ("targets", format!("{:?}", old.targets_m), format!("{:?}", new.targets_m)),
+        (
+            "drive",
+            format!("{:?}", old.drive),
+            format!("{:?}", new.drive),
+        ),
+        (
+            "calibration",
+            format!("{:?}", old.calibration),
+            format!("{:?}", new.calibration),
+        ),
+        (
+            "targets",
+            format!("{:?}", old.targets_m),
+            format!("{:?}", new.targets_m),
+        ),
     ];
     for (what, expected, seen) in comparisons {
         if expected != seen {
-            return Err(StoreError::NotResumable { path: path.to_owned(), what, expected, seen });
+            return Err(StoreError::NotResumable {
+                path: path.to_owned(),
+                what,
+                expected,
+                seen,
+            });
         }
     }
     Ok(())
@@ -232,7 +270,11 @@ pub fn read_journal(path: &Path) -> Result<ReadJournal, StoreError> {
             }
             Err(_) if at + 1 == lines.len() => torn = true,
             Err(cause) => {
-                return Err(StoreError::Format { path: path.to_owned(), line: at + 1, cause });
+                return Err(StoreError::Format {
+                    path: path.to_owned(),
+                    line: at + 1,
+                    cause,
+                });
             }
         }
     }
@@ -271,7 +313,10 @@ fn take(
     };
     match (entry, read.as_mut()) {
         (Entry::Header(header), None) if header.schema_version > SCHEMA_VERSION => {
-            return Err(StoreError::Newer { path: path.to_owned(), seen: header.schema_version });
+            return Err(StoreError::Newer {
+                path: path.to_owned(),
+                seen: header.schema_version,
+            });
         }
         (Entry::Header(header), None) => {
             *read = Some(ReadJournal {
@@ -340,7 +385,10 @@ mod tests {
         for length in first_line..=whole.len() {
             fs::write(&cut, &whole[..length]).unwrap();
             let read = read_journal(&cut).unwrap();
-            let complete_lines = whole[..length].iter().filter(|byte| **byte == b'\n').count();
+            let complete_lines = whole[..length]
+                .iter()
+                .filter(|byte| **byte == b'\n')
+                .count();
             assert_eq!(read.points.len(), complete_lines - 1);
             assert!(!read.complete);
         }
@@ -361,7 +409,10 @@ mod tests {
         journal.write(&point(2)).unwrap();
         journal.write(&Entry::Complete).unwrap();
         let read = read_journal(&path).unwrap();
-        assert_eq!((read.points.len(), read.complete, read.torn), (2, true, false));
+        assert_eq!(
+            (read.points.len(), read.complete, read.torn),
+            (2, true, false)
+        );
     }
 
     #[test]
@@ -371,10 +422,15 @@ mod tests {
         journal.write(&point(1)).unwrap();
         journal.write(&point(2)).unwrap();
         let path = journal.path().to_owned();
-        let text = fs::read_to_string(&path).unwrap().replacen("\"run\":1", "\"run\":7", 1);
+        let text = fs::read_to_string(&path)
+            .unwrap()
+            .replacen("\"run\":1", "\"run\":7", 1);
         fs::write(&path, text).unwrap();
         let error = read_journal(&path).unwrap_err();
-        assert!(matches!(error, StoreError::Format { line: 2, .. }), "{error}");
+        assert!(
+            matches!(error, StoreError::Format { line: 2, .. }),
+            "{error}"
+        );
     }
 
     #[test]

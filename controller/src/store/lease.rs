@@ -32,14 +32,17 @@ impl Lease {
             Ok(mut lock) => {
                 let owner = format!("truestage {verb}, process {}\n", std::process::id());
                 lock.set_len(0).map_err(io_error("write", &path))?;
-                lock.write_all(owner.as_bytes()).map_err(io_error("write", &path))?;
+                lock.write_all(owner.as_bytes())
+                    .map_err(io_error("write", &path))?;
                 Ok(Self { _lock: lock })
             }
             Err((mut file, _)) => {
                 let mut owner = String::new();
                 // Who holds it is a courtesy; that it is held is the fact.
                 let _ = file.rewind().and_then(|()| file.read_to_string(&mut owner));
-                Err(StoreError::Leased { owner: owner.trim().to_owned() })
+                Err(StoreError::Leased {
+                    owner: owner.trim().to_owned(),
+                })
             }
         }
     }

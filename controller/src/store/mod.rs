@@ -21,8 +21,10 @@ pub use calibration::{
     ActivePointer, CalibrationRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord,
     NodeRecord, Store, short,
 };
+pub use journal::{
+    Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
+};
 pub use lease::Lease;
-pub use journal::{Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal};
 
 pub(crate) use atomic::write_new_or_replace;
 
@@ -139,5 +141,9 @@ pub(crate) fn io_error(
     path: &Path,
 ) -> impl FnOnce(std::io::Error) -> StoreError {
     let path = path.to_owned();
-    move |source| StoreError::Io { action, path, source }
+    move |source| StoreError::Io {
+        action,
+        path,
+        source,
+    }
 }

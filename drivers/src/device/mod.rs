@@ -7,9 +7,9 @@ pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
 pub mod dcon;
-pub mod serial_line;
 #[cfg(test)]
 mod fake_node;
+pub mod serial_line;
 pub mod umd2;
 
 use core::fmt;

@@ -178,9 +178,10 @@ impl Cia401AnalogNode {
                     }
                     self.server.send_synchronous(now);
                 }
-                ServerEvent::Written(_) | ServerEvent::Nmt(_) | ServerEvent::ResetNode => {
-                    self.schedule(now);
-                }
+                ServerEvent::Written(_)
+                | ServerEvent::Nmt(_)
+                | ServerEvent::ResetNode
+                | ServerEvent::ResetCommunication => self.schedule(now),
                 ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
             }
         }

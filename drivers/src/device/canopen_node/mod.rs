@@ -132,6 +132,11 @@ impl CanopenNode {
         matches!(self.phase, Phase::Operational { .. } | Phase::Up)
     }
 
+    /// Whether what its process data says is about now: operational, alive, PDOs coming.
+    pub(super) fn is_in_service(&self) -> bool {
+        self.is_up() && !self.pdo_silent && self.consumer.state() == Some(NmtState::Operational)
+    }
+
     pub(super) const fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
     }

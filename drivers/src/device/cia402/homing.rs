@@ -178,7 +178,10 @@ impl Cia402Drive {
                 let status = HomingStatus::of(sample.status);
                 let fresh = *begun || *samples > STALE_SAMPLES;
                 match status {
-                    HomingStatus::InProgress | HomingStatus::Attained => *begun = true,
+                    HomingStatus::InProgress | HomingStatus::Attained => {
+                        *begun = true;
+                        self.repeat_at = Time::NEVER;
+                    }
                     HomingStatus::Done if fresh => self.restore(now, Ok(())),
                     HomingStatus::ErrorMoving | HomingStatus::ErrorStopped if fresh => {
                         let node = self.node.id();

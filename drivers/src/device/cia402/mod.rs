@@ -372,7 +372,12 @@ impl Axis for Cia402Drive {
         let enabled = self.state() == Some(PowerState::OperationEnabled);
         match command {
             AxisCommand::QuickStop => self.begin_quick_stop(now),
-            _ if !self.node.is_up() => self.refuse("a command", "a started node"),
+            _ if !self.node.is_in_service() => {
+                self.refuse(
+                    "a command",
+                    "a started, operational node that sends process data; start it (again)",
+                );
+            }
             AxisCommand::Enable => self.begin_enable(now),
             AxisCommand::Disable => self.begin_disable(now),
             AxisCommand::ResetFault => self.begin_reset(now),

@@ -2,9 +2,11 @@
 
 use units::Time;
 
+use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::power_state::{Goal, PowerFailure, PowerSequence, PowerStep};
+use crate::protocol::script::Step;
 use crate::wire::cia402::{Controlword, PowerState};
 
 /// A change of the power state under way.
@@ -50,6 +52,12 @@ impl Cia402Drive {
     pub(super) fn begin_quick_stop(&mut self, now: Time) {
         self.image.watch_rest();
         self.begin_power(now, Goal::QuickStop);
+        if !self.node.is_in_service() {
+            // A node that left operational hears no RPDO, but perhaps SDO.
+            let stop = Controlword::QUICK_STOP_COMMAND.bits();
+            let step = Step::write(CONTROLWORD.object, stop, "stopping by SDO");
+            self.node.run(now, vec![step]);
+        }
     }
 
     fn begin_power(&mut self, now: Time, goal: Goal) {
@@ -61,9 +69,9 @@ impl Cia402Drive {
             sequence,
             since: now,
         });
-        match first {
-            Some(control) => self.send_control(now, control),
-            None => self.advance_power(now),
+        // Everything else waits for the next statusword: the last one may be out of date.
+        if let Some(control) = first {
+            self.send_control(now, control);
         }
     }
 

@@ -569,7 +569,7 @@ fn a_drive_that_stays_where_it_is_times_out_naming_the_states() {
     let error = rig.does(AxisCommand::Enable).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "node 5: waited 2s for the state ready to switch on, last saw switch on disabled"
+        "node 5: waited 2.002s for the state ready to switch on, last saw switch on disabled"
     );
 }
 
@@ -778,7 +778,8 @@ fn a_quick_stop_is_sent_even_before_the_start() {
     let mut rig = Rig::new();
     rig.drive.command(rig.now, AxisCommand::QuickStop);
     rig.exchange();
-    assert_eq!(rig.sent, ["205#020000000000"]);
+    // And, as nobody knows whether it listens to PDOs, by SDO too.
+    assert_eq!(rig.sent, ["205#020000000000", "605#2B40600002000000"]);
 }
 
 #[test]
@@ -929,6 +930,21 @@ fn leaving_operational_is_an_alarm() {
         )
     });
     assert!(stopped, "{:?}", rig.alarms);
+}
+
+#[test]
+fn a_node_that_left_operational_is_not_believed_to_be_enabled() {
+    let mut rig = Rig::enabled();
+    rig.fake.node.nmt = Some(0x7F);
+    rig.passes_ms(60);
+    assert!(matches!(
+        rig.does(AxisCommand::Enable),
+        Err(DeviceError::NotPossible { .. })
+    ));
+    // It can still be stopped: it hears SDO.
+    rig.drive.command(rig.now, AxisCommand::QuickStop);
+    rig.exchange();
+    assert_eq!(rig.fake.node.get(0x6040, 0), 0x0002);
 }
 
 #[test]

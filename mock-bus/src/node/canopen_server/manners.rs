@@ -33,6 +33,10 @@ pub struct Manners {
     pub sdo_short_replies: u32,
     /// So many segmented or block uploads announce 79 bytes more than they deliver.
     pub sdo_wrong_sizes: u32,
+    /// Segmented uploads do not say how long they are.
+    pub sdo_sizes_omitted: bool,
+    /// The unused bytes of expedited uploads are not 0.
+    pub sdo_stale_bytes: bool,
     /// So many downloads are refused with 0x08000022.
     pub sdo_busy: u32,
     /// So many requests are executed but not answered.

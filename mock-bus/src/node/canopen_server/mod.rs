@@ -62,6 +62,8 @@ pub enum ServerEvent {
     Nmt(NmtState),
     /// The application was reset: all objects have their power-on values.
     ResetNode,
+    /// The communication was reset: the connection to the master is gone.
+    ResetCommunication,
     /// A watched producer fell silent (0x1016).
     HeartbeatLost(NodeId),
     /// It is back.

@@ -94,6 +94,7 @@ impl CanopenServer {
                 self.dictionary.reset_communication();
                 self.publish_errors();
                 self.restart(now);
+                self.events.push_back(ServerEvent::ResetCommunication);
             }
         }
     }

@@ -76,7 +76,8 @@ impl Tpdo {
         self.parameters.cob_id.is_valid() && !self.parameters.mapping.is_empty()
     }
 
-    fn is_event_driven(&self) -> bool {
+    /// Whether the TPDO is in use and sent at events.
+    pub(super) fn is_event_driven(&self) -> bool {
         self.is_valid() && self.parameters.transmission == Transmission::Event
     }
 

@@ -97,6 +97,11 @@ impl CanopenServer {
         self.tpdos.iter().any(Tpdo::is_synchronous)
     }
 
+    /// Whether a TPDO in use is sent at changes: only then must the device look for them.
+    pub fn reports_changes(&self) -> bool {
+        self.phase.is_operational() && self.tpdos.iter().any(Tpdo::is_event_driven)
+    }
+
     /// Sends the TPDOs whose turn is at this SYNC.
     pub fn send_synchronous(&mut self, now: Time) {
         if !self.phase.is_operational() {

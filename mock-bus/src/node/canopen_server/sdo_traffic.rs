@@ -138,9 +138,10 @@ impl CanopenServer {
 
     /// A server that had filled its queue before it read the abort (python-canopen issue 409).
     fn flood_after_abort(&mut self, frame: &CanFrame) {
-        let Ok(SdoRequest::Abort { .. }) = SdoRequest::parse(frame.data()) else {
+        const ABORT: u8 = 0x80;
+        if frame.data().first() != Some(&ABORT) {
             return;
-        };
+        }
         let flood =
             |m: &mut Rudeness| m.take("sdo_floods_after_abort", |m| &mut m.sdo_floods_after_abort);
         if !flood(&mut self.rudeness) {
@@ -192,7 +193,8 @@ impl Rudeness {
             return Vec::new();
         }
         let response = self.spoil_toggle(response);
-        let right = self.spoil_size(response).emit();
+        let mut right = self.spoil_size(response).emit();
+        self.leave_stale_bytes(response, &mut right);
         let mut payloads = Vec::new();
         let mut payload = right.to_vec();
         if response.object().is_some() {
@@ -235,10 +237,24 @@ impl Rudeness {
         }
     }
 
+    /// The unused bytes of an expedited value, which the standard reserves and some leave.
+    fn leave_stale_bytes(&mut self, response: SdoResponse, payload: &mut [u8; 8]) {
+        if let SdoResponse::UploadExpedited { data, .. } = response
+            && self.switched("sdo_stale_bytes", |m| m.sdo_stale_bytes)
+        {
+            payload[4 + data.data().len()..].fill(0xA5);
+        }
+    }
+
     fn spoil_size(&mut self, response: SdoResponse) -> SdoResponse {
         const NAME: &str = "sdo_wrong_sizes";
         const TOO_MANY: u32 = 79;
         match response {
+            SdoResponse::UploadInitiate { object, .. }
+                if self.switched("sdo_sizes_omitted", |m| m.sdo_sizes_omitted) =>
+            {
+                SdoResponse::UploadInitiate { object, size: None }
+            }
             SdoResponse::UploadInitiate { object, size }
                 if self.take(NAME, |m| &mut m.sdo_wrong_sizes) =>
             {

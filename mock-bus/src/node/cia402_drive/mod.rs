@@ -279,9 +279,11 @@ impl Drive {
         if self.own_event() <= now {
             self.step(now, m);
         }
-        self.publish(now, m);
-        self.server.advance(now);
-        self.settle(now, m);
+        if self.server.next_event() <= now || self.server.reports_changes() {
+            self.publish(now, m);
+            self.server.advance(now);
+            self.settle(now, m);
+        }
     }
 
     fn next_event(&self) -> Time {
@@ -326,10 +328,14 @@ impl Drive {
 
     /// Acts on what the frames said, until nothing is left to act on.
     fn settle(&mut self, now: Time, m: &mut impl Mechanism) {
+        let mut acted = false;
         while let Some(event) = self.server.poll_event() {
             self.on_event(now, event, m);
+            acted = true;
         }
-        self.publish(now, m);
+        if acted {
+            self.publish(now, m);
+        }
         self.server.send_changes(now);
     }
 
@@ -354,6 +360,7 @@ impl Drive {
                 }
             }
             ServerEvent::ResetNode => self.boot(m),
+            ServerEvent::ResetCommunication => self.abort_connection(now, m),
             ServerEvent::HeartbeatLost(_) => {
                 self.heartbeat_lost = true;
                 self.abort_connection(now, m);

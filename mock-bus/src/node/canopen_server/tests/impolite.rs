@@ -168,3 +168,14 @@ fn single_pdos_are_dropped() {
     assert_eq!(bench.sent(), ["181#0200"]);
     check_counted(&bench, "tpdo_drops", 1);
 }
+
+#[test]
+fn sizes_are_left_out_and_stale_bytes_left_in() {
+    let mut bench = impolite(|m| {
+        m.sdo_sizes_omitted = true;
+        m.sdo_stale_bytes = true;
+    });
+    assert_eq!(bench.ask("601#4008100000000000"), ["581#4008100000000000"]);
+    assert_eq!(bench.ask("601#4041600000000000"), ["581#4B4160005002A5A5"]);
+    check_counted(&bench, "sdo_stale_bytes", 1);
+}

@@ -157,17 +157,24 @@ fn after_the_loss_the_old_controlword_starts_nothing() {
     bench.check_status(0x0637);
 }
 
-#[test]
-fn stopping_the_node_stops_the_motion() {
+#[track_caller]
+fn check_command_stops(command: u8) {
     let mut bench = Bench::new();
     bench.enable();
     bench.set_point(10_000_000, 0);
     let _ = bench.wait_ms(200);
-    let _ = bench.send(0, &[2, 1]);
+    let _ = bench.send(0, &[command, 1]);
     let _ = bench.wait_ms(50);
     let stopped = bench.axis.counts;
     let _ = bench.wait_ms(500);
     assert_eq!(bench.axis.counts, stopped);
+}
+
+#[test]
+fn stopping_or_resetting_the_node_stops_the_motion() {
+    check_command_stops(0x02);
+    check_command_stops(0x81);
+    check_command_stops(0x82);
 }
 
 #[test]

@@ -226,3 +226,37 @@ fn a_standing_drive_needs_few_events() {
     let next = bench.drive.next_event() - bench.now;
     assert!(next.as_micros() > 1000, "supervised at leisure: {next:?}");
 }
+
+/// Identifiers that mean something to node 1.
+const IDS: [u16; 7] = [0x000, 0x080, 0x601, 0x601, 0x601, 0x201, 0x77F];
+/// Objects whose values steer the drive.
+const STEERING: [u16; 12] = [
+    0x6040, 0x6060, 0x607A, 0x6098, 0x607C, 0x60C2, 0x6081, 0x605A, 0x1A00, 0x1800, 0x1016, 0x2001,
+];
+
+proptest::proptest! {
+    /// Whatever comes, the drive neither panics nor moves faster than it may.
+    #[test]
+    fn no_sequence_of_frames_breaks_the_drive(
+        frames in proptest::collection::vec((0usize..7, 0usize..12, proptest::array::uniform8(0u8..), 0u64..40), 1..60),
+    ) {
+        let mut bench = Bench::new();
+        bench.enable();
+        for (id, object, mut data, wait_ms) in frames {
+            if id == 4 {
+                let [low, high] = STEERING[object].to_le_bytes();
+                let command = 0x22 | data[0] & 0x0D;
+                data[..3].copy_from_slice(&[command, low, high]);
+                data[3] &= 1;
+            }
+            let length = if IDS[id] == 0x601 { 8 } else { usize::from(data[7] % 9) };
+            let _ = bench.send(IDS[id], &data[..length]);
+            let before = bench.axis.counts;
+            let _ = bench.wait_ms(wait_ms);
+            // 0x607F is 500 mm/s; a mirrored or re-homed counter does not move the axis.
+            let travelled = (bench.axis.counts - before).unsigned_abs();
+            let cyclic = bench.drive.mode() == 8;
+            proptest::prop_assert!(cyclic || travelled <= 50_000 * (wait_ms + 2));
+        }
+    }
+}
