@@ -43,7 +43,14 @@ pub(super) fn deviations(section: &Section<'_>) -> String {
         .collect();
     let axes = Axes {
         x: padded(points.iter().map(|it| it.0), 0.02),
-        y: padded(points.iter().map(|it| it.1).chain([0.0]), 0.12),
+        y: padded(
+            points
+                .iter()
+                .map(|it| it.1)
+                .chain(bar_ends(section))
+                .chain([0.0]),
+            0.06,
+        ),
     };
     let mut svg = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">");
     svg += &format!("<title>Deviation {}</title>", super::escape(&section.title));
@@ -52,6 +59,18 @@ pub(super) fn deviations(section: &Section<'_>) -> String {
     svg += &means(&axes, section);
     svg += &legend();
     svg + "</svg>"
+}
+
+/// Where the bars of mean ± 2 s end, micrometres.
+fn bar_ends(section: &Section<'_>) -> impl Iterator<Item = f64> {
+    section.figures.targets.iter().flat_map(|it| {
+        let ends = |mean: Metres, s: Metres| [(mean - s * 2.0).um(), (mean + s * 2.0).um()];
+        let [forward, reverse] = [
+            ends(it.mean_forward, it.s_forward),
+            ends(it.mean_reverse, it.s_reverse),
+        ];
+        forward.into_iter().chain(reverse)
+    })
 }
 
 /// The range of `values`, widened on both sides by `share` of it, and never empty.

@@ -12,6 +12,7 @@
 //! and is the controller's.
 
 mod average;
+mod health;
 mod sequence;
 mod settings;
 mod weather;
@@ -21,6 +22,7 @@ use std::collections::VecDeque;
 use units::{Metres, Time};
 
 use self::average::{Averaging, RunningAverage};
+use self::health::fault_of;
 use self::sequence::{Continuity, Sequence};
 pub use self::settings::{Direction, Umd2Settings};
 use self::weather::Weather;
@@ -36,8 +38,6 @@ use crate::wire::umd2::{Line, LowSpeed, Sample};
 const NAME: DeviceName = DeviceName::Serial("interferometer");
 /// Sixteen fields of at most 20 characters.
 const LINE_MAX: usize = 16 * 21;
-/// The measurement frequency is next to nothing below this part of the reference.
-const SLOW_BEAT: u32 = 32;
 /// Sequence numbers that jump by more than this long a gap began anew.
 const GAP_MAX_S: f64 = 600.0;
 /// Impossible jumps in a row that are no damaged lines any more.
@@ -328,23 +328,6 @@ impl Umd2 {
             self.raise(Alarm::StreamSilent { waited });
         }
     }
-}
-
-/// What makes a sample's count worthless.
-const fn fault_of(sample: &Sample) -> Option<Alarm> {
-    let (reference, measurement) = (sample.reference_count, sample.measurement_count);
-    if reference == 0 {
-        return Some(Alarm::LaserLost);
-    }
-    if measurement == 0 {
-        return Some(Alarm::BeamLost);
-    }
-    let too_fast = measurement as u64 > 2 * reference as u64;
-    let too_slow = (measurement as u64) * (SLOW_BEAT as u64) < reference as u64;
-    if too_fast || too_slow {
-        return Some(Alarm::SlewError);
-    }
-    None
 }
 
 impl Device for Umd2 {

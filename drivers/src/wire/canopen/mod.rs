@@ -4,6 +4,7 @@ pub mod emcy;
 pub mod nmt;
 pub mod pdo;
 pub mod sdo;
+mod sdo_abort;
 pub mod sync;
 
 use core::fmt;

@@ -1,0 +1,81 @@
+//! Findings, and the small rules that make them.
+
+use std::collections::BTreeMap;
+
+/// Something that cannot be, at a dotted key.
+#[derive(Clone, Debug)]
+pub(in crate::config) struct Finding {
+    pub(in crate::config) key: String,
+    pub(in crate::config) cause: String,
+    pub(in crate::config) help: String,
+}
+
+/// Collects findings below one key.
+pub(super) struct Judge<'a> {
+    prefix: String,
+    findings: &'a mut Vec<Finding>,
+}
+
+impl<'a> Judge<'a> {
+    pub(super) const fn at(prefix: String, findings: &'a mut Vec<Finding>) -> Self {
+        Self { prefix, findings }
+    }
+
+    pub(super) fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
+        let key = if key.is_empty() {
+            self.prefix.clone()
+        } else {
+            format!("{}.{key}", self.prefix)
+        };
+        self.findings.push(Finding {
+            key,
+            cause: cause.into(),
+            help: help.into(),
+        });
+    }
+
+    pub(super) fn within(&mut self, key: &str, value: f64, low: f64, high: f64) {
+        if !(low..=high).contains(&value) {
+            self.say(
+                key,
+                format!("{value} is impossible"),
+                format!("give {low} to {high}"),
+            );
+        }
+    }
+
+    pub(super) fn below(&mut self, low: (&str, f64), high: (&str, f64)) {
+        if low.1 >= high.1 {
+            let cause = format!(
+                "{} must be greater than {} ({} ≤ {})",
+                high.0, low.0, high.1, low.1
+            );
+            self.say(
+                high.0,
+                cause,
+                format!("raise {} or lower {}", high.0, low.0),
+            );
+        }
+    }
+
+    pub(super) fn known<T>(
+        &mut self,
+        key: &str,
+        name: &str,
+        table: &BTreeMap<String, T>,
+        kind: &str,
+    ) {
+        if !table.contains_key(name) {
+            let names = table
+                .keys()
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", ");
+            self.say(
+                key,
+                format!("there is no {kind} `{name}`"),
+                format!("known: {names}"),
+            );
+        }
+    }
+}
