@@ -77,8 +77,23 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Result<(), Failure> {
         estimate.origin.um(),
         zeroed.journal.display()
     );
-    let value = json!({"axis": axis, "zero": to_json::zero(estimate), "journal": zeroed.journal});
-    output.result(&text, &value);
+    let drift = zeroed.previous.map(|before| {
+        let now = zeroed.entry;
+        (
+            (now.peak_max_v - before.peak_max_v) * 1e3,
+            (now.mid_v - before.mid_v) * 1e3,
+        )
+    });
+    let since = drift.map_or(String::new(), |(peak, mid)| {
+        format!("\nsince the zero before: peak sensor {peak:+.1} mV, slope sensor {mid:+.1} mV")
+    });
+    let value = json!({
+        "axis": axis,
+        "zero": to_json::zero(estimate),
+        "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
+        "journal": zeroed.journal,
+    });
+    output.result(&(text + &since), &value);
     Ok(())
 }
 
