@@ -247,6 +247,7 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Sett
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
+        stall_max: usual.common.sync_period * (patience - 1),
         timeouts: patient_drive(usual.timeouts, patience),
         ..usual
     }

@@ -5,5 +5,7 @@
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
 mod rig;
+mod stand;
 
 pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};
+pub use stand::{INTERFACE, Setup, Stand, on_every_rig};
