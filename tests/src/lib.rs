@@ -5,5 +5,7 @@
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
 mod rig;
+mod slcan_hub;
 
 pub use rig::{Bench, MACHINE, EMULATED, Rig, machine_config, rigs};
+pub use slcan_hub::SlcanHub;
