@@ -8,8 +8,8 @@ use units::Metres;
 
 use crate::peer::Peer;
 
-/// Half the drive's position window, in counts of 10 nm.
-const NEAR_COUNTS: i64 = 50;
+/// The drive's position window, in counts of 10 nm: "target reached" means no more.
+const NEAR_COUNTS: i64 = 100;
 /// What the stage deviates by and loses when it turns round (configs/emulated/linear.toml).
 const DEVIATION_MAX_UM: f64 = 25.0;
 

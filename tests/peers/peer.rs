@@ -11,6 +11,7 @@ use serde_json::Value;
 
 /// Longer than anything that the programs themselves wait for.
 const PATIENCE: Duration = Duration::from_secs(120);
+const HELP: &str = "run tests/run, or set TRUESTAGE_PEERS_PYTHON";
 
 /// A running program; killed when dropped.
 pub(crate) struct Peer {
@@ -33,7 +34,7 @@ impl Peer {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .unwrap_or_else(|error| panic!("{}: {error}", interpreter().display()));
+            .unwrap_or_else(|error| panic!("{}: {error}; {HELP}", interpreter().display()));
         let (sender, lines) = mpsc::channel();
         let output = BufReader::new(child.stdout.take().expect("its output is piped"));
         std::thread::spawn(move || {
@@ -128,10 +129,7 @@ fn interpreter() -> PathBuf {
         return PathBuf::from(named);
     }
     let usual = package().join("../target/peers-venv/bin/python");
-    assert!(
-        usual.exists(),
-        "no Python for the peers: run tests/run, or set TRUESTAGE_PEERS_PYTHON"
-    );
+    assert!(usual.exists(), "no Python for the peers: {HELP}");
     usual
 }
 
