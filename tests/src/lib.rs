@@ -5,7 +5,9 @@
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
 mod rig;
+mod slcan_hub;
 mod stand;
 
 pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};
+pub use slcan_hub::SlcanHub;
 pub use stand::{INTERFACE, Setup, Stand, on_every_rig};
