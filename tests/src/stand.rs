@@ -62,6 +62,7 @@ fn replace(text: String, changes: &[(String, String)]) -> String {
     })
 }
 
+#[expect(clippy::large_enum_variant, reason = "one a test")]
 enum Emulation {
     InProcess(Emulated),
     Running(EmulatedOnPtys),
@@ -171,12 +172,10 @@ impl Stand {
 
 fn connect(loaded: &Loaded, emulation: &Emulation, speed: f64) -> Result<Machine, Failure> {
     match emulation {
-        Emulation::InProcess(emulated) => {
-            Ok(Machine::new(loaded, Box::new(emulated.transport())))
-        }
+        Emulation::InProcess(emulated) => Ok(Machine::new(loaded, Box::new(emulated.transport()))),
         Emulation::Running(emulated) => {
             let overrides = emulated.overrides(&loaded.config)?;
-            let live = ports::open(&loaded.config, &overrides, speed)?;
+            let live = ports::open(&loaded.config, &overrides, ports::Use::Measurement, speed)?;
             Ok(Machine::new(loaded, Box::new(live)))
         }
     }
