@@ -6,7 +6,7 @@
 //! alike (docs/decisions/0001).
 
 use core::time::Duration;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -91,7 +91,10 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
-    pub(crate) instruments_run: bool,
+    /// The instruments that were started, by name.
+    pub(crate) started_instruments: BTreeSet<String>,
+    /// The instrument whose readings a procedure needs now: only its alarms count.
+    pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
 }
@@ -118,7 +121,8 @@ impl Machine {
             config,
             transport,
             supervision: Supervision::Off,
-            instruments_run: false,
+            started_instruments: BTreeSet::new(),
+            instrument_in_use: None,
             observer: Box::new(Silent),
             stop: StopRequest::default(),
         }
@@ -250,8 +254,9 @@ impl Machine {
             .collect()
     }
 
-    /// Starts SYNC and every device, and checks who they are. Nothing moves. Also after a
-    /// power cycle of the machine: instruments that run already go on, their datum stands.
+    /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
+    /// moves. Instruments are started when a procedure first needs them: a machine in
+    /// production has none.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
@@ -263,19 +268,13 @@ impl Machine {
         }
         self.set_sync(true)?;
         let machine_devices = self.axes.len() + self.analogs.len();
-        let last = if self.instruments_run {
-            machine_devices
-        } else {
-            self.device_count()
-        };
         let now = self.now();
-        for at in 0..last {
+        for at in 0..machine_devices {
             self.device_mut(at).device.start(now);
         }
-        for at in 0..last {
+        for at in 0..machine_devices {
             self.await_outcome(at, "start", START_LIMIT)?;
         }
-        self.instruments_run = true;
         self.supervision = Supervision::On;
         Ok(())
     }
@@ -300,6 +299,20 @@ impl Machine {
         }
         self.supervision = Supervision::Off;
         result.and(self.set_sync(false))
+    }
+
+    /// Starts an instrument, unless it runs already (its datum stands then), and counts its
+    /// alarms from now on.
+    pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
+        if !self.started_instruments.contains(name) {
+            let at = self.instrument_device(self.instrument_index(name));
+            let now = self.now();
+            self.device_mut(at).device.start(now);
+            self.await_outcome(at, "start", START_LIMIT)?;
+            self.started_instruments.insert(name.to_owned());
+        }
+        self.instrument_in_use = Some(name.to_owned());
+        Ok(())
     }
 
     /// Runs `procedure`; when it fails, stops and disables every axis before the failure is
@@ -336,6 +349,7 @@ impl Machine {
         for memory in self.memory.values_mut() {
             memory.approach.forget();
         }
+        self.instrument_in_use = None;
         let _ = self.set_sync(false);
         self.supervision = Supervision::Off;
     }

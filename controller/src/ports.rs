@@ -95,13 +95,23 @@ pub fn patience(clock_speed: f64) -> u32 {
     }
 }
 
-/// Opens every bus and line. `clock_speed` is 1 on real machines.
+/// What a verb will do, which says what it needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Move the machine; instruments need not be there.
+    Motion,
+    /// Read the instruments too.
+    Measurement,
+}
+
+/// Opens the buses and lines that `purpose` needs. `clock_speed` is 1 on real machines.
 ///
 /// # Errors
 /// When one cannot be opened; those before it are closed again.
 pub fn open(
     config: &MachineConfig,
     overrides: &Overrides,
+    purpose: Use,
     clock_speed: f64,
 ) -> Result<Live, Failure> {
     if !(clock_speed.is_finite() && clock_speed > 0.0) {
@@ -116,6 +126,13 @@ pub fn open(
         builder = add_can(builder, ports[name], bus, overrides.0.get(name));
     }
     for (name, line) in &config.serial {
+        let machines_own = config
+            .analog
+            .values()
+            .any(|it| it.line.as_ref() == Some(name));
+        if purpose == Use::Motion && !machines_own {
+            continue;
+        }
         let path = match overrides.0.get(name) {
             Some(Endpoint::Serial(path)) => path,
             _ => &line.path,

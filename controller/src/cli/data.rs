@@ -15,7 +15,7 @@ use truestage::store::{
 };
 use truestage::{Failure, assemble, config, json as to_json, text};
 
-use super::output::Output;
+use super::output::{Ended, Output};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FitCommand {
@@ -44,18 +44,17 @@ fn read(path: &Path) -> Result<String, Failure> {
     })
 }
 
-pub(super) fn iso230(path: &Path, output: Output) -> Result<(), Failure> {
+pub(super) fn iso230(path: &Path, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let figures = iso230::evaluate(&series)?;
     let mut text = text::figures_table(&[("measured", &figures)]);
     if !figures.conforms() {
         text += "\nnote: ISO 230-2 asks for five runs from each side and five targets";
     }
-    output.result(&text, &to_json::figures(&figures));
-    Ok(())
+    output.result(&text, &to_json::figures(&figures))
 }
 
-pub(super) fn fit(command: &FitCommand, output: Output) -> Result<(), Failure> {
+pub(super) fn fit(command: &FitCommand, output: Output) -> Ended {
     match command {
         FitCommand::Linear { data, save, axis } => {
             linear(data, save.as_deref(), axis.as_deref(), output)
@@ -64,12 +63,7 @@ pub(super) fn fit(command: &FitCommand, output: Output) -> Result<(), Failure> {
     }
 }
 
-fn linear(
-    path: &Path,
-    save: Option<&Path>,
-    axis: Option<&str>,
-    output: Output,
-) -> Result<(), Failure> {
+fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let name = axis.unwrap_or("x").to_owned();
     let fitted = error_table::analyse(&series, &FitOptions::default())
@@ -97,8 +91,7 @@ fn linear(
         );
         value["calibration"] = json!(id);
     }
-    output.result(&text, &value);
-    Ok(())
+    output.result(&text, &value)
 }
 
 /// Stores a table measured elsewhere. The drive cannot be asked here, so its identity is what
@@ -164,7 +157,7 @@ fn store_fit(
     Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
 }
 
-fn hall(path: &Path, output: Output) -> Result<(), Failure> {
+fn hall(path: &Path, output: Output) -> Ended {
     let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
         axis: path.display().to_string(),
@@ -180,6 +173,5 @@ fn hall(path: &Path, output: Output) -> Result<(), Failure> {
         estimate.right.position.um(),
         estimate.mid_voltage.value()
     );
-    output.result(&text, &to_json::zero(&estimate));
-    Ok(())
+    output.result(&text, &to_json::zero(&estimate))
 }

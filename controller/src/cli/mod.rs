@@ -141,7 +141,11 @@ pub(crate) fn main() -> ExitCode {
         Command::Report(args) => page::run(&args, output),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(failure)) => {
+            output.note(&format!("error: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
         Err(failure) => {
             output.failure(&failure);
             ExitCode::from(failure.exit_code())

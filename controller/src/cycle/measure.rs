@@ -124,6 +124,7 @@ impl Machine {
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
         let mut points = whole_runs(earlier, per_run);
+        self.use_instrument(&plan.instrument)?;
         let correction_of_length = self.set_datum(axis, plan)?;
         self.remember(axis).datum = Some((plan.clone(), correction_of_length));
         let counter = Counter {
@@ -151,6 +152,7 @@ impl Machine {
         let closure = self.measure_closure(&session)?;
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
+        self.instrument_in_use = None;
         let environment = mean_environment(&points);
         Ok(Measured {
             points,
@@ -231,9 +233,11 @@ impl Machine {
                 what: format!("axis {axis} has no datum"),
                 help: "calibrate or verify first".into(),
             })?;
+        self.use_instrument(&plan.instrument)?;
         self.go_to_datum(axis, &plan)?;
         let reading = self.read_displacement(axis, &plan)?;
         let environment = self.instrument_environment(&plan.instrument);
+        self.instrument_in_use = None;
         self.correct(&plan, &reading, &environment, &length)
     }
 

@@ -106,7 +106,12 @@ impl Machine {
         self.check_soft_limits(axis, target)?;
         let set_point = self.set_point(axis, target, correction)?;
         self.check_soft_limits(axis, set_point)?;
-        self.profile_move(axis, set_point, self.travel_speed(axis)?)?;
+        let speed = match (correction, self.compensation(axis)) {
+            // So fast that the correction changes no faster than its limit.
+            (Correction::On, Some(table)) => self.travel_speed(axis)?.min(table.speed_max()),
+            _ => self.travel_speed(axis)?,
+        };
+        self.profile_move(axis, set_point, speed)?;
         Ok(set_point)
     }
 

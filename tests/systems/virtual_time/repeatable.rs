@@ -77,10 +77,17 @@ fn one_seed_gives_bit_identical_logs_and_another_seed_another() {
     println!(
         "the cycle took {:.2} s with its recording of {} lines",
         begun.elapsed().as_secs_f64(),
-        first.recording.iter().filter(|byte| **byte == b'\n').count()
+        first
+            .recording
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count()
     );
     let second = cycle(5);
-    assert!(first.recording.len() > 100_000, "an empty recording proves nothing");
+    assert!(
+        first.recording.len() > 100_000,
+        "an empty recording proves nothing"
+    );
     assert!(first.recording == second.recording, "the recordings differ");
     assert_eq!(first.emulator, second.emulator);
     assert_eq!(first.accuracy_m.to_bits(), second.accuracy_m.to_bits());
