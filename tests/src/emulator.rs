@@ -6,7 +6,7 @@ use drivers::transport::Transport;
 use mock_bus::simulation::Simulation;
 use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
-use truestage::ports;
+use truestage::ports::{self, Use};
 
 use crate::rig::{EMULATED, Rig, machine_config};
 
@@ -125,7 +125,7 @@ impl Emulator {
         };
         let config = &self.loaded.config;
         let overrides = emulated.overrides(config).expect("its ports were matched");
-        match ports::open(config, &overrides, self.rig.speed()) {
+        match ports::open(config, &overrides, Use::Measurement, self.rig.speed()) {
             Ok(live) => Box::new(live),
             Err(failure) => panic!("{:?}: {failure}", self.rig),
         }

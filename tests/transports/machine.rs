@@ -43,14 +43,14 @@ fn look(stand: &Stand) -> (Time, Metres) {
     stand.simulation(|it| (it.now(), it.truth().scale_position()))
 }
 
-/// In the middle of a move that takes 40 s of the machine's life `what` happens to the
+/// In the middle of a move that takes 80 s of the machine's life `what` happens to the
 /// interface: the failure names port and state, and the stage stops far from the target.
 #[track_caller]
 fn check(name: &'static str, what: fn(&Interface), wanted: LinkState) {
     let interface = Rc::new(Interface::vcan(name));
     let setup = Setup::new(31)
         .interface(name)
-        .machine("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 1.0")
+        .machine("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 0.5")
         .machine("move_timeout_s = 10.0", "move_timeout_s = 100.0");
     let at = Rc::new(Cell::new(Time::NEVER));
     let meddling = |inner| {
@@ -61,7 +61,9 @@ fn check(name: &'static str, what: fn(&Interface), wanted: LinkState) {
     let store = stand.store.clone();
     let machine = &mut stand.machine;
     machine.start().unwrap();
-    machine.zero("x", &store).unwrap_or_else(|it| panic!("{it}"));
+    machine
+        .zero("x", &store)
+        .unwrap_or_else(|it| panic!("{it}"));
     at.set(machine.now() + Duration::from_secs(2));
     let failure = machine.move_to("x", Metres::from_mm(40.0)).unwrap_err();
     assert_eq!(at.get(), Time::NEVER, "{failure}");
