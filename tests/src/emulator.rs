@@ -6,7 +6,7 @@ use drivers::transport::Transport;
 use mock_bus::simulation::Simulation;
 use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
-use truestage::ports::{self, Use};
+use truestage::ports;
 
 use crate::rig::{EMULATED, Rig, machine_config};
 
@@ -68,7 +68,7 @@ fn replace(text: String, changes: &[(String, String)]) -> String {
     })
 }
 
-#[expect(clippy::large_enum_variant, reason = "one a test")]
+#[expect(clippy::large_enum_variant, reason = "there is one a test")]
 enum Emulation {
     InProcess(Emulated),
     Running(EmulatedOnPtys),
@@ -125,7 +125,12 @@ impl Emulator {
         };
         let config = &self.loaded.config;
         let overrides = emulated.overrides(config).expect("its ports were matched");
-        match ports::open(config, &overrides, Use::Measurement, self.rig.speed()) {
+        match ports::open(
+            config,
+            &overrides,
+            ports::Use::Measurement,
+            self.rig.speed(),
+        ) {
             Ok(live) => Box::new(live),
             Err(failure) => panic!("{:?}: {failure}", self.rig),
         }
