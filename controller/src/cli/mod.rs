@@ -119,8 +119,20 @@ struct MoveArgs {
     #[command(flatten)]
     machine: MachineArgs,
     /// Where to: `x=12.5mm`, `x=-300um`.
-    #[arg(required = true, value_name = "AXIS=LENGTH")]
+    #[arg(value_name = "AXIS=LENGTH")]
     targets: Vec<String>,
+}
+
+impl MoveArgs {
+    /// `truestage move x=12.5mm` means `./machine.toml`, as with every verb.
+    fn settle(mut self) -> Self {
+        let first = self.machine.config.to_string_lossy();
+        if first.contains('=') && !self.machine.config.exists() {
+            self.targets.insert(0, first.into_owned());
+            self.machine.config = "machine.toml".into();
+        }
+        self
+    }
 }
 
 /// Runs the command line of this process.
@@ -134,7 +146,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Zero(args) => verbs::zero(&args, output),
         Command::Calibrate(args) => verbs::calibrate(&args, output),
         Command::Verify(args) => verbs::verify(&args, output),
-        Command::Move(args) => verbs::move_to(&args, output),
+        Command::Move(args) => verbs::move_to(&args.settle(), output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),

@@ -183,6 +183,12 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    if args.targets.is_empty() {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
+        });
+    }
     let targets = args
         .targets
         .iter()
