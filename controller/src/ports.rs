@@ -87,11 +87,11 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
 ///
 /// [`Loaded::patience`]: crate::config::Loaded::patience
 pub fn patience(clock_speed: f64) -> u32 {
-    const PAUSES: f64 = 6.0;
+    const PAUSES: f64 = 25.0;
     if clock_speed <= 1.0 {
         1
     } else {
-        (clock_speed * PAUSES).min(1000.0).ceil() as u32
+        (clock_speed * PAUSES).min(2000.0).ceil() as u32
     }
 }
 

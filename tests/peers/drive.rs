@@ -1,28 +1,15 @@
 //! python-canopen is the master of our emulated drive.
 
-use mock_bus::config::MachineConfig;
-use mock_bus::runner::{self, Running};
+use mock_bus::runner::Running;
 use serde_json::{Value, json};
-use tests::{EMULATED, Rig};
 use units::Metres;
 
-use crate::peer::Peer;
+use crate::emulated::Emulated;
 
 /// The drive's position window, in counts of 10 nm: "target reached" means no more.
 const NEAR_COUNTS: i64 = 100;
 /// What the stage deviates by and loses when it turns round (configs/emulated/linear.toml).
 const DEVIATION_MAX_UM: f64 = 25.0;
-
-fn spawn(rig: Rig) -> (Running, [String; 2]) {
-    let config = MachineConfig::parse(EMULATED).expect("the shipped emulation is well-formed");
-    let (machine, interface) = match rig {
-        Rig::Vcan => (runner::spawn_on_vcan(&config, 1, 1.0, "vcan0"), "socketcan"),
-        Rig::Pty | Rig::InProcess => (runner::spawn_on_ptys(&config, 1, 1.0), "slcan"),
-    };
-    let machine = machine.unwrap_or_else(|error| panic!("{error}"));
-    let channel = machine.ports()[0].display().to_string();
-    (machine, [interface.to_owned(), channel])
-}
 
 fn position(machine: &Running) -> Metres {
     machine
@@ -33,15 +20,15 @@ fn position(machine: &Running) -> Metres {
 #[test]
 fn python_canopen_moves_homes_and_upsets_the_emulated_drive() {
     for rig in crate::rigs() {
-        let (machine, [interface, channel]) = spawn(rig);
-        let before = position(&machine);
-        let seen = Peer::start("drive_master.py", &[&interface, &channel]).finish();
-        let travelled = position(&machine) - before;
+        let emulated = Emulated::spawn(rig);
+        let before = position(&emulated.machine);
+        let seen = emulated.master("drive_master.py").finish();
+        let travelled = position(&emulated.machine) - before;
         check_transfers(&seen);
         check_mapping(&seen["pdos"]);
         check_motion(&seen, travelled);
         check_failure(&seen["failure"]);
-        machine.stop().expect("the machine ran to its end");
+        emulated.stop();
     }
 }
 

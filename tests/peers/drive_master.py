@@ -85,21 +85,6 @@ def object_dictionary():
     return peer.dictionary(objects)
 
 
-def wait_for(values, wanted):
-    """Takes from the queue until `wanted` comes."""
-    end = time.monotonic() + peer.PATIENCE_S
-    seen = []
-    while time.monotonic() < end:
-        try:
-            value = values.get(timeout=max(0.0, end - time.monotonic()))
-        except queue.Empty:
-            break
-        if value == wanted:
-            return
-        seen.append(value)
-    raise RuntimeError(f"waited for {wanted}, saw {seen}")
-
-
 def wait_for_status(node, what, accept):
     """Looks at statuswords as they come until one is accepted."""
     end = time.monotonic() + peer.PATIENCE_S
@@ -113,9 +98,9 @@ def wait_for_status(node, what, accept):
 def boot(node, states):
     """A reset, the boot-up message and the first heartbeat."""
     node.nmt.state = "RESET"
-    wait_for(states, 0)
+    peer.wait_for(states, 0)
     node.sdo[0x1017].raw = HEARTBEAT_MS
-    wait_for(states, 127)
+    peer.wait_for(states, 127)
 
 
 def map_pdos(node):
@@ -228,7 +213,7 @@ def fail_and_recover(node, emergencies):
     node.op_mode = "PROFILED POSITION"
     node.rpdo[1][0x607A].raw = 0
     node.controlword = 0x0F | NEW_SET_POINT
-    wait_for(emergencies, FOLLOWING_ERROR)
+    peer.wait_for(emergencies, FOLLOWING_ERROR)
     active = [error.code for error in node.emcy.active]
     wait_for_status(node, "fault", lambda status: status & 0x4F == 0x08)
     state = node.state
@@ -236,7 +221,7 @@ def fail_and_recover(node, emergencies):
     node.sdo[0x6066].raw = timeout
     node.controlword = 0x00
     node.state = "SWITCH ON DISABLED"
-    wait_for(emergencies, 0)
+    peer.wait_for(emergencies, 0)
     return {
         "emergencies": active,
         "state": state,
@@ -259,7 +244,7 @@ def main():
     aborted = aborts(node)
     pdos = map_pdos(node)
     node.nmt.state = "OPERATIONAL"
-    wait_for(states, 5)
+    peer.wait_for(states, 5)
 
     node.op_mode = "PROFILED POSITION"
     node.state = "OPERATION ENABLED"
@@ -271,7 +256,7 @@ def main():
     failure = fail_and_recover(node, emergencies)
 
     node.nmt.state = "PRE-OPERATIONAL"
-    wait_for(states, 127)
+    peer.wait_for(states, 127)
     node.sdo[0x1017].raw = 0
     network.disconnect()
     peer.report(

@@ -9,7 +9,7 @@ use drivers::wire::canopen::sdo::AbortCode;
 use drivers::wire::canopen::{NodeId, Object};
 use serde_json::json;
 use std::time::Duration;
-use tests::{Rig, SlcanHub};
+use tests::{INTERFACE, Rig, SlcanHub};
 
 use crate::peer::Peer;
 
@@ -40,8 +40,8 @@ impl Talk {
         let builder = Live::builder(Clock::real());
         let (builder, arguments, hub) = match rig {
             Rig::Vcan => (
-                builder.socketcan(BUS, "vcan0"),
-                ["socketcan".into(), "vcan0".into()],
+                builder.socketcan(BUS, INTERFACE),
+                ["socketcan".into(), INTERFACE.into()],
                 None,
             ),
             Rig::Pty | Rig::InProcess => {

@@ -1,7 +1,9 @@
-//! Software of others on the same bus: python-canopen as our emulated drive's master and as
-//! our driver's server, python-can as the reader of our recordings.
+//! Software of others on the same bus: python-canopen as the master of our emulated devices and
+//! as our driver's server, python-can as the reader of our recordings.
 
+mod analog;
 mod drive;
+mod emulated;
 mod local_node;
 mod peer;
 mod recording;

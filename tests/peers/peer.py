@@ -5,7 +5,9 @@ Called as `program INTERFACE CHANNEL`, with python-can's names: `slcan /dev/pts/
 """
 
 import json
+import queue
 import sys
+import time
 
 import canopen
 from canopen.objectdictionary import ObjectDictionary, ODRecord, ODVariable
@@ -49,6 +51,21 @@ def dictionary(objects):
     for each in objects:
         made.add_object(each)
     return made
+
+
+def wait_for(values, wanted):
+    """Takes from the queue until `wanted` comes."""
+    end = time.monotonic() + PATIENCE_S
+    seen = []
+    while time.monotonic() < end:
+        try:
+            value = values.get(timeout=max(0.0, end - time.monotonic()))
+        except queue.Empty:
+            break
+        if value == wanted:
+            return
+        seen.append(value)
+    raise RuntimeError(f"waited for {wanted}, saw {seen}")
 
 
 def report(**seen):

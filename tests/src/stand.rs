@@ -1,87 +1,27 @@
 //! A machine on any bus: what the tests that run the same on every bus are written against.
 
 use core::time::Duration;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use drivers::transport::Transport;
 use mock_bus::simulation::Simulation;
-use truestage::config::Loaded;
-use truestage::emulated::{Emulated, EmulatedOnPtys, HallDrift};
-use truestage::{Failure, Machine, Store, ports};
+use truestage::emulated::HallDrift;
+use truestage::{Failure, Machine, Store};
 use units::Metres;
 
-use crate::rig::{EMULATED, Rig, machine_config, rigs};
+use crate::emulator::{Emulator, Setup};
+use crate::rig::{Rig, rigs};
 
-/// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
-pub const INTERFACE: &str = "vcan0";
 /// The mains is off, and the drives boot, for less than this.
 const POWER_OFF: Duration = Duration::from_secs(1);
 
-/// Machines that live in real time share the processor, and on SocketCAN the interface: one
-/// after the other.
-static REAL_TIME: Mutex<()> = Mutex::new(());
-
-/// What a machine is made from: seed, configuration, description of the emulation.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    seed: u64,
-    machine: Vec<(String, String)>,
-    emulated: Vec<(String, String)>,
-}
-
-impl Setup {
-    /// The shipped machine with the noise and errors of `seed`.
-    pub const fn new(seed: u64) -> Self {
-        Self {
-            seed,
-            machine: Vec::new(),
-            emulated: Vec::new(),
-        }
-    }
-
-    /// With `from` replaced by `to` in the machine's configuration.
-    #[must_use]
-    pub fn machine(mut self, from: &str, to: &str) -> Self {
-        self.machine.push((from.to_owned(), to.to_owned()));
-        self
-    }
-
-    /// With `from` replaced by `to` in the description of the emulation.
-    #[must_use]
-    pub fn emulated(mut self, from: &str, to: &str) -> Self {
-        self.emulated.push((from.to_owned(), to.to_owned()));
-        self
-    }
-}
-
-/// # Panics
-/// When there is nothing to replace: the text has changed and the test has not.
-fn replace(text: String, changes: &[(String, String)]) -> String {
-    changes.iter().fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "`{from}` is not in the text");
-        text.replace(from, to)
-    })
-}
-
-#[expect(clippy::large_enum_variant, reason = "one a test")]
-enum Emulation {
-    InProcess(Emulated),
-    Running(EmulatedOnPtys),
-}
-
 /// A machine on one rig with everything a test looks at.
 pub struct Stand {
-    /// Where it is.
-    pub rig: Rig,
     /// The controller's side.
     pub machine: Machine,
     /// Where calibrations and runs go.
     pub store: Store,
-    /// What the controller was told.
-    pub loaded: Loaded,
-    emulation: Emulation,
-    /// Gone when dropped.
-    pub folder: tempfile::TempDir,
-    _turn: Option<MutexGuard<'static, ()>>,
+    /// The emulator's side.
+    pub emulator: Emulator,
 }
 
 impl Stand {
@@ -90,57 +30,38 @@ impl Stand {
     /// # Panics
     /// When it cannot be brought up.
     pub fn new(rig: Rig, setup: &Setup) -> Self {
-        Self::on(rig, setup, INTERFACE)
+        Self::wrapped(rig, setup, |transport| transport)
     }
 
-    /// The same with another interface for SocketCAN.
+    /// The same, with the transport wrapped (recorded, say).
     ///
     /// # Panics
     /// When it cannot be brought up.
-    pub fn on(rig: Rig, setup: &Setup, interface: &str) -> Self {
-        let turn = (rig != Rig::InProcess)
-            .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
-        let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let mut loaded = machine_config(folder.path(), |text| replace(text, &setup.machine));
-        let text = replace(EMULATED.to_owned(), &setup.emulated);
-        let (speed, seed) = (rig.speed(), setup.seed);
-        let emulation = match rig {
-            Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),
-            Rig::Pty => EmulatedOnPtys::start(&text, seed, speed).map(Emulation::Running),
-            Rig::Vcan => EmulatedOnPtys::start_on_socketcan(&text, seed, speed, interface)
-                .map(Emulation::Running),
-        };
-        let emulation = emulation.unwrap_or_else(|error| panic!("{rig:?}: {error}"));
-        loaded.patience = ports::patience(speed);
-        let machine = connect(&loaded, &emulation, speed)
-            .unwrap_or_else(|failure| panic!("{rig:?}: {failure}"));
-        let store = Store::new(folder.path(), &loaded.config.machine.name);
+    pub fn wrapped(
+        rig: Rig,
+        setup: &Setup,
+        wrap: impl FnOnce(Box<dyn Transport>) -> Box<dyn Transport>,
+    ) -> Self {
+        let emulator = Emulator::new(rig, setup);
+        let name = &emulator.loaded.config.machine.name;
         Self {
-            rig,
-            machine,
-            store,
-            loaded,
-            emulation,
-            folder,
-            _turn: turn,
+            machine: Machine::new(&emulator.loaded, wrap(emulator.transport())),
+            store: Store::new(emulator.folder.path(), name),
+            emulator,
         }
     }
 
+    /// Which rig it is on.
+    pub const fn rig(&self) -> Rig {
+        self.emulator.rig
+    }
+
     /// Looks at the simulated machine, or meddles with it.
-    ///
-    /// # Panics
-    /// When the emulator has ended.
     pub fn simulation<R: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Simulation) -> R + Send + 'static,
     ) -> R {
-        match &self.emulation {
-            Emulation::InProcess(emulated) => work(&mut emulated.simulation_mut()),
-            Emulation::Running(emulated) => {
-                let result = emulated.running().with(work);
-                result.unwrap_or_else(|error| panic!("{error}"))
-            }
-        }
+        self.emulator.simulation(work)
     }
 
     /// Where the point of the stage truly is.
@@ -167,17 +88,6 @@ impl Stand {
         self.simulation(move |simulation| simulation.power_cycle(drift));
         self.live(POWER_OFF)?;
         self.machine.start()
-    }
-}
-
-fn connect(loaded: &Loaded, emulation: &Emulation, speed: f64) -> Result<Machine, Failure> {
-    match emulation {
-        Emulation::InProcess(emulated) => Ok(Machine::new(loaded, Box::new(emulated.transport()))),
-        Emulation::Running(emulated) => {
-            let overrides = emulated.overrides(&loaded.config)?;
-            let live = ports::open(&loaded.config, &overrides, ports::Use::Measurement, speed)?;
-            Ok(Machine::new(loaded, Box::new(live)))
-        }
     }
 }
 

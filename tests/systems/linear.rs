@@ -63,7 +63,7 @@ fn the_whole_cycle_brings_the_stage_within_two_micrometres_on_every_bus() {
         let lived_s = stand.machine.now().seconds();
         println!(
             "{:?}: {lived_s:.1} s of the machine's life in {wall_s:.2} s",
-            stand.rig
+            stand.rig()
         );
         Ok(())
     });

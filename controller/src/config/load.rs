@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn a_sync_period_too_short_for_the_bus_names_one_that_fits() {
-        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.5");
+        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.4");
         let found = &findings(&text)[0];
         assert_eq!(found.key, "can.can0.sync_period_ms");
         assert!(found.help.contains("ms"), "{found}");

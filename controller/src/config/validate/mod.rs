@@ -13,6 +13,7 @@ use drivers::protocol::bus_load::BusLoadError;
 use super::model::{
     AnalogConfig, AnalogDevice, AxisConfig, CanBus, CanTransport, InstrumentConfig, MachineConfig,
 };
+use crate::assemble;
 use crate::bus_plan;
 
 /// The version of the file format this program reads.
@@ -226,6 +227,13 @@ fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
             "list each used channel once",
         );
     }
+    if analog.full_scale_v.len() != analog.channels.len() {
+        judge.say(
+            "full_scale_v",
+            "must have one value per channel",
+            "list as many as `channels`",
+        );
+    }
     match analog.device {
         AnalogDevice::Cia401 => check_cia401(judge, config, analog),
         AnalogDevice::Dcon => check_dcon(judge, config, analog),
@@ -249,13 +257,6 @@ fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
             "channels",
             "one process data object carries channels 0 to 3",
             "use those",
-        );
-    }
-    if analog.full_scale_v.len() != analog.channels.len() {
-        judge.say(
-            "full_scale_v",
-            "must have one value per channel",
-            "list as many as `channels`",
         );
     }
     for value in &analog.full_scale_v {
@@ -292,6 +293,13 @@ fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConf
     }
     if analog.channels.iter().any(|channel| *channel >= 8) {
         judge.say("channels", "a dcon module has channels 0 to 7", "use those");
+    }
+    if assemble::dcon_range(&analog.full_scale_v).is_none() {
+        judge.say(
+            "full_scale_v",
+            "a dcon module has one input range for all channels",
+            "give each channel the same: 10.0, 5.0, 1.0, 0.5 or 0.15",
+        );
     }
     match analog.poll_period_ms {
         Some(period) => judge.within("poll_period_ms", period, 1.0, 60_000.0),
