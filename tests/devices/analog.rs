@@ -14,7 +14,9 @@ use units::Volts;
 /// The module that reads the Hall sensors over a serial line instead of CAN.
 pub(crate) fn over_dcon(setup: Setup) -> Setup {
     let machine = tests::MACHINE;
-    let begin = machine.find("[analog.hall]").expect("the shipped machine has it");
+    let begin = machine
+        .find("[analog.hall]")
+        .expect("the shipped machine has it");
     let end = machine.find("[instrument.laser]").expect("it comes next");
     setup
         .machine(
@@ -61,12 +63,17 @@ fn check<D: AnalogInput>(module: impl Fn(Rig) -> Desk<D>, procedure: impl Fn(&mu
 fn fresh<D: AnalogInput>(desk: &mut Desk<D>) -> AnalogReading {
     let now = desk.now() + Duration::from_millis(300);
     desk.live_until(|device| device.reading().is_some_and(|it| it.at > now));
-    desk.device.reading().expect("it has just been read").clone()
+    desk.device
+        .reading()
+        .expect("it has just been read")
+        .clone()
 }
 
 fn inject<D: Device>(desk: &Desk<D>, fault: Fault) {
     let inject = move |it: &mut Simulation| it.inject(FaultConfig::permanent(fault)).map(drop);
-    desk.emulator.simulation(inject).expect("the fault is one of this machine");
+    desk.emulator
+        .simulation(inject)
+        .expect("the fault is one of this machine");
 }
 
 fn reads_plausible_voltages<D: AnalogInput>(desk: &mut Desk<D>) {
@@ -79,7 +86,10 @@ fn reads_plausible_voltages<D: AnalogInput>(desk: &mut Desk<D>) {
         assert!(a.value().abs() < 5.0, "{a:?}");
         assert!((a.value() - b.value()).abs() < 0.01, "{a:?}, then {b:?}");
     }
-    let strongest = first.volts.iter().fold(0.0_f64, |top, it| top.max(it.value().abs()));
+    let strongest = first
+        .volts
+        .iter()
+        .fold(0.0_f64, |top, it| top.max(it.value().abs()));
     assert!(strongest > 0.05, "{:?}", first.volts);
     assert_eq!(desk.alarms, []);
 }
@@ -117,9 +127,13 @@ fn a_dcon_module_shows_the_rail_of_its_input() {
 #[test]
 fn exchanged_inputs_exchange_their_values_on_both_modules() {
     fn swapped<D: AnalogInput>(desk: &mut Desk<D>) {
-        let [a, b] = fresh(desk).volts[..] else { panic!("two channels") };
+        let [a, b] = fresh(desk).volts[..] else {
+            panic!("two channels")
+        };
         inject(desk, Fault::InputsSwapped);
-        let [c, d] = fresh(desk).volts[..] else { panic!("two channels") };
+        let [c, d] = fresh(desk).volts[..] else {
+            panic!("two channels")
+        };
         let near = |x: Volts, y: Volts| (x.value() - y.value()).abs() < 0.01;
         assert!(near(a, d) && near(b, c), "{a:?} {b:?}, then {c:?} {d:?}");
     }
@@ -130,11 +144,20 @@ fn exchanged_inputs_exchange_their_values_on_both_modules() {
 #[test]
 fn a_silent_dcon_module_is_an_alarm_and_no_old_value() {
     check(dcon, |desk| {
-        inject(desk, Fault::Silence { port: "adc".to_owned() });
+        inject(
+            desk,
+            Fault::Silence {
+                port: "adc".to_owned(),
+            },
+        );
         let since = desk.now();
         desk.live(desk_patience(desk));
         assert_ne!(desk.alarms, []);
-        assert!(desk.device.reading().is_none_or(|it| it.at <= since + Duration::from_secs(1)));
+        assert!(
+            desk.device
+                .reading()
+                .is_none_or(|it| it.at <= since + Duration::from_secs(1))
+        );
     });
 }
 

@@ -99,7 +99,10 @@ fn a_started_drive_says_who_it_is_and_is_off() {
 fn an_enabled_drive_moves_to_its_target_and_is_disabled_again() {
     check(|drive| {
         drive.command(AxisCommand::Enable)?;
-        assert_eq!(drive.device.power_state(), Some(PowerState::OperationEnabled));
+        assert_eq!(
+            drive.device.power_state(),
+            Some(PowerState::OperationEnabled)
+        );
         drive.command(HERE_IS_ZERO)?;
         let begin = scale(drive);
         for (mm, speed) in [(12.5, 200.0), (-1.0, 50.0), (0.25, 10.0)] {
@@ -124,7 +127,10 @@ fn a_halt_stops_short_of_the_target_and_the_drive_stays_enabled() {
         drive.command(AxisCommand::Halt)?;
         let stopped = drive.reading();
         assert!(stopped.position < Metres::from_mm(40.0));
-        assert_eq!(drive.device.power_state(), Some(PowerState::OperationEnabled));
+        assert_eq!(
+            drive.device.power_state(),
+            Some(PowerState::OperationEnabled)
+        );
         assert!(rests(drive));
         // The target that was given up does not come back.
         drive.command(to(2.0, 100.0))?;
@@ -164,14 +170,16 @@ fn homing_here_moves_the_coordinates_and_not_the_stage() {
 fn a_blocked_axis_faults_and_one_reset_clears_it_when_the_cause_is_gone() {
     check(|drive| {
         on_the_way(drive)?;
-        let blocked = drive.emulator.simulation(|simulation| {
-            simulation.inject(FaultConfig::permanent(Fault::BlockedAxis))
-        });
+        let blocked = drive
+            .emulator
+            .simulation(|simulation| simulation.inject(FaultConfig::permanent(Fault::BlockedAxis)));
         let blocked = blocked.expect("every stage can be blocked");
         assert!(drive.outcome().is_err());
         drive.live_until(|drive| drive.power_state() == Some(PowerState::Fault));
         assert_ne!(drive.alarms, []);
-        drive.emulator.simulation(move |simulation| simulation.end_fault(blocked));
+        drive
+            .emulator
+            .simulation(move |simulation| simulation.end_fault(blocked));
         drive.command(AxisCommand::ResetFault)?;
         drive.command(AxisCommand::Enable)?;
         drive.command(to(6.0, 50.0))?;
@@ -197,7 +205,8 @@ fn a_drive_whose_master_falls_silent_stops_by_itself() {
 #[test]
 fn a_drive_that_is_another_one_is_refused_before_anything_is_set() {
     for rig in rigs() {
-        let change = Setup::new(21).emulated("product_code = 0x42_0001", "product_code = 0x42_0002");
+        let change =
+            Setup::new(21).emulated("product_code = 0x42_0001", "product_code = 0x42_0002");
         let emulator = Emulator::new(rig, &change);
         let loaded = &emulator.loaded;
         let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
@@ -217,17 +226,25 @@ fn a_drive_that_loses_its_power_raises_an_alarm_and_its_reference_is_gone() {
     check(|drive| {
         drive.command(AxisCommand::Enable)?;
         drive.command(HERE_IS_ZERO)?;
-        drive.emulator.simulation(|simulation| {
-            let node = "drive".to_owned();
-            let span = Duration::from_millis(300);
-            let fault = FaultConfig::lasting(Fault::PowerLoss { node }, span);
-            simulation.inject(fault).map(drop)
-        }).expect("the machine has a drive");
+        drive
+            .emulator
+            .simulation(|simulation| {
+                let node = "drive".to_owned();
+                let span = Duration::from_millis(300);
+                let fault = FaultConfig::lasting(Fault::PowerLoss { node }, span);
+                simulation.inject(fault).map(drop)
+            })
+            .expect("the machine has a drive");
         drive.live_until(|drive| !drive.is_homed());
         drive.live(Duration::from_secs(1));
         let boot_up = |alarm: &Alarm| matches!(alarm, Alarm::UnexpectedBootUp { .. });
-        let lost = |alarm: &Alarm| matches!(alarm, Alarm::HeartbeatLost { .. } | Alarm::PdoLost { .. });
-        assert!(drive.alarms.iter().any(|it| boot_up(it) || lost(it)), "{:?}", drive.alarms);
+        let lost =
+            |alarm: &Alarm| matches!(alarm, Alarm::HeartbeatLost { .. } | Alarm::PdoLost { .. });
+        assert!(
+            drive.alarms.iter().any(|it| boot_up(it) || lost(it)),
+            "{:?}",
+            drive.alarms
+        );
         Ok(())
     });
 }

@@ -45,7 +45,11 @@ fn a_datum_reads_zero_and_a_resting_stage_stays_there() {
         laser.device.set_datum(now);
         for _ in 0..3 {
             let displacement = average(laser, 100);
-            assert!(displacement.abs() < Metres(200e-9), "{} nm", displacement.nm());
+            assert!(
+                displacement.abs() < Metres(200e-9),
+                "{} nm",
+                displacement.nm()
+            );
         }
         assert_eq!(laser.alarms, []);
     });
@@ -59,9 +63,14 @@ fn its_sensors_say_what_the_weather_is() {
             it.air_temperature.and(it.pressure).is_some() && it.humidity.is_some()
         });
         let said = laser.device.environment();
-        let truth = laser.emulator.simulation(|simulation| simulation.truth().environment());
+        let truth = laser
+            .emulator
+            .simulation(|simulation| simulation.truth().environment());
         let temperature = said.air_temperature.expect("awaited").0;
-        assert!((temperature - truth.air_temperature.0).abs() < 0.2, "{temperature} °C");
+        assert!(
+            (temperature - truth.air_temperature.0).abs() < 0.2,
+            "{temperature} °C"
+        );
         let Pascals(pressure) = said.pressure.expect("awaited");
         assert!((pressure - 100_200.0).abs() < 200.0, "{pressure} Pa");
         let humidity = said.humidity.expect("awaited").0;
@@ -73,18 +82,31 @@ fn its_sensors_say_what_the_weather_is() {
 fn a_blocked_beam_is_an_alarm_and_no_number_until_a_new_datum() {
     check(|laser| {
         laser.live_until(|laser| laser.latest().is_some());
-        let blocked = laser.emulator.simulation(|simulation| {
-            simulation.inject(FaultConfig::permanent(Fault::BeamBlocked))
-        });
+        let blocked = laser
+            .emulator
+            .simulation(|simulation| simulation.inject(FaultConfig::permanent(Fault::BeamBlocked)));
         let blocked = blocked.expect("every beam can be blocked");
         laser.live_until(|laser| laser.latest().is_none());
-        assert!(laser.alarms.contains(&Alarm::BeamLost), "{:?}", laser.alarms);
-        laser.emulator.simulation(move |simulation| simulation.end_fault(blocked));
+        assert!(
+            laser.alarms.contains(&Alarm::BeamLost),
+            "{:?}",
+            laser.alarms
+        );
+        laser
+            .emulator
+            .simulation(move |simulation| simulation.end_fault(blocked));
         laser.live(Duration::from_millis(500));
-        assert!(laser.device.latest().is_none(), "a lost count is never read again");
+        assert!(
+            laser.device.latest().is_none(),
+            "a lost count is never read again"
+        );
         let now = laser.now();
         laser.device.set_datum(now);
         let displacement = average(laser, 50);
-        assert!(displacement.abs() < Metres(200e-9), "{} nm", displacement.nm());
+        assert!(
+            displacement.abs() < Metres(200e-9),
+            "{} nm",
+            displacement.nm()
+        );
     });
 }

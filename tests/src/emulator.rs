@@ -124,7 +124,12 @@ impl Emulator {
         };
         let config = &self.loaded.config;
         let overrides = emulated.overrides(config).expect("its ports were matched");
-        match ports::open(config, &overrides, ports::Use::Measurement, self.rig.speed()) {
+        match ports::open(
+            config,
+            &overrides,
+            ports::Use::Measurement,
+            self.rig.speed(),
+        ) {
             Ok(live) => Box::new(live),
             Err(failure) => panic!("{:?}: {failure}", self.rig),
         }

@@ -22,7 +22,9 @@ impl Interface {
     /// # Panics
     /// When `ip` cannot.
     pub fn pair(name: &'static str, peer: &'static str) -> Self {
-        run(&format!("ip link add dev {name} type vxcan peer name {peer}"));
+        run(&format!(
+            "ip link add dev {name} type vxcan peer name {peer}"
+        ));
         run(&format!("ip link set {name} up"));
         run(&format!("ip link set {peer} up"));
         Self(name)

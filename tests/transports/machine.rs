@@ -61,7 +61,9 @@ fn check(name: &'static str, what: fn(&Interface), wanted: LinkState) {
     let store = stand.store.clone();
     let machine = &mut stand.machine;
     machine.start().unwrap();
-    machine.zero("x", &store).unwrap_or_else(|it| panic!("{it}"));
+    machine
+        .zero("x", &store)
+        .unwrap_or_else(|it| panic!("{it}"));
     at.set(machine.now() + Duration::from_secs(2));
     let failure = machine.move_to("x", Metres::from_mm(40.0)).unwrap_err();
     assert_eq!(at.get(), Time::NEVER, "{failure}");

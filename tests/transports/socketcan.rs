@@ -87,7 +87,10 @@ fn a_frame_that_waited_in_the_queue_keeps_the_time_of_its_arrival() {
     let sent = b.now();
     while b.now().since(sent) < Duration::from_millis(300) {}
     let at = receive(&mut b).at;
-    assert!(at < sent + Duration::from_millis(250), "{at}, sent by {sent}");
+    assert!(
+        at < sent + Duration::from_millis(250),
+        "{at}, sent by {sent}"
+    );
 }
 
 #[test]
@@ -97,7 +100,10 @@ fn what_an_overflowing_receive_queue_drops_is_counted_to_the_last_frame() {
     let (mut a, mut b) = two(&vcan);
     let total = 20_000_u64;
     for _ in 0..total {
-        while a.send(HOST, &frame(0x181, &[1, 2, 3, 4, 5, 6, 7, 8])).is_err() {}
+        while a
+            .send(HOST, &frame(0x181, &[1, 2, 3, 4, 5, 6, 7, 8]))
+            .is_err()
+        {}
     }
     let (mut lost, mut received) = (0, 0);
     let mut count = |input: Input| match input {
@@ -188,7 +194,9 @@ fn error_frames_are_bus_errors() {
 #[test]
 #[ignore = "needs SocketCAN"]
 fn a_missing_interface_is_named() {
-    let built = Live::builder(Clock::real()).socketcan(HOST, "nocan9").build();
+    let built = Live::builder(Clock::real())
+        .socketcan(HOST, "nocan9")
+        .build();
     assert!(matches!(built, Err(OpenError::NoInterface { interface }) if interface == "nocan9"));
 }
 

@@ -420,6 +420,16 @@ mod tests {
         }
     }
 
+    /// 17 × 3 mm is 0.051000000000000004: a target read is the target written, to the last bit.
+    #[test]
+    fn any_target_is_the_same_target_when_a_run_is_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut header = header();
+        header.targets_m = (0..=20).map(|at| f64::from(at * 3) * 1e-3).collect();
+        let journal = Journal::create(folder.path(), &header).unwrap();
+        Journal::resume(journal.path(), &header).unwrap();
+    }
+
     /// One whole run of the header's two targets.
     fn write_run(journal: &mut Journal, run: u32) {
         for _ in 0..4 {
