@@ -68,6 +68,7 @@ fn replace(text: String, changes: &[(String, String)]) -> String {
     })
 }
 
+#[expect(clippy::large_enum_variant, reason = "there is one a test")]
 enum Emulation {
     InProcess(Emulated),
     Running(EmulatedOnPtys),
