@@ -37,6 +37,7 @@ pub mod failure;
 pub mod json;
 pub mod machine;
 pub mod observer;
+mod outbox;
 pub mod ports;
 pub mod report;
 pub mod store;

@@ -25,6 +25,7 @@ use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::cycle::RunPlan;
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
+use crate::outbox::Outbox;
 
 /// Set from anywhere (a signal handler) to stop the machine in a controlled way.
 #[derive(Clone, Debug, Default)]
@@ -84,6 +85,7 @@ pub struct Machine {
     pub(crate) config_hash: String,
     pub(crate) patience: u32,
     pub(crate) transport: Box<dyn Transport>,
+    pub(crate) outbox: Outbox,
     pub(crate) port_names: BTreeMap<Port, String>,
     pub(crate) axes: Vec<Unit<dyn Axis>>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
@@ -120,6 +122,7 @@ impl Machine {
             patience: loaded.patience,
             config,
             transport,
+            outbox: Outbox::default(),
             supervision: Supervision::Off,
             started_instruments: BTreeSet::new(),
             instrument_in_use: None,
@@ -335,6 +338,7 @@ impl Machine {
     /// what can be done, and the drives' own watch on our heartbeat does the rest.
     pub fn make_safe(&mut self) {
         self.supervision = Supervision::Stopping;
+        self.outbox.clear();
         let now = self.now();
         for unit in &mut self.axes {
             unit.device.command(now, AxisCommand::QuickStop);

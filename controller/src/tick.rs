@@ -20,7 +20,8 @@ impl Machine {
     /// could not be sent. The axes still move then: see [`Machine::guarded`].
     pub fn tick(&mut self, until: Time) -> Result<(), Failure> {
         self.send_pending()?;
-        let deadline = until.min(self.next_deadline());
+        let again = self.outbox.poll_timeout(self.transport.now());
+        let deadline = until.min(self.next_deadline()).min(again);
         let arrival = self.transport.receive(deadline);
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only
@@ -99,13 +100,15 @@ impl Machine {
     }
 
     fn send_pending(&mut self) -> Result<(), Failure> {
+        let flushed = self.outbox.flush(&mut *self.transport, self.patience);
+        flushed.or_else(|refusal| self.judge_refusal(refusal))?;
         let now = self.transport.now();
         for at in 0..self.heartbeats.len() {
             let (port, producer) = &mut self.heartbeats[at];
             producer.handle_timeout(now);
             if let Some(frame) = producer.poll_transmit() {
                 let port = *port;
-                self.send(port, &Payload::Frame(frame), "heartbeat")?;
+                self.send(port, Payload::Frame(frame), "heartbeat")?;
             }
         }
         for at in 0..self.device_count() {
@@ -116,25 +119,28 @@ impl Machine {
                     break;
                 };
                 let name = self.device_name(at);
-                self.send(port, &payload, &name)?;
+                self.send(port, payload, &name)?;
             }
         }
         Ok(())
     }
 
-    fn send(&mut self, port: Port, payload: &Payload, device: &str) -> Result<(), Failure> {
-        match self.transport.send(port, payload) {
-            Ok(()) => Ok(()),
+    fn send(&mut self, port: Port, payload: Payload, device: &str) -> Result<(), Failure> {
+        let sent = self
+            .outbox
+            .send(&mut *self.transport, port, payload, device);
+        sent.or_else(|refusal| self.judge_refusal(refusal))
+    }
+
+    fn judge_refusal(&self, (device, source): (String, SendError)) -> Result<(), Failure> {
+        match source {
             // While stopping, what can be sent is sent; the drives' watchdogs do the rest.
-            Err(_) if self.supervision == Supervision::Stopping => Ok(()),
-            Err(SendError::Unusable { port, state }) => Err(Failure::Link {
+            _ if self.supervision == Supervision::Stopping => Ok(()),
+            SendError::Unusable { port, state } => Err(Failure::Link {
                 port: self.port_name(port),
                 state,
             }),
-            Err(source) => Err(Failure::Send {
-                device: device.to_owned(),
-                source,
-            }),
+            source => Err(Failure::Send { device, source }),
         }
     }
 

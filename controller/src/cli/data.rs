@@ -77,16 +77,19 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
         series.measurements().len()
     );
     if let Some(lost_motion) = fitted.table.lost_motion() {
+        let u = lost_motion.standard_uncertainty;
         text += &format!(
-            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {:.3} µm",
+            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {}",
             lost_motion.mean.um(),
-            lost_motion.standard_uncertainty.um()
+            u.map_or("unknown (one run)".into(), |u| format!("{:.3} µm", u.um()))
         );
     }
     if let Some(config) = save {
         let id = store_fit(config, axis, path, &series, &fitted)?;
         text += &format!(
-            "\nstored as {}; use it with `truestage cal activate`",
+            "\nstored as {}; use it with `truestage cal activate {} {}`",
+            short(&id),
+            config.display(),
             short(&id)
         );
         value["calibration"] = json!(id);
@@ -95,7 +98,8 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
 }
 
 /// Stores a table measured elsewhere. The drive cannot be asked here, so its identity is what
-/// the configuration expects; with a serial number there it is checked like any other.
+/// the configuration expects; with a serial number there it is checked like any other, without
+/// one any drive of that product will do.
 fn store_fit(
     config_path: &Path,
     axis: Option<&str>,
@@ -105,12 +109,17 @@ fn store_fit(
 ) -> Result<String, Failure> {
     let loaded = config::load(config_path)?;
     let axes = &loaded.config.axis;
+    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
     let name = match (axis, axes.len()) {
         (Some(axis), _) => axis.to_owned(),
         (None, 1) => axes.keys().next().expect("there is one").clone(),
-        (None, _) => String::new(),
+        (None, _) => {
+            return Err(Failure::Usage {
+                what: "the machine has several axes".into(),
+                help: format!("add --axis with one of {}", known()),
+            });
+        }
     };
-    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
     let axis = axes.get(&name).ok_or_else(|| Failure::NoSuchAxis {
         axis: name.clone(),
         known: known(),
@@ -151,7 +160,7 @@ fn store_fit(
         runs: series.runs().len() as u32,
         closure_m: None,
         lost_motion_m: lost_motion.map(|it| it.mean.value()),
-        lost_motion_u_m: lost_motion.map(|it| it.standard_uncertainty.value()),
+        lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
         nodes: CalibrationRecord::nodes_of(&fitted.table),
     };
     Ok(Store::new(&section.data_dir, &section.name).save(&record)?)

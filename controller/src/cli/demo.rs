@@ -108,6 +108,12 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
             help: "known: linear".into(),
         });
     }
+    if !(args.speed.is_finite() && args.speed > 0.0) {
+        return Err(Failure::Usage {
+            what: format!("a speed of {}", args.speed),
+            help: "give a positive number; 1 is real time".into(),
+        });
+    }
     let mut loaded = config::parse(LINEAR, "configs/machines/linear.toml")?;
     loaded.patience = ports::patience(args.speed);
     if let Some(folder) = &args.data_dir {

@@ -11,7 +11,7 @@ use units::Metres;
 
 use super::output::{Ended, Output};
 use super::session::{Session, choose_axis};
-use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use super::{AxisArgs, CalibrateArgs, MoveArgs, NEWEST_RUN, VerifyArgs};
 
 pub(super) fn check(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
@@ -33,17 +33,31 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
     )
 }
 
+/// What is settled before anything moves.
+struct Prepared {
+    calibration: Option<String>,
+    resume: Option<PathBuf>,
+}
+
 /// Starts the machine, zeroes `axis`, loads its calibration, runs `procedure`, switches off.
 fn with_zeroed_axis<R>(
     args: &AxisArgs,
     verb: &str,
     output: Output,
     load_calibration: bool,
-    procedure: impl FnOnce(&mut Machine, &str, &Store, Option<String>) -> Result<R, Failure>,
+    resume: Option<&PathBuf>,
+    procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
     let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
     let axis = choose_axis(&session.machine, args)?;
     let store = session.store.clone();
+    let resume = journal_to_resume(resume, &store, verb, &axis)?;
+    if load_calibration && store.active(&axis)?.current.is_none() {
+        return Err(Failure::Usage {
+            what: format!("axis {axis} has no active calibration"),
+            help: "run `truestage calibrate`, or verify with --uncompensated".into(),
+        });
+    }
     session.machine.guarded(|machine| {
         machine.start()?;
         let calibration = if load_calibration {
@@ -52,7 +66,11 @@ fn with_zeroed_axis<R>(
             None
         };
         machine.zero(&axis, &store)?;
-        let result = procedure(machine, &axis, &store, calibration)?;
+        let prepared = Prepared {
+            calibration,
+            resume,
+        };
+        let result = procedure(machine, &axis, &store, prepared)?;
         machine.shut_down()?;
         Ok(result)
     })
@@ -102,9 +120,10 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         "calibrate",
         output,
         false,
-        |machine, axis, store, _| {
+        args.resume.as_ref(),
+        |machine, axis, store, prepared| {
             let options = CalibrateOptions {
-                resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
+                resume: prepared.resume,
                 accept_drift: args.accept_drift,
             };
             machine.calibrate(axis, store, &options)
@@ -143,26 +162,26 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
     let name = if compensated { "as_left" } else { "as_found" };
-    let run = |machine: &mut Machine, axis: &str, store: &Store, calibration: Option<String>| {
-        if compensated && calibration.is_none() {
-            return Err(Failure::Usage {
-                what: format!("axis {axis} has no active calibration"),
-                help: "run `truestage calibrate`, or verify with --uncompensated".into(),
-            });
-        }
-        let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
+    let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
         let verified = machine.verify(
             axis,
             store,
             &VerifyOptions {
                 compensated,
-                calibration,
-                resume,
+                calibration: prepared.calibration,
+                resume: prepared.resume,
             },
         )?;
         Ok((axis.to_owned(), verified))
     };
-    let (axis, verified) = with_zeroed_axis(&args.axis, "verify", output, compensated, run)?;
+    let (axis, verified) = with_zeroed_axis(
+        &args.axis,
+        "verify",
+        output,
+        compensated,
+        args.resume.as_ref(),
+        run,
+    )?;
     let title = name.replace('_', " ");
     let mut text = text::figures_table(&[(&title, &verified.figures)]);
     text += &format!("\npoints in {}", verified.journal.display());
@@ -183,6 +202,12 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    if args.targets.is_empty() {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
+        });
+    }
     let targets = args
         .targets
         .iter()
@@ -275,7 +300,7 @@ fn journal_to_resume(
     axis: &str,
 ) -> Result<Option<PathBuf>, Failure> {
     let Some(path) = resume else { return Ok(None) };
-    if !path.as_os_str().is_empty() {
+    if path.as_os_str() != NEWEST_RUN {
         return Ok(Some(path.clone()));
     }
     let newest = store.newest_run(verb, axis)?;

@@ -124,6 +124,10 @@ impl Machine {
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
         let mut points = whole_runs(earlier, per_run);
+        // A run that was whole but wrong ended the measurement that is continued here.
+        for run in points.chunk_by(|a, b| a.run == b.run) {
+            judge_scale(axis, plan, run)?;
+        }
         self.use_instrument(&plan.instrument)?;
         let correction_of_length = self.set_datum(axis, plan)?;
         self.remember(axis).datum = Some((plan.clone(), correction_of_length));
@@ -200,7 +204,8 @@ impl Machine {
         )?;
         let encoder = self
             .reading(axis)?
-            .map_or(Metres(f64::NAN), |sample| sample.position);
+            .expect("an axis that moved has been read")
+            .position;
         let point = PointEntry {
             run,
             approach: approach.symbol(),
@@ -357,7 +362,7 @@ fn judge_scale(axis: &str, plan: &RunPlan, points: &[PointEntry]) -> Result<(), 
 fn likely_cause(ratio: f64) -> &'static str {
     let near = |value: f64| (ratio / value - 1.0).abs() < 0.02;
     match ratio {
-        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument or the axis",
+        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument",
         _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor`",
         _ if near(4.0) || near(0.25) => "a factor of four: check `optics_factor`",
         _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres",

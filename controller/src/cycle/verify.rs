@@ -67,6 +67,12 @@ impl Machine {
                 axis: axis.to_owned(),
             });
         }
+        if options.compensated && self.compensation(axis).is_none() {
+            return Err(Failure::Usage {
+                what: format!("axis {axis} uses no calibration"),
+                help: "load or make one, or verify uncompensated".into(),
+            });
+        }
         let plan = run_plan(&config);
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;

@@ -33,7 +33,16 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     for (name, bus) in &config.can {
         check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
     }
+    for (name, line) in &config.serial {
+        Judge::at(format!("serial.{name}"), &mut findings).within(
+            "baud_bit_per_s",
+            line.baud_bit_per_s.into(),
+            50.0,
+            4e6,
+        );
+    }
     for (name, axis) in &config.axis {
+        check_axis_name(&mut findings, name);
         check_axis(
             &mut Judge::at(format!("axis.{name}"), &mut findings),
             config,
@@ -82,6 +91,18 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
     }
     if config.axis.is_empty() {
         judge.say("", "the machine has no axis", "add an [axis.NAME] section");
+    }
+}
+
+/// Axes name files, and stand in words of the command line (`x=1mm`).
+fn check_axis_name(findings: &mut Vec<Finding>, name: &str) {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.is_empty() || !name.chars().all(plain) {
+        findings.push(Finding {
+            key: format!("axis.{name}"),
+            cause: format!("`{name}` cannot name an axis"),
+            help: "use letters, digits and _".into(),
+        });
     }
 }
 
@@ -186,7 +207,7 @@ fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) 
     check_watch(judge, config, &axis.bus, axis.watch_master_ms);
     let counts =
         axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
-    if counts > f64::from(i32::MAX) {
+    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
         judge.say(
             "resolution_nm",
             format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
