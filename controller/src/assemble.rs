@@ -351,6 +351,15 @@ pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::
     }
 }
 
+/// The same for a machine whose clock runs faster than the wall's: see [`crate::ports::patience`].
+pub(crate) fn patient_search(usual: hall_zero::Settings, patience: u32) -> hall_zero::Settings {
+    hall_zero::Settings {
+        stall_limit: usual.stall_limit * patience,
+        wrong_way: usual.wrong_way * f64::from(patience),
+        ..usual
+    }
+}
+
 /// Which corrections an instrument's readings get.
 pub(crate) fn correction_settings(instrument: &InstrumentConfig) -> length_correction::Settings {
     let material = MaterialExpansion {
