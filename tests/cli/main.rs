@@ -1,1 +1,5 @@
-//! To come.
+//! The commands as a user runs them: `mock-bus` in one process, `truestage` in others.
+
+mod interrupted;
+mod programs;
+mod verbs;

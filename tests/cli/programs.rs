@@ -1,0 +1,251 @@
+//! The project's programs as a user runs them: processes, their output, their exit codes.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+use tests::{EMULATED, INTERFACE, MACHINE, Rig, rigs};
+
+/// Machines share the processor, and on SocketCAN the interface: one after the other.
+static ONE_MACHINE: Mutex<()> = Mutex::new(());
+
+/// The rigs of this run on which other processes find a machine.
+pub(crate) fn live_rigs() -> impl Iterator<Item = Rig> {
+    rigs().into_iter().filter(|rig| *rig != Rig::InProcess)
+}
+
+/// A program of this workspace, beside the tests that cargo built.
+fn program(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a process knows its program");
+    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps/TEST");
+    let path = folder.join(name);
+    assert!(
+        path.exists(),
+        "{} is not there: run `cargo build --workspace` first, as tests/run does",
+        path.display()
+    );
+    path
+}
+
+/// A process that ends with its test.
+pub(crate) struct Process(Child);
+
+impl Process {
+    fn start(command: &mut Command) -> Self {
+        let command = command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let child = command.stderr(Stdio::piped()).spawn();
+        Self(child.unwrap_or_else(|error| panic!("{command:?}: {error}")))
+    }
+
+    /// Sends a signal to this process and no other.
+    pub(crate) fn signal(&self, signal: Signal) {
+        let id = i32::try_from(self.0.id()).expect("process numbers are positive");
+        kill(Pid::from_raw(id), signal).expect("the process has not been waited for");
+    }
+
+    /// Waits until `reached`; looks whenever the process prints, and every few milliseconds.
+    ///
+    /// # Panics
+    /// When the process ends before.
+    pub(crate) fn wait_until(&mut self, reached: impl Fn() -> bool) {
+        const LOOK_EVERY_MS: u16 = 5;
+        while !reached() {
+            let ended = self.0.try_wait().expect("a child can be asked");
+            assert!(ended.is_none(), "it ended before: {ended:?}");
+            let output = self.0.stdout.as_ref().expect("it is piped").as_fd();
+            let mut fds = [PollFd::new(output, PollFlags::POLLIN)];
+            // A signal only makes the next look come sooner.
+            let _ = poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS));
+        }
+    }
+
+    /// Waits for its end.
+    pub(crate) fn end(mut self) -> Ended {
+        let child = std::mem::replace(&mut self.0, nothing());
+        Ended::new(&child.wait_with_output().expect("a child can be waited for"))
+    }
+}
+
+/// Something that has ended, in the place of a child that was given away.
+fn nothing() -> Child {
+    let mut child = Command::new("true").spawn().expect("`true` is everywhere");
+    let _ = child.wait();
+    child
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// How a program ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    /// `None`: by a signal.
+    pub(crate) code: Option<i32>,
+    /// The one object on standard output; null when there is none.
+    pub(crate) json: Value,
+    /// What it told people.
+    pub(crate) said: String,
+}
+
+impl Ended {
+    fn new(output: &Output) -> Self {
+        let text = String::from_utf8_lossy(&output.stdout);
+        let json = if text.trim().is_empty() {
+            Value::Null
+        } else {
+            let parsed = serde_json::from_str(&text);
+            parsed.unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
+        };
+        Self {
+            code: output.status.code(),
+            json,
+            said: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// The result of a program that must have ended with `code`.
+    #[track_caller]
+    pub(crate) fn with_code(self, code: i32) -> Value {
+        assert_eq!(self.code, Some(code), "{self:#?}");
+        self.json
+    }
+}
+
+/// An emulated machine in a process of its own, and a folder with its configuration.
+pub(crate) struct Bench {
+    rig: Rig,
+    mock: Process,
+    ports: Vec<String>,
+    folder: tempfile::TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Bench {
+    /// Starts `mock-bus`; it says where its ports are.
+    pub(crate) fn new(rig: Rig) -> Self {
+        let turn = ONE_MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        fs::write(folder.path().join("emulated.toml"), EMULATED).expect("a file can be written");
+        let mut command = Command::new(program("mock-bus"));
+        command.current_dir(folder.path());
+        command.args(["emulated.toml", "--seed", "51", "--speed", &speed(rig)]);
+        if rig == Rig::Vcan {
+            command.args(["--can", INTERFACE]);
+        } else {
+            command.args(["--slcan", "can0"]);
+        }
+        let mut mock = Process::start(&mut command);
+        let ports = read_ports(&mut mock);
+        let bench = Self {
+            rig,
+            mock,
+            ports,
+            folder,
+            _turn: turn,
+        };
+        bench.configure("machine.toml", |text| text);
+        bench
+    }
+
+    /// Which rig it is on.
+    pub(crate) const fn rig(&self) -> Rig {
+        self.rig
+    }
+
+    /// Where the machine's files are.
+    pub(crate) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Where its records are.
+    pub(crate) fn records(&self) -> PathBuf {
+        self.folder().join("machine-data/linear")
+    }
+
+    /// The endpoint of a port of the machine.
+    pub(crate) fn port(&self, name: &str) -> &str {
+        let start = format!("{name}=");
+        let found = self.ports.iter().find_map(|it| it.strip_prefix(&start));
+        found.expect("mock-bus names all its ports")
+    }
+
+    /// Writes the shipped configuration, with fewer measurements and after `change`.
+    pub(crate) fn configure(&self, name: &str, change: impl Fn(String) -> String) {
+        let short = MACHINE
+            .replace("runs = 3", "runs = 2")
+            .replace("targets = 8\nruns = 5", "targets = 4\nruns = 2");
+        fs::write(self.folder().join(name), change(short)).expect("a file can be written");
+    }
+
+    /// Starts `truestage --json` with a verb's words in the machine's folder; verbs that use
+    /// the machine are told where it is, unless the words say otherwise.
+    pub(crate) fn start(&self, words: &[&str]) -> Process {
+        let mut command = Command::new(program("truestage"));
+        command.current_dir(self.folder());
+        command.args(["--json", words[0]]);
+        let uses_machine = ["scan", "zero", "calibrate", "verify", "move"];
+        if uses_machine.contains(&words[0]) {
+            command.args(["--clock-speed", &speed(self.rig)]);
+            for name in ["can0", "laser"] {
+                let port = format!("{name}={}", self.port(name));
+                command.args(["--port", &port]);
+            }
+        }
+        command.args(&words[1..]);
+        Process::start(&mut command)
+    }
+
+    /// The same, and waits for its end.
+    pub(crate) fn run(&self, words: &[&str]) -> Ended {
+        self.start(words).end()
+    }
+
+    /// Asks the emulator to end, and says how it did.
+    pub(crate) fn stop(self) -> Option<i32> {
+        self.mock.signal(Signal::SIGTERM);
+        self.mock.end_quietly()
+    }
+}
+
+impl Process {
+    /// Waits for its end; what it printed has been read already.
+    fn end_quietly(mut self) -> Option<i32> {
+        self.0.wait().expect("a child can be waited for").code()
+    }
+}
+
+pub(crate) fn speed(rig: Rig) -> String {
+    rig.speed().to_string()
+}
+
+/// `can0: slcan /dev/pts/4` and the like become endpoints `can0=slcan:/dev/pts/4`.
+fn read_ports(mock: &mut Process) -> Vec<String> {
+    let ports = EMULATED.matches("[[ports]]").count();
+    let output = mock.0.stdout.as_mut().expect("it is piped");
+    let lines = BufReader::new(output).lines().take(ports);
+    let ports: Vec<_> = lines
+        .map(|line| endpoint(&line.expect("mock-bus prints text")))
+        .collect();
+    assert!(!ports.is_empty(), "mock-bus ended without a word");
+    ports
+}
+
+fn endpoint(line: &str) -> String {
+    let (name, rest) = line.split_once(": ").expect("NAME: WHERE");
+    match rest.split_once(' ') {
+        Some((kind, place)) => format!("{name}={kind}:{place}"),
+        None => format!("{name}={rest}"),
+    }
+}

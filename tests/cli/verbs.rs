@@ -1,0 +1,139 @@
+//! Each verb in a process of its own, one after the other, and what goes wrong.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::programs::{Bench, live_rigs};
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn text(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+}
+
+#[test]
+fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let scan = bench.run(&["scan"]).with_code(0);
+        assert_eq!(scan["matches"], true);
+        assert!(scan["devices"].as_array().is_some_and(|it| it.len() >= 2));
+
+        let zero = bench.run(&["zero"]).with_code(0);
+        assert_eq!(zero["axis"], "x");
+
+        let calibrated = bench.run(&["calibrate"]).with_code(0);
+        let id = text(&calibrated["calibration"]);
+        assert!(bench.folder().join(text(&calibrated["path"])).exists());
+        let list = bench.run(&["cal", "list"]).with_code(0);
+        assert_eq!(list["calibrations"][0]["id"], id);
+        assert_eq!(list["calibrations"][0]["active"], true);
+
+        let verified = bench.run(&["verify"]).with_code(0);
+        let accuracy = number(&verified["as_left"]["accuracy"]["bidirectional"]);
+        assert!((0.0..=2.0).contains(&accuracy), "A = {accuracy} µm");
+
+        let report = bench.run(&[
+            "report",
+            text(&verified["journal"]),
+            "--output",
+            "page.html",
+        ]);
+        report.with_code(0);
+        let page = fs::read_to_string(bench.folder().join("page.html")).unwrap();
+        assert!(page.contains("<svg"), "a report has pictures");
+
+        let moved = ["move", "machine.toml", "x=12.5mm", "--record", "move.log"];
+        let moved = bench.run(&moved).with_code(0);
+        assert_eq!(moved["moves"][0]["calibration"], id);
+        let correction = number(&moved["moves"][0]["set_point_mm"]) - 12.5;
+        assert!(
+            correction != 0.0 && correction.abs() < 0.05,
+            "{correction} mm"
+        );
+        let log = fs::read_to_string(bench.folder().join("move.log")).unwrap();
+        assert!(log.starts_with("# truestage recording 1\n"));
+        assert!(log.lines().any(|line| line.contains(" can0 601#")));
+        assert_eq!(bench.stop(), Some(0));
+    }
+}
+
+#[test]
+fn what_is_wrong_is_told_by_exit_code_and_in_one_object() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        refuses_before_any_bus(&bench);
+        refuses_on_the_bus(&bench);
+        let out = bench.run(&["verify", "--uncompensated"]).with_code(0);
+        assert!(number(&out["as_found"]["accuracy"]["bidirectional"]) > 2.0);
+        out_of_tolerance(&bench);
+    }
+}
+
+fn refuses_before_any_bus(bench: &Bench) {
+    bench.configure("wrong.toml", |text| {
+        text.replace("step_mm = 3.0", "step_mm = -3.0")
+    });
+    let checked = bench.run(&["check", "wrong.toml"]);
+    assert!(checked.said.contains("wrong.toml:"), "{checked:?}");
+    let error = checked.with_code(2);
+    assert_eq!(error["exit_code"], 2);
+    assert!(text(&error["error"]).contains("step_mm"), "{error}");
+
+    bench.run(&["move", "machine.toml", "x=12.5"]).with_code(2);
+    let far = bench.run(&["move", "machine.toml", "x=500mm"]).with_code(3);
+    assert!(text(&far["error"]).contains("soft limits"), "{far}");
+    let none = bench.run(&["cal", "rollback", "machine.toml", "--axis", "x"]);
+    assert_eq!(none.with_code(3)["exit_code"], 3);
+}
+
+fn refuses_on_the_bus(bench: &Bench) {
+    let other =
+        |text: String| text.replace("product_code = 0x00420001", "product_code = 0x00420009");
+    bench.configure("other.toml", other);
+    let scan = bench.run(&["scan", "other.toml"]).with_code(4);
+    assert_eq!(
+        (&scan["matches"], &scan["exit_code"]),
+        (&Value::Bool(false), &4.into())
+    );
+    let zero = bench.run(&["zero", "other.toml"]).with_code(4);
+    assert!(text(&zero["error"]).contains("0x00420009"), "{zero}");
+}
+
+/// A bad result is a result: the figures are there, and why they are bad.
+fn out_of_tolerance(bench: &Bench) {
+    let strict = |text: String| {
+        text.replace(
+            "accuracy_tolerance_um = 2.0",
+            "accuracy_tolerance_um = 0.01",
+        )
+    };
+    bench.configure("strict.toml", strict);
+    bench.run(&["calibrate", "strict.toml"]).with_code(0);
+    let verified = bench.run(&["verify", "strict.toml"]).with_code(5);
+    assert_eq!(verified["within_tolerance"], false);
+    assert_eq!(verified["exit_code"], 5);
+    assert!(number(&verified["as_left"]["accuracy"]["bidirectional"]) > 0.01);
+    assert!(Path::new(text(&verified["journal"])).is_relative());
+}
+
+#[test]
+fn a_port_that_is_not_there_is_named() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        for endpoint in ["can0=slcan:nowhere", "can0=socketcan:nocan9"] {
+            let (_, place) = endpoint.split_once(':').expect("KIND:PLACE");
+            let failed = bench.run(&["scan", "machine.toml", "--port", endpoint]);
+            let error = failed.with_code(4);
+            assert!(text(&error["error"]).contains(place), "{error}");
+        }
+    }
+}
