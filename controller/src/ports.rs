@@ -8,7 +8,7 @@ use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, LiveBuilder, SerialSettings, SlcanSettings};
 
 use crate::assemble;
-use crate::config::{CanBus, CanTransport, MachineConfig};
+use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
 
 /// Where a bus or a line is really found.
@@ -120,46 +120,102 @@ pub fn open(
             help: "give a positive number; 1 is real time".into(),
         });
     }
+    let endpoints = endpoints(config, overrides, purpose);
+    if clock_speed != 1.0 {
+        refuse_real(&endpoints, clock_speed)?;
+    }
     let mut builder = Live::builder(Clock::scaled(clock_speed));
     let ports = assemble::ports(config);
-    for (name, bus) in &config.can {
-        builder = add_can(builder, ports[name], bus, overrides.0.get(name));
-    }
-    for (name, line) in &config.serial {
-        let machines_own = config
-            .analog
-            .values()
-            .any(|it| it.line.as_ref() == Some(name));
-        if purpose == Use::Motion && !machines_own {
-            continue;
-        }
-        let path = match overrides.0.get(name) {
-            Some(Endpoint::Serial(path)) => path,
-            _ => &line.path,
-        };
-        builder = builder.serial(ports[name], path, SerialSettings::new(line.baud_bit_per_s));
+    for (name, endpoint) in &endpoints {
+        builder = add(builder, ports[name], config, name, endpoint);
     }
     Ok(builder.build()?)
 }
 
-fn add_can(
+/// Where each bus and line that `purpose` needs is found.
+fn endpoints(
+    config: &MachineConfig,
+    overrides: &Overrides,
+    purpose: Use,
+) -> BTreeMap<String, Endpoint> {
+    let checked = "the check asks for the key that its transport needs";
+    let buses = config.can.iter().map(|(name, bus)| {
+        let endpoint = match bus.transport {
+            CanTransport::SocketCan => Endpoint::SocketCan(bus.interface.clone().expect(checked)),
+            CanTransport::Slcan => Endpoint::Slcan(bus.path.clone().expect(checked)),
+        };
+        (name, endpoint)
+    });
+    let machines_own = |name: &String| {
+        let mut analogs = config.analog.values();
+        analogs.any(|it| it.line.as_ref() == Some(name))
+    };
+    let lines = config
+        .serial
+        .iter()
+        .filter(|(name, _)| purpose == Use::Measurement || machines_own(name))
+        .map(|(name, line)| (name, Endpoint::Serial(line.path.clone())));
+    buses
+        .chain(lines)
+        .map(|(name, usual)| {
+            (
+                name.clone(),
+                overrides.0.get(name).cloned().unwrap_or(usual),
+            )
+        })
+        .collect()
+}
+
+/// A clock that does not keep time stretches every supervision time-out: never with metal.
+fn refuse_real(endpoints: &BTreeMap<String, Endpoint>, speed: f64) -> Result<(), Failure> {
+    let is_emulated = |endpoint: &Endpoint| match endpoint {
+        Endpoint::SocketCan(interface) => interface.starts_with("vcan"),
+        Endpoint::Slcan(path) | Endpoint::Serial(path) => path
+            .canonicalize()
+            .is_ok_and(|path| path.starts_with("/dev/pts")),
+    };
+    match endpoints
+        .iter()
+        .find(|(_, endpoint)| !is_emulated(endpoint))
+    {
+        None => Ok(()),
+        Some((name, _)) => Err(Failure::Usage {
+            what: format!("a clock speed of {speed} with `{name}`, which is no emulated port"),
+            help: "leave --clock-speed out on a real machine".into(),
+        }),
+    }
+}
+
+fn add(
     builder: LiveBuilder,
     port: Port,
-    bus: &CanBus,
-    replacement: Option<&Endpoint>,
+    config: &MachineConfig,
+    name: &str,
+    endpoint: &Endpoint,
 ) -> LiveBuilder {
-    let slcan = SlcanSettings::new(bus.bitrate_bit_per_s);
-    let checked = "the check asks for the key that its transport needs";
-    match (replacement, bus.transport) {
-        (Some(Endpoint::SocketCan(interface)), _) => builder.socketcan(port, interface),
-        (Some(Endpoint::Slcan(path) | Endpoint::Serial(path)), _) => {
-            builder.slcan(port, path, slcan)
+    match endpoint {
+        Endpoint::SocketCan(interface) => builder.socketcan(port, interface),
+        Endpoint::Slcan(path) => {
+            let settings = SlcanSettings::new(config.can[name].bitrate_bit_per_s);
+            builder.slcan(port, path, settings)
         }
-        (None, CanTransport::SocketCan) => {
-            builder.socketcan(port, bus.interface.as_deref().expect(checked))
+        Endpoint::Serial(path) => {
+            let settings = SerialSettings::new(config.serial[name].baud_bit_per_s);
+            builder.serial(port, path, settings)
         }
-        (None, CanTransport::Slcan) => {
-            builder.slcan(port, bus.path.as_ref().expect(checked), slcan)
-        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fast_clock_is_refused_on_a_real_port() {
+        let real = BTreeMap::from([("can0".to_owned(), Endpoint::SocketCan("can0".into()))]);
+        let error = refuse_real(&real, 10.0).unwrap_err().to_string();
+        assert!(error.contains("can0"), "{error}");
+        let emulated = BTreeMap::from([("can0".to_owned(), Endpoint::SocketCan("vcan0".into()))]);
+        assert!(refuse_real(&emulated, 10.0).is_ok());
     }
 }

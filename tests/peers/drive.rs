@@ -68,6 +68,7 @@ fn check_mapping(pdos: &Value) {
     assert_eq!(pdos["command"], json!([0x6040, 0x6060, 0x607A]));
     assert_eq!(pdos["status"], json!([0x6041, 0x6061, 0x6064]));
     assert_eq!(pdos["event_timer_ms"], 20);
+    assert_eq!(pdos["inhibit_100us"], 100);
 }
 
 fn check_motion(seen: &Value, travelled: Metres) {

@@ -24,6 +24,7 @@ import peer
 NODE = 1
 HEARTBEAT_MS = 50
 STATUS_MS = 20
+INHIBIT_100US = 100
 BIG = 0x2000
 NOTEBOOK = 0x2001
 NEW_SET_POINT = 0x10
@@ -117,6 +118,8 @@ def map_pdos(node):
         pdo.trans_type = 255
     # The library takes a PDO that came twice for a periodic one: then let it be one.
     status.event_timer = STATUS_MS
+    # No thousand positions in a second: this program could not read them on a busy machine.
+    status.inhibit_time = INHIBIT_100US
     for pdo in (*node.rpdo.values(), *node.tpdo.values()):
         pdo.save()
     node.setup_402_state_machine()
@@ -125,6 +128,7 @@ def map_pdos(node):
         "command": [variable.index for variable in command],
         "status": [variable.index for variable in status],
         "event_timer_ms": status.event_timer,
+        "inhibit_100us": status.inhibit_time,
     }
 
 

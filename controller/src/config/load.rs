@@ -31,7 +31,13 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
         path: path.to_owned(),
         source,
     })?;
-    parse(&text, &path.display().to_string())
+    let mut loaded = parse(&text, &path.display().to_string())?;
+    // Relative to the file, not to whoever calls: from another folder the machine must find the
+    // same calibrations and take the same lease.
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let section = &mut loaded.config.machine;
+    section.data_dir = folder.join(&section.data_dir);
+    Ok(loaded)
 }
 
 /// Reads and judges a configuration text; `file` is its name in findings.

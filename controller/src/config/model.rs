@@ -36,7 +36,7 @@ pub struct MachineSection {
     pub name: String,
     /// The stage's serial number: calibrations belong to it.
     pub stage_serial: String,
-    /// Folder of calibrations, runs and reports; relative to the working directory.
+    /// Folder of calibrations, runs and reports; relative to the configuration file's folder.
     pub data_dir: PathBuf,
 }
 

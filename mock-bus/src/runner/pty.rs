@@ -1,23 +1,23 @@
 //! A pseudo-terminal whose far end another program opens like a serial port.
+//!
+//! What is sent while no program has it open is lost, as with a real port. A program that has
+//! it open and is slow loses nothing until the buffers are full, and then only whole messages:
+//! some clients never recover from half a line.
 
 use std::collections::VecDeque;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
+use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};
 use nix::unistd::{read, ttyname, write};
 
-/// More unsent bytes than this are an overrun: they are lost.
+/// More unsent bytes than this are an overrun.
 const UNSENT_MAX: usize = 16 * 1024;
-/// Nobody has read for so long: what waits is stale and is thrown away, as a real device's
-/// output is lost while no program has its port open.
-const STALE: Duration = Duration::from_millis(500);
 
 pub(super) struct Pty {
     master: OwnedFd,
@@ -26,7 +26,7 @@ pub(super) struct Pty {
     path: PathBuf,
     link: Option<PathBuf>,
     unsent: VecDeque<u8>,
-    last_empty: Instant,
+    clients: Clients,
 }
 
 impl Pty {
@@ -39,6 +39,8 @@ impl Pty {
         let flags = OFlag::from_bits_retain(fcntl(&pair.master, FcntlArg::F_GETFL)?);
         fcntl(&pair.master, FcntlArg::F_SETFL(flags | OFlag::O_NONBLOCK))?;
         let path = ttyname(&pair.slave)?;
+        // Before anybody can find it.
+        let clients = Clients::of(&path);
         if let Some(link) = link {
             replace_link(&path, link)?;
         }
@@ -48,7 +50,7 @@ impl Pty {
             path,
             link: link.map(Path::to_owned),
             unsent: VecDeque::new(),
-            last_empty: Instant::now(),
+            clients,
         })
     }
 
@@ -65,10 +67,14 @@ impl Pty {
     }
 
     /// What the client has written.
-    pub(super) fn receive(&self) -> io::Result<Vec<u8>> {
+    pub(super) fn receive(&mut self) -> io::Result<Vec<u8>> {
+        self.look_who_is_there()?;
         let mut buffer = [0; 4096];
         match read(&self.master, &mut buffer) {
-            Ok(length) => Ok(buffer[..length].to_vec()),
+            Ok(length) => {
+                self.clients.heard();
+                Ok(buffer[..length].to_vec())
+            }
             Err(Errno::EAGAIN | Errno::EINTR) => Ok(Vec::new()),
             Err(errno) => Err(errno.into()),
         }
@@ -76,8 +82,10 @@ impl Pty {
 
     /// Sends now what fits, and the rest at the next [`Pty::flush`].
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.drop_stale()?;
-        self.unsent.extend(bytes);
+        self.look_who_is_there()?;
+        if self.clients.is_any() && self.unsent.len() + bytes.len() <= UNSENT_MAX {
+            self.unsent.extend(bytes);
+        }
         self.flush()
     }
 
@@ -91,23 +99,63 @@ impl Pty {
                 Err(errno) => return Err(errno.into()),
             }
         }
-        if self.unsent.len() > UNSENT_MAX {
-            self.unsent.clear();
-        }
         Ok(())
     }
 
-    fn drop_stale(&mut self) -> io::Result<()> {
-        let mut unread = [PollFd::new(self.slave.as_fd(), PollFlags::POLLIN)];
-        let waiting = poll(&mut unread, PollTimeout::ZERO)? > 0;
-        if !waiting && self.unsent.is_empty() {
-            self.last_empty = Instant::now();
-        } else if self.last_empty.elapsed() > STALE {
+    /// What the last program has not read when it closes is not for the next one.
+    fn look_who_is_there(&mut self) -> io::Result<()> {
+        if self.clients.have_all_gone() {
             self.unsent.clear();
             tcflush(&self.slave, FlushArg::TCIFLUSH)?;
-            self.last_empty = Instant::now();
         }
         Ok(())
+    }
+}
+
+/// The programs that have the far end open. Equal events in a row may reach us as one, so that
+/// the count is not certain; who is heard is there in any case.
+struct Clients {
+    /// `None` where the system has no more to give: then somebody is taken to be there.
+    events: Option<Inotify>,
+    count: usize,
+}
+
+impl Clients {
+    fn of(path: &Path) -> Self {
+        let watch = || {
+            let events = Inotify::init(InitFlags::IN_NONBLOCK | InitFlags::IN_CLOEXEC)?;
+            let wanted = AddWatchFlags::IN_OPEN | AddWatchFlags::IN_CLOSE;
+            events.add_watch(path, wanted)?;
+            nix::Result::Ok(events)
+        };
+        Self {
+            events: watch().ok(),
+            count: 0,
+        }
+    }
+
+    fn is_any(&self) -> bool {
+        self.count > 0 || self.events.is_none()
+    }
+
+    fn heard(&mut self) {
+        self.count = self.count.max(1);
+    }
+
+    /// Whether there was a moment without any since the last look.
+    fn have_all_gone(&mut self) -> bool {
+        let mut all_gone = false;
+        while let Some(Ok(events)) = self.events.as_ref().map(Inotify::read_events) {
+            for event in events {
+                if event.mask.contains(AddWatchFlags::IN_OPEN) {
+                    self.count += 1;
+                } else {
+                    self.count = self.count.saturating_sub(1);
+                    all_gone |= self.count == 0;
+                }
+            }
+        }
+        all_gone
     }
 }
 
@@ -128,4 +176,64 @@ fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
         std::fs::remove_file(link)?;
     }
     std::os::unix::fs::symlink(target, link)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::File;
+    use std::io::{BufRead, BufReader, Read};
+
+    fn client(pty: &Pty) -> File {
+        let mut options = File::options();
+        options.read(true).write(true).open(pty.path()).unwrap()
+    }
+
+    #[track_caller]
+    fn check_heard(client: &mut File, expected: &[u8]) {
+        let mut heard = vec![0; expected.len()];
+        client.read_exact(&mut heard).unwrap();
+        assert_eq!(heard, expected);
+    }
+
+    #[test]
+    fn what_is_sent_while_no_program_has_it_open_is_lost() {
+        let mut pty = Pty::open(None).unwrap();
+        pty.send(b"before\r").unwrap();
+        let mut first = client(&pty);
+        pty.send(b"read\r").unwrap();
+        check_heard(&mut first, b"read\r");
+        pty.send(b"unread\r").unwrap();
+        drop(first);
+        pty.send(b"between\r").unwrap();
+        let mut second = client(&pty);
+        pty.send(b"after\r").unwrap();
+        check_heard(&mut second, b"after\r");
+    }
+
+    #[test]
+    fn a_program_that_is_slow_loses_whole_messages_and_only_when_all_buffers_are_full() {
+        const SENT: usize = 5_000;
+        let mut pty = Pty::open(None).unwrap();
+        let slow = client(&pty);
+        for number in 0..SENT {
+            pty.send(format!("line {number:08} of many\r").as_bytes())
+                .unwrap();
+        }
+        assert!(pty.has_unsent());
+        let mut lines = BufReader::new(slow).split(b'\r');
+        let mut heard = Vec::new();
+        while pty.has_unsent() {
+            heard.push(lines.next().unwrap().unwrap());
+            pty.flush().unwrap();
+        }
+        pty.send(b"end\r").unwrap();
+        heard.extend(lines.map(Result::unwrap).take_while(|line| line != b"end"));
+        assert!(heard.len() * 22 > UNSENT_MAX, "only {} lines", heard.len());
+        assert!(heard.len() < SENT, "nothing was lost");
+        for (number, line) in heard.iter().enumerate() {
+            let expected = format!("line {number:08} of many");
+            assert_eq!(String::from_utf8_lossy(line), expected);
+        }
+    }
 }

@@ -209,8 +209,18 @@ impl Cia402Drive {
                 }
             }
             Phase::AwaitingPosition => {
-                let away = (sample.position.0 - i64::from(homing.position)).abs();
-                if !homing.here || away <= self.settings.tolerance_counts() {
+                let wanted = i64::from(homing.position);
+                let away = (sample.position.0 - wanted).abs();
+                let mirrored = (sample.position.0 + wanted).abs();
+                let believed = if homing.here {
+                    away <= self.settings.tolerance_counts()
+                } else {
+                    // A search ends somewhere beside the switch, but not at minus its place:
+                    // there 0x607C has the other meaning, and the next move would go through
+                    // the switch.
+                    away < mirrored || wanted == 0
+                };
+                if believed {
                     self.target = homing.position;
                     self.homed = true;
                     self.finish(Ok(()));

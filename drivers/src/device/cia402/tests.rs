@@ -35,6 +35,8 @@ struct FakeDrive {
     ignores_identical_target: bool,
     never_acknowledges: bool,
     homing_fails: bool,
+    /// 0x607C is the way from home to zero, as CiA 402 has it.
+    offset_leads_to_zero: bool,
     fault_remains: bool,
     fault_edges: u32,
     following_error: bool,
@@ -90,6 +92,7 @@ impl FakeDrive {
             ignores_identical_target: false,
             never_acknowledges: false,
             homing_fails: false,
+            offset_leads_to_zero: false,
             fault_remains: false,
             fault_edges: 0,
             following_error: false,
@@ -201,7 +204,12 @@ impl FakeDrive {
         self.homing_samples -= 1;
         if self.homing_samples == 0 && !self.homing_fails {
             self.homed = true;
-            self.target = self.node.get(0x607C, 0);
+            let offset = self.node.get(0x607C, 0);
+            self.target = if self.offset_leads_to_zero {
+                -offset
+            } else {
+                offset
+            };
             self.set_position(self.target);
         }
     }
@@ -818,6 +826,19 @@ fn homing_on_the_limit_switch_sets_method_and_speeds() {
     assert_eq!(node.get(0x6099, 1), 1_000_000);
     assert_eq!(node.get(0x6099, 2), 200_000);
     assert_eq!(node.get(0x607C, 0), -3_100_000);
+}
+
+#[test]
+fn mirrored_coordinates_after_a_search_are_noticed_before_anything_moves_by_them() {
+    let mut rig = Rig::enabled();
+    rig.fake.offset_leads_to_zero = true;
+    let command = AxisCommand::HomeNegativeLimit {
+        position: Metres::from_mm(-6.0),
+        speed: MetresPerSecond(0.01),
+    };
+    let error = rig.does(command).unwrap_err();
+    assert!(error.to_string().contains("the new position"), "{error}");
+    assert!(!rig.drive.is_homed());
 }
 
 #[test]
