@@ -71,12 +71,13 @@ impl Machine {
     fn scan_can(&mut self, port: Port, name: &str) -> Result<Vec<Found>, Failure> {
         let mut answers = Answers::new();
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
-        self.ask(port, &all, DEVICE_TYPE, &mut answers)?;
+        let expected = assemble::expected_nodes(&self.config, name);
+        let awaited: Vec<_> = expected.keys().filter_map(|it| NodeId::new(*it)).collect();
+        self.ask(port, &all, &awaited, DEVICE_TYPE, &mut answers)?;
         let present: Vec<_> = answers.keys().copied().collect();
         for object in IDENTITY {
-            self.ask(port, &present, object, &mut answers)?;
+            self.ask(port, &present, &present, object, &mut answers)?;
         }
-        let expected = assemble::expected_nodes(&self.config, name);
         let mut found: Vec<_> = answers
             .iter()
             .map(|(node, values)| judge(name, *node, values, expected.get(&node.raw())))
@@ -89,10 +90,13 @@ impl Machine {
         Ok(found)
     }
 
+    /// Asks `nodes`, and waits a while for answers; where the machine's clock is fast, longer
+    /// for those that are `awaited`.
     fn ask(
         &mut self,
         port: Port,
         nodes: &[NodeId],
+        awaited: &[NodeId],
         object: Object,
         answers: &mut Answers,
     ) -> Result<(), Failure> {
@@ -110,6 +114,13 @@ impl Machine {
             self.collect(port, Duration::from_millis(10), answers);
         }
         self.collect(port, PATIENCE, answers);
+        for _ in 1..self.patience {
+            let answered = |node| answers.get(node).is_some_and(|it| it.contains_key(&object));
+            if awaited.iter().all(answered) {
+                break;
+            }
+            self.collect(port, PATIENCE, answers);
+        }
         Ok(())
     }
 
