@@ -131,7 +131,7 @@ fn a_port_that_is_not_there_is_named() {
         let bench = Bench::new(rig);
         for endpoint in ["can0=slcan:nowhere", "can0=socketcan:nocan9"] {
             let (_, place) = endpoint.split_once(':').expect("KIND:PLACE");
-            let failed = bench.run(&["scan", "machine.toml", "--port", endpoint]);
+            let failed = bench.run_plainly(&["scan", "machine.toml", "--port", endpoint]);
             let error = failed.with_code(4);
             assert!(text(&error["error"]).contains(place), "{error}");
         }

@@ -41,6 +41,8 @@ const IDENTITY: [Object; 4] = [
 ];
 /// So many requests are sent before answers are collected: no transmit queue overflows.
 const BATCH: usize = 8;
+/// So often a node of the configuration that did not answer is asked again.
+const ASKED_AGAIN_MAX: u32 = 2;
 /// How long the last answers may take.
 const PATIENCE: Duration = Duration::from_millis(300);
 
@@ -90,13 +92,32 @@ impl Machine {
         Ok(found)
     }
 
-    /// Asks `nodes`, and waits a while for answers; where the machine's clock is fast, longer
-    /// for those that are `awaited`.
+    /// Asks `nodes`, and waits a while for answers. Those that are `awaited` are asked again: a
+    /// node that has just been switched on boots for a moment.
     fn ask(
         &mut self,
         port: Port,
         nodes: &[NodeId],
         awaited: &[NodeId],
+        object: Object,
+        answers: &mut Answers,
+    ) -> Result<(), Failure> {
+        self.ask_once(port, nodes, object, answers)?;
+        for _ in 0..ASKED_AGAIN_MAX * self.patience {
+            let has = |node| answers.get(node).is_some_and(|it| it.contains_key(&object));
+            let silent: Vec<_> = awaited.iter().filter(|it| !has(it)).copied().collect();
+            if silent.is_empty() {
+                break;
+            }
+            self.ask_once(port, &silent, object, answers)?;
+        }
+        Ok(())
+    }
+
+    fn ask_once(
+        &mut self,
+        port: Port,
+        nodes: &[NodeId],
         object: Object,
         answers: &mut Answers,
     ) -> Result<(), Failure> {
@@ -114,13 +135,6 @@ impl Machine {
             self.collect(port, Duration::from_millis(10), answers);
         }
         self.collect(port, PATIENCE, answers);
-        for _ in 1..self.patience {
-            let answered = |node| answers.get(node).is_some_and(|it| it.contains_key(&object));
-            if awaited.iter().all(answered) {
-                break;
-            }
-            self.collect(port, PATIENCE, answers);
-        }
         Ok(())
     }
 
