@@ -1,0 +1,9 @@
+//! What goes wrong in a stage's life, and what must come of it.
+//!
+//! Every test proves that its fault was really delivered, that the right cause was named, and
+//! that the machine was safe afterwards; the numbers in the module names' documentation are
+//! those of the fault classes.
+
+mod drive;
+mod scene;
+mod witness;
