@@ -21,6 +21,7 @@ use drivers::transport::{Port, Transport};
 use units::{Metres, Time};
 
 use crate::assemble;
+use crate::bus_watch::BusWatch;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::cycle::RunPlan;
 use crate::failure::Failure;
@@ -92,6 +93,7 @@ pub struct Machine {
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
     pub(crate) instruments_run: bool,
+    pub(crate) bus_watch: BusWatch,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
 }
@@ -107,6 +109,7 @@ impl Machine {
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
+            bus_watch: BusWatch::new(&config, &ports),
             memory: config
                 .axis
                 .keys()
@@ -312,10 +315,13 @@ impl Machine {
         procedure: impl FnOnce(&mut Self) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
         let result = procedure(self);
-        if result.is_err() {
+        // Why it failed must be asked before stopping it takes its time.
+        let now = self.now();
+        result.map_err(|failure| {
+            let failure = self.bus_watch.explain(now, failure);
             self.make_safe();
-        }
-        result
+            failure
+        })
     }
 
     /// Quick stop and disable on every axis that can still be reached. Never fails: it does

@@ -20,7 +20,15 @@ fn drops(cob_id: u16) -> Fault {
 
 macro_rules! alarm {
     ($pattern:pat) => {
-        |failure: &Failure| matches!(failure, Failure::Alarm { alarm: $pattern, .. })
+        |failure: &Failure| {
+            matches!(
+                failure,
+                Failure::Alarm {
+                    alarm: $pattern,
+                    ..
+                }
+            )
+        }
     };
 }
 
@@ -102,7 +110,10 @@ fn a_drive_that_resets_while_it_moves_is_not_zeroed_any_more() {
     let mut played = check(scene, &wanted);
     assert!(!played.bench.machine.is_zeroed("x"));
     let refused = played.bench.machine.move_to("x", units::Metres::ZERO);
-    assert!(matches!(refused, Err(Failure::NotZeroed { .. })), "{refused:?}");
+    assert!(
+        matches!(refused, Err(Failure::NotZeroed { .. })),
+        "{refused:?}"
+    );
 }
 
 #[test]
@@ -126,13 +137,19 @@ fn an_emergency_during_a_measurement_is_told_in_words() {
 
 #[test]
 fn a_blocked_axis_is_named_as_such() {
-    let scene = Scene::during(Phase::Move).after_ms(100).fault(Fault::BlockedAxis);
+    let scene = Scene::during(Phase::Move)
+        .after_ms(100)
+        .fault(Fault::BlockedAxis);
     let wanted = Wanted {
         cause: |failure| match failure {
-            Failure::Alarm { alarm: Alarm::FollowingError { .. }, .. } => true,
-            Failure::Alarm { alarm: Alarm::Emergency { emergency, .. }, .. } => {
-                emergency.code == EmergencyCode::FOLLOWING_ERROR
-            }
+            Failure::Alarm {
+                alarm: Alarm::FollowingError { .. },
+                ..
+            } => true,
+            Failure::Alarm {
+                alarm: Alarm::Emergency { emergency, .. },
+                ..
+            } => emergency.code == EmergencyCode::FOLLOWING_ERROR,
             _ => false,
         },
         words: &["x:", "following error"],
@@ -144,13 +161,19 @@ fn a_blocked_axis_is_named_as_such() {
 
 #[test]
 fn torque_that_is_switched_off_while_the_axis_moves_stops_it_for_good() {
-    let scene = Scene::during(Phase::Move).after_ms(100).fault(Fault::SafeTorqueOff);
+    let scene = Scene::during(Phase::Move)
+        .after_ms(100)
+        .fault(Fault::SafeTorqueOff);
     let wanted = Wanted {
         cause: |failure| match failure {
-            Failure::Alarm { alarm: Alarm::Emergency { emergency, .. }, .. } => {
-                emergency.code == EmergencyCode::SAFE_TORQUE_OFF
-            }
-            Failure::Alarm { alarm: Alarm::DriveState { .. }, .. } => true,
+            Failure::Alarm {
+                alarm: Alarm::Emergency { emergency, .. },
+                ..
+            } => emergency.code == EmergencyCode::SAFE_TORQUE_OFF,
+            Failure::Alarm {
+                alarm: Alarm::DriveState { .. },
+                ..
+            } => true,
             _ => false,
         },
         words: &["x:"],

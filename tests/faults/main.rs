@@ -4,6 +4,16 @@
 //! that the machine was safe afterwards; the numbers in the module names' documentation are
 //! those of the fault classes.
 
+mod bus;
 mod drive;
+mod files;
+mod hall;
+mod laser;
+mod limits;
+mod power;
 mod scene;
+mod serial;
+mod start;
+mod stopping;
+mod storm;
 mod witness;

@@ -9,8 +9,9 @@ use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia401_analog::Cia401AnalogNode;
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::Bench;
-use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
 use truestage::emulated::Emulated;
+use truestage::observer::{Observer, Stage};
 use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
@@ -35,6 +36,8 @@ pub enum Phase {
     Zero,
     /// A move from 0 to 60 mm.
     Move,
+    /// Switching off and on again, then the same move.
+    Restart,
     /// Standing enabled for three seconds.
     Stand,
     /// Measuring to learn the deviations.
@@ -147,30 +150,44 @@ impl Scene {
             Box::new(Witnessed::new(inner, witness))
         });
         let store = bench.store.clone();
-        let result = bench.machine.guarded(|machine| prepare(machine, self.phase, &store));
+        let warnings = Rc::new(RefCell::new(Vec::new()));
+        bench
+            .machine
+            .observe(Box::new(Listener(Rc::clone(&warnings))));
+        let result = bench
+            .machine
+            .guarded(|machine| prepare(machine, self.phase, &store));
         result.unwrap_or_else(|failure| panic!("before the fault: {failure}"));
         let due = bench.machine.now() + self.after;
         let ids = self.schedule(&bench, due, &seen);
         let mut ended = due;
+        let calibrated = RefCell::new(None);
         let result = bench.machine.guarded(|machine| {
-            let result = perform(machine, self.phase, &store);
+            let result = perform(machine, self.phase, &store, &calibrated);
             ended = machine.now();
             result
         });
-        let played = Played { bench, result, seen, ids, due, ended };
+        let played = Played {
+            bench,
+            result,
+            seen,
+            ids,
+            due,
+            ended,
+            warnings,
+            calibrated,
+        };
         played.rest();
         if let Some(delivered) = &self.delivered {
-            assert!(delivered(&played.bench.emulated), "the fault was never delivered");
+            assert!(
+                delivered(&played.bench.emulated),
+                "the fault was never delivered"
+            );
         }
         played
     }
 
-    fn schedule(
-        &mut self,
-        bench: &Bench,
-        due: Time,
-        seen: &RefCell<Testimony>,
-    ) -> Vec<FaultId> {
+    fn schedule(&mut self, bench: &Bench, due: Time, seen: &RefCell<Testimony>) -> Vec<FaultId> {
         let mut seen = seen.borrow_mut();
         if let Some(deed) = self.deed.take() {
             seen.plan(due, deed);
@@ -183,7 +200,9 @@ impl Scene {
         let later = self.after.as_secs_f64();
         let mut inject = |mut fault: FaultConfig| {
             fault.from_s += later;
-            simulation.inject(fault).expect("the fault names what is there")
+            simulation
+                .inject(fault)
+                .expect("the fault names what is there")
         };
         self.faults.drain(..).map(&mut inject).collect()
     }
@@ -207,7 +226,12 @@ fn prepare(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Fai
     Ok(())
 }
 
-fn perform(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Failure> {
+fn perform(
+    machine: &mut Machine,
+    phase: Phase,
+    store: &Store,
+    calibrated: &RefCell<Option<Calibrated>>,
+) -> Result<(), Failure> {
     match phase {
         Phase::Start => machine.start()?,
         Phase::Zero => {
@@ -216,19 +240,42 @@ fn perform(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Fai
         Phase::Move => {
             machine.move_to("x", Metres::from_mm(60.0))?;
         }
+        Phase::Restart => {
+            machine.disable("x")?;
+            let until = machine.now() + Duration::from_millis(100);
+            machine.run_until(until)?;
+            machine.enable("x")?;
+            machine.move_to("x", Metres::from_mm(60.0))?;
+        }
         Phase::Stand => {
             let until = machine.now() + Duration::from_secs(3);
             machine.run_until(until)?;
         }
         Phase::Calibrate => {
-            machine.calibrate("x", store, &CalibrateOptions::default())?;
+            let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
+            calibrated.replace(Some(done));
         }
         Phase::Verify => {
-            let options = VerifyOptions { compensated: false, calibration: None, resume: None };
+            let options = VerifyOptions {
+                compensated: false,
+                calibration: None,
+                resume: None,
+            };
             machine.verify("x", store, &options)?;
         }
     }
     Ok(())
+}
+
+/// Writes down the warnings.
+struct Listener(Rc<RefCell<Vec<String>>>);
+
+impl Observer for Listener {
+    fn progress(&mut self, _: Stage, _: &str, _: u64, _: u64) {}
+
+    fn warning(&mut self, text: &str) {
+        self.0.borrow_mut().push(text.to_owned());
+    }
 }
 
 /// A scene that was played.
@@ -237,6 +284,9 @@ pub struct Played {
     pub result: Result<(), Failure>,
     pub seen: Rc<RefCell<Testimony>>,
     ids: Vec<FaultId>,
+    warnings: Rc<RefCell<Vec<String>>>,
+    /// What a calibration gave.
+    pub calibrated: RefCell<Option<Calibrated>>,
     /// When the fault was due.
     pub due: Time,
     /// When the phase ended.
@@ -261,6 +311,11 @@ impl Played {
         self.ended - self.due
     }
 
+    /// What the operator was warned of.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.borrow().clone()
+    }
+
     /// What the witness saw.
     pub fn seen(&self) -> Ref<'_, Testimony> {
         self.seen.borrow()
@@ -270,7 +325,10 @@ impl Played {
     #[track_caller]
     pub fn journal_points(&self, verb: &str) -> usize {
         let path = self.bench.store.newest_run(verb, "x").unwrap();
-        read_journal(&path.expect("there is a journal")).unwrap().points.len()
+        read_journal(&path.expect("there is a journal"))
+            .unwrap()
+            .points
+            .len()
     }
 
     /// The machine came to rest within `span` of the fault and stays so, without power or in
@@ -278,7 +336,11 @@ impl Played {
     #[track_caller]
     pub fn is_safe(&self, span: Duration) -> &Self {
         if let Some(at) = self.seen().moved_last(self.due) {
-            assert!(at <= self.due + span, "still moving {:?} after the fault", at - self.due);
+            assert!(
+                at <= self.due + span,
+                "still moving {:?} after the fault",
+                at - self.due
+            );
         }
         let state = power_state(&self.bench.emulated);
         let harmless = !matches!(state, PowerState::OperationEnabled);
@@ -291,7 +353,9 @@ impl Played {
     pub fn keeps_its_records(&self) -> &Self {
         let store = &self.bench.store;
         if let Some(id) = store.active("x").unwrap().current {
-            store.load(&id).unwrap_or_else(|error| panic!("active calibration: {error}"));
+            store
+                .load(&id)
+                .unwrap_or_else(|error| panic!("active calibration: {error}"));
         }
         if let Ok(folder) = std::fs::read_dir(store.runs()) {
             for entry in folder {
@@ -307,7 +371,10 @@ impl Played {
     pub fn was_delivered(&self) -> &Self {
         let simulation = self.bench.emulated.simulation();
         for id in &self.ids {
-            assert!(simulation.fault_deliveries(*id) > 0, "{id:?} was never delivered");
+            assert!(
+                simulation.fault_deliveries(*id) > 0,
+                "{id:?} was never delivered"
+            );
         }
         self
     }
@@ -321,13 +388,21 @@ pub fn power_state(emulated: &Emulated) -> PowerState {
 /// Looks at the drive, or changes it.
 pub fn with_drive<R>(emulated: &Emulated, look: impl FnOnce(&mut Cia402DriveNode) -> R) -> R {
     let mut simulation = emulated.simulation_mut();
-    look(simulation.node_mut("drive").expect("the machine has a drive"))
+    look(
+        simulation
+            .node_mut("drive")
+            .expect("the machine has a drive"),
+    )
 }
 
 /// Looks at the analog module, or changes it.
 pub fn with_analog<R>(emulated: &Emulated, look: impl FnOnce(&mut Cia401AnalogNode) -> R) -> R {
     let mut simulation = emulated.simulation_mut();
-    look(simulation.node_mut("hall_adc").expect("the machine has an analog module"))
+    look(
+        simulation
+            .node_mut("hall_adc")
+            .expect("the machine has an analog module"),
+    )
 }
 
 /// What must come of a fault.
@@ -346,18 +421,24 @@ pub struct Wanted<'a> {
 #[track_caller]
 pub fn check(scene: Scene, wanted: &Wanted<'_>) -> Played {
     let played = scene.play();
-    played.was_delivered();
     let failure = match &played.result {
-        Ok(()) => panic!("nothing was noticed"),
+        Ok(()) => panic!("nothing was noticed until {}", played.ended),
         Err(failure) => failure,
     };
     let text = failure.to_string();
-    assert!((wanted.cause)(failure), "another cause was named: {text}\n{failure:?}");
+    assert!(
+        (wanted.cause)(failure),
+        "another cause was named: {text}\n{failure:?}"
+    );
     for word in wanted.words {
         assert!(text.contains(word), "`{word}` is not in: {text}");
     }
     let reaction = played.reaction();
-    assert!(reaction <= wanted.within, "noticed only after {reaction:?}: {text}");
+    assert!(
+        reaction <= wanted.within,
+        "noticed only after {reaction:?}: {text}"
+    );
+    played.was_delivered();
     played.is_safe(wanted.rest);
     played
 }

@@ -42,7 +42,12 @@ impl Testimony {
     pub fn moved_last(&self, since: Time) -> Option<Time> {
         // Faster than noise and creep, slower than any motion that was ordered.
         const MOVING_M_PER_S: f64 = 50e-6;
-        let steps = self.path.windows(2).filter(|step| step[1].0 > since);
+        // While nobody looked, nobody knows.
+        const GAP: Duration = Duration::from_millis(100);
+        let steps = self
+            .path
+            .windows(2)
+            .filter(|step| step[1].0 > since && step[1].0 - step[0].0 < GAP);
         steps
             .filter(|step| {
                 let span = (step[1].0 - step[0].0).as_secs_f64().max(1e-4);
@@ -67,7 +72,10 @@ impl Witnessed {
 
     fn look(&self) {
         let simulation = self.inner.world().simulation();
-        let here = (simulation.now(), simulation.truth().scale_position().value());
+        let here = (
+            simulation.now(),
+            simulation.truth().scale_position().value(),
+        );
         self.seen.borrow_mut().path.push(here);
     }
 

@@ -185,6 +185,7 @@ impl CalibrationRecord {
             format!("{:#X}:{:#X} serial {}", it.vendor, it.product, it.serial)
         };
         let comparisons = [
+            ("the kind of model", self.kind.clone(), here.kind.clone()),
             (
                 "the stage's serial number",
                 self.stage_serial.clone(),
@@ -378,6 +379,21 @@ impl Store {
         pointer.current = Some(earlier.clone());
         self.write_pointer(axis, &pointer)?;
         Ok(earlier)
+    }
+
+    /// Takes the calibration of `axis` out of use: the one before is used again, or none.
+    /// Returns its name. What cannot be loaded is passed over.
+    ///
+    /// # Errors
+    /// When the pointer cannot be read or written.
+    pub fn retire(&self, axis: &str) -> Result<Option<String>, StoreError> {
+        let mut pointer = self.active(axis)?;
+        pointer.current = None;
+        while let (None, Some(earlier)) = (&pointer.current, pointer.history.pop()) {
+            pointer.current = Some(earlier).filter(|id| self.load(id).is_ok());
+        }
+        self.write_pointer(axis, &pointer)?;
+        Ok(pointer.current)
     }
 
     /// Writes a page for people.
