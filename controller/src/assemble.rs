@@ -223,7 +223,8 @@ fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
     }
 }
 
-fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
+/// The drive of an axis, as its driver is told.
+pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
     let heartbeats = (
         axis.heartbeat_producer_ms,
         axis.heartbeat_consumer_ms,
@@ -247,12 +248,17 @@ fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Sett
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
+        stall_max: usual.common.sync_period * (patience - 1),
         timeouts: patient_drive(usual.timeouts, patience),
         ..usual
     }
 }
 
-fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401Settings {
+/// A CiA 401 module, as its driver is told; the configuration has been checked.
+///
+/// # Panics
+/// When the module is of another kind.
+pub fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401Settings {
     let heartbeats = (
         analog.heartbeat_producer_ms.expect(CHECKED),
         analog.heartbeat_consumer_ms.expect(CHECKED),
@@ -278,10 +284,22 @@ fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401
     Cia401Settings::new(common, &channels).expect(CHECKED)
 }
 
-fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
+/// The one input range that all channels of a DCON module have.
+pub(crate) fn dcon_range(full_scale_v: &[f64]) -> Option<InputRange> {
+    let (first, rest) = full_scale_v.split_first()?;
+    let all_same = rest.iter().all(|volts| volts == first);
+    InputRange::ending_at(Volts(*first)).filter(|_| all_same)
+}
+
+/// A DCON module, as its driver is told; the configuration has been checked.
+///
+/// # Panics
+/// When the module is of another kind.
+pub fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
     let period = analog.poll_period_ms.expect(CHECKED);
     let address = analog.address.expect(CHECKED);
-    let usual = DconSettings::new(address, InputRange::V10, analog.channels.clone());
+    let range = dcon_range(&analog.full_scale_v).expect(CHECKED);
+    let usual = DconSettings::new(address, range, analog.channels.clone());
     DconSettings {
         checksum: analog.checksum,
         period: Duration::from_secs_f64(period * 1e-3),
@@ -291,7 +309,8 @@ fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
     }
 }
 
-fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settings {
+/// A µMD interferometer, as its driver is told.
+pub fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settings {
     let usual = Umd2Settings::default();
     Umd2Settings {
         optics_factor: instrument.optics_factor,

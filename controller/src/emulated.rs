@@ -1,5 +1,5 @@
 //! Emulated machines for demonstrations and for anybody's tests: in virtual time in this
-//! process, or on pseudo-terminals in real (or scaled) time.
+//! process, or on pseudo-terminals and SocketCAN in real (or scaled) time.
 //!
 //! This module is the only one of the package that knows `mock-bus` (the layout test checks
 //! it): nothing of the emulator's truth can reach a procedure.
@@ -105,10 +105,13 @@ fn match_ports(
         .collect()
 }
 
-/// A simulated machine on pseudo-terminals, living in a thread of its own.
+/// A simulated machine on pseudo-terminals, living in a thread of its own; its first CAN bus
+/// can be on a SocketCAN interface instead.
 pub struct EmulatedOnPtys {
     config: EmulatedConfig,
     running: Running,
+    /// The SocketCAN interface, and the place of the port that is on it.
+    interface: Option<(usize, String)>,
 }
 
 impl EmulatedOnPtys {
@@ -119,7 +122,32 @@ impl EmulatedOnPtys {
     pub fn start(toml: &str, seed: u64, speed: f64) -> Result<Self, EmulatedError> {
         let config = EmulatedConfig::parse(toml)?;
         let running = runner::spawn_on_ptys(&config, seed, speed)?;
-        Ok(Self { config, running })
+        Ok(Self {
+            config,
+            running,
+            interface: None,
+        })
+    }
+
+    /// The same with the first CAN bus on the SocketCAN interface `name` (`vcan0`, say).
+    ///
+    /// # Errors
+    /// When the description is wrong, or the interface or pseudo-terminals cannot be had.
+    pub fn start_on_socketcan(
+        toml: &str,
+        seed: u64,
+        speed: f64,
+        name: &str,
+    ) -> Result<Self, EmulatedError> {
+        let config = EmulatedConfig::parse(toml)?;
+        let running = runner::spawn_on_vcan(&config, seed, speed, name)?;
+        let place = config.ports.iter().position(|port| port.is_can());
+        let interface = place.map(|place| (place, name.to_owned()));
+        Ok(Self {
+            config,
+            running,
+            interface,
+        })
     }
 
     /// Where a controller configured by `config` finds its buses and lines.
@@ -133,23 +161,35 @@ impl EmulatedOnPtys {
                 .config
                 .port(&name)
                 .ok_or_else(|| no_port(&name, &self.config))?;
-            let path = self.running.ports()[place].clone();
-            let endpoint = if self.config.ports[place].is_can() {
-                Endpoint::Slcan(path)
-            } else {
-                Endpoint::Serial(path)
-            };
-            overrides.set(&name, endpoint);
+            overrides.set(&name, self.endpoint(place));
         }
         Ok(overrides)
     }
 
+    fn endpoint(&self, place: usize) -> Endpoint {
+        let path = self.running.ports()[place].clone();
+        match &self.interface {
+            Some((on_it, name)) if *on_it == place => Endpoint::SocketCan(name.clone()),
+            _ if self.config.ports[place].is_can() => Endpoint::Slcan(path),
+            _ => Endpoint::Serial(path),
+        }
+    }
+
     /// A line for each port: its name and its path.
     pub fn description(&self) -> Vec<String> {
-        let ports = self.config.ports.iter().zip(self.running.ports());
+        let ports = self
+            .config
+            .ports
+            .iter()
+            .zip(self.running.ports())
+            .enumerate();
         ports
-            .map(|(port, path)| {
-                let kind = if port.is_can() { "SLCAN" } else { "serial" };
+            .map(|(place, (port, path))| {
+                let kind = match self.endpoint(place) {
+                    Endpoint::SocketCan(_) => "SocketCAN",
+                    Endpoint::Slcan(_) => "SLCAN",
+                    Endpoint::Serial(_) => "serial",
+                };
                 format!("{:<8} {kind:<6} {}", port.name(), path.display())
             })
             .collect()

@@ -10,6 +10,7 @@ use drivers::transport::{LinkState, SendError};
 use units::Metres;
 
 use crate::config::ConfigError;
+use crate::emulated::EmulatedError;
 use crate::store::StoreError;
 
 /// Everything that ends a verb without its result.
@@ -333,7 +334,7 @@ pub enum Failure {
     },
     /// The emulated machine cannot be brought up.
     #[error("emulated machine: {0}")]
-    Emulator(#[from] crate::emulated::EmulatedError),
+    Emulator(#[from] EmulatedError),
 }
 
 fn in_use_text(in_use: Option<&str>) -> String {
@@ -346,7 +347,10 @@ fn in_use_text(in_use: Option<&str>) -> String {
 fn link_text(state: LinkState) -> &'static str {
     match state {
         LinkState::Up => "came back; the machine must be started anew",
-        LinkState::Down => "the interface was set down (ENETDOWN); set it up and start again",
+        LinkState::Down => {
+            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
+             set it up and start again"
+        }
         LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
     }
 }
@@ -364,7 +368,15 @@ impl Failure {
             | Self::Series(_)
             | Self::SearchSettings { .. }
             | Self::File { .. }
-            | Self::Usage { .. } => 2,
+            | Self::Usage { .. }
+            | Self::Store(
+                StoreError::Io { .. }
+                | StoreError::Unknown { .. }
+                | StoreError::Ambiguous { .. }
+                | StoreError::NoEarlier { .. }
+                | StoreError::AlreadyComplete { .. },
+            )
+            | Self::Emulator(EmulatedError::Config(_) | EmulatedError::NoPort { .. }) => 2,
             Self::SoftLimit { .. }
             | Self::NotZeroed { .. }
             | Self::Store(_)
@@ -383,16 +395,38 @@ impl Failure {
             | Self::Device { .. }
             | Self::Overdue { .. }
             | Self::Search { .. }
-            | Self::Refine { .. }
             | Self::Correction { .. }
             | Self::Interrupted
             | Self::ScanMismatch { .. }
             | Self::Emulator(_) => 4,
             Self::ZeroUncertain { .. }
+            | Self::Refine { .. }
             | Self::Closure { .. }
             | Self::Fit { .. }
             | Self::MadeWorse { .. }
             | Self::OutOfTolerance { .. } => 5,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(failure: Failure, exit_code: u8) {
+        assert_eq!(failure.exit_code(), exit_code, "{failure}");
+    }
+
+    #[test]
+    fn the_exit_code_says_whose_turn_it_is() {
+        let id = || "abc".to_owned();
+        check(StoreError::Unknown { id: id() }.into(), 2);
+        check(StoreError::Leased { owner: id() }.into(), 3);
+        check(Failure::NotZeroed { axis: id() }, 3);
+        check(Failure::ScanMismatch { wrong: 1 }, 4);
+        let (seen, limit) = (Metres(2e-6), Metres(1e-6));
+        let axis = id();
+        check(Failure::OutOfTolerance { axis, seen, limit }, 5);
     }
 }

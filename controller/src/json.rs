@@ -74,7 +74,7 @@ pub fn table(table: &ErrorTable) -> Value {
     let lost_motion = table.lost_motion();
     json!({
         "lost_motion_um": lost_motion.map(|it| um(it.mean)),
-        "lost_motion_um_u": lost_motion.map(|it| um(it.standard_uncertainty)),
+        "lost_motion_um_u": lost_motion.and_then(|it| it.standard_uncertainty).map(um),
         "largest_deviation_um": um(table.largest()),
         "nodes": nodes,
     })

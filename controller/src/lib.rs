@@ -12,7 +12,7 @@
 //!
 //! fn main() -> Result<(), Failure> {
 //!     let loaded = config::load("machine.toml".as_ref())?;
-//!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), 1.0)?;
+//!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), ports::Use::Motion, 1.0)?;
 //!     let mut machine = Machine::new(&loaded, Box::new(transport));
 //!     let section = &loaded.config.machine;
 //!     let store = Store::new(&section.data_dir, &section.name);
@@ -40,6 +40,7 @@ pub mod machine;
 pub mod observer;
 pub mod ports;
 pub mod report;
+mod stopping;
 pub mod store;
 pub mod text;
 mod tick;

@@ -6,7 +6,7 @@
 //! alike (docs/decisions/0001).
 
 use core::time::Duration;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -92,8 +92,11 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
-    pub(crate) instruments_run: bool,
     pub(crate) bus_watch: BusWatch,
+    /// The instruments that were started, by name.
+    pub(crate) started_instruments: BTreeSet<String>,
+    /// The instrument whose readings a procedure needs now: only its alarms count.
+    pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
 }
@@ -121,7 +124,8 @@ impl Machine {
             config,
             transport,
             supervision: Supervision::Off,
-            instruments_run: false,
+            started_instruments: BTreeSet::new(),
+            instrument_in_use: None,
             observer: Box::new(Silent),
             stop: StopRequest::default(),
         }
@@ -253,8 +257,9 @@ impl Machine {
             .collect()
     }
 
-    /// Starts SYNC and every device, and checks who they are. Nothing moves. Also after a
-    /// power cycle of the machine: instruments that run already go on, their datum stands.
+    /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
+    /// moves. Instruments are started when a procedure first needs them: a machine in
+    /// production has none.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
@@ -266,19 +271,13 @@ impl Machine {
         }
         self.set_sync(true)?;
         let machine_devices = self.axes.len() + self.analogs.len();
-        let last = if self.instruments_run {
-            machine_devices
-        } else {
-            self.device_count()
-        };
         let now = self.now();
-        for at in 0..last {
+        for at in 0..machine_devices {
             self.device_mut(at).device.start(now);
         }
-        for at in 0..last {
+        for at in 0..machine_devices {
             self.await_outcome(at, "start", START_LIMIT)?;
         }
-        self.instruments_run = true;
         self.supervision = Supervision::On;
         Ok(())
     }
@@ -291,59 +290,18 @@ impl Machine {
         axes.chain(analogs).chain(instruments).collect()
     }
 
-    /// Disables every axis in a controlled way and stops supervision and SYNC.
-    ///
-    /// # Errors
-    /// When an axis cannot be disabled; the others are tried all the same.
-    pub fn shut_down(&mut self) -> Result<(), Failure> {
-        let mut result = Ok(());
-        self.supervision = Supervision::Stopping;
-        for axis in self.axis_names() {
-            result = result.and(self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT));
+    /// Starts an instrument, unless it runs already (its datum stands then), and counts its
+    /// alarms from now on.
+    pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
+        if !self.started_instruments.contains(name) {
+            let at = self.instrument_device(self.instrument_index(name));
+            let now = self.now();
+            self.device_mut(at).device.start(now);
+            self.await_outcome(at, "start", START_LIMIT)?;
+            self.started_instruments.insert(name.to_owned());
         }
-        self.supervision = Supervision::Off;
-        result.and(self.set_sync(false))
-    }
-
-    /// Runs `procedure`; when it fails, stops and disables every axis before the failure is
-    /// returned.
-    ///
-    /// # Errors
-    /// What `procedure` returns.
-    pub fn guarded<R>(
-        &mut self,
-        procedure: impl FnOnce(&mut Self) -> Result<R, Failure>,
-    ) -> Result<R, Failure> {
-        let result = procedure(self);
-        // Why it failed must be asked before stopping it takes its time.
-        let now = self.now();
-        result.map_err(|failure| {
-            let failure = self.bus_watch.explain(now, failure);
-            self.make_safe();
-            failure
-        })
-    }
-
-    /// Quick stop and disable on every axis that can still be reached. Never fails: it does
-    /// what can be done, and the drives' own watch on our heartbeat does the rest.
-    pub fn make_safe(&mut self) {
-        self.supervision = Supervision::Stopping;
-        let now = self.now();
-        for unit in &mut self.axes {
-            unit.device.command(now, AxisCommand::QuickStop);
-        }
-        for at in 0..self.axes.len() {
-            // A drive that is gone cannot confirm; the others must still be stopped.
-            let _ = self.await_outcome(at, "quick stop", STOP_LIMIT);
-        }
-        for axis in self.axis_names() {
-            let _ = self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT);
-        }
-        for memory in self.memory.values_mut() {
-            memory.approach.forget();
-        }
-        let _ = self.set_sync(false);
-        self.supervision = Supervision::Off;
+        self.instrument_in_use = Some(name.to_owned());
+        Ok(())
     }
 
     /// Gives `command` to `axis` and waits until it is done.
@@ -360,7 +318,7 @@ impl Machine {
         self.await_outcome(at, step, limit)
     }
 
-    fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
+    pub(crate) fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
         for (port, name) in &self.port_names {
             let Some(bus) = self.config.can.get(name) else {
                 continue;

@@ -87,21 +87,31 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
 ///
 /// [`Loaded::patience`]: crate::config::Loaded::patience
 pub fn patience(clock_speed: f64) -> u32 {
-    const PAUSES: f64 = 6.0;
+    const PAUSES: f64 = 25.0;
     if clock_speed <= 1.0 {
         1
     } else {
-        (clock_speed * PAUSES).min(1000.0).ceil() as u32
+        (clock_speed * PAUSES).min(2000.0).ceil() as u32
     }
 }
 
-/// Opens every bus and line. `clock_speed` is 1 on real machines.
+/// What a verb will do, which says what it needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Move the machine; instruments need not be there.
+    Motion,
+    /// Read the instruments too.
+    Measurement,
+}
+
+/// Opens the buses and lines that `purpose` needs. `clock_speed` is 1 on real machines.
 ///
 /// # Errors
 /// When one cannot be opened; those before it are closed again.
 pub fn open(
     config: &MachineConfig,
     overrides: &Overrides,
+    purpose: Use,
     clock_speed: f64,
 ) -> Result<Live, Failure> {
     if !(clock_speed.is_finite() && clock_speed > 0.0) {
@@ -116,6 +126,13 @@ pub fn open(
         builder = add_can(builder, ports[name], bus, overrides.0.get(name));
     }
     for (name, line) in &config.serial {
+        let machines_own = config
+            .analog
+            .values()
+            .any(|it| it.line.as_ref() == Some(name));
+        if purpose == Use::Motion && !machines_own {
+            continue;
+        }
         let path = match overrides.0.get(name) {
             Some(Endpoint::Serial(path)) => path,
             _ => &line.path,

@@ -5,7 +5,7 @@
 //! by itself: every event comes through here.
 
 use drivers::device::Alarm;
-use drivers::transport::{Arrival, Input, LinkState, Payload, Port};
+use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
 use units::Time;
 
@@ -34,7 +34,7 @@ impl Machine {
         self.fire_deadlines(now);
         self.send_pending()?;
         self.judge_alarms()?;
-        if self.supervision == Supervision::On && self.stop.is_requested() {
+        if self.supervision != Supervision::Stopping && self.stop.is_requested() {
             return Err(Failure::Interrupted);
         }
         Ok(())
@@ -150,6 +150,10 @@ impl Machine {
             Ok(()) => Ok(()),
             // While stopping, what can be sent is sent; the drives' watchdogs do the rest.
             Err(_) if self.supervision == Supervision::Stopping => Ok(()),
+            Err(SendError::Unusable { port, state }) => Err(Failure::Link {
+                port: self.port_name(port),
+                state,
+            }),
             Err(source) => Err(Failure::Send {
                 device: device.to_owned(),
                 source,
@@ -162,7 +166,9 @@ impl Machine {
         for at in 0..self.device_count() {
             while let Some(alarm) = self.device_mut(at).device.poll_alarm() {
                 self.forget_reference(at, &alarm);
-                first = first.or(Some((at, alarm)));
+                if self.alarm_counts(at) {
+                    first = first.or(Some((at, alarm)));
+                }
             }
         }
         match first {
@@ -171,6 +177,15 @@ impl Machine {
                 alarm,
             }),
             _ => Ok(()),
+        }
+    }
+
+    /// An instrument that nobody reads may have its beam blocked.
+    fn alarm_counts(&self, at: usize) -> bool {
+        let first_instrument = self.axes.len() + self.analogs.len();
+        match at.checked_sub(first_instrument) {
+            None => true,
+            Some(at) => self.instrument_in_use.as_ref() == Some(&self.instruments[at].name),
         }
     }
 

@@ -336,7 +336,7 @@ fn a_burst_of_vibration_is_left_out_and_reported() {
 fn a_measurement_that_shakes_too_often_is_refused() {
     // Every fifth of the time and more, at other points in every run.
     let mut scene = Scene::during(Phase::Calibrate).machine("runs = 3", "runs = 6");
-    for burst in 0..40 {
+    for burst in 0..12 {
         let mut fault = FaultConfig::lasting(
             Fault::Vibration { amplitude_um: 40.0 },
             Duration::from_millis(700),

@@ -117,7 +117,7 @@ fn a_calibration_that_is_too_large_is_refused_when_it_is_loaded() {
 #[test]
 fn a_calibration_that_jumps_is_refused_when_it_is_loaded() {
     let jump = |at: usize, deviation| {
-        if at % 2 == 0 {
+        if at.is_multiple_of(2) {
             deviation
         } else {
             deviation + 30e-6

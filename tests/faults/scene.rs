@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
-use mock_bus::node::cia401_analog::Cia401AnalogNode;
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
@@ -16,7 +15,7 @@ use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
 
-use crate::witness::{Testimony, Witnessed};
+use crate::witness::{Deed, Testimony, Witnessed};
 
 /// From SYNC to SYNC in the shipped configuration.
 pub const PERIOD: Duration = Duration::from_millis(5);
@@ -46,6 +45,8 @@ pub enum Phase {
     Verify,
 }
 
+/// Whether something was seen on the emulated machine.
+type Question = Box<dyn Fn(&Emulated) -> bool>;
 /// Something that turns one text into another.
 type Change = Box<dyn Fn(String) -> String>;
 
@@ -55,8 +56,8 @@ pub struct Scene {
     after: Duration,
     seed: u64,
     faults: Vec<FaultConfig>,
-    deed: Option<Box<dyn FnOnce(&Emulated)>>,
-    delivered: Option<Box<dyn Fn(&Emulated) -> bool>>,
+    deed: Option<Deed>,
+    delivered: Option<Question>,
     machine: Change,
     emulated: Change,
     stop: bool,
@@ -392,16 +393,6 @@ pub fn with_drive<R>(emulated: &Emulated, look: impl FnOnce(&mut Cia402DriveNode
         simulation
             .node_mut("drive")
             .expect("the machine has a drive"),
-    )
-}
-
-/// Looks at the analog module, or changes it.
-pub fn with_analog<R>(emulated: &Emulated, look: impl FnOnce(&mut Cia401AnalogNode) -> R) -> R {
-    let mut simulation = emulated.simulation_mut();
-    look(
-        simulation
-            .node_mut("hall_adc")
-            .expect("the machine has an analog module"),
     )
 }
 

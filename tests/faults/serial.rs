@@ -62,28 +62,21 @@ fn a_little_garbage_costs_a_sample_and_no_more() {
 }
 
 #[test]
-fn nothing_but_garbage_stops_the_run() {
+fn a_line_that_falls_silent_stops_the_run() {
     let wanted = Wanted {
         cause: |failure| {
             matches!(
                 failure,
                 Failure::Alarm {
-                    alarm: Alarm::Garbage { .. }
-                        | Alarm::StreamSilent { .. }
-                        | Alarm::SamplesLost { .. },
+                    alarm: Alarm::StreamSilent { .. },
                     ..
                 }
             )
         },
-        words: &["laser:"],
-        within: Duration::from_secs(1),
-        rest: Duration::from_secs(1) + STOPPING,
+        words: &["laser:", "no sample"],
+        within: Duration::from_millis(120),
+        rest: Duration::from_millis(120) + STOPPING,
     };
-    let garbage = Fault::Corrupt {
-        port: "can0".into(),
-        cob_id: Some(0x7FF),
-    };
-    let _ = garbage;
     let silence = Fault::Silence { port: laser() };
     check(
         Scene::during(Phase::Calibrate)
@@ -94,15 +87,15 @@ fn nothing_but_garbage_stops_the_run() {
 }
 
 #[test]
-fn a_line_that_only_echoes_is_no_interferometer() {
-    let scene = Scene::during(Phase::Start).fault(Fault::Silence { port: laser() });
+fn a_line_without_an_interferometer_is_refused_before_anything_is_measured() {
     let wanted = Wanted {
         cause: |failure| matches!(failure, Failure::Device { .. }),
-        words: &["laser:", "good samples in a row", "0 samples"],
+        words: &["interferometer", "good samples in a row", "0 samples"],
         within: Duration::from_secs(5),
-        rest: Duration::ZERO,
+        rest: Duration::from_secs(5),
     };
-    check(scene, &wanted);
+    let silence = Fault::Silence { port: laser() };
+    check(Scene::during(Phase::Calibrate).fault(silence), &wanted);
 }
 
 /// The Hall sensors behind the serial module instead of the one on CAN.
@@ -128,23 +121,29 @@ fn adc() -> String {
 }
 
 #[test]
-fn a_serial_module_with_a_disturbed_line_still_gives_true_voltages() {
+fn a_serial_module_on_a_disturbed_line_gives_a_true_zero_or_none() {
     for fault in [
-        now_and_then(Fault::Garbage { port: adc() }, 0.02),
-        now_and_then(Fault::Split { port: adc() }, 0.2),
         FaultConfig::permanent(Fault::Echo { port: adc() }),
+        now_and_then(Fault::Split { port: adc() }, 0.2),
+        now_and_then(Fault::Garbage { port: adc() }, 0.02),
     ] {
         let name = format!("{fault:?}");
         let played = with_serial_module(Scene::during(Phase::Zero))
             .inject(fault)
             .play();
         played.was_delivered();
-        if let Err(failure) = &played.result {
-            panic!("{name}: {failure}");
+        match &played.result {
+            Ok(()) => {
+                let off = played.bench.true_position().abs();
+                assert!(off.um() < 20.0, "{name}: zero is {} µm off", off.um());
+            }
+            // An answer that is late by a part of itself belongs to another place.
+            Err(failure @ Failure::Refine { .. }) => {
+                assert!(failure.to_string().contains("interference"), "{failure}");
+                played.is_safe(Duration::from_secs(600));
+            }
+            Err(failure) => panic!("{name}: {failure}"),
         }
-        // Ten bits of millivolts at 1 V/mm, twice averaged.
-        let off = played.bench.true_position().abs();
-        assert!(off.um() < 20.0, "{name}: zero is {} µm off", off.um());
     }
 }
 

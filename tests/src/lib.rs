@@ -4,6 +4,16 @@
 //! `RIG` unset: in this process (virtual time) and on pseudo-terminals. `RIG=vcan`: on the
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
+mod desk;
+mod emulator;
+mod interface;
 mod rig;
+mod slcan_hub;
+mod stand;
 
+pub use desk::Desk;
+pub use emulator::{Emulator, INTERFACE, Setup};
+pub use interface::{Interface, run};
 pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};
+pub use slcan_hub::SlcanHub;
+pub use stand::{Stand, on_every_rig};

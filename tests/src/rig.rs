@@ -24,6 +24,19 @@ pub enum Rig {
     Vcan,
 }
 
+impl Rig {
+    /// How much faster than real time machines live here: all that a busy host bears. User
+    /// Mode Linux has one core and system calls that cost microseconds.
+    pub fn speed(self) -> f64 {
+        let native = std::env::var("VCAN_HOST").is_ok_and(|host| host == "native");
+        match self {
+            Self::InProcess => 1.0,
+            Self::Vcan if !native => 3.0,
+            Self::Pty | Self::Vcan => 8.0,
+        }
+    }
+}
+
 /// The buses that this run of the tests is for.
 ///
 /// # Panics

@@ -1,4 +1,4 @@
-//! Whole cycles of whole machines, in virtual time.
+//! Whole cycles of whole machines, on every bus and in virtual time.
 
 mod linear;
-mod linear_zero;
+mod virtual_time;

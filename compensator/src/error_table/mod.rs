@@ -71,8 +71,9 @@ impl Node {
 pub struct LostMotion {
     /// Mean over the nodes of (reverse − forward).
     pub mean: Metres,
-    /// Its standard uncertainty; the instrument's own cancels in the difference.
-    pub standard_uncertainty: Metres,
+    /// Its standard uncertainty, where every node has one; the instrument's own cancels in the
+    /// difference.
+    pub standard_uncertainty: Option<Metres>,
     /// Smallest and largest (reverse − forward) of any node.
     pub range: (Metres, Metres),
 }
@@ -220,12 +221,11 @@ impl ErrorTable {
             .map(|n| Some((n.reverse? - n.forward?).value()))
             .collect();
         let differences = differences?;
-        let variance: f64 = self
+        let variance: Option<f64> = self
             .nodes
             .iter()
             .flat_map(|n| [n.u_forward, n.u_reverse])
-            .flatten()
-            .map(|u| u.value() * u.value())
+            .map(|u| Some(u?.value() * u?.value()))
             .sum();
         let count = differences.len() as f64;
         let low = differences.iter().copied().fold(f64::INFINITY, f64::min);
@@ -235,7 +235,7 @@ impl ErrorTable {
             .fold(f64::NEG_INFINITY, f64::max);
         Some(LostMotion {
             mean: Metres(differences.iter().sum::<f64>() / count),
-            standard_uncertainty: Metres(variance.sqrt() / count),
+            standard_uncertainty: variance.map(|variance| Metres(variance.sqrt() / count)),
             range: (Metres(low), Metres(high)),
         })
     }
@@ -334,7 +334,8 @@ mod tests {
         let table = ErrorTable::new(vec![both(0.0, 1.0, 3.0), both(3.0, -1.0, 3.0)]).unwrap();
         let lost = table.lost_motion().unwrap();
         assert!((lost.mean.um() - 3.0).abs() < 1e-12);
-        assert!((lost.standard_uncertainty.um() - 0.5_f64.sqrt() / 2.0).abs() < 1e-12);
+        let u = lost.standard_uncertainty.unwrap();
+        assert!((u.um() - 0.5_f64.sqrt() / 2.0).abs() < 1e-12);
         assert!((lost.range.1.um() - 4.0).abs() < 1e-12);
     }
 

@@ -8,7 +8,7 @@ use truestage::store::{CalibrationRecord, NodeRecord, Store, short};
 use truestage::{Failure, config};
 use units::Metres;
 
-use super::output::Output;
+use super::output::{Ended, Output};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalCommand {
@@ -51,7 +51,7 @@ pub(super) enum CalCommand {
     },
 }
 
-pub(super) fn run(command: &CalCommand, output: Output) -> Result<(), Failure> {
+pub(super) fn run(command: &CalCommand, output: Output) -> Ended {
     match command {
         CalCommand::List { config } => list(&store_of(config)?, output),
         CalCommand::Show { config, id } => show(&store_of(config)?, id, output),
@@ -71,7 +71,7 @@ fn store_of(config: &std::path::Path) -> Result<Store, Failure> {
     Ok(Store::new(&section.data_dir, &section.name))
 }
 
-fn list(store: &Store, output: Output) -> Result<(), Failure> {
+fn list(store: &Store, output: Output) -> Ended {
     let mut lines = Vec::new();
     let mut values = Vec::new();
     for id in store.list()? {
@@ -99,11 +99,10 @@ fn list(store: &Store, output: Output) -> Result<(), Failure> {
     if lines.is_empty() {
         lines.push("no calibrations yet; `truestage calibrate` makes one".into());
     }
-    output.result(&lines.join("\n"), &json!({"calibrations": values}));
-    Ok(())
+    output.result(&lines.join("\n"), &json!({"calibrations": values}))
 }
 
-fn show(store: &Store, id: &str, output: Output) -> Result<(), Failure> {
+fn show(store: &Store, id: &str, output: Output) -> Ended {
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
     let mut text = format!(
@@ -122,8 +121,7 @@ fn show(store: &Store, id: &str, output: Output) -> Result<(), Failure> {
         text += &node_line(node);
     }
     let value = serde_json::to_value(&record).expect("plain data always serialises");
-    output.result(&text, &json!({"id": id, "record": value}));
-    Ok(())
+    output.result(&text, &json!({"id": id, "record": value}))
 }
 
 fn micrometres(metres: Option<f64>) -> String {
@@ -140,7 +138,7 @@ fn node_line(node: &NodeRecord) -> String {
     )
 }
 
-fn diff(store: &Store, before: &str, after: &str, output: Output) -> Result<(), Failure> {
+fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
     let load =
         |id: &str| -> Result<CalibrationRecord, Failure> { Ok(store.load(&store.resolve(id)?)?) };
     let (before, after) = (load(before)?, load(after)?);
@@ -173,12 +171,11 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Result<(), 
     if values.is_empty() {
         lines.push("  no position stands in both".into());
     }
-    output.result(&lines.join("\n"), &json!({"changes": values}));
-    Ok(())
+    output.result(&lines.join("\n"), &json!({"changes": values}))
 }
 
 /// The stage and the configuration are checked here; the drive itself when it is used.
-fn activate(path: &std::path::Path, id: &str, output: Output) -> Result<(), Failure> {
+fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let section = &loaded.config.machine;
     let store = Store::new(&section.data_dir, &section.name);
@@ -205,13 +202,11 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Result<(), Fail
     }
     store.activate(&record.axis, &id)?;
     let text = format!("axis {}: {} is in use", record.axis, short(&id));
-    output.result(&text, &json!({"axis": record.axis, "active": id}));
-    Ok(())
+    output.result(&text, &json!({"axis": record.axis, "active": id}))
 }
 
-fn rollback(store: &Store, axis: &str, output: Output) -> Result<(), Failure> {
+fn rollback(store: &Store, axis: &str, output: Output) -> Ended {
     let id = store.rollback(axis)?;
     let text = format!("axis {axis}: back to {}", short(&id));
-    output.result(&text, &json!({"axis": axis, "active": id}));
-    Ok(())
+    output.result(&text, &json!({"axis": axis, "active": id}))
 }

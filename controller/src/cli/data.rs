@@ -15,7 +15,7 @@ use truestage::store::{
 };
 use truestage::{Failure, assemble, config, json as to_json, text};
 
-use super::output::Output;
+use super::output::{Ended, Output};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FitCommand {
@@ -44,18 +44,17 @@ fn read(path: &Path) -> Result<String, Failure> {
     })
 }
 
-pub(super) fn iso230(path: &Path, output: Output) -> Result<(), Failure> {
+pub(super) fn iso230(path: &Path, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let figures = iso230::evaluate(&series)?;
     let mut text = text::figures_table(&[("measured", &figures)]);
     if !figures.conforms() {
         text += "\nnote: ISO 230-2 asks for five runs from each side and five targets";
     }
-    output.result(&text, &to_json::figures(&figures));
-    Ok(())
+    output.result(&text, &to_json::figures(&figures))
 }
 
-pub(super) fn fit(command: &FitCommand, output: Output) -> Result<(), Failure> {
+pub(super) fn fit(command: &FitCommand, output: Output) -> Ended {
     match command {
         FitCommand::Linear { data, save, axis } => {
             linear(data, save.as_deref(), axis.as_deref(), output)
@@ -64,12 +63,7 @@ pub(super) fn fit(command: &FitCommand, output: Output) -> Result<(), Failure> {
     }
 }
 
-fn linear(
-    path: &Path,
-    save: Option<&Path>,
-    axis: Option<&str>,
-    output: Output,
-) -> Result<(), Failure> {
+fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let name = axis.unwrap_or("x").to_owned();
     let fitted = error_table::analyse(&series, &FitOptions::default())
@@ -83,26 +77,29 @@ fn linear(
         series.measurements().len()
     );
     if let Some(lost_motion) = fitted.table.lost_motion() {
+        let u = lost_motion.standard_uncertainty;
         text += &format!(
-            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {:.3} µm",
+            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {}",
             lost_motion.mean.um(),
-            lost_motion.standard_uncertainty.um()
+            u.map_or("unknown (one run)".into(), |u| format!("{:.3} µm", u.um()))
         );
     }
     if let Some(config) = save {
         let id = store_fit(config, axis, path, &series, &fitted)?;
         text += &format!(
-            "\nstored as {}; use it with `truestage cal activate`",
+            "\nstored as {}; use it with `truestage cal activate {} {}`",
+            short(&id),
+            config.display(),
             short(&id)
         );
         value["calibration"] = json!(id);
     }
-    output.result(&text, &value);
-    Ok(())
+    output.result(&text, &value)
 }
 
 /// Stores a table measured elsewhere. The drive cannot be asked here, so its identity is what
-/// the configuration expects; with a serial number there it is checked like any other.
+/// the configuration expects; with a serial number there it is checked like any other, without
+/// one any drive of that product will do.
 fn store_fit(
     config_path: &Path,
     axis: Option<&str>,
@@ -112,12 +109,17 @@ fn store_fit(
 ) -> Result<String, Failure> {
     let loaded = config::load(config_path)?;
     let axes = &loaded.config.axis;
+    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
     let name = match (axis, axes.len()) {
         (Some(axis), _) => axis.to_owned(),
         (None, 1) => axes.keys().next().expect("there is one").clone(),
-        (None, _) => String::new(),
+        (None, _) => {
+            return Err(Failure::Usage {
+                what: "the machine has several axes".into(),
+                help: format!("add --axis with one of {}", known()),
+            });
+        }
     };
-    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
     let axis = axes.get(&name).ok_or_else(|| Failure::NoSuchAxis {
         axis: name.clone(),
         known: known(),
@@ -158,13 +160,13 @@ fn store_fit(
         runs: series.runs().len() as u32,
         closure_m: None,
         lost_motion_m: lost_motion.map(|it| it.mean.value()),
-        lost_motion_u_m: lost_motion.map(|it| it.standard_uncertainty.value()),
+        lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
         nodes: CalibrationRecord::nodes_of(&fitted.table),
     };
     Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
 }
 
-fn hall(path: &Path, output: Output) -> Result<(), Failure> {
+fn hall(path: &Path, output: Output) -> Ended {
     let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
         axis: path.display().to_string(),
@@ -180,6 +182,5 @@ fn hall(path: &Path, output: Output) -> Result<(), Failure> {
         estimate.right.position.um(),
         estimate.mid_voltage.value()
     );
-    output.result(&text, &to_json::zero(&estimate));
-    Ok(())
+    output.result(&text, &to_json::zero(&estimate))
 }

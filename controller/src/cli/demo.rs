@@ -18,7 +18,7 @@ use truestage::store::{Lease, ZeroEntry, read_journal};
 use truestage::{Failure, Machine, Store, json as to_json, ports, text};
 use units::{Metres, Volts};
 
-use super::output::Output;
+use super::output::{Ended, Output};
 use super::progress::Bars;
 use super::session::stop_on_signals;
 
@@ -72,7 +72,7 @@ struct Story {
     after: Verified,
 }
 
-pub(super) fn run(args: &DemoArgs, output: Output) -> Result<(), Failure> {
+pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let started = Instant::now();
     let loaded = load(args)?;
     let section = &loaded.config.machine;
@@ -82,6 +82,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Result<(), Failure> {
     let transport = ports::open(
         &loaded.config,
         &emulated.overrides(&loaded.config)?,
+        ports::Use::Measurement,
         args.speed,
     )?;
     let mut machine = Machine::new(&loaded, Box::new(transport));
@@ -93,8 +94,11 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Result<(), Failure> {
     let story = machine.guarded(|machine| tell(machine, &store, &emulated, args, output))?;
     let report = write_report(&store, &story)?;
     let text = summary(&story, &report, started.elapsed(), args.speed);
-    output.result(&text, &to_value(&story, &report, started.elapsed()));
-    judge(&story)
+    let value = to_value(&story, &report, started.elapsed());
+    match out_of_tolerance(&story) {
+        None => output.result(&text, &value),
+        Some(failure) => output.bad_result(&text, value, failure),
+    }
 }
 
 fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
@@ -102,6 +106,12 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
         return Err(Failure::Usage {
             what: format!("there is no emulated machine `{}`", args.machine),
             help: "known: linear".into(),
+        });
+    }
+    if !(args.speed.is_finite() && args.speed > 0.0) {
+        return Err(Failure::Usage {
+            what: format!("a speed of {}", args.speed),
+            help: "give a positive number; 1 is real time".into(),
         });
     }
     let mut loaded = config::parse(LINEAR, "configs/machines/linear.toml")?;
@@ -191,17 +201,14 @@ fn rezero(
     })
 }
 
-fn judge(story: &Story) -> Result<(), Failure> {
-    for verified in [&story.left, &story.after] {
-        if !verified.is_within_tolerance() {
-            return Err(Failure::OutOfTolerance {
-                axis: AXIS.into(),
-                seen: verified.figures.accuracy.bidirectional,
-                limit: verified.tolerance,
-            });
-        }
-    }
-    Ok(())
+fn out_of_tolerance(story: &Story) -> Option<Failure> {
+    let verified = [&story.left, &story.after];
+    let bad = verified.into_iter().find(|it| !it.is_within_tolerance())?;
+    Some(Failure::OutOfTolerance {
+        axis: AXIS.into(),
+        seen: bad.figures.accuracy.bidirectional,
+        limit: bad.tolerance,
+    })
 }
 
 fn columns(story: &Story) -> [(&'static str, &Figures); 3] {

@@ -90,12 +90,15 @@ struct AxisArgs {
     axis: Option<String>,
 }
 
+/// What a bare `--resume` stands for; no file is called that by accident.
+const NEWEST_RUN: &str = "<newest>";
+
 #[derive(Clone, Debug, Args)]
 struct CalibrateArgs {
     #[command(flatten)]
     axis: AxisArgs,
     /// Continue the newest interrupted run of this axis, or the journal given.
-    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = "")]
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
     resume: Option<PathBuf>,
     /// Save although the place measured first and last differs by more than the limit.
     #[arg(long)]
@@ -110,7 +113,7 @@ struct VerifyArgs {
     #[arg(long)]
     uncompensated: bool,
     /// Continue the newest interrupted run of this axis, or the journal given.
-    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = "")]
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
     resume: Option<PathBuf>,
 }
 
@@ -119,8 +122,20 @@ struct MoveArgs {
     #[command(flatten)]
     machine: MachineArgs,
     /// Where to: `x=12.5mm`, `x=-300um`.
-    #[arg(required = true, value_name = "AXIS=LENGTH")]
+    #[arg(value_name = "AXIS=LENGTH")]
     targets: Vec<String>,
+}
+
+impl MoveArgs {
+    /// `truestage move x=12.5mm` means `./machine.toml`, as with every verb.
+    fn settle(mut self) -> Self {
+        let first = self.machine.config.to_string_lossy();
+        if first.contains('=') && !self.machine.config.exists() {
+            self.targets.insert(0, first.into_owned());
+            self.machine.config = "machine.toml".into();
+        }
+        self
+    }
 }
 
 /// Runs the command line of this process.
@@ -134,17 +149,61 @@ pub(crate) fn main() -> ExitCode {
         Command::Zero(args) => verbs::zero(&args, output),
         Command::Calibrate(args) => verbs::calibrate(&args, output),
         Command::Verify(args) => verbs::verify(&args, output),
-        Command::Move(args) => verbs::move_to(&args, output),
+        Command::Move(args) => verbs::move_to(&args.settle(), output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
         Command::Report(args) => page::run(&args, output),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(failure)) => {
+            output.note(&format!("error: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
         Err(failure) => {
             output.failure(&failure);
             ExitCode::from(failure.exit_code())
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(words: &[&str]) -> Command {
+        let words = ["truestage"].iter().chain(words);
+        Cli::try_parse_from(words)
+            .unwrap_or_else(|error| panic!("{error}"))
+            .command
+    }
+
+    #[test]
+    fn a_bare_resume_means_the_newest_run() {
+        let Command::Calibrate(args) = parsed(&["calibrate", "m.toml", "--resume"]) else {
+            panic!("another verb")
+        };
+        assert_eq!(args.resume, Some(NEWEST_RUN.into()));
+        let Command::Verify(args) = parsed(&["verify", "m.toml", "--resume", "a.jsonl"]) else {
+            panic!("another verb")
+        };
+        assert_eq!(args.resume, Some("a.jsonl".into()));
+    }
+
+    #[test]
+    fn a_move_without_a_configuration_uses_the_one_here() {
+        let Command::Move(args) = parsed(&["move", "x=1mm", "y=2mm"]) else {
+            panic!("another verb")
+        };
+        let args = args.settle();
+        assert_eq!(args.machine.config, PathBuf::from("machine.toml"));
+        assert_eq!(args.targets, ["x=1mm", "y=2mm"]);
+        let Command::Move(args) = parsed(&["move", "m.toml", "x=1mm"]) else {
+            panic!("another verb")
+        };
+        let args = args.settle();
+        assert_eq!(args.machine.config, PathBuf::from("m.toml"));
+        assert_eq!(args.targets, ["x=1mm"]);
     }
 }

@@ -6,6 +6,10 @@ use serde_json::{Value, json};
 
 use truestage::Failure;
 
+/// How a verb ended: well, with a result that is a failure all the same (already printed with
+/// it), or with no result.
+pub(super) type Ended = Result<Option<Failure>, Failure>;
+
 /// How results are printed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Output {
@@ -22,7 +26,23 @@ impl Output {
     }
 
     /// The result: `text` for people, `value` with `--json`.
-    pub(super) fn result(self, text: &str, value: &Value) {
+    #[expect(clippy::unnecessary_wraps, reason = "it is how a verb ends")]
+    pub(super) fn result(self, text: &str, value: &Value) -> Ended {
+        self.print(text, value);
+        Ok(None)
+    }
+
+    /// A result that is a failure all the same: with `--json` still one object, the failure in
+    /// it beside the result.
+    #[expect(clippy::unnecessary_wraps, reason = "it is how a verb ends")]
+    pub(super) fn bad_result(self, text: &str, mut value: Value, failure: Failure) -> Ended {
+        value["error"] = json!(failure.to_string());
+        value["exit_code"] = json!(failure.exit_code());
+        self.print(text, &value);
+        Ok(Some(failure))
+    }
+
+    fn print(self, text: &str, value: &Value) {
         let line = if self.json {
             value.to_string()
         } else {
@@ -41,8 +61,8 @@ impl Output {
     pub(super) fn failure(self, failure: &Failure) {
         if self.json {
             let error = json!({"error": failure.to_string(), "exit_code": failure.exit_code()});
-            let _ = writeln!(std::io::stdout().lock(), "{error}");
+            self.print("", &error);
         }
-        let _ = writeln!(std::io::stderr().lock(), "error: {failure}");
+        self.note(&format!("error: {failure}"));
     }
 }

@@ -9,7 +9,7 @@ use truestage::report::{self, Page, Section};
 use truestage::store::read_journal;
 use truestage::{Failure, cycle};
 
-use super::output::Output;
+use super::output::{Ended, Output};
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
@@ -20,7 +20,7 @@ pub(super) struct ReportArgs {
     output: Option<PathBuf>,
 }
 
-pub(super) fn run(args: &ReportArgs, output: Output) -> Result<(), Failure> {
+pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
     let journal = read_journal(&args.run)?;
     let figures = figures_of(&journal.points)?;
     let title = format!("{} of axis {}", journal.header.verb, journal.header.axis);
@@ -50,8 +50,7 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Result<(), Failure> {
     output.result(
         &format!("report in {}", path.display()),
         &json!({"report": path}),
-    );
-    Ok(())
+    )
 }
 
 /// `None` for a run with too few points for figures (a zero, or one that was interrupted).

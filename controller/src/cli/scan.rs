@@ -3,26 +3,23 @@
 use serde_json::json;
 use truestage::Failure;
 use truestage::cycle::Found;
+use truestage::ports::Use;
 
 use super::MachineArgs;
-use super::output::Output;
+use super::output::{Ended, Output};
 use super::session::Session;
 
-pub(super) fn run(args: &MachineArgs, output: Output) -> Result<(), Failure> {
-    let mut session = Session::open(args, "scan", output)?;
+pub(super) fn run(args: &MachineArgs, output: Output) -> Ended {
+    let mut session = Session::open(args, "scan", Use::Measurement, output)?;
     let found = session.machine.scan()?;
     let lines: Vec<_> = found.iter().map(line).collect();
     let values: Vec<_> = found.iter().map(value).collect();
-    let all_match = found.iter().all(|it| it.mismatches.is_empty());
-    output.result(
-        &lines.join("\n"),
-        &json!({"devices": values, "matches": all_match}),
-    );
-    if all_match {
-        return Ok(());
-    }
     let wrong = found.iter().filter(|it| !it.mismatches.is_empty()).count();
-    Err(Failure::ScanMismatch { wrong })
+    let value = json!({"devices": values, "matches": wrong == 0});
+    if wrong == 0 {
+        return output.result(&lines.join("\n"), &value);
+    }
+    output.bad_result(&lines.join("\n"), value, Failure::ScanMismatch { wrong })
 }
 
 fn line(found: &Found) -> String {

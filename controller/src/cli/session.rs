@@ -6,7 +6,7 @@ use std::io::BufWriter;
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
 use truestage::config::{self, Loaded};
-use truestage::ports::{self, Overrides};
+use truestage::ports::{self, Overrides, Use};
 use truestage::store::Lease;
 use truestage::{Failure, Machine, StopRequest, Store, assemble};
 
@@ -23,14 +23,19 @@ pub(super) struct Session {
 
 impl Session {
     /// Reads the configuration, takes the lease, opens the ports. Nothing is sent.
-    pub(super) fn open(args: &MachineArgs, verb: &str, output: Output) -> Result<Self, Failure> {
+    pub(super) fn open(
+        args: &MachineArgs,
+        verb: &str,
+        purpose: Use,
+        output: Output,
+    ) -> Result<Self, Failure> {
         let mut loaded = config::load(&args.config)?;
         loaded.patience = ports::patience(args.clock_speed);
         let overrides = Overrides::parse(&args.ports, &loaded.config)?;
         let section = &loaded.config.machine;
         let store = Store::new(&section.data_dir, &section.name);
         let lease = Lease::take(&store, verb)?;
-        let transport = ports::open(&loaded.config, &overrides, args.clock_speed)?;
+        let transport = ports::open(&loaded.config, &overrides, purpose, args.clock_speed)?;
         let transport = recorded(transport, args, &loaded)?;
         let mut machine = Machine::new(&loaded, transport);
         machine.observe(Box::new(Bars::new(output.is_json())));

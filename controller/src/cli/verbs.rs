@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::ports::Use;
 use truestage::store::{Store, read_journal};
 use truestage::{Failure, Machine, config, json as to_json, text};
 use units::Metres;
 
-use super::output::Output;
+use super::output::{Ended, Output};
 use super::session::{Session, choose_axis};
-use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use super::{AxisArgs, CalibrateArgs, MoveArgs, NEWEST_RUN, VerifyArgs};
 
-pub(super) fn check(path: &Path, output: Output) -> Result<(), Failure> {
+pub(super) fn check(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let machine = &loaded.config.machine;
     let text = format!(
@@ -29,8 +30,13 @@ pub(super) fn check(path: &Path, output: Output) -> Result<(), Failure> {
     output.result(
         &text,
         &json!({"ok": true, "machine": machine.name, "hash": loaded.hash}),
-    );
-    Ok(())
+    )
+}
+
+/// What is settled before anything moves.
+struct Prepared {
+    calibration: Option<String>,
+    resume: Option<PathBuf>,
 }
 
 /// Starts the machine, zeroes `axis`, loads its calibration, runs `procedure`, switches off.
@@ -39,11 +45,19 @@ fn with_zeroed_axis<R>(
     verb: &str,
     output: Output,
     load_calibration: bool,
-    procedure: impl FnOnce(&mut Machine, &str, &Store, Option<String>) -> Result<R, Failure>,
+    resume: Option<&PathBuf>,
+    procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
-    let mut session = Session::open(&args.machine, verb, output)?;
+    let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
     let axis = choose_axis(&session.machine, args)?;
     let store = session.store.clone();
+    let resume = journal_to_resume(resume, &store, verb, &axis)?;
+    if load_calibration && store.active(&axis)?.current.is_none() {
+        return Err(Failure::Usage {
+            what: format!("axis {axis} has no active calibration"),
+            help: "run `truestage calibrate`, or verify with --uncompensated".into(),
+        });
+    }
     session.machine.guarded(|machine| {
         machine.start()?;
         let calibration = if load_calibration {
@@ -52,14 +66,18 @@ fn with_zeroed_axis<R>(
             None
         };
         machine.zero(&axis, &store)?;
-        let result = procedure(machine, &axis, &store, calibration)?;
+        let prepared = Prepared {
+            calibration,
+            resume,
+        };
+        let result = procedure(machine, &axis, &store, prepared)?;
         machine.shut_down()?;
         Ok(result)
     })
 }
 
-pub(super) fn zero(args: &AxisArgs, output: Output) -> Result<(), Failure> {
-    let mut session = Session::open(&args.machine, "zero", output)?;
+pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
+    let mut session = Session::open(&args.machine, "zero", Use::Motion, output)?;
     let axis = choose_axis(&session.machine, args)?;
     let store = session.store.clone();
     let zeroed = session.machine.guarded(|machine| {
@@ -77,20 +95,35 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Result<(), Failure> {
         estimate.origin.um(),
         zeroed.journal.display()
     );
-    let value = json!({"axis": axis, "zero": to_json::zero(estimate), "journal": zeroed.journal});
-    output.result(&text, &value);
-    Ok(())
+    let drift = zeroed.previous.map(|before| {
+        let now = zeroed.entry;
+        (
+            (now.peak_max_v - before.peak_max_v) * 1e3,
+            (now.mid_v - before.mid_v) * 1e3,
+        )
+    });
+    let since = drift.map_or(String::new(), |(peak, mid)| {
+        format!("\nsince the zero before: peak sensor {peak:+.1} mV, slope sensor {mid:+.1} mV")
+    });
+    let value = json!({
+        "axis": axis,
+        "zero": to_json::zero(estimate),
+        "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
+        "journal": zeroed.journal,
+    });
+    output.result(&(text + &since), &value)
 }
 
-pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Result<(), Failure> {
+pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let calibrated = with_zeroed_axis(
         &args.axis,
         "calibrate",
         output,
         false,
-        |machine, axis, store, _| {
+        args.resume.as_ref(),
+        |machine, axis, store, prepared| {
             let options = CalibrateOptions {
-                resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
+                resume: prepared.resume,
                 accept_drift: args.accept_drift,
             };
             machine.calibrate(axis, store, &options)
@@ -123,33 +156,32 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Result<(), Fail
         "closure_um": to_json::um(calibrated.measured.closure),
         "fit": to_json::fitted(fitted),
     });
-    output.result(&text, &value);
-    Ok(())
+    output.result(&text, &value)
 }
 
-pub(super) fn verify(args: &VerifyArgs, output: Output) -> Result<(), Failure> {
+pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
     let name = if compensated { "as_left" } else { "as_found" };
-    let run = |machine: &mut Machine, axis: &str, store: &Store, calibration: Option<String>| {
-        if compensated && calibration.is_none() {
-            return Err(Failure::Usage {
-                what: format!("axis {axis} has no active calibration"),
-                help: "run `truestage calibrate`, or verify with --uncompensated".into(),
-            });
-        }
-        let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
+    let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
         let verified = machine.verify(
             axis,
             store,
             &VerifyOptions {
                 compensated,
-                calibration,
-                resume,
+                calibration: prepared.calibration,
+                resume: prepared.resume,
             },
         )?;
         Ok((axis.to_owned(), verified))
     };
-    let (axis, verified) = with_zeroed_axis(&args.axis, "verify", output, compensated, run)?;
+    let (axis, verified) = with_zeroed_axis(
+        &args.axis,
+        "verify",
+        output,
+        compensated,
+        args.resume.as_ref(),
+        run,
+    )?;
     let title = name.replace('_', " ");
     let mut text = text::figures_table(&[(&title, &verified.figures)]);
     text += &format!("\npoints in {}", verified.journal.display());
@@ -162,27 +194,26 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Result<(), Failure> {
         "journal": verified.journal,
     });
     if compensated && !within {
-        if !output.is_json() {
-            output.result(&text, &value);
-        }
         let seen = verified.figures.accuracy.bidirectional;
-        return Err(Failure::OutOfTolerance {
-            axis,
-            seen,
-            limit: verified.tolerance,
-        });
+        let limit = verified.tolerance;
+        return output.bad_result(&text, value, Failure::OutOfTolerance { axis, seen, limit });
     }
-    output.result(&text, &value);
-    Ok(())
+    output.result(&text, &value)
 }
 
-pub(super) fn move_to(args: &MoveArgs, output: Output) -> Result<(), Failure> {
+pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    if args.targets.is_empty() {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
+        });
+    }
     let targets = args
         .targets
         .iter()
         .map(|text| parse_target(text))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut session = Session::open(&args.machine, "move", output)?;
+    let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     for (axis, target) in &targets {
         let (min, max) = {
             let config = session.machine.axis_config(axis)?;
@@ -233,8 +264,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Result<(), Failure> {
                    "calibration": calibration})
         })
         .collect();
-    output.result(&lines.join("\n"), &json!({"moves": value}));
-    Ok(())
+    output.result(&lines.join("\n"), &json!({"moves": value}))
 }
 
 /// `x=12.5mm`: the unit is never guessed.
@@ -270,7 +300,7 @@ fn journal_to_resume(
     axis: &str,
 ) -> Result<Option<PathBuf>, Failure> {
     let Some(path) = resume else { return Ok(None) };
-    if !path.as_os_str().is_empty() {
+    if path.as_os_str() != NEWEST_RUN {
         return Ok(Some(path.clone()));
     }
     let newest = store.newest_run(verb, axis)?;

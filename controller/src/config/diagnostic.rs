@@ -63,7 +63,7 @@ impl fmt::Display for Diagnostic {
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{}: cannot read the configuration: {source}", path.display())]
+    #[error("{}: cannot read the configuration: {source}{}", path.display(), hint(source))]
     Unreadable {
         /// Which file.
         path: PathBuf,
@@ -76,6 +76,16 @@ pub enum ConfigError {
         /// All that was found, in the order of the file.
         findings: Vec<Diagnostic>,
     },
+}
+
+/// Somebody's first try is in a folder without a `machine.toml`.
+fn hint(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::NotFound => {
+            "\n  help: name a machine's configuration, such as configs/machines/linear.toml"
+        }
+        _ => "",
+    }
 }
 
 fn show(findings: &[Diagnostic]) -> String {

@@ -210,6 +210,77 @@ mod tests {
         assert_eq!((found.line, found.column), (line_of("soft_max_mm"), 15));
     }
 
+    /// What TOML can write and no machine can be.
+    #[test]
+    fn values_that_would_move_an_axis_where_it_must_not_go_are_refused() {
+        for (from, to, key) in [
+            (
+                "soft_min_mm = -3.0",
+                "soft_min_mm = nan",
+                "axis.x.soft_max_mm",
+            ),
+            (
+                "soft_max_mm = 63.0",
+                "soft_max_mm = nan",
+                "axis.x.soft_max_mm",
+            ),
+            (
+                "negative_limit_mm = -6.0",
+                "negative_limit_mm = 6.0",
+                "axis.x.zero.negative_limit_mm",
+            ),
+            (
+                "negative_limit_mm = -6.0",
+                "negative_limit_mm = nan",
+                "axis.x.zero.negative_limit_mm",
+            ),
+            (
+                "standard_uncertainty_limit_um = 0.2",
+                "standard_uncertainty_limit_um = nan",
+                "axis.x.zero.standard_uncertainty_limit_um",
+            ),
+            (
+                "rail_high_v = 4.9",
+                "rail_high_v = 9.9",
+                "axis.x.zero.rail_high_v",
+            ),
+            (
+                "turn_below_peak_v = 0.3",
+                "turn_below_peak_v = 3.0",
+                "axis.x.zero",
+            ),
+            (
+                "overrun_mm = 0.5",
+                "overrun_mm = 0.0",
+                "axis.x.calibrate.overrun_mm",
+            ),
+            (
+                "baud_bit_per_s = 115200",
+                "baud_bit_per_s = 0",
+                "serial.laser.baud_bit_per_s",
+            ),
+            ("[axis.x]", "[axis.\"../x\"]", "axis.../x"),
+        ] {
+            assert!(LINEAR.contains(from), "{from}");
+            let text = LINEAR.replace(from, to).replace(
+                "[axis.x.",
+                match key {
+                    "axis.../x" => "[axis.\"../x\".",
+                    _ => "[axis.x.",
+                },
+            );
+            let found = findings(&text);
+            assert!(found.iter().any(|it| it.key == key), "{to}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_calibration_run_without_limits_for_its_result_is_refused() {
+        let end = LINEAR.find("[axis.x.compensation]").unwrap();
+        let found = &findings(&LINEAR[..end])[0];
+        assert!(found.help.contains("[axis.x.compensation]"), "{found}");
+    }
+
     #[test]
     fn two_devices_with_one_node_id_are_refused() {
         let text = LINEAR.replace("node_id = 2", "node_id = 1");
@@ -229,7 +300,7 @@ mod tests {
 
     #[test]
     fn a_sync_period_too_short_for_the_bus_names_one_that_fits() {
-        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.5");
+        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.4");
         let found = &findings(&text)[0];
         assert_eq!(found.key, "can.can0.sync_period_ms");
         assert!(found.help.contains("ms"), "{found}");

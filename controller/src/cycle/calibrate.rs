@@ -65,6 +65,8 @@ impl Machine {
             });
         }
         let plan = run_plan(&config);
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", axis, &plan, None);
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
         let measuring = MeasureOptions {
@@ -74,7 +76,9 @@ impl Machine {
         let measured = self.measure_runs(axis, &plan, measuring, &mut journal, &earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
         let limit = Metres::from_um(config.closure_limit_um);
-        if measured.closure.abs() > limit && !options.accept_drift {
+        // Written so that NaN is refused too.
+        let closed = measured.closure.abs() <= limit;
+        if !closed && !options.accept_drift {
             return Err(Failure::Closure {
                 axis: axis.to_owned(),
                 seen: measured.closure,
@@ -163,7 +167,7 @@ impl Machine {
             runs: plan.runs,
             closure_m: Some(measured.closure.value()),
             lost_motion_m: lost_motion.map(|it| it.mean.value()),
-            lost_motion_u_m: lost_motion.map(|it| it.standard_uncertainty.value()),
+            lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
             nodes: CalibrationRecord::nodes_of(&fitted.table),
             ..self.this_machine(axis)
         }

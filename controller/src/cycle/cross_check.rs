@@ -202,7 +202,7 @@ fn scale_mismatch(axis: &str, travel_m: f64, ratio: f64, limit_ppm: f64) -> Fail
 fn likely_cause(ratio: f64) -> &'static str {
     let near = |value: f64| (ratio / value - 1.0).abs() < 0.02;
     match ratio {
-        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument or the axis",
+        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument",
         _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor`",
         _ if near(4.0) || near(0.25) => "a factor of four: check `optics_factor`",
         _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres",

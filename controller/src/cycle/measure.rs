@@ -133,6 +133,11 @@ impl Machine {
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
         let mut points = whole_runs(earlier, per_run);
+        // A run that was whole but wrong ended the measurement that is continued here.
+        for run in points.chunk_by(|a, b| a.run == b.run) {
+            judge_scale(axis, plan.scale_limit_ppm, run)?;
+        }
+        self.use_instrument(&plan.instrument)?;
         let correction_of_length = self.set_datum(axis, plan)?;
         self.remember(axis).datum = Some((plan.clone(), correction_of_length));
         let counter = Counter {
@@ -165,6 +170,7 @@ impl Machine {
         let closure = self.measure_closure(&mut session)?;
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
+        self.instrument_in_use = None;
         let environment = mean_environment(&points);
         Ok(Measured {
             points,
@@ -212,7 +218,8 @@ impl Machine {
         )?;
         let encoder = self
             .reading(axis)?
-            .map_or(Metres(f64::NAN), |sample| sample.position);
+            .expect("an axis that moved has been read")
+            .position;
         let point = PointEntry {
             run,
             approach: approach.symbol(),
@@ -246,9 +253,11 @@ impl Machine {
                 what: format!("axis {axis} has no datum"),
                 help: "calibrate or verify first".into(),
             })?;
+        self.use_instrument(&plan.instrument)?;
         self.go_to_datum(axis, &plan)?;
         let reading = self.read_displacement(axis, &plan)?;
         let environment = self.instrument_environment(&plan.instrument);
+        self.instrument_in_use = None;
         self.correct(&plan, &reading, &environment, &length)
     }
 

@@ -64,7 +64,7 @@ impl Machine {
                 found.extend(self.scan_can(port, &name)?);
             }
         }
-        found.extend(self.scan_instruments());
+        found.extend(self.scan_serial());
         Ok(found)
     }
 
@@ -122,9 +122,16 @@ impl Machine {
         }
     }
 
-    fn scan_instruments(&mut self) -> Vec<Found> {
-        let first = self.axes.len() + self.analogs.len();
-        (first..self.device_count())
+    /// Everything on a serial line: analog modules and instruments.
+    fn scan_serial(&mut self) -> Vec<Found> {
+        let lines: Vec<_> = (0..self.device_count())
+            .filter(|at| {
+                let port = self.device_mut(*at).port;
+                self.config.serial.contains_key(&self.port_names[&port])
+            })
+            .collect();
+        lines
+            .into_iter()
             .map(|at| {
                 let now = self.now();
                 self.device_mut(at).device.start(now);

@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use compensator::apply::ApproachTracker;
+use compensator::error_table::{Compensation, OutOfRange};
 use drivers::device::AxisCommand;
 use units::{Approach, Metres, MetresPerSecond, MetresPerSecondSquared};
 
@@ -81,19 +83,18 @@ impl Machine {
         let (Correction::On, Some(compensation)) = (correction, compensation) else {
             return Ok(target);
         };
-        let memory = self.memory.get(axis).expect("every axis has its memory");
-        // With no known motion before, forward is as good a guess as any, and the first
-        // move of every procedure is long enough to make it true.
-        let approach = memory
-            .approach
-            .approach_of(target)
-            .unwrap_or(Approach::Forward);
-        compensation
-            .set_point(target, approach)
-            .map_err(|source| Failure::OutOfCalibration {
+        let tracker = &self
+            .memory
+            .get(axis)
+            .expect("every axis has its memory")
+            .approach;
+        let here = self.reading(axis)?.map(|reading| reading.position);
+        set_point_of(compensation, tracker, here, target).map_err(|source| {
+            Failure::OutOfCalibration {
                 axis: axis.to_owned(),
                 source,
-            })
+            }
+        })
     }
 
     /// Moves without asking for a zero: procedures that make the zero use it too.
@@ -106,7 +107,12 @@ impl Machine {
         self.check_soft_limits(axis, target)?;
         let set_point = self.set_point(axis, target, correction)?;
         self.check_soft_limits(axis, set_point)?;
-        self.profile_move(axis, set_point, self.travel_speed(axis)?)?;
+        let speed = match (correction, self.compensation(axis)) {
+            // So fast that the correction changes no faster than its limit.
+            (Correction::On, Some(table)) => self.travel_speed(axis)?.min(table.speed_max()),
+            _ => self.travel_speed(axis)?,
+        };
+        self.profile_move(axis, set_point, speed)?;
         Ok(set_point)
     }
 
@@ -172,8 +178,103 @@ impl Machine {
             speed,
             acceleration,
         };
-        self.command(axis, command, "move", limit)?;
-        self.remember(axis).approach.update(target);
-        Ok(())
+        let result = self.command(axis, command, "move", limit);
+        let approach = &mut self.remember(axis).approach;
+        if result.is_ok() {
+            approach.update(target);
+        } else {
+            // Where it stopped, and from where it came there, nobody knows.
+            approach.forget();
+        }
+        result
+    }
+}
+
+/// The set-point for `target` from the side from which the drive will really come.
+///
+/// Which side that is depends on the set-point itself: over less than the deviation, target and
+/// set-point may lie on different sides of where the axis is. With no motion remembered (after
+/// a zero), `here` says where it starts.
+fn set_point_of(
+    compensation: &Compensation,
+    tracker: &ApproachTracker,
+    here: Option<Metres>,
+    target: Metres,
+) -> Result<Metres, OutOfRange> {
+    let mut from = *tracker;
+    if from == ApproachTracker::new()
+        && let Some(here) = here
+    {
+        from.update(here);
+    }
+    let usual = from.approach().unwrap_or(Approach::Forward);
+    let other = match usual {
+        Approach::Forward => Approach::Reverse,
+        Approach::Reverse => Approach::Forward,
+    };
+    for approach in [usual, other] {
+        if let Ok(set_point) = compensation.set_point(target, approach)
+            && from.approach_of(set_point) == Some(approach)
+        {
+            return Ok(set_point);
+        }
+    }
+    // Within the lost motion of where it is, no side is right: the one asked for is the best.
+    compensation.set_point(target, from.approach_of(target).unwrap_or(usual))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use compensator::error_table::{EndPolicy, ErrorTable, Interpolation, Limits, Node};
+
+    /// Forward 2 µm too far, reverse 5 µm.
+    fn compensation() -> Compensation {
+        let node = |mm: f64| Node {
+            position: Metres::from_mm(mm),
+            forward: Some(Metres::from_um(2.0)),
+            reverse: Some(Metres::from_um(5.0)),
+            u_forward: None,
+            u_reverse: None,
+        };
+        let limits = Limits {
+            size: Metres::from_um(50.0),
+            slope: 0.01,
+            rate: MetresPerSecond(1.0),
+        };
+        let table = ErrorTable::new(vec![node(-10.0), node(10.0)]).unwrap();
+        Compensation::new(table, Interpolation::Linear, limits, EndPolicy::Hold).unwrap()
+    }
+
+    #[track_caller]
+    fn check(moves_um: &[f64], here_um: Option<f64>, target_um: f64, expected_um: f64) {
+        let mut tracker = ApproachTracker::new();
+        for um in moves_um {
+            tracker.update(Metres::from_um(*um));
+        }
+        let here = here_um.map(Metres::from_um);
+        let target = Metres::from_um(target_um);
+        let seen = set_point_of(&compensation(), &tracker, here, target).unwrap();
+        assert!((seen.um() - expected_um).abs() < 1e-6, "{}", seen.um());
+    }
+
+    #[test]
+    fn the_first_move_after_a_zero_is_corrected_for_the_side_it_really_comes_from() {
+        check(&[], Some(0.0), -2000.0, -2005.0);
+        check(&[], Some(0.0), 2000.0, 1998.0);
+        check(&[], None, -2000.0, -2002.0);
+    }
+
+    #[test]
+    fn a_remembered_direction_says_more_than_the_encoder() {
+        check(&[0.0, 1000.0], Some(0.0), 500.0, 495.0);
+        check(&[0.0, 1000.0], Some(0.0), 1500.0, 1498.0);
+    }
+
+    /// The set-point of 1000 µm was 998 µm: 999 µm lies beyond that, its set-point before it.
+    #[test]
+    fn a_step_smaller_than_the_deviation_is_corrected_for_the_drives_own_direction() {
+        check(&[0.0, 998.0], Some(998.0), 999.0, 994.0);
+        check(&[0.0, 998.0], Some(998.0), 1001.0, 999.0);
     }
 }

@@ -69,7 +69,15 @@ impl Machine {
                 axis: axis.to_owned(),
             });
         }
+        if options.compensated && self.compensation(axis).is_none() {
+            return Err(Failure::Usage {
+                what: format!("axis {axis} uses no calibration"),
+                help: "load or make one, or verify uncompensated".into(),
+            });
+        }
         let plan = run_plan(&config);
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
         let measuring = MeasureOptions {

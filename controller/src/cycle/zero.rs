@@ -22,7 +22,7 @@ use crate::failure::Failure;
 use crate::machine::{Machine, STOP_LIMIT};
 use crate::observer::Stage;
 use crate::store::{
-    Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry,
+    Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry, read_journal,
 };
 
 /// A zero that was found.
@@ -34,6 +34,11 @@ pub struct Zeroed {
     pub outcome: Outcome,
     /// Where it is recorded.
     pub journal: PathBuf,
+    /// What was found now.
+    pub entry: ZeroEntry,
+    /// The zero before it, from the newest complete journal of this axis: what the sensors
+    /// have drifted since.
+    pub previous: Option<ZeroEntry>,
 }
 
 impl Zeroed {
@@ -62,6 +67,7 @@ impl Machine {
         let config = self.axis_config(axis)?.zero.clone();
         let config = config.ok_or_else(|| missing(axis, "zero"))?;
         self.remember(axis).zeroed = false;
+        let previous = previous_zero(store, axis);
         let mut journal = Journal::create(&store.runs(), &self.zero_header(axis))?;
         let found = self.find_zero(axis, &config, &mut journal);
         if let Err(failure) = &found {
@@ -70,13 +76,15 @@ impl Machine {
                 cause: failure.to_string(),
             });
         }
-        let (outcome, estimate) = found?;
+        let (outcome, estimate, entry) = found?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
         Ok(Zeroed {
             estimate,
             outcome,
             journal: journal.path().to_owned(),
+            entry,
+            previous,
         })
     }
 
@@ -85,7 +93,7 @@ impl Machine {
         axis: &str,
         config: &ZeroConfig,
         journal: &mut Journal,
-    ) -> Result<(Outcome, ZeroEstimate), Failure> {
+    ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
         self.observer.progress(Stage::Zero, axis, 0, STEPS);
         self.enable(axis)?;
         self.reference(axis, config)?;
@@ -96,10 +104,11 @@ impl Machine {
         let outcome = self.search(axis, config, settings)?;
         self.observer.progress(Stage::Zero, axis, 3, STEPS);
         let estimate = self.estimate(axis, config, &settings, &outcome)?;
-        journal.write(&Entry::Zero(self.zero_entry(&estimate)))?;
+        let entry = self.zero_entry(&estimate);
+        journal.write(&Entry::Zero(entry))?;
         self.adopt_zero(axis, estimate.origin)?;
         self.observer.progress(Stage::Zero, axis, STEPS, STEPS);
-        Ok((outcome, estimate))
+        Ok((outcome, estimate, entry))
     }
 
     /// Coarse reference on the negative limit switch.
@@ -319,6 +328,13 @@ impl Machine {
             standing: position.standing,
         }))
     }
+}
+
+/// The newest zero on record. A trend is worth having but never worth failing for: a journal
+/// that cannot be read is no reason not to zero.
+fn previous_zero(store: &Store, axis: &str) -> Option<ZeroEntry> {
+    let path = store.newest_run("zero", axis).ok().flatten()?;
+    read_journal(&path).ok()?.zeros.pop()
 }
 
 /// Which samples were used already.

@@ -180,9 +180,16 @@ impl CalibrationRecord {
     /// # Errors
     /// Naming the first thing that differs.
     pub fn belongs_to(&self, id: &str, here: &Self) -> Result<(), StoreError> {
+        // A table measured elsewhere may not know the drive's serial number (0 in 0x1018:04).
+        let serial_known = self.drive.serial != 0;
         let drive = |record: &Self| {
             let it = &record.drive;
-            format!("{:#X}:{:#X} serial {}", it.vendor, it.product, it.serial)
+            let product = format!("{:#X}:{:#X}", it.vendor, it.product);
+            if serial_known {
+                format!("{product} serial {}", it.serial)
+            } else {
+                product
+            }
         };
         let comparisons = [
             ("the kind of model", self.kind.clone(), here.kind.clone()),
@@ -562,6 +569,19 @@ mod tests {
         other.drive.serial = 8;
         let error = mine.belongs_to("id", &other).unwrap_err().to_string();
         assert!(error.contains("the drive"), "{error}");
+        other = record("A");
+        other.kind = "rotary".into();
+        assert!(mine.belongs_to("id", &other).is_err());
+    }
+
+    #[test]
+    fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_down() {
+        let machine = record("A");
+        let mut elsewhere = record("A");
+        elsewhere.drive.serial = 0;
+        assert!(elsewhere.belongs_to("id", &machine).is_ok());
+        elsewhere.drive.vendor = 2;
+        assert!(elsewhere.belongs_to("id", &machine).is_err());
     }
 
     #[test]

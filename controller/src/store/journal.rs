@@ -145,8 +145,13 @@ impl Journal {
     /// # Errors
     /// When it cannot be read or does not describe the same run as `header`.
     pub fn resume(path: &Path, header: &JournalHeader) -> Result<(Self, ReadJournal), StoreError> {
-        let read = read_journal(path)?;
+        let mut read = read_journal(path)?;
         same_run(path, &read.header, header)?;
+        if read.complete {
+            return Err(StoreError::AlreadyComplete {
+                path: path.to_owned(),
+            });
+        }
         let file = OpenOptions::new()
             .append(true)
             .open(path)
@@ -160,6 +165,7 @@ impl Journal {
         journal.write(&Entry::Resumed {
             at: header.started.clone(),
         })?;
+        read.keep_whole_runs();
         Ok((journal, read))
     }
 
@@ -209,6 +215,16 @@ pub struct ReadJournal {
     pub torn: bool,
 }
 
+impl ReadJournal {
+    /// What a continued run goes on from: the run that was cut short is measured anew.
+    fn keep_whole_runs(&mut self) {
+        let whole = self.header.targets_m.len() * 2;
+        let count = |run: u32| self.points.iter().filter(|point| point.run == run).count();
+        let kept = self.points.iter().filter(|point| count(point.run) == whole);
+        self.points = kept.copied().collect();
+    }
+}
+
 fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(), StoreError> {
     let comparisons = [
         ("verb", old.verb.clone(), new.verb.clone()),
@@ -233,6 +249,12 @@ fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(),
             format!("{:?}", old.calibration),
             format!("{:?}", new.calibration),
         ),
+        (
+            "instrument and its corrections",
+            format!("{:?}", old.instrument),
+            format!("{:?}", new.instrument),
+        ),
+        ("number of runs", old.runs.to_string(), new.runs.to_string()),
         (
             "targets",
             format!("{:?}", old.targets_m),
@@ -331,7 +353,11 @@ fn take(
         (Entry::Header(_), Some(_)) | (_, None) => return Err(misplaced()),
         (Entry::Point(point), Some(read)) => read.points.push(point),
         (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
-        (Entry::Resumed { .. } | Entry::Failed { .. }, Some(read)) => read.complete = false,
+        (Entry::Resumed { .. }, Some(read)) => {
+            read.complete = false;
+            read.keep_whole_runs();
+        }
+        (Entry::Failed { .. }, Some(read)) => read.complete = false,
         (Entry::Complete, Some(read)) => read.complete = true,
     }
     Ok(())
@@ -394,25 +420,68 @@ mod tests {
         }
     }
 
+    /// 17 × 3 mm is 0.051000000000000004: a target read is the target written, to the last bit.
+    #[test]
+    fn any_target_is_the_same_target_when_a_run_is_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut header = header();
+        header.targets_m = (0..=20).map(|at| f64::from(at * 3) * 1e-3).collect();
+        let journal = Journal::create(folder.path(), &header).unwrap();
+        Journal::resume(journal.path(), &header).unwrap();
+    }
+
+    /// One whole run of the header's two targets.
+    fn write_run(journal: &mut Journal, run: u32) {
+        for _ in 0..4 {
+            journal.write(&point(run)).unwrap();
+        }
+    }
+
     #[test]
     fn resuming_cuts_the_torn_line_and_goes_on() {
         let folder = tempfile::tempdir().unwrap();
         let mut journal = Journal::create(folder.path(), &header()).unwrap();
-        journal.write(&point(1)).unwrap();
+        write_run(&mut journal, 1);
         let path = journal.path().to_owned();
         let mut bytes = fs::read(&path).unwrap();
         bytes.extend_from_slice(b"1234abcd {\"entry\":\"poi");
         fs::write(&path, &bytes).unwrap();
         let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
         assert!(read.torn);
-        assert_eq!(read.points.len(), 1);
-        journal.write(&point(2)).unwrap();
+        assert_eq!(read.points.len(), 4);
+        write_run(&mut journal, 2);
         journal.write(&Entry::Complete).unwrap();
         let read = read_journal(&path).unwrap();
         assert_eq!(
             (read.points.len(), read.complete, read.torn),
-            (2, true, false)
+            (8, true, false)
         );
+    }
+
+    #[test]
+    fn a_run_cut_short_counts_once_however_often_it_is_resumed() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        write_run(&mut journal, 1);
+        journal.write(&point(2)).unwrap();
+        let path = journal.path().to_owned();
+        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        assert_eq!(read.points.len(), 4);
+        write_run(&mut journal, 2);
+        let (_, read) = Journal::resume(&path, &header()).unwrap();
+        let runs: Vec<_> = read.points.iter().map(|point| point.run).collect();
+        assert_eq!(runs, [1, 1, 1, 1, 2, 2, 2, 2]);
+        assert_eq!(read_journal(&path).unwrap().points, read.points);
+    }
+
+    #[test]
+    fn a_run_that_is_complete_cannot_be_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        write_run(&mut journal, 1);
+        journal.write(&Entry::Complete).unwrap();
+        let error = Journal::resume(journal.path(), &header()).unwrap_err();
+        assert!(error.to_string().contains("complete"), "{error}");
     }
 
     #[test]
@@ -441,5 +510,9 @@ mod tests {
         other.stage_serial = "B".into();
         let error = Journal::resume(journal.path(), &other).unwrap_err();
         assert!(error.to_string().contains("stage serial"), "{error}");
+        let mut other = header();
+        other.instrument.air_corrected = true;
+        let error = Journal::resume(journal.path(), &other).unwrap_err();
+        assert!(error.to_string().contains("instrument"), "{error}");
     }
 }

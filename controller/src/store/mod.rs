@@ -122,6 +122,12 @@ pub enum StoreError {
         /// Why.
         source: compensator::error_table::TableError,
     },
+    /// Nothing is left of the run to be done.
+    #[error("{}: this run is complete; start a new one without --resume", path.display())]
+    AlreadyComplete {
+        /// Which journal.
+        path: PathBuf,
+    },
     /// The journal cannot be continued.
     #[error("{}: cannot be resumed: {what} was `{expected}`, is now `{seen}`", path.display())]
     NotResumable {

@@ -13,6 +13,8 @@
 //! # (0000000000.005000) can0 sync 2000000
 //! ```
 //!
+//! Stamps have microseconds, as candump's; so that a replay tells the same story as the
+//! recording, the recorded machine is told the same times: rounded up to microseconds.
 //! SYNCs of the SYNC thread do not pass the transport; only its period is noted (in ns).
 
 use core::time::Duration;
@@ -25,6 +27,15 @@ use crate::wire::candump::{Content, Direction, Record};
 
 /// The first line of a recording.
 pub(super) const HEADER: &str = "# truestage recording 1";
+
+/// The moment as a recording has it. Rounded up: what came after a moment comes after it still.
+pub(super) const fn rounded(at: Time) -> Time {
+    const MICROSECOND: u64 = 1_000;
+    match at.nanos().checked_next_multiple_of(MICROSECOND) {
+        Some(nanos) => Time(nanos),
+        None => Time::NEVER,
+    }
+}
 
 /// A transport that writes down what passes.
 #[derive(Debug)]
@@ -149,11 +160,11 @@ impl<T: Transport, W: io::Write> Recorder<T, W> {
 
 impl<T: Transport, W: io::Write> Transport for Recorder<T, W> {
     fn now(&self) -> Time {
-        self.inner.now()
+        rounded(self.inner.now())
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        let at = self.inner.now();
+        let at = self.now();
         let result = self.inner.send(port, payload);
         match &result {
             Ok(()) => self.payload(at, port, payload, Direction::Transmitted),
@@ -163,13 +174,14 @@ impl<T: Transport, W: io::Write> Transport for Recorder<T, W> {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        let arrival = self.inner.receive(until)?;
+        let mut arrival = self.inner.receive(rounded(until))?;
+        arrival.at = rounded(arrival.at);
         self.arrival(&arrival);
         Some(arrival)
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
-        let at = self.inner.now();
+        let at = self.now();
         let result = self.inner.set_sync(port, period);
         if result.is_ok() {
             let nanos = period.map_or(0, |period| period.as_nanos());

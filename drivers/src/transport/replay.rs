@@ -9,6 +9,7 @@ use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 use units::Time;
 
+use super::record::rounded;
 use super::{Arrival, Input, LinkState, Payload, Port, SendError, Transport};
 use crate::wire::candump::{Content, Direction, Record};
 
@@ -166,6 +167,7 @@ impl Transport for Replay {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
+        let until = rounded(until);
         match self.arrivals.front() {
             Some(next) if next.at <= until.max(self.now) => {
                 self.now = self.now.max(next.at);

@@ -53,6 +53,8 @@ pub(super) struct SlcanPort {
     reported: LinkState,
     /// Something was heard in the present step.
     heard: bool,
+    /// When the present step ends, whatever is heard.
+    step_ends: Time,
     next_status: Time,
     flags: StatusFlags,
     stamps: AdapterStamps,
@@ -97,6 +99,7 @@ impl SlcanPort {
             state: State::Gone,
             reported: LinkState::Up,
             heard: false,
+            step_ends: Time::NEVER,
             next_status: Time::NEVER,
             flags: StatusFlags::empty(),
             stamps: AdapterStamps::default(),
@@ -143,6 +146,7 @@ impl SlcanPort {
             return;
         }
         let deadline = now + self.wall(self.settings.answer_timeout);
+        self.step_ends = deadline;
         self.state = State::Starting { step, deadline };
         if !self.settings.answers {
             self.step_done(now, step);
@@ -179,9 +183,10 @@ impl SlcanPort {
         }
     }
 
-    /// An adapter that speaks but does not know `V` ends the step by falling silent.
+    /// An adapter that speaks but does not know `V` ends the step by falling silent. One that
+    /// never falls silent is none: some other device streams there.
     fn shorten(&mut self, now: Time, step: Step) {
-        let deadline = now + self.wall(VERSION_WAIT.min(self.settings.answer_timeout));
+        let deadline = (now + self.wall(VERSION_WAIT)).min(self.step_ends);
         self.state = State::Starting { step, deadline };
     }
 

@@ -22,8 +22,11 @@ const SLEEP_MAX: Duration = Duration::from_millis(50);
 pub const LATENESS_CLASSES: usize = 16;
 
 /// Where SYNCs go; shared with the port that reads.
-pub(super) trait SyncSink: Send + Sync {
+pub trait SyncSink: Send + Sync {
     /// Sends one SYNC now or not at all.
+    ///
+    /// # Errors
+    /// What the operating system said.
     fn send_sync(&self) -> Result<(), Errno>;
 }
 
@@ -70,7 +73,7 @@ impl SyncStatistics {
 }
 
 /// A running SYNC producer; dropping it stops it.
-pub(super) struct SyncThread {
+pub struct SyncThread {
     shared: Arc<Shared>,
 }
 
@@ -89,7 +92,10 @@ struct Plan {
 
 impl SyncThread {
     /// Starts a thread that sends the first SYNC one (wall) period from now.
-    pub(super) fn start(sink: Arc<dyn SyncSink>, period: Duration) -> std::io::Result<Self> {
+    ///
+    /// # Errors
+    /// When the system has no thread to give.
+    pub fn start(sink: Arc<dyn SyncSink>, period: Duration) -> std::io::Result<Self> {
         let plan = Plan {
             period,
             running: true,
@@ -108,16 +114,17 @@ impl SyncThread {
     }
 
     /// Changes the period, from the SYNC after the next one on.
-    pub(super) fn set_period(&self, period: Duration) {
+    pub fn set_period(&self, period: Duration) {
         self.shared.plan().period = period;
     }
 
     /// Whether the thread still runs.
-    pub(super) fn is_running(&self) -> bool {
+    pub fn is_running(&self) -> bool {
         !self.shared.ended.load(Ordering::Acquire)
     }
 
-    pub(super) fn statistics(&self) -> SyncStatistics {
+    /// What it has done so far.
+    pub fn statistics(&self) -> SyncStatistics {
         self.shared.plan().statistics
     }
 }

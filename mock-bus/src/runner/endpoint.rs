@@ -69,7 +69,7 @@ impl Endpoint {
             Kind::Serial(pty) | Kind::Slcan(pty, _) => {
                 pty.as_ref().map(|pty| (pty.fd(), pty.has_unsent()))
             }
-            Kind::Vcan(vcan) => Some((vcan.fd(), false)),
+            Kind::Vcan(vcan) => vcan.fd().map(|fd| (fd, false)),
         }
     }
 

@@ -1,56 +1,112 @@
 //! A SocketCAN interface: the devices appear on it as other nodes.
+//!
+//! An interface that is deleted takes the bus away, not the devices: they live on, and are
+//! heard again when there is an interface of that name again.
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
+use std::time::{Duration, Instant};
 
 use drivers::wire::can::{BusError, CanFrame, CanId};
 use socketcan::{CanErrorFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, StandardId};
 
+/// How often to look whether a deleted interface is back.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
 pub(super) struct Vcan {
-    socket: CanSocket,
+    interface: String,
+    socket: Link,
+}
+
+enum Link {
+    Open(CanSocket),
+    Gone { look_at: Instant },
+}
+
+impl Link {
+    fn gone() -> Self {
+        Self::Gone {
+            look_at: Instant::now() + LOOK_EVERY,
+        }
+    }
+}
+
+fn open(interface: &str) -> io::Result<CanSocket> {
+    let socket = CanSocket::open(interface)?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
 }
 
 impl Vcan {
     pub(super) fn open(interface: &str) -> io::Result<Self> {
-        let socket = CanSocket::open(interface)?;
-        socket.set_nonblocking(true)?;
-        Ok(Self { socket })
+        Ok(Self {
+            interface: interface.to_owned(),
+            socket: Link::Open(open(interface)?),
+        })
     }
 
-    pub(super) fn fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+    /// Nothing to wait for while the interface is gone.
+    pub(super) fn fd(&self) -> Option<BorrowedFd<'_>> {
+        match &self.socket {
+            Link::Open(socket) => Some(socket.as_fd()),
+            Link::Gone { .. } => None,
+        }
     }
 
     /// The next frame of the host; `None` when there is none, or one that is no classic frame.
-    pub(super) fn receive(&self) -> io::Result<Option<CanFrame>> {
-        match self.socket.read_frame() {
+    pub(super) fn receive(&mut self) -> io::Result<Option<CanFrame>> {
+        self.look();
+        let Link::Open(socket) = &self.socket else {
+            return Ok(None);
+        };
+        match socket.read_frame() {
             Ok(frame) => Ok(from_socket(&frame)),
-            Err(error) if passes(&error) => Ok(None),
-            Err(error) => Err(error),
+            Err(error) => self.pass(error).map(|()| None),
         }
     }
 
     /// A full transmit queue loses the frame, as a node that nobody acknowledges does.
-    pub(super) fn send(&self, frame: &CanFrame) -> io::Result<()> {
-        let Some(frame) = to_socket(frame) else {
-            return Ok(());
-        };
-        lossy(self.socket.write_frame(&frame))
+    pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
+        match to_socket(frame) {
+            Some(frame) => self.write(&frame),
+            None => Ok(()),
+        }
     }
 
-    pub(super) fn send_error(&self, error: BusError) -> io::Result<()> {
+    pub(super) fn send_error(&mut self, error: BusError) -> io::Result<()> {
         let (class, data) = error.emit();
         match CanErrorFrame::new_error(class, &data) {
-            Ok(frame) => lossy(self.socket.write_frame(&frame)),
+            Ok(frame) => self.write(&frame.into()),
             Err(_) => Ok(()),
         }
     }
-}
 
-fn lossy(result: io::Result<()>) -> io::Result<()> {
-    match result {
-        Err(error) if passes(&error) => Ok(()),
-        other => other,
+    fn write(&mut self, frame: &socketcan::CanFrame) -> io::Result<()> {
+        let Link::Open(socket) = &self.socket else {
+            return Ok(());
+        };
+        socket.write_frame(frame).or_else(|error| self.pass(error))
+    }
+
+    /// Lets an error be that is no failure of the emulator.
+    fn pass(&mut self, error: io::Error) -> io::Result<()> {
+        match error.raw_os_error() {
+            _ if passes(&error) => Ok(()),
+            Some(libc::ENODEV | libc::ENXIO) => {
+                self.socket = Link::gone();
+                Ok(())
+            }
+            _ => Err(error),
+        }
+    }
+
+    fn look(&mut self) {
+        let Link::Gone { look_at } = &self.socket else {
+            return;
+        };
+        if Instant::now() >= *look_at {
+            self.socket = open(&self.interface).map_or_else(|_| Link::gone(), Link::Open);
+        }
     }
 }
 

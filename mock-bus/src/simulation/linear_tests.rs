@@ -133,7 +133,7 @@ fn the_hall_adc_shows_what_the_plant_feels() {
         .find(|frame| frame.standard_id() == Some(0x582));
     let data = answer.expect("the module answers").data();
     assert_eq!(data[0], 0x4B, "{data:02X?}");
-    let volts = f64::from(i16::from_le_bytes([data[4], data[5]])) * 10.0 / 32768.0;
+    let volts = f64::from(i16::from_le_bytes([data[4], data[5]])) * 5.0 / 32768.0;
     assert!(volts.abs() > 0.05 && volts.abs() < 2.0, "{volts}");
 }
 

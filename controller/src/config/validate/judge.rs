@@ -45,9 +45,11 @@ impl<'a> Judge<'a> {
     }
 
     pub(super) fn below(&mut self, low: (&str, f64), high: (&str, f64)) {
-        if low.1 >= high.1 {
+        // A NaN, which TOML can write, is not in order, either.
+        let in_order = low.1 < high.1;
+        if !in_order {
             let cause = format!(
-                "{} must be greater than {} ({} ≤ {})",
+                "{} must be greater than {} ({} and {})",
                 high.0, low.0, high.1, low.1
             );
             self.say(

@@ -13,6 +13,7 @@ use drivers::protocol::bus_load::BusLoadError;
 use super::model::{
     AnalogConfig, AnalogDevice, AxisConfig, CanBus, CanTransport, InstrumentConfig, MachineConfig,
 };
+use crate::assemble;
 use crate::bus_plan;
 
 /// The version of the file format this program reads.
@@ -32,7 +33,16 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     for (name, bus) in &config.can {
         check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
     }
+    for (name, line) in &config.serial {
+        Judge::at(format!("serial.{name}"), &mut findings).within(
+            "baud_bit_per_s",
+            line.baud_bit_per_s.into(),
+            50.0,
+            4e6,
+        );
+    }
     for (name, axis) in &config.axis {
+        check_axis_name(&mut findings, name);
         check_axis(
             &mut Judge::at(format!("axis.{name}"), &mut findings),
             config,
@@ -81,6 +91,18 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
     }
     if config.axis.is_empty() {
         judge.say("", "the machine has no axis", "add an [axis.NAME] section");
+    }
+}
+
+/// Axes name files, and stand in words of the command line (`x=1mm`).
+fn check_axis_name(findings: &mut Vec<Finding>, name: &str) {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.is_empty() || !name.chars().all(plain) {
+        findings.push(Finding {
+            key: format!("axis.{name}"),
+            cause: format!("`{name}` cannot name an axis"),
+            help: "use letters, digits and _".into(),
+        });
     }
 }
 
@@ -185,7 +207,7 @@ fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) 
     check_watch(judge, config, &axis.bus, axis.watch_master_ms);
     let counts =
         axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
-    if counts > f64::from(i32::MAX) {
+    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
         judge.say(
             "resolution_nm",
             format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
@@ -203,6 +225,13 @@ fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
             "channels",
             "is empty or names a channel twice",
             "list each used channel once",
+        );
+    }
+    if analog.full_scale_v.len() != analog.channels.len() {
+        judge.say(
+            "full_scale_v",
+            "must have one value per channel",
+            "list as many as `channels`",
         );
     }
     match analog.device {
@@ -228,13 +257,6 @@ fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
             "channels",
             "one process data object carries channels 0 to 3",
             "use those",
-        );
-    }
-    if analog.full_scale_v.len() != analog.channels.len() {
-        judge.say(
-            "full_scale_v",
-            "must have one value per channel",
-            "list as many as `channels`",
         );
     }
     for value in &analog.full_scale_v {
@@ -271,6 +293,13 @@ fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConf
     }
     if analog.channels.iter().any(|channel| *channel >= 8) {
         judge.say("channels", "a dcon module has channels 0 to 7", "use those");
+    }
+    if assemble::dcon_range(&analog.full_scale_v).is_none() {
+        judge.say(
+            "full_scale_v",
+            "a dcon module has one input range for all channels",
+            "give each channel the same: 10.0, 5.0, 1.0, 0.5 or 0.15",
+        );
     }
     match analog.poll_period_ms {
         Some(period) => judge.within("poll_period_ms", period, 1.0, 60_000.0),

@@ -64,6 +64,7 @@ pub(super) struct Image {
     margin: i64,
     tolerance: i64,
     sync_period: Duration,
+    stall_max: Duration,
     /// Where the axis was when it last seemed to come to rest.
     rest: Counts,
     standing: u8,
@@ -74,12 +75,14 @@ pub(super) struct Image {
 }
 
 impl Image {
-    /// `speed_max` in counts per second, `margin` and `tolerance` in counts.
+    /// `speed_max` in counts per second, `margin` and `tolerance` in counts; samples may lie
+    /// `stall_max` further apart than their arrivals say.
     pub(super) const fn new(
         speed_max: f64,
         margin: i64,
         tolerance: i64,
         sync_period: Duration,
+        stall_max: Duration,
     ) -> Self {
         Self {
             sample: None,
@@ -88,6 +91,7 @@ impl Image {
             margin,
             tolerance,
             sync_period,
+            stall_max,
             rest: Counts(0),
             standing: 0,
             doubted: false,
@@ -173,7 +177,7 @@ impl Image {
             return Judgement::Believed;
         };
         // Frames that queued up in a stall arrive together: at least a period lies between.
-        let apart = sample.at.since(old.at).max(self.sync_period);
+        let apart = sample.at.since(old.at).max(self.sync_period) + self.stall_max;
         let limit = (self.speed_max * 1.2 * apart.as_secs_f64()) as i64 + self.margin;
         let by = sample.position - old.position;
         if by.0.abs() <= limit {

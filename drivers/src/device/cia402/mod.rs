@@ -118,6 +118,7 @@ impl Cia402Drive {
             counts(settings.jump_margin.value()) as i64,
             settings.tolerance_counts(),
             settings.common.sync_period,
+            settings.stall_max,
         );
         Self {
             node: CanopenNode::new(settings.common, PROFILE),

@@ -35,6 +35,9 @@ pub struct Cia402Settings {
     pub acceleration_max: MetresPerSecondSquared,
     /// How far a position may be from where `speed_max` could have taken it.
     pub jump_margin: Metres,
+    /// How much later than it came a sample may be stamped on a host that is held up. None on
+    /// a real machine: its transports stamp what queued up with the time of its arrival.
+    pub stall_max: Duration,
     /// Acceleration while homing (0x609A).
     pub homing_acceleration: MetresPerSecondSquared,
     /// What 0x607C means to this drive.
@@ -133,6 +136,7 @@ impl Cia402Settings {
             speed_max,
             acceleration_max,
             jump_margin: Metres::from_um(100.0),
+            stall_max: Duration::ZERO,
             homing_acceleration: acceleration_max * 0.1,
             home_offset: HomeOffset::IsPositionAtHome,
             map_following_error: true,

@@ -20,6 +20,14 @@ pub enum InputRange {
 }
 
 impl InputRange {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::V10, Self::V5, Self::V1, Self::Mv500, Self::Mv150];
+
+    /// The range that ends at `limit`, where there is one.
+    pub fn ending_at(limit: Volts) -> Option<Self> {
+        Self::ALL.into_iter().find(|range| range.limit() == limit)
+    }
+
     /// The code in a module's configuration.
     pub const fn code(self) -> u8 {
         match self {

@@ -259,6 +259,7 @@ impl Drive {
 
     fn power_off(&mut self, m: &mut impl Mechanism) {
         self.switch_off(m);
+        self.power = Power::NotReady;
         m.encoder_power(false);
         self.server.power_off();
     }

@@ -1,0 +1,190 @@
+"""Runs the benchmark programs in turn and prints what they measured as one JSON object.
+
+    measure.py bus PROGRAMS    SDO round trips and SYNC jitter on vcan0
+    measure.py host PROGRAMS   table correction, and SYNC jitter without CAN
+
+PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "sync": path}.
+The caller pins this process to one core; what it starts inherits that.
+"""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+INTERFACE = "vcan0"
+QUICK = bool(os.environ.get("BENCH_QUICK"))
+
+SDO_ROUNDS = 2 if QUICK else 9
+ROUND_TRIPS = {"ours": 4000, "raw": 4000, "python": 600}
+
+SYNC_ROUNDS = 1 if QUICK else 5
+# As many frames as an unprivileged listener can keep until the end.
+SYNC_COUNT = 400
+BUS_PERIODS_US = [5000]
+HOST_PERIODS_US = [2000, 5000]
+FIFO_PRIORITY = 40
+
+COUNTED_CALLS = 200_000
+COUNTED = [("linear", 20), ("linear", 20_000), ("monotone cubic", 20), ("monotone cubic", 20_000)]
+
+
+def run(command, **options):
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, **options)
+    return json.loads(done.stdout)
+
+
+@contextlib.contextmanager
+def background(command):
+    """A process that lives as long as the block."""
+    process = subprocess.Popen(command)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def wait_for_server(client):
+    """Returns when the server answers; the client waits for ever for a server that does not."""
+    for _ in range(20):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            subprocess.run(client, timeout=5, check=True, stdout=subprocess.DEVNULL)
+            return
+    sys.exit("the SDO server does not answer")
+
+
+def sdo(program):
+    clients = {
+        "ours": [program, "ours", INTERFACE],
+        "raw": [program, "raw", INTERFACE],
+        "python": [sys.executable, os.path.join(HERE, "python_client.py"), INTERFACE],
+    }
+    rates = {name: [] for name in clients}
+    with background([program, "server", INTERFACE]):
+        wait_for_server([*clients["raw"], "1"])
+        for _ in range(SDO_ROUNDS):
+            for name, command in clients.items():
+                count = ROUND_TRIPS[name]
+                rates[name].append(count / run([*command, str(count)])["seconds"])
+    per_second = {name: statistics.median(values) for name, values in rates.items()}
+    return {
+        "rounds": SDO_ROUNDS,
+        "round_trips_per_round": ROUND_TRIPS,
+        "round_trips_per_s": {name: spread(values) for name, values in rates.items()},
+        "ours_to_python": per_second["ours"] / per_second["python"],
+        "ours_to_raw": per_second["ours"] / per_second["raw"],
+    }
+
+
+def spread(values):
+    return {"median": statistics.median(values), "min": min(values), "max": max(values)}
+
+
+def as_real_time():
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+
+
+def real_time_is_allowed():
+    try:
+        subprocess.run(["true"], preexec_fn=as_real_time, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return False
+    return True
+
+
+def load(busy):
+    """One thread that never rests, on the same core."""
+    spin = [sys.executable, "-c", "while True: pass"]
+    return background(spin) if busy else contextlib.nullcontext()
+
+
+def sync(program, sink, periods_us):
+    senders = {"ours": ("ours", {}), "tokio": ("tokio", {})}
+    if real_time_is_allowed():
+        senders["tokio, SCHED_FIFO"] = ("tokio", {"preexec_fn": as_real_time})
+    cases = [
+        (name, period_us, busy)
+        for period_us in periods_us
+        for busy in (False, True)
+        for name in senders
+    ]
+    runs = {case: [] for case in cases}
+    for _ in range(SYNC_ROUNDS):
+        for case in cases:
+            name, period_us, busy = case
+            sender, options = senders[name]
+            command = [program, sender, sink, str(period_us), str(SYNC_COUNT)]
+            with load(busy):
+                runs[case].append(run(command, **options))
+    return {
+        "rounds": SYNC_ROUNDS,
+        "frames_per_round": SYNC_COUNT,
+        "cases": [judge_sync(case, runs[case]) for case in cases],
+    }
+
+
+def judge_sync(case, runs):
+    name, period_us, busy = case
+    own = runs[0]["real_time"]
+    return {
+        "sender": name,
+        "period_us": period_us,
+        "busy": busy,
+        "sched_fifo": "SCHED_FIFO" in name if own is None else own,
+        "p50_us": statistics.median(run["p50_us"] for run in runs),
+        "p99_us": statistics.median(run["p99_us"] for run in runs),
+        "max_us": max(run["max_us"] for run in runs),
+        "earliest_us": statistics.median(run["earliest_us"] for run in runs),
+        "skipped": sum(run["skipped"] for run in runs),
+    }
+
+
+def instructions(program):
+    """Instructions per call, as the difference of two runs; nothing without valgrind."""
+    if not shutil.which("valgrind"):
+        return []
+    return [
+        {"interpolation": name, "nodes": nodes, "instructions": per_call(program, name, nodes)}
+        for name, nodes in COUNTED
+    ]
+
+
+def per_call(program, name, nodes):
+    few, many = (
+        count_instructions([program, "calls", name, str(nodes), str(calls)])
+        for calls in (COUNTED_CALLS, 2 * COUNTED_CALLS)
+    )
+    return (many - few) / COUNTED_CALLS
+
+
+def count_instructions(command):
+    valgrind = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+    done = subprocess.run([*valgrind, *command], stderr=subprocess.PIPE, text=True, check=True)
+    return int(re.search(r"Collected : (\d+)", done.stderr).group(1))
+
+
+def main(place, programs):
+    begin = time.monotonic()
+    if place == "bus":
+        measured = {
+            "sdo": sdo(programs["sdo"]),
+            "sync": sync(programs["sync"], INTERFACE, BUS_PERIODS_US),
+        }
+    else:
+        measured = {
+            "table": run([programs["table"], "times"]),
+            "table_instructions": instructions(programs["table"]),
+            "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
+        }
+    measured["seconds"] = round(time.monotonic() - begin)
+    print(json.dumps(measured))
+
+
+main(sys.argv[1], json.loads(sys.argv[2]))

@@ -1,0 +1,5 @@
+//! Each device's driver against its emulation, the same on every bus.
+
+mod analog;
+mod drive;
+mod interferometer;

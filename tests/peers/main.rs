@@ -1,0 +1,18 @@
+//! Software of others on the same bus: python-canopen as the master of our emulated devices and
+//! as our driver's server, python-can as the reader of our recordings.
+
+mod analog;
+mod drive;
+mod emulated;
+mod local_node;
+mod peer;
+mod recording;
+
+use tests::Rig;
+
+/// The buses of this run that another program can be on.
+fn rigs() -> impl Iterator<Item = Rig> {
+    tests::rigs()
+        .into_iter()
+        .filter(|rig| *rig != Rig::InProcess)
+}

@@ -1,0 +1,155 @@
+//! The emulated machine of a rig, and transports to it.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use drivers::transport::Transport;
+use mock_bus::simulation::Simulation;
+use truestage::config::Loaded;
+use truestage::emulated::{Emulated, EmulatedOnPtys};
+use truestage::ports;
+
+use crate::rig::{EMULATED, Rig, machine_config};
+
+/// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
+pub const INTERFACE: &str = "vcan0";
+
+/// Machines that live in real time share the processor, and on SocketCAN the interface: one
+/// after the other.
+static REAL_TIME: Mutex<()> = Mutex::new(());
+
+/// What a machine is made from: seed, configuration, description of the emulation.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    seed: u64,
+    interface: &'static str,
+    machine: Vec<(String, String)>,
+    emulated: Vec<(String, String)>,
+}
+
+impl Setup {
+    /// The shipped machine with the noise and errors of `seed`.
+    pub const fn new(seed: u64) -> Self {
+        Self {
+            seed,
+            interface: INTERFACE,
+            machine: Vec::new(),
+            emulated: Vec::new(),
+        }
+    }
+
+    /// On another SocketCAN interface than the usual one.
+    #[must_use]
+    pub const fn interface(mut self, name: &'static str) -> Self {
+        self.interface = name;
+        self
+    }
+
+    /// With `from` replaced by `to` in the machine's configuration.
+    #[must_use]
+    pub fn machine(mut self, from: &str, to: &str) -> Self {
+        self.machine.push((from.to_owned(), to.to_owned()));
+        self
+    }
+
+    /// With `from` replaced by `to` in the description of the emulation.
+    #[must_use]
+    pub fn emulated(mut self, from: &str, to: &str) -> Self {
+        self.emulated.push((from.to_owned(), to.to_owned()));
+        self
+    }
+}
+
+/// # Panics
+/// When there is nothing to replace: the text has changed and the test has not.
+fn replace(text: String, changes: &[(String, String)]) -> String {
+    changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "`{from}` is not in the text");
+        text.replace(from, to)
+    })
+}
+
+#[expect(clippy::large_enum_variant, reason = "there is one a test")]
+enum Emulation {
+    InProcess(Emulated),
+    Running(EmulatedOnPtys),
+}
+
+/// An emulated machine on one rig.
+pub struct Emulator {
+    /// Where it is.
+    pub rig: Rig,
+    /// What its controller is told.
+    pub loaded: Loaded,
+    emulation: Emulation,
+    /// For the controller's records; gone when dropped.
+    pub folder: tempfile::TempDir,
+    _turn: Option<MutexGuard<'static, ()>>,
+}
+
+impl Emulator {
+    /// The machine of `setup` on `rig`.
+    ///
+    /// # Panics
+    /// When it cannot be brought up.
+    pub fn new(rig: Rig, setup: &Setup) -> Self {
+        let turn = (rig != Rig::InProcess)
+            .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let mut loaded = machine_config(folder.path(), |text| replace(text, &setup.machine));
+        loaded.patience = ports::patience(rig.speed());
+        let text = replace(EMULATED.to_owned(), &setup.emulated);
+        let (speed, seed) = (rig.speed(), setup.seed);
+        let emulation = match rig {
+            Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),
+            Rig::Pty => EmulatedOnPtys::start(&text, seed, speed).map(Emulation::Running),
+            Rig::Vcan => EmulatedOnPtys::start_on_socketcan(&text, seed, speed, setup.interface)
+                .map(Emulation::Running),
+        };
+        Self {
+            rig,
+            loaded,
+            emulation: emulation.unwrap_or_else(|error| panic!("{rig:?}: {error}")),
+            folder,
+            _turn: turn,
+        }
+    }
+
+    /// A transport to it; make one only.
+    ///
+    /// # Panics
+    /// When a port cannot be opened.
+    pub fn transport(&self) -> Box<dyn Transport> {
+        let emulated = match &self.emulation {
+            Emulation::InProcess(emulated) => return Box::new(emulated.transport()),
+            Emulation::Running(emulated) => emulated,
+        };
+        let config = &self.loaded.config;
+        let overrides = emulated.overrides(config).expect("its ports were matched");
+        match ports::open(
+            config,
+            &overrides,
+            ports::Use::Measurement,
+            self.rig.speed(),
+        ) {
+            Ok(live) => Box::new(live),
+            Err(failure) => panic!("{:?}: {failure}", self.rig),
+        }
+    }
+
+    /// Looks at the simulated machine, or meddles with it.
+    ///
+    /// # Panics
+    /// When the emulator has ended.
+    pub fn simulation<R: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Simulation) -> R + Send + 'static,
+    ) -> R {
+        match &self.emulation {
+            Emulation::InProcess(emulated) => work(&mut emulated.simulation_mut()),
+            Emulation::Running(emulated) => {
+                let result = emulated.running().with(work);
+                result.unwrap_or_else(|error| panic!("{error}"))
+            }
+        }
+    }
+}

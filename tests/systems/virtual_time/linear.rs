@@ -1,0 +1,94 @@
+//! The linear stage: calibrate → zero → compensate → verify.
+
+use compensator::iso230::Figures;
+use tests::Bench;
+use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::{Failure, text};
+use units::{Metres, Time};
+
+fn options(calibration: Option<String>) -> VerifyOptions {
+    VerifyOptions {
+        compensated: calibration.is_some(),
+        calibration,
+        resume: None,
+    }
+}
+
+/// As found and as left of one emulated stage.
+fn cycle(seed: u64) -> (Figures, Figures) {
+    let mut bench = Bench::new(seed);
+    let store = bench.store.clone();
+    let result = bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero("x", &store)?;
+        let found = machine.verify("x", &store, &options(None))?;
+        let calibrated = machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        let left = machine.verify("x", &store, &options(Some(calibrated.id)))?;
+        machine.shut_down()?;
+        Ok((found.figures, left.figures))
+    });
+    result.unwrap_or_else(|failure: Failure| panic!("seed {seed}: {failure}"))
+}
+
+#[test]
+fn twenty_stages_are_brought_within_two_micrometres_between_the_calibrated_positions() {
+    let mut worst = Metres::ZERO;
+    let mut least = Metres(f64::INFINITY);
+    for seed in 1..=20 {
+        let (found, left) = cycle(seed);
+        let largest = text::largest_deviation(&found);
+        assert!(
+            largest >= Metres::from_um(8.0),
+            "seed {seed}: as found {} µm",
+            largest.um()
+        );
+        let accuracy = left.accuracy.bidirectional;
+        assert!(
+            accuracy <= Metres::from_um(2.0),
+            "seed {seed}: as left {} µm",
+            accuracy.um()
+        );
+        worst = worst.max(accuracy);
+        least = least.min(largest);
+    }
+    println!(
+        "as found at least ±{:.2} µm; as left A at most {:.3} µm",
+        least.um(),
+        worst.um()
+    );
+}
+
+#[test]
+fn a_compensated_move_brings_the_point_itself_to_its_target() {
+    let mut bench = Bench::new(3);
+    let store = bench.store.clone();
+    bench
+        .machine
+        .guarded(|machine| {
+            machine.start()?;
+            machine.zero("x", &store)?;
+            machine.calibrate("x", &store, &CalibrateOptions::default())?;
+            machine.move_to("x", Metres::from_mm(50.0))
+        })
+        .unwrap_or_else(|failure| panic!("{failure}"));
+    for (mm, seed) in [
+        (12.5, "forward"),
+        (44.4, "forward"),
+        (31.0, "reverse"),
+        (3.3, "reverse"),
+    ] {
+        let target = Metres::from_mm(mm);
+        bench.machine.move_to("x", target).unwrap();
+        let now: Time = bench.machine.now();
+        bench
+            .machine
+            .run_until(now + core::time::Duration::from_millis(50))
+            .unwrap();
+        let off = bench.true_position() - target;
+        assert!(
+            off.abs() <= Metres::from_um(1.0),
+            "{mm} mm ({seed}): {} µm off",
+            off.um()
+        );
+    }
+}
