@@ -351,6 +351,11 @@ pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::
     }
 }
 
+/// What an instrument's counter counts.
+pub(crate) fn half_wavelength(instrument: &InstrumentConfig) -> Metres {
+    Umd2Settings::default().vacuum_wavelength / (2.0 * f64::from(instrument.optics_factor))
+}
+
 /// Which corrections an instrument's readings get.
 pub(crate) fn correction_settings(instrument: &InstrumentConfig) -> length_correction::Settings {
     let material = MaterialExpansion {
