@@ -370,6 +370,11 @@ pub(crate) fn patient_search(usual: hall_zero::Settings, patience: u32) -> hall_
     }
 }
 
+/// What an instrument's counter counts.
+pub(crate) fn half_wavelength(instrument: &InstrumentConfig) -> Metres {
+    Umd2Settings::default().vacuum_wavelength / (2.0 * f64::from(instrument.optics_factor))
+}
+
 /// Which corrections an instrument's readings get.
 pub(crate) fn correction_settings(instrument: &InstrumentConfig) -> length_correction::Settings {
     let material = MaterialExpansion {

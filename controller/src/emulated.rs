@@ -218,6 +218,10 @@ fn no_port(name: &str, emulated: &EmulatedConfig) -> EmulatedError {
 }
 
 impl World for Emulated {
+    fn now(&self) -> Time {
+        self.simulation.borrow().now()
+    }
+
     fn next_event(&self) -> Time {
         self.simulation.borrow().next_event()
     }

@@ -44,6 +44,32 @@ pub enum Failure {
         /// The port's name in the configuration.
         port: String,
     },
+    /// Another master is on the bus.
+    #[error(
+        "{port}: {heard} was heard that this controller did not send: another master is on the \
+         bus; disconnect it, then start again"
+    )]
+    SecondMaster {
+        /// The port's name in the configuration.
+        port: String,
+        /// What only a master sends.
+        heard: &'static str,
+    },
+    /// Somebody takes the bus for himself, and what should have come did not.
+    #[error(
+        "{port}: identifier {cob_id:#05X} takes {percent:.0} % of the bus and leaves no room; \
+         find the device that sends it ({missing})"
+    )]
+    Babbling {
+        /// The port's name in the configuration.
+        port: String,
+        /// What is sent.
+        cob_id: u16,
+        /// Its share of the bus.
+        percent: f64,
+        /// What did not come or go.
+        missing: Box<Failure>,
+    },
     /// A device raised an alarm.
     #[error("{device}: {alarm}")]
     Alarm {
@@ -181,6 +207,46 @@ pub enum Failure {
         /// What it looks like.
         cause: &'static str,
     },
+    /// The interferometer's count slipped.
+    #[error(
+        "axis {axis}: run {run}, between {} and {} mm the interferometer jumped by {:.3} µm \
+         against the encoder, {half_wavelengths} half wavelengths: fringes were lost or gained; \
+         keep the beam free and steady, set a new datum and measure again",
+        from.mm(), to.mm(), jump.um()
+    )]
+    FringeJump {
+        /// Which axis.
+        axis: String,
+        /// By how much.
+        jump: Metres,
+        /// The same, counted.
+        half_wavelengths: i64,
+        /// In which run it was noticed.
+        run: u32,
+        /// The target before it.
+        from: Metres,
+        /// The target after it.
+        to: Metres,
+    },
+    /// With its calibration the axis is worse than without; it is not used any more.
+    #[error(
+        "axis {axis}: CALIBRATION {calibration} MAKES THE AXIS WORSE: systematic deviation \
+         {:.3} µm with it, {:.3} µm when it was made; its sign, axis or place is wrong. It was \
+         taken out of use; {}",
+        after.um(), before.um(), in_use_text(in_use.as_deref())
+    )]
+    MadeWorse {
+        /// Which axis.
+        axis: String,
+        /// The calibration, shortened.
+        calibration: String,
+        /// The systematic deviation that it should have taken away.
+        before: Metres,
+        /// What there is with it.
+        after: Metres,
+        /// The calibration that is used again.
+        in_use: Option<String>,
+    },
     /// The same place measured at the beginning and the end differs too much.
     #[error(
         "axis {axis}: closure error {:.3} µm, the limit is {:.3} µm; thermal drift or a loose \
@@ -256,7 +322,7 @@ pub enum Failure {
         limit: Metres,
     },
     /// Somebody asked to stop (Ctrl-C).
-    #[error("stopped on request; the axes were stopped and disabled")]
+    #[error("stopped on request")]
     Interrupted,
     /// The command line asks for something that is not there.
     #[error("{what}; {help}")]
@@ -269,6 +335,13 @@ pub enum Failure {
     /// The emulated machine cannot be brought up.
     #[error("emulated machine: {0}")]
     Emulator(#[from] EmulatedError),
+}
+
+fn in_use_text(in_use: Option<&str>) -> String {
+    in_use.map_or_else(
+        || "the axis has no calibration now".into(),
+        |id| format!("calibration {id}, used before, is in use again"),
+    )
 }
 
 fn link_text(state: LinkState) -> &'static str {
@@ -315,6 +388,9 @@ impl Failure {
             | Self::Send { .. }
             | Self::Link { .. }
             | Self::BusOff { .. }
+            | Self::SecondMaster { .. }
+            | Self::Babbling { .. }
+            | Self::FringeJump { .. }
             | Self::Alarm { .. }
             | Self::Device { .. }
             | Self::Overdue { .. }
@@ -327,6 +403,7 @@ impl Failure {
             | Self::Refine { .. }
             | Self::Closure { .. }
             | Self::Fit { .. }
+            | Self::MadeWorse { .. }
             | Self::OutOfTolerance { .. } => 5,
         }
     }

@@ -30,6 +30,7 @@
 
 pub mod assemble;
 pub mod bus_plan;
+mod bus_watch;
 pub mod config;
 pub mod cycle;
 pub mod emulated;
@@ -40,6 +41,7 @@ pub mod observer;
 mod outbox;
 pub mod ports;
 pub mod report;
+mod stopping;
 pub mod store;
 pub mod text;
 mod tick;

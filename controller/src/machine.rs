@@ -21,6 +21,7 @@ use drivers::transport::{Port, Transport};
 use units::{Metres, Time};
 
 use crate::assemble;
+use crate::bus_watch::BusWatch;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::cycle::RunPlan;
 use crate::failure::Failure;
@@ -93,6 +94,7 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
+    pub(crate) bus_watch: BusWatch,
     /// The instruments that were started, by name.
     pub(crate) started_instruments: BTreeSet<String>,
     /// The instrument whose readings a procedure needs now: only its alarms count.
@@ -112,6 +114,7 @@ impl Machine {
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
+            bus_watch: BusWatch::new(&config, &ports),
             memory: config
                 .axis
                 .keys()
@@ -290,20 +293,6 @@ impl Machine {
         axes.chain(analogs).chain(instruments).collect()
     }
 
-    /// Disables every axis in a controlled way and stops supervision and SYNC.
-    ///
-    /// # Errors
-    /// When an axis cannot be disabled; the others are tried all the same.
-    pub fn shut_down(&mut self) -> Result<(), Failure> {
-        let mut result = Ok(());
-        self.supervision = Supervision::Stopping;
-        for axis in self.axis_names() {
-            result = result.and(self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT));
-        }
-        self.supervision = Supervision::Off;
-        result.and(self.set_sync(false))
-    }
-
     /// Starts an instrument, unless it runs already (its datum stands then), and counts its
     /// alarms from now on.
     pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
@@ -316,46 +305,6 @@ impl Machine {
         }
         self.instrument_in_use = Some(name.to_owned());
         Ok(())
-    }
-
-    /// Runs `procedure`; when it fails, stops and disables every axis before the failure is
-    /// returned.
-    ///
-    /// # Errors
-    /// What `procedure` returns.
-    pub fn guarded<R>(
-        &mut self,
-        procedure: impl FnOnce(&mut Self) -> Result<R, Failure>,
-    ) -> Result<R, Failure> {
-        let result = procedure(self);
-        if result.is_err() {
-            self.make_safe();
-        }
-        result
-    }
-
-    /// Quick stop and disable on every axis that can still be reached. Never fails: it does
-    /// what can be done, and the drives' own watch on our heartbeat does the rest.
-    pub fn make_safe(&mut self) {
-        self.supervision = Supervision::Stopping;
-        self.outbox.clear();
-        let now = self.now();
-        for unit in &mut self.axes {
-            unit.device.command(now, AxisCommand::QuickStop);
-        }
-        for at in 0..self.axes.len() {
-            // A drive that is gone cannot confirm; the others must still be stopped.
-            let _ = self.await_outcome(at, "quick stop", STOP_LIMIT);
-        }
-        for axis in self.axis_names() {
-            let _ = self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT);
-        }
-        for memory in self.memory.values_mut() {
-            memory.approach.forget();
-        }
-        self.instrument_in_use = None;
-        let _ = self.set_sync(false);
-        self.supervision = Supervision::Off;
     }
 
     /// Gives `command` to `axis` and waits until it is done.
@@ -372,7 +321,7 @@ impl Machine {
         self.await_outcome(at, step, limit)
     }
 
-    fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
+    pub(crate) fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
         for (port, name) in &self.port_names {
             let Some(bus) = self.config.can.get(name) else {
                 continue;

@@ -26,6 +26,9 @@ impl Stage {
 pub trait Observer {
     /// `done` of `total` steps of `stage` on `axis` are done.
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64);
+
+    /// Something that a person should look after, although the machine goes on.
+    fn warning(&mut self, _text: &str) {}
 }
 
 /// Hears nothing.

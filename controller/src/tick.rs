@@ -6,7 +6,7 @@
 
 use drivers::device::Alarm;
 use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
-use drivers::wire::can::BusErrorClass;
+use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
 use units::Time;
 
 use crate::failure::Failure;
@@ -73,6 +73,7 @@ impl Machine {
         if self.supervision == Supervision::Stopping {
             return Ok(());
         }
+        self.bus_watch.observe(arrival)?;
         match arrival.input {
             Input::Link(state @ (LinkState::Down | LinkState::Gone)) => Err(Failure::Link {
                 port: self.port_name(arrival.port),
@@ -83,11 +84,33 @@ impl Machine {
                     port: self.port_name(arrival.port),
                 })
             }
-            Input::Link(LinkState::Up)
-            | Input::BusError(_)
-            | Input::Lost(_)
-            | Input::Payload(_) => Ok(()),
+            Input::BusError(error) => {
+                self.warn_of(arrival.port, error);
+                Ok(())
+            }
+            Input::Lost(frames) => {
+                let port = self.port_name(arrival.port);
+                let text =
+                    format!("{port}: {frames} received frames were lost; is the host overloaded?");
+                self.observer.warning(&text);
+                Ok(())
+            }
+            Input::Link(LinkState::Up) | Input::Payload(_) => Ok(()),
         }
+    }
+
+    /// A bus that gets worse goes on, but somebody should look at its cable.
+    fn warn_of(&mut self, port: Port, error: BusError) {
+        let passive = ControllerProblem::RX_PASSIVE | ControllerProblem::TX_PASSIVE;
+        let high = ControllerProblem::RX_WARNING | ControllerProblem::TX_WARNING;
+        let state = match error.controller {
+            it if it.intersects(passive) => "error-passive",
+            it if it.intersects(high) => "many errors",
+            _ => return,
+        };
+        let port = self.port_name(port);
+        let text = format!("{port}: {state}; check cable, termination and shield");
+        self.observer.warning(&text);
     }
 
     fn fire_deadlines(&mut self, now: Time) {
@@ -174,7 +197,11 @@ impl Machine {
 
     /// A drive that was reset has lost its origin, whoever is listening.
     fn forget_reference(&mut self, at: usize, alarm: &Alarm) {
-        if !matches!(alarm, Alarm::UnexpectedBootUp { .. }) || at >= self.axes.len() {
+        let lost = matches!(
+            alarm,
+            Alarm::UnexpectedBootUp { .. } | Alarm::DuplicateNode { .. }
+        );
+        if !lost || at >= self.axes.len() {
             return;
         }
         let name = self.axes[at].name.clone();

@@ -51,6 +51,15 @@ impl Observer for Bars {
             bar.finish_and_clear();
         }
     }
+
+    fn warning(&mut self, text: &str) {
+        match &self.current {
+            Some((_, bar)) if !bar.is_finished() => {
+                bar.suspend(|| eprintln!("warning: {text}"));
+            }
+            _ => eprintln!("warning: {text}"),
+        }
+    }
 }
 
 impl Drop for Bars {

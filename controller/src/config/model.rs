@@ -181,6 +181,13 @@ pub struct InstrumentConfig {
     pub correct_cosine: bool,
     pub misalignment_mrad: f64,
     pub instrument_standard_uncertainty_nm: f64,
+    #[serde(default = "half_an_hour")]
+    pub environment_frozen_s: f64,
+}
+
+/// The last digit of a good sensor moves with the air of a good hall.
+const fn half_an_hour() -> f64 {
+    1800.0
 }
 
 /// The drift-free zero (system S5).

@@ -65,6 +65,8 @@ impl Machine {
             });
         }
         let plan = run_plan(&config);
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", axis, &plan, None);
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
         let measuring = MeasureOptions {

@@ -2,11 +2,12 @@
 
 use core::time::Duration;
 
-use compensator::length_correction::LengthCorrection;
+use compensator::length_correction::{EnvironmentWatch, LengthCorrection};
 use compensator::measurement::{LinearSeries, Measurement};
 use drivers::device::{DisplacementReading, Environment};
 use units::{Approach, Metres};
 
+use super::cross_check::{CrossCheck, Plausible, judge_scale};
 use super::travel::Correction;
 use crate::assemble;
 use crate::failure::Failure;
@@ -102,7 +103,15 @@ struct Session<'a> {
     correction_of_length: LengthCorrection,
     journal: &'a mut Journal,
     counter: Counter,
+    check: CrossCheck,
+    watch: EnvironmentWatch,
 }
+
+/// Values that the instrument's sensors sent are never older than this.
+const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
+/// What a stage can do at most where the configuration says nothing.
+const SLOPE_MAX: f64 = 0.01;
+const STEP_MAX: Metres = Metres(5e-6);
 
 impl Machine {
     /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
@@ -126,7 +135,7 @@ impl Machine {
         let mut points = whole_runs(earlier, per_run);
         // A run that was whole but wrong ended the measurement that is continued here.
         for run in points.chunk_by(|a, b| a.run == b.run) {
-            judge_scale(axis, plan, run)?;
+            judge_scale(axis, plan.scale_limit_ppm, run)?;
         }
         self.use_instrument(&plan.instrument)?;
         let correction_of_length = self.set_datum(axis, plan)?;
@@ -148,12 +157,17 @@ impl Machine {
             correction_of_length,
             journal,
             counter,
+            check: CrossCheck::new(axis, self.plausible(axis, plan)?),
+            watch: self.environment_watch(plan),
         };
         let first = points.last().map_or(1, |point| point.run + 1);
         for run in first..=plan.runs {
-            points.extend(self.measure_run(&mut session, run)?);
+            let measured = self.measure_run(&mut session, run)?;
+            let before = points.len().saturating_sub(per_run);
+            session.check.compare(&points[before..], &measured)?;
+            points.extend(measured);
         }
-        let closure = self.measure_closure(&session)?;
+        let closure = self.measure_closure(&mut session)?;
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
         self.instrument_in_use = None;
@@ -181,7 +195,7 @@ impl Machine {
         for target in plan.targets.iter().rev() {
             points.push(self.measure_point(session, run, Approach::Reverse, *target)?);
         }
-        judge_scale(session.axis, plan, &points)?;
+        judge_scale(session.axis, plan.scale_limit_ppm, &points)?;
         Ok(points)
     }
 
@@ -195,7 +209,7 @@ impl Machine {
         let axis = session.axis;
         let set_point = self.travel(axis, target, session.correction)?;
         let reading = self.read_displacement(session.axis, session.plan)?;
-        let environment = self.instrument_environment(&session.plan.instrument);
+        let environment = self.watched_environment(session)?;
         let measured = self.correct(
             session.plan,
             &reading,
@@ -217,6 +231,7 @@ impl Machine {
             at_s: reading.at.seconds(),
             environment: EnvironmentRecord::from(&environment),
         };
+        session.check.take(&point)?;
         session.journal.write(&Entry::Point(point))?;
         session.counter.done += 1;
         let Counter { stage, done, total } = session.counter;
@@ -270,16 +285,46 @@ impl Machine {
         Ok(())
     }
 
-    fn measure_closure(&mut self, session: &Session<'_>) -> Result<Metres, Failure> {
+    fn measure_closure(&mut self, session: &mut Session<'_>) -> Result<Metres, Failure> {
         self.go_to_datum(session.axis, session.plan)?;
         let reading = self.read_displacement(session.axis, session.plan)?;
-        let environment = self.instrument_environment(&session.plan.instrument);
+        let environment = self.watched_environment(session)?;
         self.correct(
             session.plan,
             &reading,
             &environment,
             &session.correction_of_length,
         )
+    }
+
+    /// What a stage like this can do from one point to the next.
+    fn plausible(&self, axis: &str, plan: &RunPlan) -> Result<Plausible, Failure> {
+        let limits = self.axis_config(axis)?.compensation.as_ref();
+        Ok(Plausible {
+            slope: limits.map_or(SLOPE_MAX, |it| it.slope_limit),
+            step: limits.map_or(STEP_MAX, |it| Metres::from_um(it.jump_limit_um)),
+            half_wavelength: assemble::half_wavelength(&self.config.instrument[&plan.instrument]),
+        })
+    }
+
+    fn environment_watch(&self, plan: &RunPlan) -> EnvironmentWatch {
+        let config = &self.config.instrument[&plan.instrument];
+        let frozen = Duration::from_secs_f64(config.environment_frozen_s);
+        EnvironmentWatch::new(frozen, ENVIRONMENT_STALE)
+    }
+
+    /// The environment, as long as its sensors can be believed.
+    fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
+        let instrument = &session.plan.instrument;
+        let environment = self.instrument_environment(instrument);
+        let reading = assemble::correction_environment(&environment);
+        match session.watch.observe(self.now(), reading) {
+            Ok(()) => Ok(environment),
+            Err(source) => Err(Failure::Correction {
+                instrument: instrument.clone(),
+                source,
+            }),
+        }
     }
 
     /// Lets the stage stand, then averages.
@@ -337,39 +382,6 @@ fn whole_runs(points: &[PointEntry], per_run: usize) -> Vec<PointEntry> {
         .filter(|point| count(point.run) == per_run)
         .copied()
         .collect()
-}
-
-/// Judges instrument against encoder over the longest travel of a run (fault class 31).
-fn judge_scale(axis: &str, plan: &RunPlan, points: &[PointEntry]) -> Result<(), Failure> {
-    let by_encoder = |a: &&PointEntry, b: &&PointEntry| a.encoder_m.total_cmp(&b.encoder_m);
-    let lowest = points.iter().min_by(by_encoder).expect("a run has points");
-    let highest = points.iter().max_by(by_encoder).expect("a run has points");
-    let travel = highest.encoder_m - lowest.encoder_m;
-    let ratio = (highest.measured_m - lowest.measured_m) / travel;
-    let ppm = (ratio - 1.0) * 1e6;
-    if ppm.abs() <= plan.scale_limit_ppm {
-        return Ok(());
-    }
-    Err(Failure::ScaleMismatch {
-        axis: axis.to_owned(),
-        travel: Metres(travel),
-        ppm,
-        limit_ppm: plan.scale_limit_ppm,
-        cause: likely_cause(ratio),
-    })
-}
-
-fn likely_cause(ratio: f64) -> &'static str {
-    let near = |value: f64| (ratio / value - 1.0).abs() < 0.02;
-    match ratio {
-        _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument",
-        _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor`",
-        _ if near(4.0) || near(0.25) => "a factor of four: check `optics_factor`",
-        _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres",
-        _ if near(1e3) || near(1e-3) => "a factor of 1000: check the units of `resolution_nm`",
-        _ if ratio.abs() < 0.02 => "the instrument does not follow: reflector on the stage?",
-        _ => "check `resolution_nm`, the optics and the alignment",
-    }
 }
 
 fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {

@@ -3,6 +3,7 @@
 //! [`Machine`]: crate::machine::Machine
 
 mod calibrate;
+mod cross_check;
 mod measure;
 mod scan;
 mod travel;

@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use compensator::error_table::ErrorTable;
 use compensator::iso230::{self, Figures};
 use units::Metres;
 
@@ -12,7 +13,7 @@ use crate::config::VerifyConfig;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::Store;
+use crate::store::{Store, short};
 
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
 const SCALE_LIMIT_PPM: f64 = 1000.0;
@@ -50,7 +51,8 @@ impl Verified {
 
 impl Machine {
     /// Measures `axis` at the configuration's verification targets and evaluates ISO 230-2.
-    /// Being out of tolerance is a result here, not an error.
+    /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
+    /// than without the calibration is one, and takes the calibration out of use.
     ///
     /// # Errors
     /// When the axis is not zeroed or anything stops the machine.
@@ -74,6 +76,8 @@ impl Machine {
             });
         }
         let plan = run_plan(&config);
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
         let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
         let measuring = MeasureOptions {
@@ -83,13 +87,79 @@ impl Machine {
         let measured = self
             .measure_runs(axis, &plan, measuring, &mut journal, &earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
-        Ok(Verified {
+        let verified = Verified {
             figures: iso230::evaluate(&measured.series()?)?,
             journal: journal.path().to_owned(),
             measured,
             tolerance: Metres::from_um(config.accuracy_tolerance_um),
+        };
+        if options.compensated {
+            self.judge_benefit(axis, store, &verified, options.calibration.as_deref())
+                .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        }
+        Ok(verified)
+    }
+
+    /// A calibration that is out of tolerance and makes the axis worse than it was found is
+    /// taken out of use (fault class 48: sign, axis or index exchanged).
+    fn judge_benefit(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        verified: &Verified,
+        calibration: Option<&str>,
+    ) -> Result<(), Failure> {
+        let Some(compensation) = self.compensation(axis) else {
+            return Ok(());
+        };
+        let before = systematic_deviation(compensation.table());
+        let after = verified.figures.systematic_deviation.bidirectional;
+        if verified.is_within_tolerance() || after <= before {
+            return Ok(());
+        }
+        let in_use = self.fall_back(axis, store, calibration)?;
+        Err(Failure::MadeWorse {
+            axis: axis.to_owned(),
+            calibration: calibration.map_or_else(|| "in use".to_owned(), short),
+            before,
+            after,
+            in_use: in_use.as_deref().map(short),
         })
     }
+
+    /// Goes back to the newest calibration before `calibration` that fits this machine, or to
+    /// none.
+    fn fall_back(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        calibration: Option<&str>,
+    ) -> Result<Option<String>, Failure> {
+        self.set_compensation(axis, None)?;
+        // One that is not the active one is only forgotten here.
+        if calibration.is_none() || store.active(axis)?.current.as_deref() != calibration {
+            return Ok(None);
+        }
+        while store.retire(axis)?.is_some() {
+            if let Ok(loaded) = self.load_active(axis, store) {
+                return Ok(loaded);
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The range of the deviations that a table takes away, both approaches together.
+fn systematic_deviation(table: &ErrorTable) -> Metres {
+    let deviations = || {
+        let nodes = table.nodes().iter();
+        nodes
+            .flat_map(|node| [node.forward, node.reverse])
+            .flatten()
+    };
+    let largest = deviations().fold(Metres(f64::NEG_INFINITY), Metres::max);
+    let smallest = deviations().fold(Metres(f64::INFINITY), Metres::min);
+    largest - smallest
 }
 
 fn run_plan(config: &VerifyConfig) -> RunPlan {

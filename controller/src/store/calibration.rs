@@ -388,6 +388,21 @@ impl Store {
         Ok(earlier)
     }
 
+    /// Takes the calibration of `axis` out of use: the one before is used again, or none.
+    /// Returns its name. What cannot be loaded is passed over.
+    ///
+    /// # Errors
+    /// When the pointer cannot be read or written.
+    pub fn retire(&self, axis: &str) -> Result<Option<String>, StoreError> {
+        let mut pointer = self.active(axis)?;
+        pointer.current = None;
+        while let (None, Some(earlier)) = (&pointer.current, pointer.history.pop()) {
+            pointer.current = Some(earlier).filter(|id| self.load(id).is_ok());
+        }
+        self.write_pointer(axis, &pointer)?;
+        Ok(pointer.current)
+    }
+
     /// Writes a page for people.
     ///
     /// # Errors

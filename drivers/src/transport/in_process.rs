@@ -11,6 +11,11 @@ use crate::wire::canopen::sync::emit_sync;
 
 /// What is at the other end of the ports: emulated devices and their machine.
 pub trait World {
+    /// The world's present time. Ahead of the host's when the host was held up.
+    fn now(&self) -> Time {
+        Time::ZERO
+    }
+
     /// When something happens by itself next; [`Time::NEVER`] for never.
     fn next_event(&self) -> Time;
 
@@ -74,13 +79,16 @@ impl<W: World> InProcess<W> {
         next.unwrap_or(Time::NEVER)
     }
 
-    /// Sends the SYNCs that are due. The host does not hear its own.
+    /// Sends the SYNCs that are due; those that a held-up host missed are left out. The host
+    /// does not hear its own.
     fn send_due_syncs(&mut self) {
         for (port, sync) in &mut self.syncs {
             while sync.next <= self.now {
                 let frame = Payload::Frame(emit_sync(None));
-                // A SYNC that the port cannot take is lost, as on a real bus.
-                let _ = self.world.deliver(sync.next, *port, &frame);
+                if self.now.since(sync.next) < sync.period {
+                    // A SYNC that the port cannot take is lost, as on a real bus.
+                    let _ = self.world.deliver(sync.next, *port, &frame);
+                }
                 sync.next += sync.period;
             }
         }
@@ -89,7 +97,7 @@ impl<W: World> InProcess<W> {
 
 impl<W: World> Transport for InProcess<W> {
     fn now(&self) -> Time {
-        self.now
+        self.now.max(self.world.now())
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
@@ -100,6 +108,7 @@ impl<W: World> Transport for InProcess<W> {
     /// When the world asks for the same moment without end.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
         let mut rounds = 0;
+        self.now = self.now.max(self.world.now());
         loop {
             if let Some(arrival) = self.world.collect() {
                 return Some(arrival);

@@ -324,6 +324,12 @@ fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &
         0.0,
         100.0,
     );
+    judge.within(
+        "environment_frozen_s",
+        instrument.environment_frozen_s,
+        1.0,
+        1e6,
+    );
     let uncertainty = instrument.instrument_standard_uncertainty_nm;
     judge.within("instrument_standard_uncertainty_nm", uncertainty, 0.0, 1e6);
 }

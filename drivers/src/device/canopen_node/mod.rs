@@ -7,6 +7,7 @@
 mod error;
 mod identity;
 mod settings;
+mod twins;
 mod vigil;
 
 use core::time::Duration;
@@ -71,6 +72,10 @@ enum Phase {
         since: Time,
     },
     Up,
+    /// It booted by itself; process data that come all the same are another device's.
+    Rebooted {
+        since: Time,
+    },
 }
 
 /// The common part of a CANopen device.
@@ -79,6 +84,7 @@ pub(super) struct CanopenNode {
     settings: NodeSettings,
     profile: u16,
     client: SdoClient,
+    twins: twins::Twins,
     consumer: HeartbeatConsumer,
     phase: Phase,
     description: Vec<Step>,
@@ -99,6 +105,7 @@ impl CanopenNode {
         Self {
             client: SdoClient::new(settings.node, sdo).with_retry(settings.retry),
             consumer: HeartbeatConsumer::new(settings.node, settings.consumer_time),
+            twins: twins::Twins::new(settings.node),
             settings,
             profile,
             phase: Phase::Off,
@@ -165,6 +172,7 @@ impl CanopenNode {
         self.identity = None;
         self.pdo_silent = false;
         self.consumer.rest();
+        self.twins.forget();
         self.description = description;
         self.phase = Phase::Probing { since: now };
         self.probe(now);
@@ -242,6 +250,7 @@ impl CanopenNode {
             }
             Phase::Operational { since } => since + self.settings.timeouts.operational,
             Phase::Up if !self.pdo_silent => self.pdo_deadline(),
+            Phase::Rebooted { since } => self.reboot_deadline(since),
             Phase::Up | Phase::Off | Phase::Describing | Phase::Described | Phase::Configuring => {
                 Time::NEVER
             }
@@ -257,10 +266,19 @@ impl CanopenNode {
         self.last_pdo + settings.sync_period * settings.missed_pdos_max + settings.sync_period / 2
     }
 
+    /// When process data of a twin must have come: after the next SYNC.
+    fn reboot_deadline(&self, since: Time) -> Time {
+        since + self.settings.sync_period * 3 / 2
+    }
+
     pub(super) fn handle(&mut self, now: Time, input: &Input) {
         let Input::Payload(Payload::Frame(frame)) = input else {
             return;
         };
+        if self.twins.contradicts(frame) {
+            let node = self.settings.node;
+            self.end_by(now, Alarm::DuplicateNode { node });
+        }
         if let Some(event) = self.consumer.handle_frame(now, frame) {
             self.take_heartbeat(now, event);
         } else if self.client.handle_frame(now, frame) {
@@ -274,6 +292,7 @@ impl CanopenNode {
             if number == 1 {
                 self.last_pdo = now;
                 self.pdo_silent = false;
+                self.take_pdo_of_twin();
             }
             let frame = *frame;
             self.events.push_back(NodeEvent::Pdo { number, frame });
@@ -326,6 +345,11 @@ impl CanopenNode {
                 let waited = now.since(self.last_pdo);
                 self.events.push_back(NodeEvent::PdoSilent { waited });
             }
+            Phase::Rebooted { since } if now >= self.reboot_deadline(since) => {
+                self.phase = Phase::Off;
+                let node = self.settings.node;
+                self.alarm(Alarm::UnexpectedBootUp { node });
+            }
             Phase::Off
             | Phase::Probing { .. }
             | Phase::Describing
@@ -333,6 +357,7 @@ impl CanopenNode {
             | Phase::Configuring
             | Phase::Starting { .. }
             | Phase::Operational { .. }
+            | Phase::Rebooted { .. }
             | Phase::Up => {}
         }
     }
@@ -391,6 +416,7 @@ impl CanopenNode {
             | Phase::Described
             | Phase::Starting { .. }
             | Phase::Operational { .. }
+            | Phase::Rebooted { .. }
             | Phase::Up => self.events.push_back(NodeEvent::ScriptDone(script)),
         }
     }

@@ -34,28 +34,33 @@ impl CanopenNode {
         self.client.server_restarted();
         self.script = None;
         match self.phase {
-            Phase::Off => {}
+            Phase::Off | Phase::Rebooted { .. } => {}
             Phase::Probing { .. } => self.probe(now),
+            Phase::Up => self.phase = Phase::Rebooted { since: now },
             Phase::Describing
             | Phase::Described
             | Phase::Configuring
             | Phase::Starting { .. }
-            | Phase::Operational { .. }
-            | Phase::Up => {
-                let was_up = self.is_up();
+            | Phase::Operational { .. } => {
                 let node = self.settings.node;
                 self.end_by(now, Alarm::UnexpectedBootUp { node });
-                if was_up {
-                    self.phase = Phase::Off;
-                }
             }
         }
     }
 
+    /// Process data after a boot-up: the one that sends them did not boot.
+    pub(super) fn take_pdo_of_twin(&mut self) {
+        if let Phase::Rebooted { .. } = self.phase {
+            self.phase = Phase::Up;
+            let node = self.settings.node;
+            self.alarm(Alarm::DuplicateNode { node });
+        }
+    }
+
     /// An alarm that ends a start, or is told when the node is up.
-    fn end_by(&mut self, now: Time, alarm: Alarm) {
+    pub(super) fn end_by(&mut self, now: Time, alarm: Alarm) {
         match self.phase {
-            Phase::Off | Phase::Probing { .. } => {}
+            Phase::Off | Phase::Probing { .. } | Phase::Rebooted { .. } => {}
             Phase::Up => self.alarm(alarm),
             Phase::Describing
             | Phase::Described
@@ -85,7 +90,7 @@ impl CanopenNode {
         }
     }
 
-    fn alarm(&mut self, alarm: Alarm) {
+    pub(super) fn alarm(&mut self, alarm: Alarm) {
         self.events.push_back(NodeEvent::Alarm(alarm));
     }
 }

@@ -15,6 +15,7 @@
 //! Absent: cyclic synchronous modes, interpolated position, touch probe, torque.
 
 mod convert;
+mod course;
 mod homing;
 mod image;
 mod motion;
@@ -96,6 +97,8 @@ pub struct Cia402Drive {
     first: Option<Sample>,
     /// The state the drive was brought to and must keep.
     kept: Option<PowerState>,
+    /// Where the motion under way began.
+    course: Option<course::Course>,
     /// Alarms that were told and whose cause lasts.
     told_state: bool,
     told_following: bool,
@@ -132,6 +135,7 @@ impl Cia402Drive {
             homed: false,
             first: None,
             kept: None,
+            course: None,
             told_state: false,
             told_following: false,
             told_short: false,
@@ -179,6 +183,7 @@ impl Cia402Drive {
         self.activity = Activity::Idle;
         self.repeat_at = Time::NEVER;
         self.image.allow_jumps(false);
+        self.course = None;
         self.outcome = Some(result);
     }
 
@@ -283,6 +288,7 @@ impl Cia402Drive {
         self.outcome = None;
         self.repeat_at = Time::NEVER;
         self.image.allow_jumps(false);
+        self.course = None;
         if matches!(self.activity, Activity::Starting) {
             self.node.give_up(now);
         } else {

@@ -6,7 +6,7 @@
 //! window: the bit may still be set from the move before.
 
 use core::time::Duration;
-use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+use units::{Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 
 use super::convert::{acceleration_counts, counts_i32, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
@@ -44,6 +44,10 @@ pub(super) struct Move {
 impl Move {
     pub(super) const fn deadline(&self) -> Time {
         self.deadline
+    }
+
+    pub(super) const fn target(&self) -> Counts {
+        Counts(self.target as i64)
     }
 
     const fn awaited(&self) -> &'static str {

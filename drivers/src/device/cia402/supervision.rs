@@ -14,7 +14,7 @@ const COMPARING: &str = "comparing process data with the object it carries";
 
 impl Cia402Drive {
     pub(super) fn take_alarm(&mut self, alarm: Alarm) {
-        if let Alarm::UnexpectedBootUp { .. } = alarm {
+        if let Alarm::UnexpectedBootUp { .. } | Alarm::DuplicateNode { .. } = alarm {
             // Everything volatile is gone: reference, profile, state.
             self.homed = false;
             self.reached = None;
@@ -141,6 +141,7 @@ impl Cia402Drive {
         let lagging = sample.mode == OperationMode::ProfilePosition
             && seen == PowerState::OperationEnabled
             && sample.status.contains(Statusword::MODE_13);
+        self.watch_course(lagging);
         if lagging && !self.told_following {
             self.alarm(Alarm::FollowingError { node });
         }

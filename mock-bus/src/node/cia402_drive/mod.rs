@@ -34,7 +34,7 @@ use drivers::wire::can::CanFrame;
 use drivers::wire::canopen::NodeId;
 use drivers::wire::canopen::emcy::EmergencyCode;
 use drivers::wire::canopen::nmt::NmtState;
-use drivers::wire::cia402::{Controlword, HomingStatus};
+use drivers::wire::cia402::{Controlword, HomingStatus, PowerState};
 use units::Time;
 
 pub(in crate::node) use config::checked_node_id;
@@ -100,6 +100,11 @@ impl Cia402DriveNode {
     /// How the drive itself misbehaves.
     pub fn quirks_mut(&mut self) -> &mut DriveQuirks {
         &mut self.drive.config.quirks
+    }
+
+    /// The drive's state as it is, whatever its statusword says: for judges only.
+    pub const fn power_state(&self) -> PowerState {
+        self.drive.power.wire()
     }
 
     /// Which faults were delivered, and how often.
@@ -254,6 +259,7 @@ impl Drive {
 
     fn power_off(&mut self, m: &mut impl Mechanism) {
         self.switch_off(m);
+        self.power = Power::NotReady;
         m.encoder_power(false);
         self.server.power_off();
     }

@@ -1,0 +1,105 @@
+//! What a device says unasked when something is wrong.
+
+use core::time::Duration;
+use units::Metres;
+
+use crate::wire::canopen::NodeId;
+use crate::wire::canopen::emcy::Emergency;
+use crate::wire::canopen::nmt::NmtState;
+use crate::wire::cia402::PowerState;
+
+/// Something that must stop the machine, or at least be told.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[expect(
+    missing_docs,
+    reason = "fields are named by what they are: node, waited, state, limit"
+)]
+pub enum Alarm {
+    /// No heartbeat for the consumer time.
+    #[error("{node}: no heartbeat for {waited:?}; power, cable or drive lost")]
+    HeartbeatLost { node: NodeId, waited: Duration },
+    /// The node booted by itself: it was reset or lost power, its reference is gone.
+    #[error("{node}: booted by itself; it lost power or was reset, zero again")]
+    UnexpectedBootUp { node: NodeId },
+    /// A second device with this node identifier is on the bus.
+    #[error(
+        "{node}: a second device with this node number is on the bus; give one of them another \
+         (LSS or its switches)"
+    )]
+    DuplicateNode { node: NodeId },
+    /// The node left operational.
+    #[error("{node}: left operational, is {state}")]
+    UnexpectedNmtState { node: NodeId, state: NmtState },
+    /// An emergency message that reports an error.
+    #[error("{node}: emergency {}, error register {:#04X}", emergency.code, emergency.register)]
+    Emergency { node: NodeId, emergency: Emergency },
+    /// The node's synchronous PDO did not come for `missed` SYNCs.
+    #[error("{node}: process data missing for {missed} SYNC periods")]
+    PdoLost { node: NodeId, missed: u32 },
+    /// A PDO was shorter than its mapping.
+    #[error("{node}: process data of {seen} bytes, mapped {expected}")]
+    PdoTooShort {
+        node: NodeId,
+        expected: usize,
+        seen: usize,
+    },
+    /// The drive left the state it was told to keep.
+    #[error("{node}: drive is in {seen}, should be in {expected}")]
+    DriveState {
+        node: NodeId,
+        expected: PowerState,
+        seen: PowerState,
+    },
+    /// The drive says its following error left the window.
+    #[error("{node}: following error outside its window; blocked or overloaded?")]
+    FollowingError { node: NodeId },
+    /// The axis goes the other way than its drive wants it to.
+    #[error(
+        "{node}: the axis runs in the wrong direction: wanted {:+.3} mm, went {:+.3} mm; motor \
+         phases, encoder or polarity exchanged?", wanted.mm(), moved.mm()
+    )]
+    WrongDirection {
+        node: NodeId,
+        wanted: Metres,
+        moved: Metres,
+    },
+    /// An implausible jump of a position.
+    #[error(
+        "{node}: position jumped by {:.3} mm, possible are {:.3} mm", jump.mm(), limit.mm()
+    )]
+    PositionJump {
+        node: NodeId,
+        jump: Metres,
+        limit: Metres,
+    },
+    /// The interferometer's measurement beam is blocked.
+    #[error("interferometer: beam lost; clear and align it, set a new datum")]
+    BeamLost,
+    /// So many samples had no valid phase: there is light, but too little of it.
+    #[error(
+        "interferometer: beam too weak, {samples} samples without a valid phase; align it, clean \
+         the optics"
+    )]
+    BeamWeak { samples: u64 },
+    /// The interferometer's laser head gives no reference.
+    #[error("interferometer: no reference from the laser head")]
+    LaserLost,
+    /// The stage moved faster than the interferometer can count.
+    #[error("interferometer: too fast to count; slow down")]
+    SlewError,
+    /// Samples are missing from the interferometer's stream.
+    #[error("interferometer: {lost} samples missing")]
+    SamplesLost { lost: u64 },
+    /// The interferometer began to count anew: it was reset or lost power.
+    #[error("interferometer: was reset; set a new datum")]
+    CountRestarted,
+    /// The stream ended.
+    #[error("interferometer: no sample for {waited:?}; cable or power?")]
+    StreamSilent { waited: Duration },
+    /// Lines that are not understood came in a row: wrong baud rate?
+    #[error("{lines} lines in a row not understood; wrong baud rate?")]
+    Garbage { lines: u64 },
+    /// An analog channel's sample is too old.
+    #[error("analog input: no sample for {waited:?}")]
+    StaleSample { waited: Duration },
+}

@@ -1,0 +1,380 @@
+//! The interferometer and its sensors (classes 25 to 27, 31, 33, 34): a reading that is not one
+//! is never recorded, and a run that cannot be believed is not saved.
+
+use std::time::Duration;
+
+use compensator::error_table::FitError;
+use compensator::length_correction::EnvironmentError;
+use drivers::device::Alarm;
+use mock_bus::fault::{Fault, FaultConfig};
+use truestage::Failure;
+use truestage::store::read_journal;
+
+use crate::scene::{Phase, Played, STOPPING, Scene, Wanted, check, check_harmless};
+
+/// In the middle of the first run of a calibration.
+const MIDST_MS: u64 = 2500;
+/// The longest that one point takes.
+const POINT: Duration = Duration::from_secs(1);
+/// The longest that a whole calibration takes.
+const WHOLE: Duration = Duration::from_secs(120);
+
+fn measuring() -> Scene {
+    Scene::during(Phase::Calibrate).after_ms(MIDST_MS)
+}
+
+/// Points were recorded before the fault and none after it; no calibration came of it.
+#[track_caller]
+fn check_nothing_recorded(played: &Played) {
+    let store = &played.bench.store;
+    let path = store.newest_run("calibrate", "x").unwrap().unwrap();
+    let read = read_journal(&path).unwrap();
+    assert!(!read.complete);
+    assert!(
+        !read.points.is_empty(),
+        "the fault came before the first point"
+    );
+    for point in &read.points {
+        assert!(
+            point.at_s <= played.due.seconds() + 1e-3,
+            "recorded after the fault: {point:?}"
+        );
+        assert!(point.measured_m.is_finite() && point.encoder_m.is_finite());
+    }
+    assert_eq!(store.active("x").unwrap().current, None);
+    assert!(played.bench.machine.compensation("x").is_none());
+}
+
+#[test]
+fn a_beam_that_is_interrupted_stops_the_run_and_no_point_is_made_up() {
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Alarm {
+                    alarm: Alarm::BeamLost,
+                    ..
+                }
+            )
+        },
+        words: &["laser:", "beam lost"],
+        within: Duration::from_millis(20),
+        rest: Duration::from_millis(20) + STOPPING,
+    };
+    let played = check(measuring().fault(Fault::BeamBlocked), &wanted);
+    check_nothing_recorded(&played);
+    let moment = FaultConfig::lasting(Fault::BeamBlocked, Duration::from_millis(30));
+    check_nothing_recorded(&check(measuring().inject(moment), &wanted));
+}
+
+#[test]
+fn a_beam_that_is_too_weak_is_named_and_no_point_is_made_up() {
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Alarm {
+                    alarm: Alarm::BeamWeak { .. },
+                    ..
+                }
+            )
+        },
+        words: &["laser:", "beam too weak"],
+        within: POINT,
+        rest: POINT + STOPPING,
+    };
+    check_nothing_recorded(&check(measuring().fault(Fault::BeamWeak), &wanted));
+}
+
+#[test]
+fn the_stream_that_ends_stops_the_run() {
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Alarm {
+                    alarm: Alarm::StreamSilent { .. },
+                    ..
+                }
+            )
+        },
+        words: &["laser:", "no sample"],
+        within: Duration::from_millis(120),
+        rest: Duration::from_millis(120) + STOPPING,
+    };
+    let mute = Fault::Mute {
+        node: "interferometer".into(),
+    };
+    check_nothing_recorded(&check(measuring().fault(mute), &wanted));
+    let unplugged = Wanted {
+        cause: |failure| matches!(failure, Failure::Link { .. }),
+        words: &["laser:", "ENODEV"],
+        within: Duration::from_millis(5),
+        rest: Duration::from_millis(5) + STOPPING,
+    };
+    let gone = Fault::LinkGone {
+        port: "laser".into(),
+    };
+    check_nothing_recorded(&check(measuring().fault(gone), &unplugged));
+}
+
+#[test]
+fn an_interferometer_that_restarts_has_no_datum_any_more() {
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Alarm {
+                    alarm: Alarm::CountRestarted | Alarm::StreamSilent { .. },
+                    ..
+                }
+            )
+        },
+        words: &["laser:"],
+        within: Duration::from_secs(1),
+        rest: Duration::from_secs(1) + STOPPING,
+    };
+    let fault = FaultConfig::lasting(
+        Fault::PowerLoss {
+            node: "interferometer".into(),
+        },
+        Duration::from_millis(10),
+    );
+    let scene = measuring().inject(fault);
+    check_nothing_recorded(&check(scene, &wanted));
+}
+
+#[track_caller]
+fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) {
+    let fault = Fault::FringeJump { half_wavelengths };
+    let scene = Scene::during(Phase::Calibrate)
+        .after_ms(after_ms)
+        .seed(seed)
+        .fault(fault);
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::FringeJump { .. }),
+        words: &["axis x", "half wavelengths", "fringes"],
+        within: WHOLE,
+        rest: WHOLE,
+    };
+    let played = check(scene, &wanted);
+    let Err(Failure::FringeJump {
+        half_wavelengths: seen,
+        ..
+    }) = &played.result
+    else {
+        unreachable!("checked above")
+    };
+    // The stage's own deviation from point to point blurs a large jump by some counts.
+    let blur = if half_wavelengths.abs() > 50 { 30 } else { 0 };
+    assert!(
+        (seen - half_wavelengths).abs() <= blur,
+        "{seen} instead of {half_wavelengths}"
+    );
+    assert_eq!(played.bench.store.active("x").unwrap().current, None);
+}
+
+#[test]
+fn a_fringe_count_that_slips_is_recognised_by_the_encoder() {
+    for seed in 1..=3 {
+        check_jump(1, 4000, seed);
+        check_jump(-2, 2500, seed);
+        check_jump(3, 5500, seed);
+        check_jump(-1, 10_000, seed);
+    }
+}
+
+#[test]
+fn a_fringe_count_that_slips_far_stops_the_run_at_once() {
+    check_jump(2000, MIDST_MS, 1);
+    check_jump(-700, MIDST_MS, 2);
+    let fault = Fault::FringeJump {
+        half_wavelengths: 5000,
+    };
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::FringeJump { run: 1, .. }),
+        words: &["half wavelengths"],
+        within: POINT,
+        rest: POINT + STOPPING,
+    };
+    check_nothing_recorded(&check(measuring().fault(fault), &wanted));
+}
+
+#[track_caller]
+fn check_scale(from: &'static str, to: &'static str, word: &str) {
+    let scene = Scene::during(Phase::Calibrate).machine(from, to);
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::ScaleMismatch { .. }),
+        words: &["axis x", "differs from the encoder", word],
+        within: WHOLE,
+        rest: WHOLE,
+    };
+    let played = check(scene, &wanted);
+    assert_eq!(played.bench.store.active("x").unwrap().current, None);
+}
+
+#[test]
+fn an_instrument_that_counts_the_other_way_is_refused() {
+    check_scale("reverse = false", "reverse = true", "the sign is turned");
+}
+
+#[test]
+fn an_instrument_with_the_wrong_optics_factor_is_refused() {
+    check_scale(
+        "optics_factor = 1 ",
+        "optics_factor = 2 ",
+        "a factor of two",
+    );
+    check_scale(
+        "optics_factor = 1 ",
+        "optics_factor = 4 ",
+        "a factor of four",
+    );
+}
+
+#[test]
+fn a_small_error_of_scale_is_refused_after_the_first_run() {
+    // As if the beam ran 60 mrad beside the travel: 1800 ppm.
+    check_scale(
+        "correct_cosine = false\nmisalignment_mrad = 0.0",
+        "correct_cosine = true\nmisalignment_mrad = 60.0",
+        "alignment",
+    );
+}
+
+#[test]
+fn impossible_values_of_the_environment_stop_the_run() {
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Correction {
+                    source: EnvironmentError::OutOfRange { .. },
+                    ..
+                }
+            )
+        },
+        words: &["laser", "air temperature", "sensor broken"],
+        within: POINT,
+        rest: POINT + STOPPING,
+    };
+    check_nothing_recorded(&check(
+        measuring().fault(Fault::ImpossibleEnvironment),
+        &wanted,
+    ));
+}
+
+/// Air and machine that swing within minutes, and sensors that must show it.
+fn swinging(scene: Scene) -> Scene {
+    scene
+        .machine(
+            "environment_frozen_s = 1800.0",
+            "environment_frozen_s = 6.0",
+        )
+        .emulated("swing_period_min = 40.0", "swing_period_min = 1.0")
+        .emulated(
+            "stage_temperature_swing_k = 0.03",
+            "stage_temperature_swing_k = 0.3",
+        )
+        .emulated(
+            "humidity_swing_percent = 1.5",
+            "humidity_swing_percent = 10.0",
+        )
+}
+
+#[test]
+fn sensors_that_stand_still_are_not_believed_for_ever() {
+    check_harmless(
+        swinging(Scene::during(Phase::Calibrate))
+            .machine("closure_limit_um = 1.0", "closure_limit_um = 5.0"),
+    );
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Correction {
+                    source: EnvironmentError::Frozen { .. },
+                    ..
+                }
+            )
+        },
+        words: &["laser", "frozen"],
+        within: Duration::from_secs(8),
+        rest: Duration::from_secs(8) + STOPPING,
+    };
+    check(
+        swinging(measuring()).fault(Fault::FrozenEnvironment),
+        &wanted,
+    );
+}
+
+#[test]
+fn a_burst_of_vibration_is_left_out_and_reported() {
+    let fault = FaultConfig::lasting(
+        Fault::Vibration { amplitude_um: 40.0 },
+        Duration::from_millis(1000),
+    );
+    let scene = measuring().inject(fault).machine("runs = 3", "runs = 5");
+    let played = check_harmless(scene);
+    let calibrated = played.calibrated.borrow();
+    let fitted = &calibrated.as_ref().expect("a calibration was made").fitted;
+    let robust = &fitted.robust;
+    assert!(
+        !robust.outliers.is_empty() && robust.share < 0.2,
+        "share {}",
+        robust.share
+    );
+    let far = robust
+        .outliers
+        .iter()
+        .filter(|point| point.residual.abs().um() > 1.0);
+    assert!(far.clone().count() >= 3, "{:?}", robust.outliers);
+    assert!(far.clone().all(|point| point.run == 1));
+}
+
+#[test]
+fn a_measurement_that_shakes_too_often_is_refused() {
+    // Every fifth of the time and more, at other points in every run.
+    let mut scene = Scene::during(Phase::Calibrate).machine("runs = 3", "runs = 6");
+    for burst in 0..12 {
+        let mut fault = FaultConfig::lasting(
+            Fault::Vibration { amplitude_um: 40.0 },
+            Duration::from_millis(700),
+        );
+        fault.from_s = 1.0 + 1.93 * f64::from(burst);
+        scene = scene.inject(fault);
+    }
+    let wanted = Wanted {
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Fit {
+                    source: FitError::TooManyOutliers { .. },
+                    ..
+                }
+            )
+        },
+        words: &["axis x", "limit is 20 %", "vibration"],
+        within: WHOLE,
+        rest: WHOLE,
+    };
+    let played = check(scene, &wanted);
+    assert_eq!(played.bench.store.active("x").unwrap().current, None);
+}
+
+#[test]
+fn a_place_that_is_not_found_again_at_the_end_is_not_saved() {
+    // The air of the dead path that is not told to the controller: 50 mm.
+    let scene = Scene::during(Phase::Calibrate)
+        .emulated("pressure_swing_hpa = 0.3", "pressure_swing_hpa = 150.0")
+        .emulated("swing_period_min = 40.0", "swing_period_min = 1.0")
+        .machine("closure_limit_um = 1.0", "closure_limit_um = 0.5");
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::Closure { .. }),
+        words: &["axis x", "closure error", "drift", "nothing was saved"],
+        within: WHOLE,
+        rest: WHOLE,
+    };
+    let played = check(scene, &wanted);
+    assert_eq!(played.bench.store.active("x").unwrap().current, None);
+}

@@ -1,0 +1,447 @@
+//! A scene: a machine in some phase of its work, and what goes wrong with it there.
+
+use std::cell::{Ref, RefCell};
+use std::rc::Rc;
+use std::time::Duration;
+
+use drivers::wire::cia402::PowerState;
+use mock_bus::fault::{Fault, FaultConfig, FaultId};
+use mock_bus::node::cia402_drive::Cia402DriveNode;
+use tests::Bench;
+use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
+use truestage::emulated::Emulated;
+use truestage::observer::{Observer, Stage};
+use truestage::store::read_journal;
+use truestage::{Failure, Machine, Store};
+use units::{Metres, Time};
+
+use crate::witness::{Deed, Testimony, Witnessed};
+
+/// From SYNC to SYNC in the shipped configuration.
+pub const PERIOD: Duration = Duration::from_millis(5);
+/// When a lost heartbeat is noticed.
+pub const HEARTBEAT: Duration = Duration::from_millis(150);
+/// When the drive notices that the controller is gone.
+pub const WATCH_MASTER: Duration = Duration::from_millis(500);
+/// What a stop may take once it is ordered: 200 mm/s at 20 m/s², a few frames.
+pub const STOPPING: Duration = Duration::from_millis(100);
+
+/// What the machine is doing when the fault comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Starting the devices.
+    Start,
+    /// Finding its zero.
+    Zero,
+    /// A move from 0 to 60 mm.
+    Move,
+    /// Switching off and on again, then the same move.
+    Restart,
+    /// Standing enabled for three seconds.
+    Stand,
+    /// Measuring to learn the deviations.
+    Calibrate,
+    /// Measuring to judge.
+    Verify,
+}
+
+/// Whether something was seen on the emulated machine.
+type Question = Box<dyn Fn(&Emulated) -> bool>;
+/// Something that turns one text into another.
+type Change = Box<dyn Fn(String) -> String>;
+
+/// What happens where.
+pub struct Scene {
+    phase: Phase,
+    after: Duration,
+    seed: u64,
+    faults: Vec<FaultConfig>,
+    deed: Option<Deed>,
+    delivered: Option<Question>,
+    machine: Change,
+    emulated: Change,
+    stop: bool,
+}
+
+/// The shipped machine with fewer points: the same procedures in less time.
+pub fn shortened(text: String) -> String {
+    text.replace("step_mm = 3.0", "step_mm = 6.0")
+        .replace("targets = 8", "targets = 4")
+        .replace("runs = 5", "runs = 2")
+        .replace("jump_limit_um = 5.0", "jump_limit_um = 15.0")
+}
+
+impl Scene {
+    /// Nothing goes wrong in `phase` yet.
+    pub fn during(phase: Phase) -> Self {
+        Self {
+            phase,
+            after: Duration::ZERO,
+            seed: 1,
+            faults: Vec::new(),
+            deed: None,
+            delivered: None,
+            machine: Box::new(shortened),
+            emulated: Box::new(|text| text),
+            stop: false,
+        }
+    }
+
+    /// The fault comes this long after the phase began.
+    pub fn after_ms(mut self, ms: u64) -> Self {
+        self.after = Duration::from_millis(ms);
+        self
+    }
+
+    /// The noise and the errors of the machine.
+    pub const fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// A fault that stays.
+    pub fn fault(self, fault: Fault) -> Self {
+        self.inject(FaultConfig::permanent(fault))
+    }
+
+    /// A fault with its duration and probability.
+    pub fn inject(mut self, fault: FaultConfig) -> Self {
+        self.faults.push(fault);
+        self
+    }
+
+    /// Something done to the emulated devices when the fault is due; `delivered` says
+    /// afterwards whether it really struck.
+    pub fn deed(
+        mut self,
+        deed: impl FnOnce(&Emulated) + 'static,
+        delivered: impl Fn(&Emulated) -> bool + 'static,
+    ) -> Self {
+        self.deed = Some(Box::new(deed));
+        self.delivered = Some(Box::new(delivered));
+        self
+    }
+
+    /// A machine that differs from the shipped one in `key`.
+    pub fn machine(mut self, from: &'static str, to: &'static str) -> Self {
+        let earlier = self.machine;
+        self.machine = Box::new(move |text| replaced(&earlier(text), from, to));
+        self
+    }
+
+    /// An emulation that differs from the shipped one.
+    pub fn emulated(mut self, from: &'static str, to: &'static str) -> Self {
+        let earlier = self.emulated;
+        self.emulated = Box::new(move |text| replaced(&earlier(text), from, to));
+        self
+    }
+
+    /// Somebody asks to stop when the fault is due.
+    pub const fn stop_request(mut self) -> Self {
+        self.stop = true;
+        self
+    }
+
+    /// Plays the scene.
+    #[track_caller]
+    pub fn play(mut self) -> Played {
+        let seen = Rc::new(RefCell::new(Testimony::default()));
+        let witness = Rc::clone(&seen);
+        let mut bench = Bench::wrapped(self.seed, &self.machine, &self.emulated, |inner| {
+            Box::new(Witnessed::new(inner, witness))
+        });
+        let store = bench.store.clone();
+        let warnings = Rc::new(RefCell::new(Vec::new()));
+        bench
+            .machine
+            .observe(Box::new(Listener(Rc::clone(&warnings))));
+        let result = bench
+            .machine
+            .guarded(|machine| prepare(machine, self.phase, &store));
+        result.unwrap_or_else(|failure| panic!("before the fault: {failure}"));
+        let due = bench.machine.now() + self.after;
+        let ids = self.schedule(&bench, due, &seen);
+        let mut ended = due;
+        let calibrated = RefCell::new(None);
+        let result = bench.machine.guarded(|machine| {
+            let result = perform(machine, self.phase, &store, &calibrated);
+            ended = machine.now();
+            result
+        });
+        let played = Played {
+            bench,
+            result,
+            seen,
+            ids,
+            due,
+            ended,
+            warnings,
+            calibrated,
+        };
+        played.rest();
+        if let Some(delivered) = &self.delivered {
+            assert!(
+                delivered(&played.bench.emulated),
+                "the fault was never delivered"
+            );
+        }
+        played
+    }
+
+    fn schedule(&mut self, bench: &Bench, due: Time, seen: &RefCell<Testimony>) -> Vec<FaultId> {
+        let mut seen = seen.borrow_mut();
+        if let Some(deed) = self.deed.take() {
+            seen.plan(due, deed);
+        }
+        if self.stop {
+            let request = bench.machine.stop_request();
+            seen.plan(due, Box::new(move |_| request.stop()));
+        }
+        let mut simulation = bench.emulated.simulation_mut();
+        let later = self.after.as_secs_f64();
+        let mut inject = |mut fault: FaultConfig| {
+            fault.from_s += later;
+            simulation
+                .inject(fault)
+                .expect("the fault names what is there")
+        };
+        self.faults.drain(..).map(&mut inject).collect()
+    }
+}
+
+#[track_caller]
+fn replaced(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "`{from}` is not in the file");
+    text.replace(from, to)
+}
+
+fn prepare(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Failure> {
+    if matches!(phase, Phase::Start) {
+        return Ok(());
+    }
+    machine.start()?;
+    if matches!(phase, Phase::Zero) {
+        return Ok(());
+    }
+    machine.zero("x", store)?;
+    Ok(())
+}
+
+fn perform(
+    machine: &mut Machine,
+    phase: Phase,
+    store: &Store,
+    calibrated: &RefCell<Option<Calibrated>>,
+) -> Result<(), Failure> {
+    match phase {
+        Phase::Start => machine.start()?,
+        Phase::Zero => {
+            machine.zero("x", store)?;
+        }
+        Phase::Move => {
+            machine.move_to("x", Metres::from_mm(60.0))?;
+        }
+        Phase::Restart => {
+            machine.disable("x")?;
+            let until = machine.now() + Duration::from_millis(100);
+            machine.run_until(until)?;
+            machine.enable("x")?;
+            machine.move_to("x", Metres::from_mm(60.0))?;
+        }
+        Phase::Stand => {
+            let until = machine.now() + Duration::from_secs(3);
+            machine.run_until(until)?;
+        }
+        Phase::Calibrate => {
+            let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
+            calibrated.replace(Some(done));
+        }
+        Phase::Verify => {
+            let options = VerifyOptions {
+                compensated: false,
+                calibration: None,
+                resume: None,
+            };
+            machine.verify("x", store, &options)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes down the warnings.
+struct Listener(Rc<RefCell<Vec<String>>>);
+
+impl Observer for Listener {
+    fn progress(&mut self, _: Stage, _: &str, _: u64, _: u64) {}
+
+    fn warning(&mut self, text: &str) {
+        self.0.borrow_mut().push(text.to_owned());
+    }
+}
+
+/// A scene that was played.
+pub struct Played {
+    pub bench: Bench,
+    pub result: Result<(), Failure>,
+    pub seen: Rc<RefCell<Testimony>>,
+    ids: Vec<FaultId>,
+    warnings: Rc<RefCell<Vec<String>>>,
+    /// What a calibration gave.
+    pub calibrated: RefCell<Option<Calibrated>>,
+    /// When the fault was due.
+    pub due: Time,
+    /// When the phase ended.
+    pub ended: Time,
+}
+
+impl Played {
+    /// Two seconds without a controller, with the witness looking on.
+    fn rest(&self) {
+        let mut simulation = self.bench.emulated.simulation_mut();
+        let end = simulation.now() + Duration::from_secs(2);
+        while simulation.now() < end {
+            let next = simulation.now() + Duration::from_millis(2);
+            simulation.advance(next);
+            let here = (next, simulation.truth().scale_position().value());
+            self.seen.borrow_mut().path.push(here);
+        }
+    }
+
+    /// How long after the fault the phase ended.
+    pub fn reaction(&self) -> Duration {
+        self.ended - self.due
+    }
+
+    /// What the operator was warned of.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.borrow().clone()
+    }
+
+    /// What the witness saw.
+    pub fn seen(&self) -> Ref<'_, Testimony> {
+        self.seen.borrow()
+    }
+
+    /// Points that the newest journal of `verb` holds.
+    #[track_caller]
+    pub fn journal_points(&self, verb: &str) -> usize {
+        let path = self.bench.store.newest_run(verb, "x").unwrap();
+        read_journal(&path.expect("there is a journal"))
+            .unwrap()
+            .points
+            .len()
+    }
+
+    /// The machine came to rest within `span` of the fault and stays so, without power or in
+    /// quick stop; whatever calibration is active can be used, every journal read.
+    #[track_caller]
+    pub fn is_safe(&self, span: Duration) -> &Self {
+        if let Some(at) = self.seen().moved_last(self.due) {
+            assert!(
+                at <= self.due + span,
+                "still moving {:?} after the fault",
+                at - self.due
+            );
+        }
+        let state = power_state(&self.bench.emulated);
+        let harmless = !matches!(state, PowerState::OperationEnabled);
+        assert!(harmless, "the drive was left in {state}");
+        self.keeps_its_records()
+    }
+
+    /// Whatever calibration is active can be used, and every journal can be read.
+    #[track_caller]
+    pub fn keeps_its_records(&self) -> &Self {
+        let store = &self.bench.store;
+        if let Some(id) = store.active("x").unwrap().current {
+            store
+                .load(&id)
+                .unwrap_or_else(|error| panic!("active calibration: {error}"));
+        }
+        if let Ok(folder) = std::fs::read_dir(store.runs()) {
+            for entry in folder {
+                let path = entry.unwrap().path();
+                read_journal(&path).unwrap_or_else(|error| panic!("journal: {error}"));
+            }
+        }
+        self
+    }
+
+    /// Every fault struck.
+    #[track_caller]
+    pub fn was_delivered(&self) -> &Self {
+        let simulation = self.bench.emulated.simulation();
+        for id in &self.ids {
+            assert!(
+                simulation.fault_deliveries(*id) > 0,
+                "{id:?} was never delivered"
+            );
+        }
+        self
+    }
+}
+
+/// The drive's state as it is, whatever it says.
+pub fn power_state(emulated: &Emulated) -> PowerState {
+    with_drive(emulated, |drive| drive.power_state())
+}
+
+/// Looks at the drive, or changes it.
+pub fn with_drive<R>(emulated: &Emulated, look: impl FnOnce(&mut Cia402DriveNode) -> R) -> R {
+    let mut simulation = emulated.simulation_mut();
+    look(
+        simulation
+            .node_mut("drive")
+            .expect("the machine has a drive"),
+    )
+}
+
+/// What must come of a fault.
+pub struct Wanted<'a> {
+    /// Whether this is the failure.
+    pub cause: fn(&Failure) -> bool,
+    /// Words of its text.
+    pub words: &'a [&'a str],
+    /// From the fault to the failure, at most.
+    pub within: Duration,
+    /// From the fault to rest, at most.
+    pub rest: Duration,
+}
+
+/// Plays `scene` and judges what came of it: delivered, named, in time, safe, nothing lost.
+#[track_caller]
+pub fn check(scene: Scene, wanted: &Wanted<'_>) -> Played {
+    let played = scene.play();
+    let failure = match &played.result {
+        Ok(()) => panic!("nothing was noticed until {}", played.ended),
+        Err(failure) => failure,
+    };
+    let text = failure.to_string();
+    assert!(
+        (wanted.cause)(failure),
+        "another cause was named: {text}\n{failure:?}"
+    );
+    for word in wanted.words {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+    let reaction = played.reaction();
+    assert!(
+        reaction <= wanted.within,
+        "noticed only after {reaction:?}: {text}"
+    );
+    played.was_delivered();
+    played.is_safe(wanted.rest);
+    played
+}
+
+/// Plays `scene`, whose fault must do no harm.
+#[track_caller]
+pub fn check_harmless(scene: Scene) -> Played {
+    let played = scene.play();
+    played.was_delivered();
+    if let Err(failure) = &played.result {
+        panic!("should have been tolerated: {failure}\n{failure:?}");
+    }
+    played.keeps_its_records();
+    played
+}

@@ -1,0 +1,162 @@
+//! Stopping: on request, by a controller that is killed or held up (classes 39, 40, 50).
+
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::time::Duration;
+
+use drivers::wire::cia402::PowerState;
+use mock_bus::fault::Fault;
+use tests::Bench;
+use truestage::Failure;
+use units::{Metres, Time};
+
+use crate::scene::{
+    PERIOD, Phase, STOPPING, Scene, WATCH_MASTER, Wanted, check, check_harmless, power_state,
+};
+use crate::witness::{Testimony, Witnessed};
+
+#[test]
+fn a_stop_request_stops_every_phase_in_a_controlled_way() {
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::Interrupted),
+        words: &["stopped on request"],
+        within: PERIOD * 2,
+        rest: PERIOD * 2 + STOPPING,
+    };
+    for (phase, after_ms) in [
+        (Phase::Zero, 300),
+        (Phase::Zero, 4000),
+        (Phase::Move, 100),
+        (Phase::Stand, 1000),
+        (Phase::Calibrate, 2600),
+        (Phase::Verify, 2600),
+    ] {
+        let played = check(
+            Scene::during(phase).after_ms(after_ms).stop_request(),
+            &wanted,
+        );
+        assert_eq!(
+            power_state(&played.bench.emulated),
+            PowerState::SwitchOnDisabled
+        );
+    }
+}
+
+/// Moves, and is killed in the midst of it: nobody ticks any more. Returns when that was.
+fn killed_in_motion(watch: &'static str) -> (Bench, Time) {
+    let seen = Rc::new(RefCell::new(Testimony::default()));
+    let witness = Rc::clone(&seen);
+    let key = "watch_master_ms = 500";
+    let mut bench = Bench::wrapped(
+        1,
+        |text| text.replace(key, watch),
+        |text| text,
+        |inner| Box::new(Witnessed::new(inner, witness)),
+    );
+    let store = bench.store.clone();
+    bench.machine.start().unwrap();
+    bench.machine.zero("x", &store).unwrap();
+    let end = bench.machine.now() + Duration::from_millis(100);
+    // As SIGKILL does: nothing is tidied up on the way out.
+    seen.borrow_mut()
+        .plan(end, Box::new(|_| resume_unwind(Box::new("killed"))));
+    let machine = &mut bench.machine;
+    let moved = catch_unwind(AssertUnwindSafe(|| {
+        machine.move_to("x", Metres::from_mm(60.0))
+    }));
+    assert!(moved.is_err(), "the move ended before: {moved:?}");
+    (bench, end)
+}
+
+#[test]
+fn the_drive_stops_a_stage_whose_controller_was_killed() {
+    let (bench, killed) = killed_in_motion("watch_master_ms = 150");
+    let mut simulation = bench.emulated.simulation_mut();
+    let position = |simulation: &mock_bus::simulation::Simulation| simulation.truth().position();
+    let before = position(&simulation);
+    simulation.advance(killed + Duration::from_millis(20));
+    let moving = (position(&simulation) - before).abs();
+    assert!(
+        moving.mm() > 1.0,
+        "it should still move: {} mm",
+        moving.mm()
+    );
+    // Its last heartbeat may be as old as a heartbeat's period.
+    simulation.advance(killed + Duration::from_millis(150) + STOPPING);
+    let stopped = position(&simulation);
+    simulation.advance(killed + Duration::from_secs(3));
+    let crept = (position(&simulation) - stopped).abs();
+    assert!(crept.um() < 1.0, "still moving: {} µm", crept.um());
+    assert!(
+        (60.0 - stopped.mm()).abs() > 5.0,
+        "it ran to its target: {} mm",
+        stopped.mm()
+    );
+    drop(simulation);
+    let state = power_state(&bench.emulated);
+    assert_ne!(state, PowerState::OperationEnabled);
+}
+
+#[test]
+fn a_controller_held_up_for_a_moment_goes_on() {
+    let held_up = |emulated: &truestage::emulated::Emulated| {
+        let mut simulation = emulated.simulation_mut();
+        let until = simulation.now() + Duration::from_millis(9);
+        simulation.advance(until);
+    };
+    check_harmless(
+        Scene::during(Phase::Calibrate)
+            .after_ms(2500)
+            .deed(held_up, |_| true),
+    );
+    check_harmless(
+        Scene::during(Phase::Move)
+            .after_ms(100)
+            .deed(held_up, |_| true),
+    );
+}
+
+#[test]
+fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
+    let held_up = |emulated: &truestage::emulated::Emulated| {
+        let mut simulation = emulated.simulation_mut();
+        let began = simulation.now();
+        let mut position_at = |span: Duration| {
+            simulation.advance(began + span);
+            simulation.truth().position()
+        };
+        let stopped = position_at(WATCH_MASTER + STOPPING);
+        let crept = (position_at(Duration::from_secs(2)) - stopped).abs();
+        assert!(crept.um() < 1.0, "it went on by {} µm", crept.um());
+    };
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::Alarm { .. } | Failure::Device { .. }),
+        words: &["x:"],
+        within: Duration::from_millis(2100),
+        rest: WATCH_MASTER + STOPPING,
+    };
+    check(
+        Scene::during(Phase::Move)
+            .after_ms(60)
+            .deed(held_up, |_| true),
+        &wanted,
+    );
+}
+
+#[test]
+fn a_stop_request_while_the_drive_is_silent_ends_all_the_same() {
+    let scene = Scene::during(Phase::Move)
+        .after_ms(100)
+        .fault(Fault::LinkGone {
+            port: "can0".into(),
+        })
+        .stop_request();
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::Interrupted | Failure::Link { .. }),
+        words: &[],
+        within: PERIOD,
+        rest: WATCH_MASTER + STOPPING,
+    };
+    check(scene, &wanted);
+}

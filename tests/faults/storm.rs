@@ -1,0 +1,354 @@
+//! Any fault at any moment of the whole cycle: nothing panics, the cause is a possible one, the
+//! stage comes to rest, what is stored stays sound.
+//!
+//! `FAULT_SEED=17 cargo test -p tests --test faults storm` plays one seed again;
+//! `FAULT_RUNS=2000` plays that many.
+
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::rc::Rc;
+use std::time::Duration;
+
+use drivers::device::Alarm;
+use drivers::wire::cia402::PowerState;
+use mock_bus::fault::FaultConfig;
+use mock_bus::random::Stream;
+use tests::Bench;
+use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::store::{StoreError, read_journal};
+use truestage::{Failure, Machine, Store};
+use units::{Metres, Time};
+
+use crate::scene::{power_state, shortened};
+use crate::witness::{Testimony, Witnessed};
+
+/// How many runs on each change.
+const RUNS: u64 = 200;
+/// The whole cycle takes about this long.
+const CYCLE_S: f64 = 42.0;
+
+/// What may be blamed for a fault.
+type Causes = fn(&Failure) -> bool;
+
+fn drive_or_bus(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Alarm { .. }
+            | Failure::Device { .. }
+            | Failure::Overdue { .. }
+            | Failure::Babbling { .. }
+            | Failure::Send { .. }
+    )
+}
+
+fn link(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Link { .. } | Failure::BusOff { .. } | Failure::Send { .. }
+    )
+}
+
+fn sensors(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Search { .. } | Failure::Refine { .. } | Failure::ZeroUncertain { .. }
+    ) || drive_or_bus(failure)
+}
+
+fn optics(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Alarm {
+            alarm: Alarm::BeamLost
+                | Alarm::BeamWeak { .. }
+                | Alarm::SamplesLost { .. }
+                | Alarm::SlewError
+                | Alarm::StreamSilent { .. }
+                | Alarm::CountRestarted
+                | Alarm::Garbage { .. },
+            ..
+        } | Failure::FringeJump { .. }
+            | Failure::ScaleMismatch { .. }
+            | Failure::Closure { .. }
+            | Failure::Fit { .. }
+            | Failure::Jump { .. }
+            | Failure::Correction { .. }
+            | Failure::MadeWorse { .. }
+            | Failure::Compensation { .. }
+            | Failure::Device { .. }
+            | Failure::Overdue { .. }
+    )
+}
+
+fn nothing(_: &Failure) -> bool {
+    false
+}
+
+/// A frame whose bits are wrong may say anything that the device could say, to the search too.
+fn anything_said(failure: &Failure) -> bool {
+    drive_or_bus(failure) || sensors(failure) || matches!(failure, Failure::SecondMaster { .. })
+}
+
+fn second_master(failure: &Failure) -> bool {
+    matches!(failure, Failure::SecondMaster { .. })
+}
+
+fn link_or_optics(failure: &Failure) -> bool {
+    link(failure) || optics(failure)
+}
+
+/// Every kind of fault, as a configuration file writes it, with what may be blamed for it.
+const KINDS: &[(&str, Causes)] = &[
+    ("kind = 'mute', node = 'drive'", drive_or_bus),
+    ("kind = 'mute', node = 'hall_adc'", drive_or_bus),
+    ("kind = 'mute', node = 'interferometer'", optics),
+    ("kind = 'stop_heartbeat', node = 'drive'", drive_or_bus),
+    ("kind = 'stop_heartbeat', node = 'hall_adc'", drive_or_bus),
+    ("kind = 'stop_pdos', node = 'drive'", drive_or_bus),
+    ("kind = 'stop_pdos', node = 'hall_adc'", drive_or_bus),
+    ("kind = 'power_loss', node = 'drive'", drive_or_bus),
+    ("kind = 'power_loss', node = 'hall_adc'", drive_or_bus),
+    ("kind = 'power_loss', node = 'interferometer'", optics),
+    (
+        "kind = 'babble', port = 'can0', cob_id = 0x010",
+        drive_or_bus,
+    ),
+    ("kind = 'babble', port = 'can0', cob_id = 0x7F0", nothing),
+    (
+        "kind = 'foreign_sync', port = 'can0', period_ms = 10.0",
+        second_master,
+    ),
+    (
+        "kind = 'duplicate_boot_up', port = 'can0', node_id = 1",
+        drive_or_bus,
+    ),
+    (
+        "kind = 'duplicate_boot_up', port = 'can0', node_id = 2",
+        drive_or_bus,
+    ),
+    (
+        "kind = 'emergency', port = 'can0', node_id = 1, code = 0x2310, register = 3",
+        drive_or_bus,
+    ),
+    ("kind = 'error_passive', port = 'can0'", nothing),
+    ("kind = 'bus_off', port = 'can0'", link),
+    ("kind = 'link_down', port = 'can0'", link),
+    ("kind = 'link_gone', port = 'can0'", link),
+    ("kind = 'link_gone', port = 'laser'", link_or_optics),
+    ("kind = 'blocked_axis'", sensors),
+    ("kind = 'safe_torque_off'", sensors),
+    (
+        "kind = 'limit_switch', positive = true, pressed = true",
+        sensors,
+    ),
+    (
+        "kind = 'limit_switch', positive = false, pressed = true",
+        sensors,
+    ),
+    ("kind = 'beam_blocked'", optics),
+    ("kind = 'beam_weak'", optics),
+    ("kind = 'fringe_jump', half_wavelengths = 2", optics),
+    ("kind = 'fringe_jump', half_wavelengths = 300", optics),
+    ("kind = 'vibration', amplitude_um = 20.0", optics),
+    ("kind = 'frozen_environment'", optics),
+    ("kind = 'impossible_environment'", optics),
+    ("kind = 'inputs_swapped'", sensors),
+    ("kind = 'input_rail', channel = 0", sensors),
+    ("kind = 'input_rail', channel = 1", sensors),
+    ("kind = 'input_open', channel = 0", sensors),
+    ("kind = 'input_open', channel = 1", sensors),
+    ("kind = 'input_stuck', channel = 0", sensors),
+    ("kind = 'input_stuck', channel = 1", sensors),
+    ("kind = 'input_inverted', channel = 0", sensors),
+    ("kind = 'input_inverted', channel = 1", sensors),
+    ("kind = 'garbage', port = 'laser'", optics),
+    ("kind = 'split', port = 'laser'", optics),
+    ("kind = 'merge', port = 'laser'", optics),
+    ("kind = 'silence', port = 'laser'", optics),
+    (
+        "kind = 'late_answer', port = 'laser', delay_ms = 30.0",
+        optics,
+    ),
+    ("kind = 'corrupt', port = 'can0'", anything_said),
+    ("kind = 'drop', port = 'can0'", anything_said),
+    ("kind = 'duplicate', port = 'can0'", drive_or_bus),
+    ("kind = 'reorder', port = 'can0'", drive_or_bus),
+    (
+        "kind = 'delay', port = 'can0', delay_ms = 4.0",
+        anything_said,
+    ),
+];
+
+/// A fault at a random moment, for a random time.
+fn draw(seed: u64) -> (FaultConfig, Causes) {
+    let mut chance = Stream::new(seed, "storm");
+    // Every kind has its turn.
+    let (kind, causes) = KINDS[(seed % KINDS.len() as u64) as usize];
+    let text = format!("fault = {{ {kind} }}");
+    let mut config: FaultConfig = toml::from_str(&text).expect(kind);
+    config.from_s = chance.between(0.0, CYCLE_S);
+    if chance.chance(0.5) {
+        config.duration_s = Some(10_f64.powf(chance.between(-3.0, 0.7)));
+    }
+    if chance.chance(0.5) {
+        config.probability = 10_f64.powf(chance.between(-3.0, 0.0));
+    }
+    (config, causes)
+}
+
+fn cycle(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
+    let options = |calibration: Option<String>| VerifyOptions {
+        compensated: calibration.is_some(),
+        calibration,
+        resume: None,
+    };
+    machine.start()?;
+    machine.zero("x", store)?;
+    machine.verify("x", store, &options(None))?;
+    let made = machine.calibrate("x", store, &CalibrateOptions::default())?;
+    machine.verify("x", store, &options(Some(made.id)))?;
+    machine.move_to("x", Metres::from_mm(31.4))?;
+    machine.shut_down()
+}
+
+struct Storm {
+    bench: Bench,
+    seen: Rc<RefCell<Testimony>>,
+    ended: Time,
+    result: Result<(), Failure>,
+}
+
+fn play(seed: u64, fault: &FaultConfig) -> Storm {
+    let seen = Rc::new(RefCell::new(Testimony::default()));
+    let witness = Rc::clone(&seen);
+    let mut bench = Bench::wrapped(
+        seed,
+        shortened,
+        |text| text,
+        |inner| Box::new(Witnessed::new(inner, witness)),
+    );
+    bench
+        .emulated
+        .simulation_mut()
+        .inject(fault.clone())
+        .expect("it names what is there");
+    let store = bench.store.clone();
+    let mut ended = Time::ZERO;
+    let result = bench.machine.guarded(|machine| {
+        let result = cycle(machine, &store);
+        ended = machine.now();
+        result
+    });
+    Storm {
+        bench,
+        seen,
+        ended,
+        result,
+    }
+}
+
+/// What must hold whatever happened.
+fn judge(storm: &Storm, fault: &FaultConfig, causes: Causes) {
+    if let Err(failure) = &storm.result {
+        let due = Time::from_seconds(fault.from_s);
+        assert!(storm.ended >= due, "failed before the fault: {failure}");
+        assert!(causes(failure), "blamed: {failure}\n{failure:?}");
+    }
+    come_to_rest(storm);
+    let store = &storm.bench.store;
+    if let Some(id) = store.active("x").expect("the pointer is whole").current {
+        let record = store.load(&id).expect("the active calibration is whole");
+        let here = storm.bench.machine.this_machine("x");
+        match record.belongs_to(&id, &here) {
+            // A drive that is gone has told nobody who it is.
+            Ok(())
+            | Err(StoreError::Foreign {
+                what: "the drive", ..
+            }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    }
+    let runs = std::fs::read_dir(store.runs()).into_iter().flatten();
+    for entry in runs {
+        let path = entry.expect("the folder can be read").path();
+        let read = read_journal(&path).expect("every journal is whole");
+        assert!(read.points.iter().all(|point| point.measured_m.is_finite()));
+    }
+}
+
+/// The stage stands one second after the end and then for ever, and nothing pushes it.
+fn come_to_rest(storm: &Storm) {
+    let mut simulation = storm.bench.emulated.simulation_mut();
+    let begin = simulation.now();
+    let mut position_at = |s: f64| {
+        simulation.advance(begin + Duration::from_secs_f64(s));
+        simulation.truth().scale_position()
+    };
+    let stopped = position_at(1.0);
+    let crept = (position_at(3.0) - stopped).abs();
+    assert!(crept.um() < 0.5, "crept by {} µm after the end", crept.um());
+    drop(simulation);
+    let state = power_state(&storm.bench.emulated);
+    assert_ne!(
+        state,
+        PowerState::OperationEnabled,
+        "the drive was left enabled"
+    );
+    // Whatever went wrong, no later than the drive's own watch and a stop allow.
+    let bound = storm.ended + Duration::from_millis(800);
+    if let Some(moved) = storm.seen.borrow().moved_last(storm.ended) {
+        assert!(
+            moved <= bound,
+            "moved until {moved}, failed at {}",
+            storm.ended
+        );
+    }
+}
+
+fn run(seed: u64) -> Result<String, String> {
+    let (fault, causes) = draw(seed);
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let storm = play(seed, &fault);
+        judge(&storm, &fault, causes);
+        match &storm.result {
+            Ok(()) => "survived".to_owned(),
+            Err(failure) => failure.to_string(),
+        }
+    }));
+    outcome.map_err(|panic| {
+        let text = panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
+            .unwrap_or_default();
+        format!(
+            "{text}\n  with {fault:?}\n  again: FAULT_SEED={seed} cargo test -p tests --test \
+             faults storm"
+        )
+    })
+}
+
+fn number(variable: &str) -> Option<u64> {
+    std::env::var(variable).ok()?.parse().ok()
+}
+
+#[test]
+fn any_fault_at_any_moment_leaves_a_safe_machine_and_sound_records() {
+    let seeds: Vec<u64> = match number("FAULT_SEED") {
+        Some(seed) => vec![seed],
+        None => (0..number("FAULT_RUNS").unwrap_or(RUNS)).collect(),
+    };
+    let results: Vec<_> = seeds.iter().map(|seed| run(*seed)).collect();
+    let survived = results
+        .iter()
+        .filter(|it| it.as_deref() == Ok("survived"))
+        .count();
+    println!("{} runs, {survived} survived", results.len());
+    let failures: Vec<_> = results.into_iter().filter_map(Result::err).collect();
+    assert!(
+        failures.is_empty(),
+        "{} failed:\n{}",
+        failures.len(),
+        failures.join("\n\n")
+    );
+}

@@ -1,0 +1,129 @@
+//! A witness of the truth: what the controller sent and where the stage really was, at every
+//! moment, and what is done to the machine at set moments behind the controller's back.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use drivers::transport::in_process::InProcess;
+use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+use drivers::wire::can::CanFrame;
+use truestage::emulated::Emulated;
+use units::Time;
+
+/// Something done to the machine.
+pub type Deed = Box<dyn FnOnce(&Emulated)>;
+
+/// What was seen.
+#[derive(Default)]
+pub struct Testimony {
+    /// Where the stage truly was, in metres.
+    pub path: Vec<(Time, f64)>,
+    /// The frames that the controller sent.
+    pub sent: Vec<(Time, CanFrame)>,
+    deeds: Vec<(Time, Deed)>,
+}
+
+impl Testimony {
+    /// Does `deed` at `at`.
+    pub fn plan(&mut self, at: Time, deed: Deed) {
+        self.deeds.push((at, deed));
+    }
+
+    /// The controlwords of RPDO 1 of node 1, with their times.
+    pub fn controlwords(&self) -> impl Iterator<Item = (Time, u16)> {
+        self.sent
+            .iter()
+            .filter(|(_, frame)| frame.standard_id() == Some(0x201))
+            .map(|(at, frame)| (*at, u16::from_le_bytes([frame.data()[0], frame.data()[1]])))
+    }
+
+    /// When the stage moved last after `since`; `None` when it never did.
+    pub fn moved_last(&self, since: Time) -> Option<Time> {
+        // Faster than noise and creep, slower than any motion that was ordered.
+        const MOVING_M_PER_S: f64 = 50e-6;
+        // While nobody looked, nobody knows.
+        const GAP: Duration = Duration::from_millis(100);
+        let steps = self
+            .path
+            .windows(2)
+            .filter(|step| step[1].0 > since && step[1].0 - step[0].0 < GAP);
+        steps
+            .filter(|step| {
+                let span = (step[1].0 - step[0].0).as_secs_f64().max(1e-4);
+                (step[1].1 - step[0].1).abs() / span > MOVING_M_PER_S
+            })
+            .map(|step| step[1].0)
+            .next_back()
+    }
+}
+
+/// A transport that a witness looks over.
+pub struct Witnessed {
+    inner: InProcess<Emulated>,
+    seen: Rc<RefCell<Testimony>>,
+}
+
+impl Witnessed {
+    /// Looks over `inner`.
+    pub const fn new(inner: InProcess<Emulated>, seen: Rc<RefCell<Testimony>>) -> Self {
+        Self { inner, seen }
+    }
+
+    fn look(&self) {
+        let simulation = self.inner.world().simulation();
+        let here = (
+            simulation.now(),
+            simulation.truth().scale_position().value(),
+        );
+        self.seen.borrow_mut().path.push(here);
+    }
+
+    fn next_deed(&self) -> Time {
+        let deeds = &self.seen.borrow().deeds;
+        deeds.iter().map(|(at, _)| *at).min().unwrap_or(Time::NEVER)
+    }
+
+    fn do_what_is_due(&self) {
+        let now = self.inner.now();
+        loop {
+            let mut seen = self.seen.borrow_mut();
+            let Some(due) = seen.deeds.iter().position(|(at, _)| *at <= now) else {
+                return;
+            };
+            let (_, deed) = seen.deeds.remove(due);
+            drop(seen);
+            deed(self.inner.world());
+        }
+    }
+}
+
+impl Transport for Witnessed {
+    fn now(&self) -> Time {
+        self.inner.now()
+    }
+
+    fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
+        if let Payload::Frame(frame) = payload {
+            let now = self.inner.now();
+            self.seen.borrow_mut().sent.push((now, *frame));
+        }
+        self.inner.send(port, payload)
+    }
+
+    fn receive(&mut self, until: Time) -> Option<Arrival> {
+        loop {
+            let stop = until.min(self.next_deed());
+            let arrival = self.inner.receive(stop);
+            self.look();
+            self.do_what_is_due();
+            if arrival.is_some() || stop >= until {
+                return arrival;
+            }
+        }
+    }
+
+    fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
+        self.inner.set_sync(port, period)
+    }
+}
