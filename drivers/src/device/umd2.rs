@@ -183,7 +183,7 @@ impl Umd2 {
         self.low_speed(now, sample.low_speed);
         match self.sequence.take(&sample, garbage) {
             Continuity::Follows => {}
-            Continuity::Doubtful => return self.unusable(1, |lost| Alarm::SamplesLost { lost }),
+            Continuity::Doubtful => return self.unusable(1, 0),
             Continuity::Gap(missing) => self.note_missing(missing),
             Continuity::Restart => return self.lose_count(Alarm::CountRestarted),
         }
@@ -191,7 +191,7 @@ impl Umd2 {
             self.lose_count(alarm);
         } else if !sample.phase_is_valid() {
             self.counts.invalid_phase += 1;
-            self.unusable(1, |samples| Alarm::BeamWeak { samples });
+            self.unusable(1, 1);
         } else if self.is_impossible(&sample) {
             self.impossible();
         } else {
@@ -219,16 +219,21 @@ impl Umd2 {
         if let State::Starting { since, .. } = self.state {
             self.state = State::Starting { since, good: 0 };
         }
-        self.unusable(missing, |lost| Alarm::SamplesLost { lost });
+        self.unusable(missing, 0);
     }
 
-    /// Samples that an average lacks, and what it is when they become too many.
-    fn unusable(&mut self, count: u64, cause: fn(u64) -> Alarm) {
+    /// Samples that an average lacks, and how many of them for want of light.
+    fn unusable(&mut self, count: u64, dim: u64) {
         if let Averaging::Running(average) = &mut self.averaging {
             average.lacking += count;
-            let lacking = average.lacking;
-            if lacking > self.settings.lost_samples_max {
-                self.raise(cause(lacking));
+            average.dim += dim;
+            let (lost, samples) = (average.lacking, average.dim);
+            if lost > self.settings.lost_samples_max {
+                self.raise(if samples * 2 > lost {
+                    Alarm::BeamWeak { samples }
+                } else {
+                    Alarm::SamplesLost { lost }
+                });
             }
         }
     }
@@ -249,7 +254,7 @@ impl Umd2 {
     fn impossible(&mut self) {
         self.counts.impossible_jumps += 1;
         self.jumps_in_a_row += 1;
-        self.unusable(1, |lost| Alarm::SamplesLost { lost });
+        self.unusable(1, 0);
         if self.jumps_in_a_row >= JUMPS_MAX {
             self.lose_count(Alarm::SlewError);
         }

@@ -25,6 +25,8 @@ pub(super) struct RunningAverage {
     squares_m2: f64,
     /// Samples that were missing or unusable meanwhile.
     pub(super) lacking: u64,
+    /// Those among them whose phase was not valid.
+    pub(super) dim: u64,
 }
 
 impl RunningAverage {
@@ -36,6 +38,7 @@ impl RunningAverage {
             mean_m: 0.0,
             squares_m2: 0.0,
             lacking: 0,
+            dim: 0,
         }
     }
 
