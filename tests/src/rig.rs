@@ -31,7 +31,7 @@ impl Rig {
         let native = std::env::var("VCAN_HOST").is_ok_and(|host| host == "native");
         match self {
             Self::InProcess => 1.0,
-            Self::Vcan if !native => 3.0,
+            Self::Vcan if !native => 1.5,
             Self::Pty | Self::Vcan => 5.0,
         }
     }
