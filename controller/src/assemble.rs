@@ -191,10 +191,20 @@ fn node_settings(
         consumer_time: millis(consumer) * patience,
         // 0x1016 has 16 bits of milliseconds.
         master_consumer_time: (millis(watch_master) * patience).min(millis(u16::MAX)),
-        missed_pdos_max: usual.missed_pdos_max * patience,
+        missed_pdos_max: patient_pdos(&usual, millis(consumer), patience),
         timeouts: patient_node(usual.timeouts, patience),
         ..usual
     }
+}
+
+/// Where the clock is faster than the wall's, a pause of the host silences process data and
+/// heartbeats alike, so they are waited for alike.
+fn patient_pdos(usual: &NodeSettings, consumer_time: Duration, patience: u32) -> u32 {
+    if patience == 1 {
+        return usual.missed_pdos_max;
+    }
+    let periods = (consumer_time * patience).as_nanos() / usual.sync_period.as_nanos().max(1);
+    u32::try_from(periods).map_or(u32::MAX, |it| it.max(usual.missed_pdos_max))
 }
 
 /// See [`crate::config::Loaded::patience`].
@@ -348,6 +358,15 @@ pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::
         rail_high: Volts(zero.rail_high_v),
         noise: Volts(zero.noise_mv * 1e-3),
         ..hall_zero::Settings::default()
+    }
+}
+
+/// The same for a machine whose clock runs faster than the wall's: see [`crate::ports::patience`].
+pub(crate) fn patient_search(usual: hall_zero::Settings, patience: u32) -> hall_zero::Settings {
+    hall_zero::Settings {
+        stall_limit: usual.stall_limit * patience,
+        wrong_way: usual.wrong_way * f64::from(patience),
+        ..usual
     }
 }
 

@@ -7,7 +7,7 @@
 //! # A stage in a program of yours
 //!
 //! ```no_run
-//! use truestage::{Failure, Machine, StopRequest, Store, config, ports};
+//! use truestage::{Failure, Machine, Store, config, ports};
 //! use units::Metres;
 //!
 //! fn main() -> Result<(), Failure> {

@@ -11,7 +11,7 @@ use drivers::transport::{Payload, Port, SendError, Transport};
 use units::Time;
 
 /// How long a transmit queue may stay full.
-const FULL_LIMIT: Duration = Duration::from_millis(20);
+const FULL_LIMIT: Duration = Duration::from_millis(15);
 /// How soon the queue is tried again.
 const AGAIN: Duration = Duration::from_millis(1);
 
@@ -59,7 +59,7 @@ impl Outbox {
     /// Sends what waits, as far as the queues take it.
     ///
     /// # Errors
-    /// When a queue has been full for too long (`patience` times 20 ms), or a port failed.
+    /// When a queue has been full for too long (`patience` times 15 ms), or a port failed.
     pub(crate) fn flush(
         &mut self,
         transport: &mut dyn Transport,

@@ -30,6 +30,9 @@ const PORT: Port = Port(0);
 const SYNC: u32 = 0x80;
 const STANDARD_ONLY: u32 = 0xC000_07FF;
 const BUFFER_BYTES: usize = 4 << 20;
+/// A SYNC this share of a period before the usual moment is taken for an early one, any other
+/// for a late one: our thread sends nothing that is more than half a period late.
+const EARLIER_SHARE: f64 = 0.1;
 /// A frame's worth of bytes, for who has no CAN.
 const FRAME: [u8; 16] = [0x80, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
 
@@ -267,21 +270,29 @@ impl Run {
         })
     }
 
-    /// Microseconds after the deadline. Tokio sends every one, however late, so that they can
-    /// be counted; our thread leaves out what is more than half a period late, so that each
-    /// belongs to the nearest deadline.
+    /// Microseconds after the deadline. Tokio sends every one, however late, so that counting
+    /// them tells which deadline was meant; our thread leaves SYNCs out.
     fn lateness(&self, period: Duration) -> Vec<f64> {
-        let (begin, period_us) = (self.sent[0], period.as_secs_f64() * 1e6);
-        let after_us = |at: Duration, then: Duration| (at.as_secs_f64() - then.as_secs_f64()) * 1e6;
-        let first_us = after_us(begin, self.first);
-        let late = |(index, at): (usize, &Duration)| {
-            let since_us = after_us(*at, begin);
-            let periods = match self.statistics {
-                Some(_) => (since_us / period_us).round(),
-                None => index as f64,
-            };
-            first_us + since_us - periods * period_us
-        };
-        self.sent.iter().enumerate().map(late).collect()
+        let period_us = period.as_secs_f64() * 1e6;
+        let sent_us = self
+            .sent
+            .iter()
+            .map(|at| (at.as_secs_f64() - self.first.as_secs_f64()) * 1e6);
+        if self.statistics.is_none() {
+            let late = |(index, at): (usize, f64)| at - index as f64 * period_us;
+            return sent_us.enumerate().map(late).collect();
+        }
+        let sent_us: Vec<f64> = sent_us.collect();
+        let typical_us = median(sent_us.iter().map(|at| at.rem_euclid(period_us)).collect());
+        let periods = |at: f64| ((at - typical_us) / period_us + EARLIER_SHARE).floor();
+        sent_us
+            .iter()
+            .map(|at| at - periods(*at) * period_us)
+            .collect()
     }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }

@@ -189,12 +189,21 @@ impl Bench {
         fs::write(self.folder().join(name), change(short)).expect("a file can be written");
     }
 
-    /// Starts `truestage --json` with a verb's words in the machine's folder; verbs that use
-    /// the machine are told where it is, unless the words say otherwise.
-    pub(crate) fn start(&self, words: &[&str]) -> Process {
+    /// Runs `truestage --json` with these words and no others in the machine's folder.
+    pub(crate) fn run_plainly(&self, words: &[&str]) -> Ended {
+        Process::start(self.command().args(words)).end()
+    }
+
+    fn command(&self) -> Command {
         let mut command = Command::new(program("truestage"));
-        command.current_dir(self.folder());
-        command.args(["--json", words[0]]);
+        command.current_dir(self.folder()).arg("--json");
+        command
+    }
+
+    /// Starts a verb in the machine's folder; verbs that use the machine are told where it is.
+    pub(crate) fn start(&self, words: &[&str]) -> Process {
+        let mut command = self.command();
+        command.arg(words[0]);
         let uses_machine = ["scan", "zero", "calibrate", "verify", "move"];
         if uses_machine.contains(&words[0]) {
             command.args(["--clock-speed", &speed(self.rig)]);

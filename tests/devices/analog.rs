@@ -11,25 +11,6 @@ use tests::{Desk, Emulator, Rig, Setup, rigs};
 use truestage::assemble;
 use units::Volts;
 
-/// The module that reads the Hall sensors over a serial line instead of CAN.
-pub(crate) fn over_dcon(setup: Setup) -> Setup {
-    let machine = tests::MACHINE;
-    let begin = machine
-        .find("[analog.hall]")
-        .expect("the shipped machine has it");
-    let end = machine.find("[instrument.laser]").expect("it comes next");
-    setup
-        .machine(
-            &machine[begin..end],
-            "[analog.hall]\ndevice = \"dcon\"\nline = \"adc\"\naddress = 1\nchecksum = true\n\
-             channels = [0, 1]\nfull_scale_v = [5.0, 5.0]\npoll_period_ms = 100.0\n\n",
-        )
-        .machine(
-            "[axis.x]\n",
-            "[serial.adc]\npath = \"/dev/ttyUSB0\"\nbaud_bit_per_s = 9600\n\n[axis.x]\n",
-        )
-}
-
 /// How long a module may be silent: longer than a busy host pauses, and short enough to wait
 /// for.
 fn silence(rig: Rig) -> Duration {
@@ -45,7 +26,7 @@ fn cia401(rig: Rig) -> Desk<Cia401Analog> {
 }
 
 fn dcon(rig: Rig) -> Desk<Dcon> {
-    let emulator = Emulator::new(rig, &over_dcon(Setup::new(22)));
+    let emulator = Emulator::new(rig, &Setup::new(22).over_dcon());
     let loaded = &emulator.loaded;
     let analog = &loaded.config.analog["hall"];
     let mut settings = assemble::dcon_settings(analog, loaded.patience);

@@ -210,9 +210,9 @@ fn a_transmit_queue_that_is_full_is_named_and_drops_nothing_silently() {
             )
         },
         words: &["transmit queue full", "txqueuelen"],
-        // A queue that is full for a moment is waited for.
-        within: PERIOD * 6,
-        rest: PERIOD * 6,
+        // Full for a moment is ordinary: 15 ms, three periods, are waited for.
+        within: PERIOD * 4,
+        rest: PERIOD * 4,
     };
     check(scene, &wanted);
 }

@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{EMULATED, Rig, machine_config};
+use crate::rig::{EMULATED, MACHINE, Rig, machine_config};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -49,6 +49,22 @@ impl Setup {
     pub fn machine(mut self, from: &str, to: &str) -> Self {
         self.machine.push((from.to_owned(), to.to_owned()));
         self
+    }
+
+    /// With the Hall sensors read by the module on the serial line instead of that on CAN.
+    ///
+    /// # Panics
+    /// When the shipped configuration has become another one.
+    #[must_use]
+    pub fn over_dcon(self) -> Self {
+        let begin = MACHINE.find("[analog.hall]").expect("the machine has it");
+        let end = MACHINE.find("[instrument.laser]").expect("it comes next");
+        let module = "[analog.hall]\ndevice = \"dcon\"\nline = \"adc\"\naddress = 1\n\
+                      checksum = true\nchannels = [0, 1]\nfull_scale_v = [5.0, 5.0]\n\
+                      poll_period_ms = 100.0\n\n";
+        let line = "[serial.adc]\npath = \"/dev/ttyUSB0\"\nbaud_bit_per_s = 9600\n\n[axis.x]\n";
+        self.machine(&MACHINE[begin..end], module)
+            .machine("[axis.x]\n", line)
     }
 
     /// With `from` replaced by `to` in the description of the emulation.

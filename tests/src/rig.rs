@@ -32,7 +32,7 @@ impl Rig {
         match self {
             Self::InProcess => 1.0,
             Self::Vcan if !native => 3.0,
-            Self::Pty | Self::Vcan => 8.0,
+            Self::Pty | Self::Vcan => 5.0,
         }
     }
 }

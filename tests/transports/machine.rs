@@ -43,6 +43,8 @@ fn look(stand: &Stand) -> (Time, Metres) {
     stand.simulation(|it| (it.now(), it.truth().scale_position()))
 }
 
+/// The name begins with `vcan`: only such an interface may have a clock that is not real.
+///
 /// In the middle of a move that takes 80 s of the machine's life `what` happens to the
 /// interface: the failure names port and state, and the stage stops far from the target.
 #[track_caller]
@@ -95,11 +97,11 @@ fn stops_by_itself(stand: &Stand) {
 #[test]
 #[ignore = "needs SocketCAN"]
 fn an_interface_set_down_in_a_move_ends_it_by_name_and_the_stage_stops() {
-    check("tmdown", Interface::down, LinkState::Down);
+    check("vcan-down", Interface::down, LinkState::Down);
 }
 
 #[test]
 #[ignore = "needs SocketCAN"]
 fn an_interface_deleted_in_a_move_ends_it_by_name_and_the_stage_stops() {
-    check("tmdeleted", Interface::delete, LinkState::Gone);
+    check("vcan-del", Interface::delete, LinkState::Gone);
 }

@@ -70,12 +70,18 @@ impl Grid {
             low + self.breaks[low + 1..=high].partition_point(|b| *b < value)
         };
         let piece = piece.min(self.breaks.len() - 2);
-        // Rounding of the bucket number may put a value on an edge one bucket too far.
-        piece - usize::from((piece > 0) & (value <= self.breaks[piece]))
+        // Rounding of the bucket number may put a value on an edge one bucket too far: so
+        // seldom that a branch, which is not waited for, is the cheaper.
+        if value <= self.breaks[piece] {
+            return piece.saturating_sub(1);
+        }
+        piece
     }
 }
 
+/// One line of the processor's cache.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Piece {
     deviation: Segment,
     /// actual at the start of the piece: start + deviation there.

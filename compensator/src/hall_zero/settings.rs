@@ -34,6 +34,8 @@ pub struct Settings {
     pub time_limit: Duration,
     /// Longest time without motion where motion is wanted.
     pub stall_limit: Duration,
+    /// An axis this far on the wrong side of where a move began moves the wrong way.
+    pub wrong_way: Metres,
     /// How often the samples of one band may be started over.
     pub restarts_max: u32,
     /// Lower soft limit of the axis.
@@ -71,6 +73,7 @@ impl Default for Settings {
             search_limit: Metres(2e-3),
             time_limit: Duration::from_secs(60),
             stall_limit: Duration::from_secs(2),
+            wrong_way: Metres(100e-6),
             restarts_max: 50,
             soft_min: Metres(-10e-3),
             soft_max: Metres(10e-3),
@@ -155,6 +158,7 @@ impl Settings {
             ("arrival", self.arrival.value()),
             ("time limit", self.time_limit.as_secs_f64()),
             ("stall limit", self.stall_limit.as_secs_f64()),
+            ("wrong way", self.wrong_way.value()),
             ("stuck samples", self.stuck_samples as f64),
         ];
         for (setting, seen) in positive {

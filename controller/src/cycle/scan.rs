@@ -41,6 +41,8 @@ const IDENTITY: [Object; 4] = [
 ];
 /// So many requests are sent before answers are collected: no transmit queue overflows.
 const BATCH: usize = 8;
+/// So often a node of the configuration that did not answer is asked again.
+const ASKED_AGAIN_MAX: u32 = 2;
 /// How long the last answers may take.
 const PATIENCE: Duration = Duration::from_millis(300);
 
@@ -71,12 +73,13 @@ impl Machine {
     fn scan_can(&mut self, port: Port, name: &str) -> Result<Vec<Found>, Failure> {
         let mut answers = Answers::new();
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
-        self.ask(port, &all, DEVICE_TYPE, &mut answers)?;
+        let expected = assemble::expected_nodes(&self.config, name);
+        let awaited: Vec<_> = expected.keys().filter_map(|it| NodeId::new(*it)).collect();
+        self.ask(port, &all, &awaited, DEVICE_TYPE, &mut answers)?;
         let present: Vec<_> = answers.keys().copied().collect();
         for object in IDENTITY {
-            self.ask(port, &present, object, &mut answers)?;
+            self.ask(port, &present, &present, object, &mut answers)?;
         }
-        let expected = assemble::expected_nodes(&self.config, name);
         let mut found: Vec<_> = answers
             .iter()
             .map(|(node, values)| judge(name, *node, values, expected.get(&node.raw())))
@@ -89,7 +92,29 @@ impl Machine {
         Ok(found)
     }
 
+    /// Asks `nodes`, and waits a while for answers. Those that are `awaited` are asked again: a
+    /// node that has just been switched on boots for a moment.
     fn ask(
+        &mut self,
+        port: Port,
+        nodes: &[NodeId],
+        awaited: &[NodeId],
+        object: Object,
+        answers: &mut Answers,
+    ) -> Result<(), Failure> {
+        self.ask_once(port, nodes, object, answers)?;
+        for _ in 0..ASKED_AGAIN_MAX * self.patience {
+            let has = |node| answers.get(node).is_some_and(|it| it.contains_key(&object));
+            let silent: Vec<_> = awaited.iter().filter(|it| !has(it)).copied().collect();
+            if silent.is_empty() {
+                break;
+            }
+            self.ask_once(port, &silent, object, answers)?;
+        }
+        Ok(())
+    }
+
+    fn ask_once(
         &mut self,
         port: Port,
         nodes: &[NodeId],

@@ -100,7 +100,8 @@ impl Machine {
         self.observer.progress(Stage::Zero, axis, 1, STEPS);
         self.travel(axis, Metres::ZERO, Correction::Off)?;
         self.observer.progress(Stage::Zero, axis, 2, STEPS);
-        let settings = assemble::hall_settings(config, self.axis_config(axis)?);
+        let usual = assemble::hall_settings(config, self.axis_config(axis)?);
+        let settings = assemble::patient_search(usual, self.patience);
         let outcome = self.search(axis, config, settings)?;
         self.observer.progress(Stage::Zero, axis, 3, STEPS);
         let estimate = self.estimate(axis, config, &settings, &outcome)?;

@@ -26,7 +26,7 @@ use super::socketcan::{self, CanPort};
 use super::sync_thread::{SyncSink, SyncStatistics, SyncThread};
 use super::{Arrival, Input, Payload, Port, SendError, Transport};
 
-/// Until the clock has been read, a wait is no longer than this.
+/// Until the clock has been read, a wait is no longer than this, or half of what is left.
 const COARSE_WAIT: Duration = Duration::from_millis(1);
 /// The longest single wait, so that a deadline of "never" needs no special case.
 const WAIT_MAX: Duration = Duration::from_secs(3_600);
@@ -370,11 +370,13 @@ impl Transport for Live {
         self.slot_mut(port)?.live.send(payload)
     }
 
-    /// Reads the clock only when nothing comes at once: where that is a system call (virtual
-    /// machines), it would take as long as the frame. A caller that has not read it for long
-    /// may get up to a millisecond more than it asked for.
+    /// Reads the clock only when nothing comes in the first half of the wait: where that is a
+    /// system call (virtual machines), it would take as long as the frame; so would a timer
+    /// set for every frame before the kernel's next tick. A caller that last read the clock
+    /// longer ago than half of what it now waits may get that much more than it asked for,
+    /// or a millisecond.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        let mut longest = COARSE_WAIT;
+        let mut fresh = false;
         loop {
             if let Some(arrival) = self.poll_ports() {
                 return Some(arrival);
@@ -382,7 +384,12 @@ impl Transport for Live {
             let target = until.min(self.next_event());
             let timeout = self.clock.wall_span(target.since(self.known.get()));
             let was_over = self.known.get() >= until;
-            if self.wait(timeout.min(longest))
+            let longest = if fresh {
+                WAIT_MAX
+            } else {
+                COARSE_WAIT.max(timeout / 2)
+            };
+            if self.wait(timeout.min(longest).min(WAIT_MAX))
                 && let Some(arrival) = self.poll_ports()
             {
                 return Some(arrival);
@@ -391,7 +398,7 @@ impl Transport for Live {
                 return None;
             }
             self.now();
-            longest = WAIT_MAX;
+            fresh = true;
         }
     }
 

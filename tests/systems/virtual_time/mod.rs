@@ -4,3 +4,4 @@
 mod linear;
 mod linear_zero;
 mod repeatable;
+mod serial_zero;

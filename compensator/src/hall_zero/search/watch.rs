@@ -5,8 +5,6 @@ use units::{Metres, Time, Volts};
 use super::Sample;
 use crate::hall_zero::{Reason, Sensor, SensorFault, Settings};
 
-/// An axis this far on the wrong side of where a move began moves the wrong way.
-const WRONG_WAY: Metres = Metres(100e-6);
 /// Consecutive samples at a rail that stop the search at once.
 const RAIL_SAMPLES: u32 = 3;
 /// Bit-identical samples that are a stuck ADC when the axis moved [`STUCK_TRAVEL`] meanwhile.
@@ -92,7 +90,7 @@ impl MotionWatch {
             _ => *self.0.insert(fresh),
         };
         let moved = (sample.position - watched.from).value() * direction;
-        if moved < -WRONG_WAY.value() {
+        if moved < -settings.wrong_way.value() {
             return Some(Reason::WrongDirection);
         }
         if moved > settings.arrival.value() {
