@@ -25,9 +25,9 @@ use crate::witness::{Testimony, Witnessed};
 /// How many runs on each change.
 const RUNS: u64 = 200;
 /// One in so many is also repaired, and must work again.
-const RECOVERIES: u64 = 3;
+const RECOVERIES: u64 = 6;
 /// How many controllers are killed.
-const KILLS: u64 = 25;
+const KILLS: u64 = 12;
 /// The whole cycle takes about this long.
 const CYCLE_S: f64 = 34.0;
 
