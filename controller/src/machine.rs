@@ -267,7 +267,7 @@ impl Machine {
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
     pub fn start(&mut self) -> Result<(), Failure> {
-        self.supervision = Supervision::Off;
+        self.catch_up();
         for memory in self.memory.values_mut() {
             memory.zeroed = false;
             memory.approach.forget();

@@ -52,6 +52,22 @@ impl Machine {
         Ok(())
     }
 
+    /// Takes note of what arrived while nobody listened, and acts on none of it.
+    pub(crate) fn catch_up(&mut self) {
+        let now = self.now();
+        self.supervision = Supervision::Stopping;
+        while let Some(arrival) = self.transport.receive(now) {
+            let is_old = arrival.at < now;
+            // Nothing is judged while stopping.
+            let _ = self.take(&arrival);
+            if !is_old {
+                break;
+            }
+        }
+        let _ = self.judge_alarms();
+        self.supervision = Supervision::Off;
+    }
+
     fn next_deadline(&mut self) -> Time {
         let beats = self
             .heartbeats

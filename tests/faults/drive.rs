@@ -176,7 +176,7 @@ fn torque_that_is_switched_off_while_the_axis_moves_stops_it_for_good() {
             } => true,
             _ => false,
         },
-        words: &["x:"],
+        words: &["x:", "torque"],
         within: PERIOD * 3,
         // It coasts: 200 mm/s at 2 m/s².
         rest: Duration::from_millis(250),

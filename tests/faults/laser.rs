@@ -233,6 +233,21 @@ fn an_instrument_with_the_wrong_optics_factor_is_refused() {
 }
 
 #[test]
+fn an_encoder_whose_counts_are_taken_for_another_length_makes_no_zero() {
+    // Doubled, and an inch taken for a centimetre: the magnets are not where they should be.
+    for resolution in ["resolution_nm = 20.0 ", "resolution_nm = 25.4 "] {
+        let scene = Scene::during(Phase::Zero).machine("resolution_nm = 10.0 ", resolution);
+        let wanted = Wanted {
+            cause: |failure| matches!(failure, Failure::Search { .. }),
+            words: &["axis x", "hall zero"],
+            within: WHOLE,
+            rest: WHOLE,
+        };
+        check(scene, &wanted);
+    }
+}
+
+#[test]
 fn a_small_error_of_scale_is_refused_after_the_first_run() {
     // As if the beam ran 60 mrad beside the travel: 1800 ppm.
     check_scale(

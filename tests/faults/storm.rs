@@ -5,13 +5,13 @@
 //! `FAULT_RUNS=2000` plays that many.
 
 use std::cell::RefCell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::device::Alarm;
 use drivers::wire::cia402::PowerState;
-use mock_bus::fault::FaultConfig;
+use mock_bus::fault::{FaultConfig, FaultId};
 use mock_bus::random::Stream;
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
@@ -24,8 +24,12 @@ use crate::witness::{Testimony, Witnessed};
 
 /// How many runs on each change.
 const RUNS: u64 = 200;
+/// One in so many is also repaired, and must work again.
+const RECOVERIES: u64 = 6;
+/// How many controllers are killed.
+const KILLS: u64 = 12;
 /// The whole cycle takes about this long.
-const CYCLE_S: f64 = 42.0;
+const CYCLE_S: f64 = 34.0;
 
 /// What may be blamed for a fault.
 type Causes = fn(&Failure) -> bool;
@@ -214,24 +218,27 @@ fn cycle(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
 struct Storm {
     bench: Bench,
     seen: Rc<RefCell<Testimony>>,
+    id: FaultId,
     ended: Time,
     result: Result<(), Failure>,
 }
 
-fn play(seed: u64, fault: &FaultConfig) -> Storm {
+fn witnessed(seed: u64) -> (Bench, Rc<RefCell<Testimony>>) {
     let seen = Rc::new(RefCell::new(Testimony::default()));
     let witness = Rc::clone(&seen);
-    let mut bench = Bench::wrapped(
+    let bench = Bench::wrapped(
         seed,
         shortened,
         |text| text,
         |inner| Box::new(Witnessed::new(inner, witness)),
     );
-    bench
-        .emulated
-        .simulation_mut()
-        .inject(fault.clone())
-        .expect("it names what is there");
+    (bench, seen)
+}
+
+fn play(seed: u64, fault: &FaultConfig) -> Storm {
+    let (mut bench, seen) = witnessed(seed);
+    let id = bench.emulated.simulation_mut().inject(fault.clone());
+    let id = id.expect("it names what is there");
     let store = bench.store.clone();
     let mut ended = Time::ZERO;
     let result = bench.machine.guarded(|machine| {
@@ -242,6 +249,7 @@ fn play(seed: u64, fault: &FaultConfig) -> Storm {
     Storm {
         bench,
         seen,
+        id,
         ended,
         result,
     }
@@ -253,13 +261,28 @@ fn judge(storm: &Storm, fault: &FaultConfig, causes: Causes) {
         let due = Time::from_seconds(fault.from_s);
         assert!(storm.ended >= due, "failed before the fault: {failure}");
         assert!(causes(failure), "blamed: {failure}\n{failure:?}");
+        let simulation = storm.bench.emulated.simulation();
+        let struck = simulation.fault_deliveries(storm.id);
+        assert!(struck > 0, "failed without the fault: {failure}");
     }
-    come_to_rest(storm);
-    let store = &storm.bench.store;
+    come_to_rest(&storm.bench);
+    // Whatever went wrong, no later than the drive's own watch and a stop allow.
+    let bound = storm.ended + Duration::from_millis(800);
+    if let Some(moved) = storm.seen.borrow().moved_last(storm.ended) {
+        assert!(
+            moved <= bound,
+            "moved until {moved}, failed at {}",
+            storm.ended
+        );
+    }
+    records_are_sound(&storm.bench);
+}
+
+fn records_are_sound(bench: &Bench) {
+    let store = &bench.store;
     if let Some(id) = store.active("x").expect("the pointer is whole").current {
         let record = store.load(&id).expect("the active calibration is whole");
-        let here = storm.bench.machine.this_machine("x");
-        match record.belongs_to(&id, &here) {
+        match record.belongs_to(&id, &bench.machine.this_machine("x")) {
             // A drive that is gone has told nobody who it is.
             Ok(())
             | Err(StoreError::Foreign {
@@ -276,9 +299,30 @@ fn judge(storm: &Storm, fault: &FaultConfig, causes: Causes) {
     }
 }
 
-/// The stage stands one second after the end and then for ever, and nothing pushes it.
-fn come_to_rest(storm: &Storm) {
+/// Once the cause is gone, the machine works as before; a drive's fault is acknowledged.
+fn recovers(storm: &mut Storm) {
     let mut simulation = storm.bench.emulated.simulation_mut();
+    simulation.end_fault(storm.id);
+    let later = simulation.now() + Duration::from_secs(1);
+    simulation.advance(later);
+    drop(simulation);
+    take_up_work(&mut storm.bench.machine, &storm.bench.store)
+        .unwrap_or_else(|failure| panic!("does not recover: {failure}\n{failure:?}"));
+}
+
+fn take_up_work(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
+    machine.guarded(|machine| {
+        machine.start()?;
+        machine.reset_fault("x")?;
+        machine.zero("x", store)?;
+        machine.move_to("x", Metres::from_mm(5.0))?;
+        machine.shut_down()
+    })
+}
+
+/// The stage stands one second after the end and then for ever, and nothing pushes it.
+fn come_to_rest(bench: &Bench) {
+    let mut simulation = bench.emulated.simulation_mut();
     let begin = simulation.now();
     let mut position_at = |s: f64| {
         simulation.advance(begin + Duration::from_secs_f64(s));
@@ -288,28 +332,22 @@ fn come_to_rest(storm: &Storm) {
     let crept = (position_at(3.0) - stopped).abs();
     assert!(crept.um() < 0.5, "crept by {} µm after the end", crept.um());
     drop(simulation);
-    let state = power_state(&storm.bench.emulated);
+    let state = power_state(&bench.emulated);
     assert_ne!(
         state,
         PowerState::OperationEnabled,
         "the drive was left enabled"
     );
-    // Whatever went wrong, no later than the drive's own watch and a stop allow.
-    let bound = storm.ended + Duration::from_millis(800);
-    if let Some(moved) = storm.seen.borrow().moved_last(storm.ended) {
-        assert!(
-            moved <= bound,
-            "moved until {moved}, failed at {}",
-            storm.ended
-        );
-    }
 }
 
 fn run(seed: u64) -> Result<String, String> {
     let (fault, causes) = draw(seed);
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        let storm = play(seed, &fault);
+        let mut storm = play(seed, &fault);
         judge(&storm, &fault, causes);
+        if seed.is_multiple_of(RECOVERIES) {
+            recovers(&mut storm);
+        }
         match &storm.result {
             Ok(()) => "survived".to_owned(),
             Err(failure) => failure.to_string(),
@@ -332,13 +370,14 @@ fn number(variable: &str) -> Option<u64> {
     std::env::var(variable).ok()?.parse().ok()
 }
 
-#[test]
-fn any_fault_at_any_moment_leaves_a_safe_machine_and_sound_records() {
+/// `share` of 2: two tests that run beside each other.
+fn storm(share: u64) {
     let seeds: Vec<u64> = match number("FAULT_SEED") {
         Some(seed) => vec![seed],
         None => (0..number("FAULT_RUNS").unwrap_or(RUNS)).collect(),
     };
-    let results: Vec<_> = seeds.iter().map(|seed| run(*seed)).collect();
+    let mine = seeds.into_iter().filter(|seed| seed % 2 == share);
+    let results: Vec<_> = mine.map(run).collect();
     let survived = results
         .iter()
         .filter(|it| it.as_deref() == Ok("survived"))
@@ -351,4 +390,44 @@ fn any_fault_at_any_moment_leaves_a_safe_machine_and_sound_records() {
         failures.len(),
         failures.join("\n\n")
     );
+}
+
+#[test]
+fn any_fault_at_any_moment_leaves_a_safe_machine_and_sound_records() {
+    storm(0);
+}
+
+#[test]
+fn any_other_fault_does_so_too() {
+    storm(1);
+}
+
+/// Kills the controller at a random moment of the cycle; another one takes over.
+fn kill(seed: u64) {
+    let (mut bench, seen) = witnessed(seed);
+    let at = Time::from_seconds(Stream::new(seed, "kill").between(0.1, CYCLE_S));
+    // As SIGKILL does: nothing is tidied up on the way out.
+    seen.borrow_mut()
+        .plan(at, Box::new(|_| resume_unwind(Box::new("killed"))));
+    let store = bench.store.clone();
+    let machine = &mut bench.machine;
+    let ended = catch_unwind(AssertUnwindSafe(|| cycle(machine, &store)));
+    if let Ok(result) = ended {
+        result.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        return;
+    }
+    come_to_rest(&bench);
+    records_are_sound(&bench);
+    let mut successor = Machine::new(&bench.loaded, Box::new(bench.emulated.transport()));
+    take_up_work(&mut successor, &store).unwrap_or_else(|failure| {
+        panic!("seed {seed}, killed at {at}: the next one fails: {failure}\n{failure:?}")
+    });
+}
+
+#[test]
+fn a_controller_killed_at_any_moment_leaves_a_stage_that_stops_and_another_can_use() {
+    match number("FAULT_SEED") {
+        Some(seed) => kill(seed),
+        None => (0..KILLS).for_each(kill),
+    }
 }

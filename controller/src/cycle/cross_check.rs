@@ -203,9 +203,11 @@ fn likely_cause(ratio: f64) -> &'static str {
     let near = |value: f64| (ratio / value - 1.0).abs() < 0.02;
     match ratio {
         _ if near(-1.0) => "the sign is turned: set `reverse` of the instrument",
-        _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor`",
-        _ if near(4.0) || near(0.25) => "a factor of four: check `optics_factor`",
-        _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres",
+        _ if near(2.0) || near(0.5) => "a factor of two: check `optics_factor` and `resolution_nm`",
+        _ if near(4.0) || near(0.25) => {
+            "a factor of four: check `optics_factor` and `resolution_nm`"
+        }
+        _ if near(25.4) || near(1.0 / 25.4) => "inch taken for millimetres: check `resolution_nm`",
         _ if near(1e3) || near(1e-3) => "a factor of 1000: check the units of `resolution_nm`",
         _ if ratio.abs() < 0.02 => "the instrument does not follow: reflector on the stage?",
         _ => "check `resolution_nm`, the optics and the alignment, or the fringe counter slipped",

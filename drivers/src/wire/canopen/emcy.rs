@@ -49,6 +49,11 @@ const NAMES: &[(u16, u16, &str)] = &[
     (0xFF00, 0x8600, "positioning controller"),
     (0xF000, 0x8000, "monitoring"),
     (0xFF00, 0x9000, "external"),
+    (
+        0xFFFF,
+        0xFF01,
+        "manufacturer specific; often: safe torque off (STO) is open",
+    ),
     (0xFF00, 0xFF00, "manufacturer specific"),
 ];
 
