@@ -175,9 +175,9 @@ fn homing_here_moves_the_coordinates_and_not_the_stage() {
 fn a_blocked_axis_faults_and_one_reset_clears_it_when_the_cause_is_gone() {
     check(|drive| {
         on_the_way(drive)?;
-        let blocked = drive
-            .emulator
-            .simulation(|simulation| simulation.inject(FaultConfig::permanent(Fault::BlockedAxis)));
+        let blocked = drive.emulator.simulation(|simulation| {
+            simulation.inject(FaultConfig::permanent(Fault::BlockedAxis { axis: 0 }))
+        });
         let blocked = blocked.expect("every stage can be blocked");
         assert!(drive.outcome().is_err());
         drive.live_until(|drive| drive.power_state() == Some(PowerState::Fault));
