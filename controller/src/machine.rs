@@ -18,6 +18,7 @@ use drivers::device::{
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
+use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
 use crate::assemble;
@@ -216,6 +217,14 @@ impl Machine {
         Ok(self.axis(axis)?.device.reading())
     }
 
+    /// The newest power state of `axis`, `None` before its drive has said one.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
+        Ok(self.axis(axis)?.device.power_state())
+    }
+
     /// What every device said it is, by its name in the configuration.
     pub fn identities(&self) -> BTreeMap<String, Identity> {
         let axes = self
@@ -311,13 +320,13 @@ impl Machine {
     pub(crate) fn command(
         &mut self,
         axis: &str,
-        command: AxisCommand,
+        command: impl Into<AxisCommand>,
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
         let now = self.now();
-        self.axes[at].device.command(now, command);
+        self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
     }
 

@@ -84,7 +84,7 @@ impl Kinematics {
     fn holds_the_platform(&self) -> bool {
         let [xx, xy, yy] = self.moments();
         let weakest = f64::midpoint(xx, yy) - f64::midpoint(xx, -yy).hypot(xy);
-        if !(weakest > SHARE_MIN) {
+        if weakest.is_nan() || weakest <= SHARE_MIN {
             return false;
         }
         self.grip_m() > ARM_MIN_M
