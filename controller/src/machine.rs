@@ -190,6 +190,16 @@ impl Machine {
             && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
     }
 
+    /// Coordinates mean something only after the zero.
+    pub(crate) fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        if self.is_zeroed(axis) {
+            return Ok(());
+        }
+        Err(Failure::NotZeroed {
+            axis: axis.to_owned(),
+        })
+    }
+
     /// The calibration `axis` uses now.
     pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
         self.memory.get(axis)?.compensation.as_ref()
