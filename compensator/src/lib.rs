@@ -10,6 +10,7 @@
 //! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
 //! | [`hall_zero`] | where is the drift-free origin (system S5)? |
 //! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
+//! | [`platform`] | which strokes bring an alignment platform into a pose, and back (system S1)? |
 //! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
 //! | [`apply`] | how does a correction get onto a moving axis without a bump? |
 //! | [`interpolation`], [`least_squares`], [`uncertainty`] | the numerics under them |
@@ -28,4 +29,5 @@ pub mod iso230;
 pub mod least_squares;
 pub mod length_correction;
 pub mod measurement;
+pub mod platform;
 pub mod uncertainty;
