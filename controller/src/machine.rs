@@ -18,6 +18,7 @@ use drivers::device::{
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
+use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
 use crate::assemble;
@@ -189,6 +190,16 @@ impl Machine {
             && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
     }
 
+    /// Coordinates mean something only after the zero.
+    pub(crate) fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        if self.is_zeroed(axis) {
+            return Ok(());
+        }
+        Err(Failure::NotZeroed {
+            axis: axis.to_owned(),
+        })
+    }
+
     /// The calibration `axis` uses now.
     pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
         self.memory.get(axis)?.compensation.as_ref()
@@ -214,6 +225,14 @@ impl Machine {
     /// When there is no such axis.
     pub fn reading(&self, axis: &str) -> Result<Option<AxisReading>, Failure> {
         Ok(self.axis(axis)?.device.reading())
+    }
+
+    /// The newest power state of `axis`, `None` before its drive has said one.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
+        Ok(self.axis(axis)?.device.power_state())
     }
 
     /// What every device said it is, by its name in the configuration.
@@ -311,13 +330,13 @@ impl Machine {
     pub(crate) fn command(
         &mut self,
         axis: &str,
-        command: AxisCommand,
+        command: impl Into<AxisCommand>,
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
         let now = self.now();
-        self.axes[at].device.command(now, command);
+        self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
     }
 
