@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`measurement`] | are these measured data complete and in order? |
 //! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
+//! | [`rotary`] | what is the error of a rotary table, by a plate worse than it (system S2)? |
 //! | [`hall_zero`] | where is the drift-free origin (system S5)? |
 //! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
 //! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
@@ -28,4 +29,5 @@ pub mod iso230;
 pub mod least_squares;
 pub mod length_correction;
 pub mod measurement;
+pub mod rotary;
 pub mod uncertainty;

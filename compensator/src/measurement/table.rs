@@ -155,12 +155,15 @@ pub enum Fault {
         /// The target before it.
         previous_mm: f64,
     },
+    /// Something that only data of a rotary table can have.
+    #[error(transparent)]
+    Rotary(#[from] super::RotaryFault),
 }
 
 /// The columns of one file format.
 pub(super) struct Format {
-    columns: &'static [&'static str],
-    header: &'static str,
+    pub(super) columns: &'static [&'static str],
+    pub(super) header: &'static str,
 }
 
 impl Format {
@@ -242,7 +245,16 @@ impl Table {
         self.rows.len()
     }
 
-    fn fail(&self, row: usize, column: usize, fault: Fault) -> DataError {
+    /// The line of the file a row stands in.
+    pub(super) fn line(&self, row: usize) -> usize {
+        self.rows[row].0
+    }
+
+    pub(super) fn text(&self, row: usize, column: usize) -> &str {
+        &self.rows[row].1[column].text
+    }
+
+    pub(super) fn fail(&self, row: usize, column: usize, fault: Fault) -> DataError {
         let (line, cells) = &self.rows[row];
         DataError {
             file: self.file.clone(),
