@@ -11,8 +11,8 @@ use super::fault::{DataError, Fault};
 
 /// The columns of one file format.
 pub(super) struct Format {
-    columns: &'static [&'static str],
-    header: &'static str,
+    pub(super) columns: &'static [&'static str],
+    pub(super) header: &'static str,
 }
 
 impl Format {
@@ -161,6 +161,10 @@ impl Table {
     }
 
     /// The line of a row in the file, counted from 1.
+    pub(super) fn text(&self, row: usize, column: usize) -> &str {
+        &self.rows[row].1[column].text
+    }
+
     pub(super) fn line(&self, row: usize) -> usize {
         self.rows[row].0
     }
