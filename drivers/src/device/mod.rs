@@ -10,13 +10,15 @@ pub mod cia402;
 pub mod dcon;
 #[cfg(test)]
 mod fake_node;
+pub mod in_sight;
 pub mod serial_line;
 pub mod umd2;
 
 use core::fmt;
 use core::time::Duration;
 use units::{
-    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time, Volts,
+    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, Radians, RelativeHumidity, Time,
+    Volts,
 };
 
 pub use alarm::Alarm;
@@ -118,6 +120,14 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         /// Search speed.
         speed: Q::Speed,
     },
+    /// Home on the first index pulse off the negative limit switch (method 1); the drive's
+    /// coordinates become `position` there.
+    HomeIndex {
+        /// The coordinate of the index pulse.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+    },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {
         /// The coordinate of where the axis stands now.
@@ -197,6 +207,39 @@ pub struct DisplacementReading {
     pub standard_deviation: Metres,
     /// How many samples were averaged.
     pub samples: u32,
+}
+
+/// An instrument that sees where a body is in a plane.
+pub trait PoseInstrument: Device {
+    /// Begins to take pictures until `exposures` of them are good, and averages their poses.
+    /// Only pictures taken after this call count. [`Device::poll_outcome`] says when it is
+    /// done; then [`PoseInstrument::pose`].
+    fn begin_pose(&mut self, now: Time, exposures: u32);
+
+    /// The last pose, `None` before the first and after a measurement that failed: a picture
+    /// that was judged bad never becomes a number.
+    fn pose(&self) -> Option<PoseReading>;
+}
+
+/// Where a body was seen, in the machine's frame, from where the instrument was taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseReading {
+    /// When the answer about the last picture arrived.
+    pub at: Time,
+    /// Displacement of the body's origin along x.
+    pub x: Metres,
+    /// Displacement of the body's origin along y.
+    pub y: Metres,
+    /// Turn, counter-clockwise.
+    pub angle: Radians,
+    /// Standard deviations of the single pictures in x, y and angle, zero for a single one.
+    pub standard_deviation: (Metres, Metres, Radians),
+    /// How like the taught target the worst picture was, 0 to 1.
+    pub score: f64,
+    /// How many pictures were averaged.
+    pub samples: u32,
+    /// How many more were taken and judged bad.
+    pub rejected: u32,
 }
 
 /// What an instrument's weather sensors say; `None` where it has none or they fell silent.
@@ -320,6 +363,28 @@ pub enum DeviceError {
         value: f64,
         limit: f64,
         unit: &'static str,
+    },
+    /// A device answered a command with something else than success.
+    #[error("{device}: {step} refused with {status}")]
+    Refused {
+        device: DeviceName,
+        step: &'static str,
+        status: crate::wire::in_sight::Status,
+    },
+    /// Too few good pictures.
+    #[error(
+        "{device}: {good} good pictures of {wanted}; of {} bad ones {without_target} showed no \
+         target and {judged_bad} were judged bad (best score {:.0} %); is the target in the \
+         field, clean, lit and at rest?",
+        without_target + judged_bad, best_score * 100.0
+    )]
+    NoGoodPicture {
+        device: DeviceName,
+        good: u32,
+        wanted: u32,
+        without_target: u32,
+        judged_bad: u32,
+        best_score: f64,
     },
     /// An alarm ended the command.
     #[error("{device}: {step} ended by an alarm: {alarm}")]

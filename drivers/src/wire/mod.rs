@@ -9,6 +9,7 @@ pub mod candump;
 pub mod canopen;
 pub mod cia402;
 pub mod dcon;
+pub mod in_sight;
 pub mod slcan;
 pub mod umd2;
 
