@@ -161,12 +161,13 @@ impl Table {
     }
 
     /// The line of a row in the file, counted from 1.
-    pub(super) fn text(&self, row: usize, column: usize) -> &str {
-        &self.rows[row].1[column].text
-    }
-
     pub(super) fn line(&self, row: usize) -> usize {
         self.rows[row].0
+    }
+
+    /// A cell as it was written.
+    pub(super) fn text(&self, row: usize, column: usize) -> &str {
+        &self.rows[row].1[column].text
     }
 
     /// The name of an axis: letters, digits, `_` and `-`.
