@@ -22,7 +22,7 @@ pub use calibration::{
     NodeRecord, Store, short,
 };
 pub use journal::{
-    Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
+    ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
 

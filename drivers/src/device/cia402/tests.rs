@@ -768,6 +768,19 @@ fn a_quick_stop_goes_out_at_once_while_an_sdo_is_pending() {
 }
 
 #[test]
+fn a_stop_is_not_confirmed_by_what_the_drive_said_before_it() {
+    let mut rig = Rig::started();
+    // Off, and its last statusword says so; then it falls silent.
+    rig.drive.command(rig.now, AxisCommand::QuickStop);
+    let silent_until = rig.now + Duration::from_secs(2);
+    rig.drive.handle_timeout(silent_until);
+    let Some(Err(DeviceError::Timeout { awaited, .. })) = rig.drive.poll_outcome() else {
+        panic!("believed")
+    };
+    assert_eq!(awaited, "a statusword after the command");
+}
+
+#[test]
 fn a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() {
     let mut rig = Rig::enabled();
     rig.fake.stays_in_quick_stop = true;
