@@ -769,15 +769,15 @@ fn a_quick_stop_goes_out_at_once_while_an_sdo_is_pending() {
 
 #[test]
 fn a_stop_is_not_confirmed_by_what_the_drive_said_before_it() {
-    let mut rig = Rig::started();
-    // Off, and its last statusword says so; then it falls silent.
+    let mut rig = Rig::new();
+    rig.start().unwrap();
     rig.drive.command(rig.now, AxisCommand::QuickStop);
-    let silent_until = rig.now + Duration::from_secs(2);
-    rig.drive.handle_timeout(silent_until);
-    let Some(Err(DeviceError::Timeout { awaited, .. })) = rig.drive.poll_outcome() else {
-        panic!("believed")
-    };
-    assert_eq!(awaited, "a statusword after the command");
+    // Sampled before it heard the command: "switch on disabled", and it was so.
+    rig.fake.sync();
+    rig.exchange();
+    assert_eq!(rig.drive.poll_outcome(), None);
+    rig.passes_ms(3 * SYNC_MS);
+    assert_eq!(rig.drive.poll_outcome(), Some(Ok(())));
 }
 
 #[test]
