@@ -81,8 +81,8 @@ impl Pty {
         }
     }
 
-    /// The rate that the client has set, as far as it is one of the usual; a client that has set
-    /// none is at the terminal's 38400.
+    /// The rate that the client has set, where it has set one of the usual by its code; one that
+    /// is set as a number cannot be read here.
     pub(super) fn client_rate(&self) -> Option<u32> {
         let settings = libc::termios::from(tcgetattr(&self.slave).ok()?);
         Some(match settings.c_cflag & libc::CBAUD {
