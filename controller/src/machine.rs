@@ -320,13 +320,13 @@ impl Machine {
     pub(crate) fn command(
         &mut self,
         axis: &str,
-        command: AxisCommand,
+        command: impl Into<AxisCommand>,
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
         let now = self.now();
-        self.axes[at].device.command(now, command);
+        self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
     }
 

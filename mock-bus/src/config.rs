@@ -13,6 +13,7 @@ use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode, addresses_fit};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
+use crate::plant::platform::config::PlatformConfig;
 
 /// One emulated machine.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -329,18 +330,53 @@ impl MachineConfig {
                 positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
             }
         }
-        let resolution_nm = stage.encoder.resolution_nm;
+        if let Some(platform) = &self.plant.platform {
+            check_platform(platform)?;
+        }
+        let plant = &self.plant;
         self.nodes
             .iter()
-            .try_for_each(|node| node.device.check(resolution_nm))
+            .try_for_each(|node| node.device.check(plant))
     }
 }
 
+fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
+    let screw = &platform.screw;
+    for (key, seen) in [
+        ("lead_mm", screw.lead_mm),
+        ("resolution_nm", screw.resolution_nm),
+        ("work_range_mm", screw.work_range_mm),
+        ("servo_bandwidth_hz", screw.servo_bandwidth_hz),
+        ("acceleration_max_m_per_s2", screw.acceleration_max_m_per_s2),
+        (
+            "friction_deceleration_m_per_s2",
+            screw.friction_deceleration_m_per_s2,
+        ),
+        (
+            "hard_stop_mm - work_range_mm",
+            screw.hard_stop_mm - screw.work_range_mm,
+        ),
+        (
+            "hard_stop_mm - start_mm",
+            screw.hard_stop_mm - screw.start_mm,
+        ),
+    ] {
+        positive(key, seen)?;
+    }
+    if platform.holds_the_platform() {
+        return Ok(());
+    }
+    Err(ConfigError::Value {
+        key: "actuators",
+        seen: platform.actuators.len() as f64,
+        expected: "three or four screws that hold x, y and angle",
+    })
+}
+
 impl DeviceConfig {
-    /// `resolution_nm` is the plant's encoder's.
-    fn check(&self, resolution_nm: f64) -> Result<(), ConfigError> {
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
         match self {
-            Self::Cia402Drive(config) if config.encoder_resolution_nm != resolution_nm => {
+            Self::Cia402Drive(config) if config.encoder_resolution_nm != plant.resolution_nm() => {
                 Err(ConfigError::Value {
                     key: "encoder_resolution_nm",
                     seen: config.encoder_resolution_nm,

@@ -14,8 +14,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader,
-    SCHEMA_VERSION, Store,
+    CalibrationRecord, Content, Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord,
+    Journal, JournalHeader, LinearContent, RecordHead, SCHEMA_VERSION, Store,
 };
 
 /// How a calibration is made.
@@ -105,8 +105,8 @@ impl Machine {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record.belongs_to(&id, &self.this_machine(axis))?;
-        let compensation = self.prepare(axis, record.table(&id)?)?;
+        record.head.belongs_to(&id, &self.this_machine(axis))?;
+        let compensation = self.prepare(axis, record.linear(&id)?.table(&id)?)?;
         self.set_compensation(axis, Some(compensation))?;
         Ok(Some(id))
     }
@@ -147,8 +147,7 @@ impl Machine {
         measured: &Measured,
         fitted: &Fitted,
     ) -> CalibrationRecord {
-        let lost_motion = fitted.table.lost_motion();
-        CalibrationRecord {
+        let head = RecordHead {
             created: utc_now(),
             source: journal
                 .path()
@@ -158,41 +157,32 @@ impl Machine {
                 .into_owned(),
             instrument: self.instrument_record(&plan.instrument),
             environment: measured.environment,
-            runs: plan.runs,
-            closure_m: Some(measured.closure.value()),
-            lost_motion_m: lost_motion.map(|it| it.mean.value()),
-            lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
-            nodes: CalibrationRecord::nodes_of(&fitted.table),
             ..self.this_machine(axis)
+        };
+        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
+        CalibrationRecord {
+            head,
+            content: Content::LinearErrorTable(content),
         }
     }
 
-    /// A record without measurements that says who this machine is.
-    pub fn this_machine(&self, axis: &str) -> CalibrationRecord {
-        let resolution_nm = self
-            .config
-            .axis
-            .get(axis)
-            .map_or(0.0, |axis| axis.resolution_nm);
-        CalibrationRecord {
+    /// The head of a record without measurements, which says who this machine is.
+    pub fn this_machine(&self, axis: &str) -> RecordHead {
+        let config = self.config.axis.get(axis);
+        RecordHead {
             schema_version: SCHEMA_VERSION,
-            kind: "linear_error_table".into(),
             machine: self.config.machine.name.clone(),
             stage_serial: self.config.machine.stage_serial.clone(),
             config_hash: self.config_hash.clone(),
             axis: axis.to_owned(),
             drive: self.drive_record(axis),
-            resolution_m: resolution_nm * 1e-9,
+            resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
+            resolution_rad: None,
             created: String::new(),
             program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
             source: String::new(),
             instrument: InstrumentRecord::default(),
-            environment: crate::store::EnvironmentRecord::default(),
-            runs: 0,
-            closure_m: None,
-            lost_motion_m: None,
-            lost_motion_u_m: None,
-            nodes: Vec::new(),
+            environment: EnvironmentRecord::default(),
         }
     }
 

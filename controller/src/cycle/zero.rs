@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use compensator::hall_zero::{
     Outcome, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
 };
-use drivers::device::AxisCommand;
+use drivers::device::{AxisCommand, DriveCommand};
 use units::{Metres, MetresPerSecond, Time, Volts};
 
 use super::calibrate::missing;
@@ -155,7 +155,7 @@ impl Machine {
                 None => {}
                 Some(Progress::Found(outcome)) => return Ok(*outcome),
                 Some(Progress::Failed(source)) => {
-                    self.command(axis, AxisCommand::Halt, "halt", STOP_LIMIT)?;
+                    self.command(axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
                     return Err(Failure::Search {
                         axis: axis.to_owned(),
                         source,
@@ -182,7 +182,7 @@ impl Machine {
                     acceleration,
                 }
             }
-            _ => AxisCommand::Halt,
+            _ => DriveCommand::Halt.into(),
         };
         if *motion != Some(command) {
             let at = self.axis_index(axis)?;

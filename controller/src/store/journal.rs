@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::calibration::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
+use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
 
 /// What a run is: written first.

@@ -1,7 +1,7 @@
 //! What a device says unasked when something is wrong.
 
 use core::time::Duration;
-use units::Metres;
+use units::LengthOrAngle;
 
 use crate::wire::canopen::NodeId;
 use crate::wire::canopen::emcy::Emergency;
@@ -55,22 +55,20 @@ pub enum Alarm {
     FollowingError { node: NodeId },
     /// The axis goes the other way than its drive wants it to.
     #[error(
-        "{node}: the axis runs in the wrong direction: wanted {:+.3} mm, went {:+.3} mm; motor \
-         phases, encoder or polarity exchanged?", wanted.mm(), moved.mm()
+        "{node}: the axis runs in the wrong direction: wanted {wanted:+.3}, went {moved:+.3}; motor \
+         phases, encoder or polarity exchanged?"
     )]
     WrongDirection {
         node: NodeId,
-        wanted: Metres,
-        moved: Metres,
+        wanted: LengthOrAngle,
+        moved: LengthOrAngle,
     },
     /// An implausible jump of a position.
-    #[error(
-        "{node}: position jumped by {:.3} mm, possible are {:.3} mm", jump.mm(), limit.mm()
-    )]
+    #[error("{node}: position jumped by {jump:.3}, possible are {limit:.3}")]
     PositionJump {
         node: NodeId,
-        jump: Metres,
-        limit: Metres,
+        jump: LengthOrAngle,
+        limit: LengthOrAngle,
     },
     /// The interferometer's measurement beam is blocked.
     #[error("interferometer: beam lost; clear and align it, set a new datum")]

@@ -16,8 +16,7 @@ pub mod umd2;
 use core::fmt;
 use core::time::Duration;
 use units::{
-    Celsius, Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, RelativeHumidity,
-    Time, Volts,
+    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time, Volts,
 };
 
 pub use alarm::Alarm;
@@ -59,14 +58,11 @@ pub trait Device {
     fn counters(&self) -> Vec<(&'static str, u64)>;
 }
 
-/// A controlled direction: one servo drive.
-pub trait Axis: Device {
+/// A servo drive, whatever it moves.
+pub trait ServoDrive: Device {
     /// Begins a command; a command that still runs is superseded.
     /// [`Device::poll_outcome`] says when it is done, and how.
-    fn command(&mut self, now: Time, command: AxisCommand);
-
-    /// The newest sample of the axis, `None` before the first one.
-    fn reading(&self) -> Option<AxisReading>;
+    fn control(&mut self, now: Time, command: DriveCommand);
 
     /// The newest state, in the drive's own terms.
     fn power_state(&self) -> Option<PowerState>;
@@ -75,9 +71,9 @@ pub trait Axis: Device {
     fn is_homed(&self) -> bool;
 }
 
-/// What an axis can be told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisCommand {
+/// What every drive can be told, whatever it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveCommand {
     /// Switch on, up to operation enabled.
     Enable,
     /// Switch off, in a controlled way.
@@ -86,43 +82,66 @@ pub enum AxisCommand {
     QuickStop,
     /// Acknowledge a fault, once.
     ResetFault,
+    /// Slow down and stand, staying enabled; done when standing.
+    Halt,
+}
+
+/// A controlled direction, linear or rotary: one servo drive that positions in `Q`.
+pub trait Axis<Q: Coordinate = Metres>: ServoDrive {
+    /// Begins a command; a command that still runs is superseded.
+    /// [`Device::poll_outcome`] says when it is done, and how.
+    fn command(&mut self, now: Time, command: AxisCommand<Q>);
+
+    /// The newest sample of the axis, `None` before the first one.
+    fn reading(&self) -> Option<AxisReading<Q>>;
+}
+
+/// What an axis can be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisCommand<Q: Coordinate = Metres> {
+    /// What every drive can be told.
+    Drive(DriveCommand),
     /// Profile position move to `target` (drive coordinates); done when target reached.
     MoveTo {
         /// Where to, in drive coordinates.
-        target: Metres,
+        target: Q,
         /// Profile velocity.
-        speed: MetresPerSecond,
+        speed: Q::Speed,
         /// Profile acceleration and deceleration.
-        acceleration: MetresPerSecondSquared,
+        acceleration: Q::Acceleration,
     },
-    /// Slow down and stand, staying enabled; done when standing.
-    Halt,
     /// Home on the negative limit switch (method 17); the drive's coordinates become
     /// `position` there.
     HomeNegativeLimit {
         /// The coordinate of the switch.
-        position: Metres,
+        position: Q,
         /// Search speed.
-        speed: MetresPerSecond,
+        speed: Q::Speed,
     },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {
         /// The coordinate of where the axis stands now.
-        position: Metres,
+        position: Q,
     },
+}
+
+impl<Q: Coordinate> From<DriveCommand> for AxisCommand<Q> {
+    fn from(command: DriveCommand) -> Self {
+        Self::Drive(command)
+    }
 }
 
 /// One sample of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisReading {
+pub struct AxisReading<Q: Coordinate = Metres> {
     /// When it arrived.
     pub at: Time,
     /// The encoder, as the drive counts.
     pub counts: Counts,
-    /// The same in metres, drive coordinates.
-    pub position: Metres,
+    /// The same in metres or radians, drive coordinates.
+    pub position: Q,
     /// The drive's own following error, where it is mapped.
-    pub following_error: Option<Metres>,
+    pub following_error: Option<Q>,
     /// Whether the drive reports its target reached and no motion pending.
     pub standing: bool,
 }
@@ -293,13 +312,14 @@ pub enum DeviceError {
         needs: &'static str,
     },
     /// A value cannot be represented in the drive's units.
-    #[error("{node}: {what} {value} does not fit {object} (limit {limit})")]
+    #[error("{node}: {what} {value} {unit} does not fit {object} (limit {limit} {unit})")]
     OutOfRange {
         node: NodeId,
         object: Object,
         what: &'static str,
         value: f64,
         limit: f64,
+        unit: &'static str,
     },
     /// An alarm ended the command.
     #[error("{device}: {step} ended by an alarm: {alarm}")]
@@ -337,7 +357,7 @@ pub enum Seen {
     Power(PowerState),
     Statusword(u16),
     Mode(i8),
-    Position(Metres),
+    Position(LengthOrAngle),
     Samples(u32),
 }
 
@@ -349,7 +369,7 @@ impl fmt::Display for Seen {
             Self::Power(state) => state.fmt(f),
             Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
             Self::Mode(raw) => write!(f, "mode {raw}"),
-            Self::Position(at) => write!(f, "position {:.6} mm", at.mm()),
+            Self::Position(at) => write!(f, "position {at:.6}"),
             Self::Samples(count) => write!(f, "{count} samples"),
         }
     }

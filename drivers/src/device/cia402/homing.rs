@@ -1,7 +1,7 @@
 //! Homing (CiA 402, 11): parameters, mode 6, start, status by mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Metres, MetresPerSecond, Time};
+use units::{Coordinate, Time};
 
 use super::convert::counts_i32;
 use super::settings::HomeOffset;
@@ -48,19 +48,14 @@ impl Homing {
     }
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     /// With a search speed: on the negative limit switch; without: here.
-    pub(super) fn begin_homing(
-        &mut self,
-        now: Time,
-        position: Metres,
-        search: Option<MetresPerSecond>,
-    ) {
+    pub(super) fn begin_homing(&mut self, now: Time, position: Q, search: Option<Q::Speed>) {
         if search.is_none() && !self.image.stands() {
             self.refuse("homing here", "an axis that stands");
             return;
         }
-        let reversed = self.settings.scale.resolution() < Metres::ZERO;
+        let reversed = self.settings.scale.resolution() < Q::ZERO;
         let method = match search {
             None => 37,
             // The negative end of the axis is the drive's positive one when it counts against it.
@@ -267,7 +262,7 @@ impl Cia402Drive {
             }
             Phase::AwaitingPosition => {
                 let seen = self.image.sample().map_or(Seen::Nothing, |sample| {
-                    Seen::Position(self.settings.scale.to_metres(sample.position))
+                    Seen::Position(self.settings.scale.to_coordinate(sample.position).into())
                 });
                 self.time_out(now, since, "the new position after homing", seen);
             }

@@ -29,12 +29,15 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use units::Time;
+use units::{Coordinate, Metres, Quantity, Time};
 
 pub use settings::{Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes};
 
 use super::canopen_node::{CanopenNode, NodeEvent};
-use super::{Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, Identity, Seen};
+use super::{
+    Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DriveCommand, Identity, Seen,
+    ServoDrive,
+};
 use crate::protocol::script::Script;
 use crate::transport::Input;
 use crate::wire::Payload;
@@ -73,10 +76,10 @@ impl Activity {
     }
 }
 
-/// One CiA 402 drive, one axis.
+/// One CiA 402 drive, one axis: linear ([`Metres`]) or rotary.
 #[derive(Debug)]
-pub struct Cia402Drive {
-    settings: Cia402Settings,
+pub struct Cia402Drive<Q: Coordinate = Metres> {
+    settings: Cia402Settings<Q>,
     node: CanopenNode,
     image: Image,
     activity: Activity,
@@ -109,10 +112,10 @@ pub struct Cia402Drive {
     repeated_commands: u64,
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     /// A drive that is not started.
-    pub fn new(settings: Cia402Settings) -> Self {
-        let counts = |metres: f64| metres / settings.scale.resolution().abs().value();
+    pub fn new(settings: Cia402Settings<Q>) -> Self {
+        let counts = |si: f64| si / settings.scale.resolution().abs().value();
         let image = Image::new(
             counts(settings.speed_max.value()),
             counts(settings.jump_margin.value()) as i64,
@@ -147,7 +150,7 @@ impl Cia402Drive {
     }
 
     /// What was set.
-    pub const fn settings(&self) -> &Cia402Settings {
+    pub const fn settings(&self) -> &Cia402Settings<Q> {
         &self.settings
     }
 
@@ -209,6 +212,17 @@ impl Cia402Drive {
             step,
             needs,
         }));
+    }
+
+    fn refuse_out_of_service(&mut self) {
+        self.refuse(
+            "a command",
+            "a started, operational node that sends process data; start it (again)",
+        );
+    }
+
+    fn is_enabled(&self) -> bool {
+        self.state() == Some(PowerState::OperationEnabled)
     }
 
     fn alarm(&mut self, alarm: Alarm) {
@@ -305,7 +319,7 @@ impl Cia402Drive {
     }
 }
 
-impl Device for Cia402Drive {
+impl<Q: Coordinate> Device for Cia402Drive<Q> {
     fn handle(&mut self, now: Time, input: &Input) {
         self.node.handle(now, input);
         self.pump(now);
@@ -373,25 +387,41 @@ impl Device for Cia402Drive {
     }
 }
 
-impl Axis for Cia402Drive {
-    fn command(&mut self, now: Time, command: AxisCommand) {
+impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
+    fn control(&mut self, now: Time, command: DriveCommand) {
         self.supersede(now);
-        let enabled = self.state() == Some(PowerState::OperationEnabled);
         match command {
-            AxisCommand::QuickStop => self.begin_quick_stop(now),
-            _ if !self.node.is_in_service() => {
-                self.refuse(
-                    "a command",
-                    "a started, operational node that sends process data; start it (again)",
-                );
-            }
-            AxisCommand::Enable => self.begin_enable(now),
-            AxisCommand::Disable => self.begin_disable(now),
-            AxisCommand::ResetFault => self.begin_reset(now),
+            DriveCommand::QuickStop => self.begin_quick_stop(now),
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            DriveCommand::Enable => self.begin_enable(now),
+            DriveCommand::Disable => self.begin_disable(now),
+            DriveCommand::ResetFault => self.begin_reset(now),
             // A drive that is not enabled does not move: nothing is left to do.
-            AxisCommand::Halt if !enabled => self.finish(Ok(())),
-            AxisCommand::Halt => self.begin_halt(now),
-            _ if !enabled => self.refuse("moving", "an enabled drive"),
+            DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
+            DriveCommand::Halt => self.begin_halt(now),
+        }
+    }
+
+    fn power_state(&self) -> Option<PowerState> {
+        self.state()
+    }
+
+    fn is_homed(&self) -> bool {
+        self.homed
+    }
+}
+
+impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
+    fn command(&mut self, now: Time, command: AxisCommand<Q>) {
+        if let AxisCommand::Drive(command) = command {
+            self.control(now, command);
+            return;
+        }
+        self.supersede(now);
+        match command {
+            AxisCommand::Drive(_) => {}
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            _ if !self.is_enabled() => self.refuse("moving", "an enabled drive"),
             AxisCommand::MoveTo {
                 target,
                 speed,
@@ -404,7 +434,7 @@ impl Axis for Cia402Drive {
         }
     }
 
-    fn reading(&self) -> Option<AxisReading> {
+    fn reading(&self) -> Option<AxisReading<Q>> {
         let sample = self.image.sample()?;
         let scale = self.settings.scale;
         let pending = sample.mode == OperationMode::ProfilePosition
@@ -412,22 +442,14 @@ impl Axis for Cia402Drive {
         Some(AxisReading {
             at: sample.at,
             counts: sample.position,
-            position: scale.to_metres(sample.position),
+            position: scale.to_coordinate(sample.position),
             following_error: self
                 .image
                 .following_error()
-                .map(|counts| scale.to_metres(counts)),
+                .map(|counts| scale.to_coordinate(counts)),
             standing: sample.status.contains(Statusword::TARGET_REACHED)
                 && !pending
                 && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
         })
-    }
-
-    fn power_state(&self) -> Option<PowerState> {
-        self.state()
-    }
-
-    fn is_homed(&self) -> bool {
-        self.homed
     }
 }

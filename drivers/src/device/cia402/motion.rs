@@ -6,9 +6,9 @@
 //! window: the bit may still be set from the move before.
 
 use core::time::Duration;
-use units::{Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+use units::{Coordinate, Counts, Time};
 
-use super::convert::{acceleration_counts, counts_i32, velocity_counts};
+use super::convert::{acceleration_counts, counts_i32, out_of_range, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
@@ -75,13 +75,13 @@ impl Halt {
     }
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_move(
         &mut self,
         now: Time,
-        target: Metres,
-        speed: MetresPerSecond,
-        acceleration: MetresPerSecondSquared,
+        target: Q,
+        speed: Q::Speed,
+        acceleration: Q::Acceleration,
     ) {
         match self.plan_move(now, target, speed, acceleration) {
             Err(error) => self.finish(Err(error)),
@@ -123,9 +123,9 @@ impl Cia402Drive {
     fn plan_move(
         &self,
         now: Time,
-        target: Metres,
-        speed: MetresPerSecond,
-        acceleration: MetresPerSecondSquared,
+        target: Q,
+        speed: Q::Speed,
+        acceleration: Q::Acceleration,
     ) -> Result<Move, DeviceError> {
         let settings = &self.settings;
         let object = TARGET_POSITION.object;
@@ -133,13 +133,8 @@ impl Cia402Drive {
         if let Some((low, high)) = settings.soft_limits {
             let limit = if target < low { low } else { high };
             if target < low || target > high {
-                return Err(DeviceError::OutOfRange {
-                    node: self.node.id(),
-                    object,
-                    what: "target",
-                    value: target.value(),
-                    limit: limit.value(),
-                });
+                let range = (target.value(), limit.value());
+                return Err(out_of_range(settings, object, "target", range, Q::UNIT));
             }
         }
         let profile = (
@@ -297,7 +292,7 @@ impl Cia402Drive {
         }
         let seen = match (phase, self.image.sample()) {
             (MovePhase::Running, Some(sample)) => {
-                Seen::Position(self.settings.scale.to_metres(sample.position))
+                Seen::Position(self.settings.scale.to_coordinate(sample.position).into())
             }
             (MovePhase::AwaitingMode, Some(sample)) => Seen::Mode(sample.mode.raw()),
             (

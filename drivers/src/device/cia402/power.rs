@@ -1,6 +1,6 @@
 //! Enable, disable, quick stop and fault reset of a drive.
 
-use units::Time;
+use units::{Coordinate, Time};
 
 use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
@@ -38,7 +38,7 @@ const fn stops(goal: Goal) -> bool {
     }
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time) {
         if let Some(sample) = self.image.sample() {
             // The target in RPDO 1 counts only at an edge, but a true one is the better company.
