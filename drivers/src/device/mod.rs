@@ -395,7 +395,9 @@ pub enum DeviceError {
         seen: String,
     },
     /// A value cannot be represented in the amplifier's units.
-    #[error("{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})")]
+    #[error(
+        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
+    )]
     ParameterOutOfRange {
         device: DeviceName,
         parameter: Parameter,

@@ -46,18 +46,20 @@ impl LineUse {
         match self {
             Self::Unshared | Self::Holds => true,
             Self::Idle => false,
-            Self::Wants { urgency, since } => others.into_iter().all(|(other, first)| match other {
-                Self::Unshared | Self::Idle => true,
-                Self::Holds => false,
-                Self::Wants {
-                    urgency: its,
-                    since: it_waits,
-                } => {
-                    // The more urgent, then who has waited longer, then the order.
-                    let older = it_waits < since || it_waits == since && first;
-                    urgency > its || urgency == its && !older
-                }
-            }),
+            Self::Wants { urgency, since } => {
+                others.into_iter().all(|(other, first)| match other {
+                    Self::Unshared | Self::Idle => true,
+                    Self::Holds => false,
+                    Self::Wants {
+                        urgency: its,
+                        since: it_waits,
+                    } => {
+                        // The more urgent, then who has waited longer, then the order.
+                        let older = it_waits < since || it_waits == since && first;
+                        urgency > its || urgency == its && !older
+                    }
+                })
+            }
         }
     }
 }

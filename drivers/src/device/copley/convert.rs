@@ -55,7 +55,13 @@ fn positive<Q: Coordinate>(
     if value > 0.0 && value <= limit && number <= f64::from(i32::MAX) {
         return Ok((number as i64).max(1));
     }
-    Err(out_of_range(settings, parameter, what, (value, limit), unit))
+    Err(out_of_range(
+        settings,
+        parameter,
+        what,
+        (value, limit),
+        unit,
+    ))
 }
 
 pub(super) fn length<Q: Coordinate>(

@@ -12,9 +12,7 @@ use std::collections::VecDeque;
 use units::Time;
 
 use super::settings::CopleyTimeouts;
-use crate::wire::copley::{
-    Address, BAUD_AT_RESET, Bank, Command, Parameter, Reply, Request,
-};
+use crate::wire::copley::{Address, BAUD_AT_RESET, Bank, Command, Parameter, Reply, Request};
 use crate::wire::{LineControl, Payload};
 
 /// Longer than any byte at 9600 bit/s.

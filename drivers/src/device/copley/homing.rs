@@ -6,13 +6,13 @@
 //! set afterwards.
 
 use core::time::Duration;
-use units::{Coordinate, Counts, Quantity, Time};
+use units::{Coordinate, Counts, Time};
 
 use super::convert::{acceleration, amplifier_counts, speed};
 use super::script::Step;
 use super::{Activity, CopleyAxis, read};
 use crate::device::{DeviceError, Seen, Urgency};
-use crate::wire::copley::{HomingMethod, Parameter, Trajectory, TrajectoryStatus};
+use crate::wire::copley::{EventStatus, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
 const PREPARING: &str = "setting the homing parameters";
 const STARTING: &str = "starting the homing";
@@ -52,7 +52,7 @@ impl Homing {
 impl<Q: Coordinate> CopleyAxis<Q> {
     /// With a search speed: on the negative limit switch; without: here.
     pub(super) fn begin_homing(&mut self, now: Time, position: Q, search: Option<Q::Speed>) {
-        if search.is_none() && !self.image.stands() {
+        if search.is_none() && self.image.events.contains(EventStatus::IN_MOTION) {
             self.refuse("homing here", "an axis that stands");
             return;
         }

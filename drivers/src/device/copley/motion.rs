@@ -5,7 +5,7 @@
 //! and commanded position are read: they say whether it has begun.
 
 use core::time::Duration;
-use units::{Coordinate, Counts, Quantity, Time};
+use units::{Coordinate, Counts, Time};
 
 use super::convert::{acceleration, amplifier_counts, out_of_range, speed};
 use super::script::Step;
@@ -33,11 +33,17 @@ pub(super) struct Plan {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    Loading { then_start: bool },
+    Loading {
+        then_start: bool,
+    },
     /// `t 1` is on its way, for the so manieth time.
-    Starting { attempts: u32 },
+    Starting {
+        attempts: u32,
+    },
     /// Its `ok` was lost.
-    Resolving { attempts: u32 },
+    Resolving {
+        attempts: u32,
+    },
     Running,
 }
 
@@ -194,7 +200,10 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     }
 
     fn resolve(&mut self, now: Time, plan: Plan, attempts: u32) {
-        let status = self.script.number(Parameter::TRAJECTORY_STATUS).unwrap_or(0);
+        let status = self
+            .script
+            .number(Parameter::TRAJECTORY_STATUS)
+            .unwrap_or(0);
         let commanded = self.script.number(Parameter::COMMANDED_POSITION);
         let runs = status & i64::from(TrajectoryStatus::RUNNING.bits()) != 0;
         let has_moved = commanded.is_some_and(|at| at != plan.from);
@@ -204,7 +213,9 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             // It is known to stand where it stood: nothing was begun.
             self.begin_prepared(now, plan);
             if let Activity::Motion(motion) = &mut self.activity {
-                motion.phase = Phase::Starting { attempts: attempts + 1 };
+                motion.phase = Phase::Starting {
+                    attempts: attempts + 1,
+                };
             }
         } else {
             let error = self.unanswered(STARTING, attempts);

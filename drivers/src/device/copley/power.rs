@@ -186,7 +186,11 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             Phase::Stopping => self.disable(now, deadline, Urgency::Stop),
             // Not cleared twice: what is left is read.
             Phase::Clearing if !step.repeatable => {
-                self.run(now, vec![read(Parameter::FAULTS, RESETTING)], Urgency::Command);
+                self.run(
+                    now,
+                    vec![read(Parameter::FAULTS, RESETTING)],
+                    Urgency::Command,
+                );
             }
             Phase::Checking
             | Phase::Enabling

@@ -131,7 +131,11 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         steps.extend(Step::check(parameter, 0, "clearing the home offset"));
         let parameter = Parameter::ABORT_DECELERATION;
         let value = acceleration(settings, parameter, settings.quick_stop_deceleration)?;
-        steps.extend(Step::check(parameter, value, "setting the stop deceleration"));
+        steps.extend(Step::check(
+            parameter,
+            value,
+            "setting the stop deceleration",
+        ));
         if let Some(limit) = settings.following_error {
             let parameter = Parameter::FOLLOWING_ERROR_LIMIT;
             let value = length(settings, parameter, "following error limit", limit)?;

@@ -1,7 +1,7 @@
 //! Looking at the amplifier again and again, and what of it is an alarm.
 
 use core::time::Duration;
-use units::{Coordinate, Counts, Quantity, Time};
+use units::{Coordinate, Counts, Time};
 
 use super::image::Judgement;
 use super::start::Starting;

@@ -1,8 +1,8 @@
 //! The amplifiers as a host meets them, byte by byte.
 
 use super::*;
-use drivers::wire::copley::EventStatus;
 use crate::plant::config::PlantConfig;
+use drivers::wire::copley::EventStatus;
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -10,6 +10,8 @@
 //! A command that was not understood (`e 33`) was not carried out and is sent again, twice at
 //! most. Nothing else is ever sent again from here.
 
+mod fence;
+
 use core::time::Duration;
 use std::collections::VecDeque;
 
@@ -20,9 +22,7 @@ use super::settings::CopleyTimeouts;
 use crate::device::serial_line::{AssembledLine, LineAssembler};
 use crate::device::{LineUse, Urgency};
 use crate::wire::Payload;
-use crate::wire::copley::{
-    Address, Bank, CR, Command, ErrorCode, LINE_MAX, Parameter, Reply, Request,
-};
+use crate::wire::copley::{Address, CR, Command, ErrorCode, LINE_MAX, Reply, Request};
 
 /// Replies are reckoned with so many bytes.
 const REPLY_BYTES: usize = 24;
@@ -176,10 +176,7 @@ impl Link {
     pub(super) const fn is_open(&self) -> bool {
         !matches!(
             self.state,
-            State::Closed
-                | State::Seeking { .. }
-                | State::Beginning { .. }
-                | State::Finding { .. }
+            State::Closed | State::Seeking { .. } | State::Beginning { .. } | State::Finding { .. }
         )
     }
 
@@ -206,26 +203,6 @@ impl Link {
     pub(super) fn cancel(&mut self) {
         if let State::Waiting { .. } = self.state {
             self.state = State::Free;
-        }
-    }
-
-    /// A stop is next: clean-up waits until it has gone.
-    pub(super) fn hurry(&mut self) {
-        match self.state {
-            State::Asked { .. } => self.hurried = true,
-            State::Quiet { then, .. } | State::Fencing { then, .. } => {
-                self.suspect = true;
-                self.state = State::Free;
-                if then != Then::Nothing {
-                    self.tell_lost();
-                }
-            }
-            State::Closed
-            | State::Seeking { .. }
-            | State::Beginning { .. }
-            | State::Finding { .. }
-            | State::Free
-            | State::Waiting { .. } => {}
         }
     }
 
@@ -384,33 +361,6 @@ impl Link {
         self.events.push_back(LinkEvent::Lost);
     }
 
-    fn fence(&mut self, then: Then, line: &[u8]) {
-        let reply = Reply::parse(line);
-        let unreachable = reply == Ok(Reply::Error(ErrorCode::CanFailed));
-        let fits = match (self.serial, &reply) {
-            (Some(serial), Ok(reply)) => reply.number() == Some(serial),
-            // Before the serial number is known, a number is all that can be told.
-            (None, Ok(reply)) => reply.number().is_some(),
-            (_, Err(_)) => false,
-        };
-        if fits || unreachable {
-            self.clean(then);
-        } else {
-            self.counts.late += 1;
-        }
-    }
-
-    /// Nothing old is under way any more.
-    fn clean(&mut self, then: Then) {
-        self.suspect = false;
-        self.state = State::Free;
-        match then {
-            Then::Nothing => {}
-            Then::TellLost => self.tell_lost(),
-            Then::Ask(request, urgency) => self.send(request, urgency, 0),
-        }
-    }
-
     fn found(&mut self, now: Time, found: Found) {
         let State::Finding { since, then, .. } = self.state else {
             return;
@@ -436,137 +386,57 @@ impl Link {
 
     /// Acts on deadlines, and gives a deadline to what has just been sent.
     pub(super) fn handle_timeout(&mut self, now: Time) {
+        if now < self.poll_timeout() {
+            return;
+        }
         match self.state {
             State::Closed | State::Seeking { .. } | State::Free | State::Waiting { .. } => {}
-            State::Beginning { since, then } => {
-                self.counts.searches += 1;
-                self.lines.clear();
-                let finding = Finding::begin(now, self.baud, &self.timeouts, &mut self.outbox);
-                self.state = State::Finding {
-                    finding,
-                    since,
-                    then,
-                };
-            }
-            State::Finding {
-                mut finding,
-                since,
-                then,
-            } => {
-                if now >= finding.poll_timeout() {
-                    self.lines.clear();
-                }
-                let found = finding.handle_timeout(now, &self.timeouts, &mut self.outbox);
-                self.state = State::Finding {
-                    finding,
-                    since,
-                    then,
-                };
-                self.found(now, found);
-            }
+            State::Beginning { since, then } => self.begin_finding(now, since, then),
+            State::Finding { .. } => self.advance_finding(now),
             State::Asked {
                 request,
-                urgency,
-                resends,
                 deadline: None,
-            } => {
-                let deadline = Some(now + self.reply_time(&request));
-                self.state = State::Asked {
-                    request,
-                    urgency,
-                    resends,
-                    deadline,
-                };
-            }
-            State::Asked {
-                urgency,
-                deadline: Some(deadline),
                 ..
-            } if now >= deadline => self.reply_missing(now, urgency),
+            } => self.await_until(now + self.reply_time(&request)),
+            State::Asked { urgency, .. } => self.reply_missing(now, urgency),
             State::Quiet {
                 until: None, then, ..
             } => self.be_quiet(now, then),
-            State::Quiet {
-                until: Some(until),
-                then,
-                ..
-            } if now >= until => self.ask_fence(0, then),
-            State::Fencing {
-                fences,
-                deadline: None,
-                then,
-            } => {
-                let deadline = Some(now + self.reply_time(&self.fence_request()));
-                self.state = State::Fencing {
-                    fences,
-                    deadline,
-                    then,
-                };
+            State::Quiet { then, .. } => self.ask_fence(0, then),
+            State::Fencing { deadline: None, .. } => {
+                let fence = self.fence_request();
+                self.await_until(now + self.reply_time(&fence));
             }
-            State::Fencing {
-                fences,
-                deadline: Some(deadline),
-                then,
-            } if now >= deadline => {
-                if fences + 1 < FENCES {
-                    self.ask_fence(fences + 1, then);
-                } else {
-                    let since = now;
-                    self.state = State::Beginning { since, then };
-                    self.handle_timeout(now);
-                }
+            State::Fencing { fences, then, .. } if fences + 1 < FENCES => {
+                self.ask_fence(fences + 1, then);
             }
-            State::Asked { .. } | State::Quiet { .. } | State::Fencing { .. } => {}
+            State::Fencing { then, .. } => self.begin_finding(now, now, then),
         }
     }
 
-    fn reply_missing(&mut self, now: Time, urgency: Urgency) {
-        if core::mem::take(&mut self.hurried) || urgency == Urgency::Stop {
-            self.suspect = true;
-            self.state = State::Free;
-            self.tell_lost();
-        } else {
-            self.be_quiet(now, Then::TellLost);
+    const fn await_until(&mut self, at: Time) {
+        if let State::Asked { deadline, .. } | State::Fencing { deadline, .. } = &mut self.state {
+            *deadline = Some(at);
         }
     }
 
-    fn be_quiet(&mut self, now: Time, then: Then) {
+    fn begin_finding(&mut self, now: Time, since: Time, then: Then) {
+        self.counts.searches += 1;
         self.lines.clear();
-        self.state = State::Quiet {
-            until: Some(now + self.timeouts.quiet),
-            limit: now + self.timeouts.quiet * NOISE_MAX,
+        let finding = Finding::begin(now, self.baud, &self.timeouts, &mut self.outbox);
+        self.state = State::Finding {
+            finding,
+            since,
             then,
         };
     }
 
-    fn fence_request(&self) -> Request {
-        match self.serial {
-            Some(_) => Request {
-                address: self.address,
-                command: Command::Get {
-                    bank: Bank::Flash,
-                    parameter: Parameter::SERIAL_NUMBER,
-                },
-            },
-            None => Request {
-                address: Address::GATEWAY,
-                command: Command::Get {
-                    bank: Bank::Ram,
-                    parameter: Parameter::BAUD,
-                },
-            },
-        }
-    }
-
-    fn ask_fence(&mut self, fences: u32, then: Then) {
+    fn advance_finding(&mut self, now: Time) {
         self.lines.clear();
-        let bytes = self.fence_request().emit();
-        self.outbox.push_back(Payload::Bytes(bytes));
-        self.state = State::Fencing {
-            fences,
-            deadline: None,
-            then,
-        };
+        if let State::Finding { finding, .. } = &mut self.state {
+            let found = finding.handle_timeout(now, &self.timeouts, &mut self.outbox);
+            self.found(now, found);
+        }
     }
 
     fn reply_time(&self, request: &Request) -> Duration {
