@@ -4,3 +4,4 @@ mod analog;
 mod camera;
 mod drive;
 mod interferometer;
+mod screw;
