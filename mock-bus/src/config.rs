@@ -341,6 +341,7 @@ impl MachineConfig {
         }
         if let Some(platform) = &self.plant.platform {
             check_platform(platform)?;
+            positive("field_mm", self.plant.camera.field_mm)?;
         }
         let plant = &self.plant;
         self.nodes
