@@ -59,8 +59,9 @@ impl PlatformState {
         }
     }
 
-    /// Where it stopped, nobody knows; its zero and the datum hold.
-    pub(crate) fn interrupted(&mut self) {
+    /// A move begins: should it not end, nobody knows where it stopped; the zero and the datum
+    /// hold. What is known is set again when it has ended.
+    pub(crate) fn interrupted_before_it_ends(&mut self) {
         self.pose = None;
         for screw in &mut self.screws {
             screw.memory = None;
@@ -90,8 +91,8 @@ pub(crate) fn kinematics(
                     y: Metres::from_mm(it.point_mm[1]),
                 },
                 direction: [x / length, y / length],
-                min: Metres::from_mm(limits.map_or(-1.0, |axis| axis.soft_min_mm)),
-                max: Metres::from_mm(limits.map_or(1.0, |axis| axis.soft_max_mm)),
+                stroke_min: Metres::from_mm(limits.map_or(-1.0, |axis| axis.soft_min_mm)),
+                stroke_max: Metres::from_mm(limits.map_or(1.0, |axis| axis.soft_max_mm)),
             }
         })
         .collect();
