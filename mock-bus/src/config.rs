@@ -10,6 +10,7 @@ use crate::node::Node;
 use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
 use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
+use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
 use crate::plant::platform::config::PlatformConfig;
@@ -125,6 +126,8 @@ pub enum DeviceConfig {
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
     DconModule(DconModuleConfig),
+    /// In-Sight vision system, on a serial line.
+    InSightController(InSightControllerConfig),
 }
 
 impl DeviceConfig {
@@ -135,13 +138,16 @@ impl DeviceConfig {
             Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
+            Self::InSightController(config) => {
+                Box::new(InSightControllerNode::new(config, seed, name))
+            }
         }
     }
 
     const fn wants_can(&self) -> bool {
         match self {
             Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
-            Self::Umd2Interferometer(_) | Self::DconModule(_) => false,
+            Self::Umd2Interferometer(_) | Self::DconModule(_) | Self::InSightController(_) => false,
         }
     }
 }
@@ -385,6 +391,11 @@ impl DeviceConfig {
                 positive("batch_samples", f64::from(config.batch_samples))
             }
             Self::DconModule(config) => positive("channels", config.channels as f64),
+            Self::InSightController(config) => {
+                positive("length_unit_um", config.length_unit_um)?;
+                positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
+                positive("exposure_ms", config.exposure_ms)
+            }
         }
     }
 }

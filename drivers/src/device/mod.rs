@@ -120,6 +120,14 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         /// Search speed.
         speed: Q::Speed,
     },
+    /// Home on the first index pulse off the negative limit switch (method 1); the drive's
+    /// coordinates become `position` there.
+    HomeIndex {
+        /// The coordinate of the index pulse.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+    },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {
         /// The coordinate of where the axis stands now.
