@@ -23,6 +23,7 @@ use units::{Metres, Time};
 use crate::assemble;
 use crate::bus_watch::BusWatch;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::cycle::platform::PlatformState;
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
@@ -93,6 +94,7 @@ pub struct Machine {
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
+    pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
     /// The instruments that were started, by name.
@@ -123,6 +125,7 @@ impl Machine {
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
+            platform: PlatformState::of(&config),
             config,
             transport,
             outbox: Outbox::default(),
@@ -289,6 +292,9 @@ impl Machine {
         for memory in self.memory.values_mut() {
             memory.zeroed = false;
             memory.approach.forget();
+        }
+        if let Some(platform) = &mut self.platform {
+            platform.forget();
         }
         self.set_sync(true)?;
         let machine_devices = self.axes.len() + self.analogs.len();

@@ -6,10 +6,15 @@
 mod diagnostic;
 mod load;
 mod model;
+mod platform;
 mod validate;
 
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
+pub use platform::{
+    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
+    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
+};
 pub use model::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
     CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,

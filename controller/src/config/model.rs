@@ -4,6 +4,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::platform::PlatformConfig;
+
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -26,6 +28,8 @@ pub struct MachineConfig {
     /// Measuring instruments by name.
     #[serde(default)]
     pub instrument: BTreeMap<String, InstrumentConfig>,
+    /// The alignment platform that the axes move, if they move one.
+    pub platform: Option<PlatformConfig>,
 }
 
 /// Who the machine is, and where its records live.

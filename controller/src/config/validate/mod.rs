@@ -2,6 +2,7 @@
 
 mod cycle;
 mod judge;
+mod platform;
 
 use std::collections::BTreeMap;
 
@@ -64,6 +65,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
             instrument,
         );
     }
+    platform::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
     if findings.is_empty() {
