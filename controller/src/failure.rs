@@ -382,6 +382,7 @@ impl Failure {
     /// 5 the result is out of tolerance.
     pub const fn exit_code(&self) -> u8 {
         match self {
+            Self::Platform(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }

@@ -198,7 +198,7 @@ impl Machine {
         ScrewCompensation::new(model, limits_of(limits, resolution), rule_of(limits)).map_err(
             |source| {
                 let axis = axis.clone();
-                PlatformFailure::Model { axis, source }.into()
+                Failure::ScrewCompensation { axis, source }
             },
         )
     }

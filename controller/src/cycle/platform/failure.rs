@@ -67,14 +67,6 @@ pub enum PlatformFailure {
         /// Why.
         source: screw::patent::OneStroke,
     },
-    /// The model cannot be applied within the limits of the configuration.
-    #[error("axis {axis}: {source}")]
-    Model {
-        /// Which axis.
-        axis: String,
-        /// Why.
-        source: screw::ScrewError,
-    },
     /// The image does not agree after all moves allowed.
     #[error(
         "platform: after {moves} moves the image still differs by {:.3} µm, the tolerance is {:.3} µm",
@@ -110,8 +102,7 @@ impl PlatformFailure {
             | Self::OutOfReach(_)
             | Self::OutOfRange { .. }
             | Self::Path(_)
-            | Self::OutOfCalibration { .. }
-            | Self::Model { .. } => 3,
+            | Self::OutOfCalibration { .. } => 3,
             Self::Forward(_) => 4,
             Self::Fit { .. }
             | Self::PatentFit { .. }
