@@ -9,6 +9,7 @@ use crate::fault::FaultConfig;
 use crate::node::Node;
 use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
 use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
+use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode, addresses_fit};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
 use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
@@ -128,6 +129,8 @@ pub enum DeviceConfig {
     DconModule(DconModuleConfig),
     /// In-Sight vision system, on a serial line.
     InSightController(InSightControllerConfig),
+    /// Copley Controls servo amplifiers, on one serial line.
+    CopleyAmps(CopleyAmpsConfig),
 }
 
 impl DeviceConfig {
@@ -141,13 +144,17 @@ impl DeviceConfig {
             Self::InSightController(config) => {
                 Box::new(InSightControllerNode::new(config, seed, name))
             }
+            Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
         }
     }
 
     const fn wants_can(&self) -> bool {
         match self {
             Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
-            Self::Umd2Interferometer(_) | Self::DconModule(_) | Self::InSightController(_) => false,
+            Self::Umd2Interferometer(_)
+            | Self::DconModule(_)
+            | Self::InSightController(_)
+            | Self::CopleyAmps(_) => false,
         }
     }
 }
@@ -396,8 +403,30 @@ impl DeviceConfig {
                 positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
                 positive("exposure_ms", config.exposure_ms)
             }
+            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
         }
     }
+}
+
+fn check_amps(config: &CopleyAmpsConfig, resolution_nm: f64) -> Result<(), ConfigError> {
+    if !addresses_fit(config) {
+        return Err(ConfigError::Value {
+            key: "amps",
+            seen: config.amps.len() as f64,
+            expected: "amplifiers with different addresses up to 127, one of them 0",
+        });
+    }
+    let odd = config
+        .amps
+        .iter()
+        .find(|amp| amp.encoder_resolution_nm != resolution_nm);
+    odd.map_or(Ok(()), |amp| {
+        Err(ConfigError::Value {
+            key: "encoder_resolution_nm",
+            seen: amp.encoder_resolution_nm,
+            expected: "the plant's resolution_nm",
+        })
+    })
 }
 
 fn positive(key: &'static str, seen: f64) -> Result<(), ConfigError> {

@@ -372,7 +372,7 @@ impl Device for InSight {
             Input::Lost(_) => self.lines.skip_message(),
             // Whatever runs ends by its own time-outs.
             Input::Link(_) => self.lines.clear(),
-            Input::Payload(Payload::Frame(_)) | Input::BusError(_) => {}
+            Input::Payload(Payload::Frame(_) | Payload::Control(_)) | Input::BusError(_) => {}
         }
     }
 
