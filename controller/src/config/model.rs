@@ -4,6 +4,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::camera::CameraConfig;
 use super::platform::PlatformConfig;
 
 /// The whole file.
@@ -28,6 +29,9 @@ pub struct MachineConfig {
     /// Measuring instruments by name.
     #[serde(default)]
     pub instrument: BTreeMap<String, InstrumentConfig>,
+    /// Image controllers by name.
+    #[serde(default)]
+    pub camera: BTreeMap<String, CameraConfig>,
     /// The alignment platform that the axes move, if they move one.
     pub platform: Option<PlatformConfig>,
 }

@@ -271,9 +271,9 @@ impl Machine {
 
     fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
         let name = self.platform_config()?.camera.clone();
-        let unit = &self.cameras[self.camera_index(&name)];
+        let identity = self.identities().remove(&name);
         Ok(InstrumentRecord {
-            identity: unit.device.identity().unwrap_or_default().name,
+            identity: identity.unwrap_or_default().name,
             name,
             ..InstrumentRecord::default()
         })

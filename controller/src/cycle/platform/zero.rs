@@ -8,7 +8,6 @@ use compensator::platform::Pose;
 use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond};
 
-use super::look::pose_of;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -63,7 +62,7 @@ impl Machine {
         }
         self.approach_zero()?;
         let exposures = self.platform_config()?.exposures * DATUM_LOOKS;
-        let datum = pose_of(&self.look(exposures)?);
+        let datum = self.camera_pose(exposures)?;
         self.platform_state_mut()?.datum = Some(datum);
         self.observer.progress(Stage::Zero, "platform", steps, steps);
         Ok(datum)
