@@ -13,13 +13,13 @@ mod validate;
 pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
-pub use platform::{
-    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
-    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
-};
 pub use model::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
     CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
     InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
     SerialLine, VerifyConfig, ZeroConfig,
+};
+pub use platform::{
+    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
+    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };

@@ -5,9 +5,7 @@ use units::{Metres, Radians};
 
 use super::judge::{Finding, Judge};
 use crate::config::model::MachineConfig;
-use crate::config::platform::{
-    PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
-};
+use crate::config::platform::{PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig};
 use crate::cycle::platform::kinematics;
 
 pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -33,7 +31,11 @@ pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     }
     // What is wrong with the arrangement can only be told of numbers that are sound.
     if findings.is_empty() {
-        check_arrangement(&mut Judge::at("platform".into(), findings), config, platform);
+        check_arrangement(
+            &mut Judge::at("platform".into(), findings),
+            config,
+            platform,
+        );
     }
 }
 
@@ -56,11 +58,20 @@ fn check_numbers(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     }
     if let Some(align) = &platform.align {
         judge.within("align.tolerance_um", align.tolerance_um, 1e-3, 1e6);
-        judge.within("align.iterations_max", align.iterations_max.into(), 1.0, 1000.0);
+        judge.within(
+            "align.iterations_max",
+            align.iterations_max.into(),
+            1.0,
+            1000.0,
+        );
     }
 }
 
-fn check_references(findings: &mut Vec<Finding>, config: &MachineConfig, platform: &PlatformConfig) {
+fn check_references(
+    findings: &mut Vec<Finding>,
+    config: &MachineConfig,
+    platform: &PlatformConfig,
+) {
     Judge::at("platform".into(), findings).known(
         "camera",
         &platform.camera,
@@ -82,7 +93,12 @@ fn check_references(findings: &mut Vec<Finding>, config: &MachineConfig, platfor
                     "give the first index pulse off the negative limit switch",
                 );
             }
-            judge.within("axis speed", platform.speed_mm_per_s, 0.0, axis.speed_max_mm_per_s);
+            judge.within(
+                "axis speed",
+                platform.speed_mm_per_s,
+                0.0,
+                axis.speed_max_mm_per_s,
+            );
         }
     }
 }
@@ -94,7 +110,12 @@ fn check_calibrate(
     run: &PlatformCalibrateConfig,
 ) {
     judge.below(("first_mm", run.first_mm), ("last_mm", run.last_mm));
-    judge.within("step_mm", run.step_mm, 1e-6, (run.last_mm - run.first_mm).max(1e-6));
+    judge.within(
+        "step_mm",
+        run.step_mm,
+        1e-6,
+        (run.last_mm - run.first_mm).max(1e-6),
+    );
     judge.within("runs", run.runs.into(), 1.0, 1000.0);
     judge.within("closure_limit_um", run.closure_limit_um, 1e-3, 1e4);
     judge.within("harmonics_max", run.harmonics_max.into(), 0.0, 32.0);
@@ -103,7 +124,12 @@ fn check_calibrate(
         .compensation
         .as_ref()
         .map_or(0.0, |it| it.lost_motion_max_um);
-    judge.within("overrun_mm", run.overrun_mm, (lost_motion_um * 1e-3).max(1e-6), 1e3);
+    judge.within(
+        "overrun_mm",
+        run.overrun_mm,
+        (lost_motion_um * 1e-3).max(1e-6),
+        1e3,
+    );
     for actuator in &platform.actuator {
         let Some(axis) = config.axis.get(&actuator.axis) else {
             continue;
@@ -127,7 +153,12 @@ fn check_compensation(judge: &mut Judge<'_>, compensation: &ScrewCompensationCon
     judge.within("size_limit_um", compensation.size_limit_um, 1e-3, 1e5);
     judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
     judge.within("extrapolation_mm", compensation.extrapolation_mm, 0.0, 1e3);
-    judge.within("lost_motion_max_um", compensation.lost_motion_max_um, 1e-3, 1e3);
+    judge.within(
+        "lost_motion_max_um",
+        compensation.lost_motion_max_um,
+        1e-3,
+        1e3,
+    );
 }
 
 fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &PlatformConfig) {
@@ -172,6 +203,8 @@ fn unreachable_corner(held: &Platform, platform: &PlatformConfig) -> Option<(Pos
             let centre = Point::default();
             let angles = held.reachable_angles(centre);
             let pose = Pose::default();
-            angles.is_none().then(|| (pose, "nothing is in reach".into()))
+            angles
+                .is_none()
+                .then(|| (pose, "nothing is in reach".into()))
         })
 }

@@ -4,7 +4,6 @@
 use std::path::PathBuf;
 
 use compensator::measurement::Stroke;
-use compensator::platform::Pose;
 use compensator::screw::{self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, patent};
 use units::{Approach, Metres};
 
@@ -58,7 +57,10 @@ impl Machine {
         let missing = |section| PlatformFailure::NotConfigured { section };
         let config = self.platform_config()?;
         let plan = config.calibrate.clone().ok_or(missing("calibrate"))?;
-        config.compensation.as_ref().ok_or(missing("compensation"))?;
+        config
+            .compensation
+            .as_ref()
+            .ok_or(missing("compensation"))?;
         let header = self.platform_header("calibrate", plan.runs, None)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
         let measured = self.measure_screws(&plan, &mut journal);
@@ -179,7 +181,7 @@ impl Machine {
                 let strokes: Vec<_> = strokes.iter().filter(reverse).copied().collect();
                 let estimate = patent::estimate(&strokes);
                 estimate
-                    .map_err(|source| PlatformFailure::PatentFit { axis, source })?
+                    .map_err(|source| PlatformFailure::Fit { axis, source })?
                     .model()
             }
         };
@@ -253,7 +255,12 @@ impl Machine {
         &mut self,
         store: &Store,
     ) -> Result<Vec<(String, Option<String>)>, Failure> {
-        let axes: Vec<_> = self.platform_state()?.screws.iter().map(|it| it.axis.clone()).collect();
+        let axes: Vec<_> = self
+            .platform_state()?
+            .screws
+            .iter()
+            .map(|it| it.axis.clone())
+            .collect();
         let mut loaded = Vec::new();
         for (at, axis) in axes.into_iter().enumerate() {
             let id = store.active(&axis)?.current;
@@ -314,7 +321,10 @@ fn round(targets: &[Metres], plan: &PlatformCalibrateConfig) -> Vec<(Metres, Opt
     let overrun = Metres::from_mm(plan.overrun_mm);
     let (first, last) = (targets[0], targets[targets.len() - 1]);
     let up = targets.iter().map(|it| (*it, Some(Approach::Forward)));
-    let down = targets.iter().rev().map(|it| (*it, Some(Approach::Reverse)));
+    let down = targets
+        .iter()
+        .rev()
+        .map(|it| (*it, Some(Approach::Reverse)));
     core::iter::once((first - overrun, None))
         .chain(up)
         .chain(core::iter::once((last + overrun, None)))

@@ -59,14 +59,6 @@ pub enum PlatformFailure {
         /// Why.
         source: screw::FitError,
     },
-    /// The strokes measured give the patent's method nothing.
-    #[error("axis {axis}: {source}; nothing was stored")]
-    PatentFit {
-        /// Which axis.
-        axis: String,
-        /// Why.
-        source: screw::patent::OneStroke,
-    },
     /// The image does not agree after all moves allowed.
     #[error(
         "platform: after {moves} moves the image still differs by {:.3} µm, the tolerance is {:.3} µm",
@@ -104,10 +96,7 @@ impl PlatformFailure {
             | Self::Path(_)
             | Self::OutOfCalibration { .. } => 3,
             Self::Forward(_) => 4,
-            Self::Fit { .. }
-            | Self::PatentFit { .. }
-            | Self::NotAligned { .. }
-            | Self::OutOfTolerance { .. } => 5,
+            Self::Fit { .. } | Self::NotAligned { .. } | Self::OutOfTolerance { .. } => 5,
         }
     }
 }

@@ -58,7 +58,10 @@ impl Machine {
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
         let state = self.platform_state()?;
-        let strokes = state.kinematics.check(target).map_err(PlatformFailure::from)?;
+        let strokes = state
+            .kinematics
+            .check(target)
+            .map_err(PlatformFailure::from)?;
         if let Some(from) = state.pose {
             let path = state.kinematics.check_path(from, target);
             path.map_err(PlatformFailure::from)?;
@@ -103,10 +106,12 @@ impl Machine {
             let expected = match (&screw.compensation, correction) {
                 (Some(compensation), Correction::On) => {
                     let corrected = compensation.correct(*stroke, &memory);
-                    Some(corrected.map_err(|source| PlatformFailure::OutOfCalibration {
-                        axis: screw.axis.clone(),
-                        source,
-                    })?)
+                    Some(
+                        corrected.map_err(|source| PlatformFailure::OutOfCalibration {
+                            axis: screw.axis.clone(),
+                            source,
+                        })?,
+                    )
                 }
                 (Some(compensation), Correction::Off) => {
                     Some(compensation.expected(*stroke, &memory))
@@ -262,9 +267,7 @@ impl Machine {
     /// The travel after which a screw is engaged whatever it was before.
     pub(super) fn lost_motion_max(&self) -> Result<Metres, Failure> {
         let compensation = self.platform_config()?.compensation.as_ref();
-        Ok(compensation.map_or(LOST_MOTION_MAX, |it| {
-            Metres::from_um(it.lost_motion_max_um)
-        }))
+        Ok(compensation.map_or(LOST_MOTION_MAX, |it| Metres::from_um(it.lost_motion_max_um)))
     }
 
     pub(super) fn platform_config(&self) -> Result<&PlatformConfig, Failure> {

@@ -114,7 +114,11 @@ pub(crate) fn from_datum(seen: Pose, datum: Pose) -> Pose {
 
 /// What a travel of a screw without a calibration leaves of its engagement: known once it is
 /// longer than any lost motion may be.
-pub(crate) fn engaged_by(travel: Metres, lost_motion_max: Metres, before: Engagement) -> Engagement {
+pub(crate) fn engaged_by(
+    travel: Metres,
+    lost_motion_max: Metres,
+    before: Engagement,
+) -> Engagement {
     if travel.abs() < lost_motion_max {
         match (before, travel > Metres::ZERO, travel < Metres::ZERO) {
             (Engagement::Forward, true, _) => Engagement::Forward,

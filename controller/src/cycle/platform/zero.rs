@@ -64,7 +64,8 @@ impl Machine {
         let exposures = self.platform_config()?.exposures * DATUM_LOOKS;
         let datum = self.camera_pose(exposures)?;
         self.platform_state_mut()?.datum = Some(datum);
-        self.observer.progress(Stage::Zero, "platform", steps, steps);
+        self.observer
+            .progress(Stage::Zero, "platform", steps, steps);
         Ok(datum)
     }
 
