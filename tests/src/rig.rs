@@ -159,8 +159,8 @@ impl Bench {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let loaded = shipped_config(shipped, folder.path(), machine);
         let text = emulated(shipped.emulated.to_owned());
-        let emulated = Emulated::new(&text, seed, &loaded.config)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let emulated =
+            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
         let store = Store::new(folder.path(), &loaded.config.machine.name);
         Self {

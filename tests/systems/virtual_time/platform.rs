@@ -46,8 +46,11 @@ impl Judge {
 /// The largest true errors over `poses` moves, before and after calibrating.
 fn cycle(seed: u64, poses: u32, method: &str, rule: &str) -> (Metres, Metres) {
     let mut bench = Bench::of(&UVW, seed, |text| {
-        text.replace("method = \"least_squares\"", &format!("method = \"{method}\""))
-            .replace("rule = \"engagement\"", &format!("rule = \"{rule}\""))
+        text.replace(
+            "method = \"least_squares\"",
+            &format!("method = \"{method}\""),
+        )
+        .replace("rule = \"engagement\"", &format!("rule = \"{rule}\""))
     });
     let store = bench.store.clone();
     let result = run(&mut bench, &store, seed, poses);
@@ -85,8 +88,16 @@ fn visit(bench: &mut Bench, judge: &Judge, seed: u64, poses: u32) -> Result<Metr
 fn least_squares_brings_the_platform_within_a_micrometre() {
     for seed in 1..=3 {
         let (found, left) = cycle(seed, 100, "least_squares", "engagement");
-        println!("seed {seed}: as found {:.3} µm, as left {:.3} µm", found.um(), left.um());
+        println!(
+            "seed {seed}: as found {:.3} µm, as left {:.3} µm",
+            found.um(),
+            left.um()
+        );
         let (found, left) = cycle(seed, 100, "patent", "patent");
-        println!("seed {seed}: as found {:.3} µm, patent {:.3} µm", found.um(), left.um());
+        println!(
+            "seed {seed}: as found {:.3} µm, patent {:.3} µm",
+            found.um(),
+            left.um()
+        );
     }
 }

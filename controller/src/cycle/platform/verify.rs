@@ -249,7 +249,11 @@ mod tests {
     fn poses_are_spread_over_the_whole_range_and_differ_from_seed_to_seed() {
         for dimension in 0..3 {
             let places: Vec<f64> = (0..64).map(|at| spread(7, at, dimension)).collect();
-            let in_band = |low: f64| places.iter().filter(move |it| (low..low + 0.5).contains(*it));
+            let in_band = |low: f64| {
+                places
+                    .iter()
+                    .filter(move |it| (low..low + 0.5).contains(*it))
+            };
             for low in [-1.0, -0.5, 0.0, 0.5] {
                 let count = in_band(low).count();
                 assert!((12..=20).contains(&count), "{count} from {low}");
