@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::camera::CameraConfig;
+use super::platform::PlatformConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -31,6 +32,8 @@ pub struct MachineConfig {
     /// Image controllers by name.
     #[serde(default)]
     pub camera: BTreeMap<String, CameraConfig>,
+    /// The alignment platform that the axes move, if they move one.
+    pub platform: Option<PlatformConfig>,
 }
 
 /// Who the machine is, and where its records live.

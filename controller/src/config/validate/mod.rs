@@ -3,6 +3,7 @@
 mod camera;
 mod cycle;
 mod judge;
+mod platform;
 
 use std::collections::BTreeMap;
 
@@ -67,6 +68,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
     }
     check_cameras(config, &mut findings);
+    platform::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
     if findings.is_empty() {
