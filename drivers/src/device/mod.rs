@@ -10,16 +10,19 @@ pub mod cia402;
 pub mod dcon;
 #[cfg(test)]
 mod fake_node;
+mod latch;
 pub mod serial_line;
 pub mod umd2;
 
 use core::fmt;
 use core::time::Duration;
 use units::{
-    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time, Volts,
+    Approach, Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time,
+    Volts,
 };
 
 pub use alarm::Alarm;
+pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis};
 
 use crate::transport::Input;
 use crate::wire::Payload;
@@ -117,6 +120,16 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         position: Q,
         /// Search speed.
         speed: Q::Speed,
+    },
+    /// Home on the next index pulse of the encoder (methods 33 and 34); the drive's coordinates
+    /// become `position` there.
+    HomeIndex {
+        /// The coordinate of the index mark.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+        /// The direction of the search.
+        approach: Approach,
     },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {

@@ -1,9 +1,10 @@
 //! A servo drive by CiA 402 (IEC 61800-7-201) on CANopen.
 //!
-//! Start, power, profile position, homing, halt, quick stop and supervision of one axis.
+//! Start, power, profile position, homing, halt, quick stop and supervision of one axis, linear
+//! or turning endlessly, and its touch probe.
 //!
 //! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
-//! error, both at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
+//! error, TPDO 3 (if wanted) the touch probe, all at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
 //! taken over at once: no adapter that re-orders frames can part a target from the edge that
 //! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
 //! they are written by SDO, read back, before the move that needs them.
@@ -12,12 +13,14 @@
 //! and a controlword that seems to be without effect is sent again. All levels, no edge but the
 //! fault reset's: a repetition is harmless.
 //!
-//! Absent: cyclic synchronous modes, interpolated position, touch probe, torque.
+//! Absent: cyclic synchronous modes, interpolated position, the second touch probe, torque.
 
 mod convert;
 mod course;
 mod homing;
 mod image;
+mod latch;
+mod modulo;
 mod motion;
 mod power;
 mod settings;
@@ -25,13 +28,18 @@ mod start;
 mod supervision;
 
 #[cfg(test)]
+mod rotary_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
 
 use units::{Coordinate, Metres, Quantity, Time};
 
-pub use settings::{Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes};
+pub use settings::{
+    Cia402Settings, Cia402Timeouts, Edge, HomeOffset, LatchSettings, OptionCodes, PositionRange,
+    Turn,
+};
 
 use super::canopen_node::{CanopenNode, NodeEvent};
 use super::{
@@ -44,8 +52,9 @@ use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
-use homing::Homing;
+use homing::{Home, Homing};
 use image::{Image, Sample};
+use latch::{LatchChange, Probe};
 use motion::{Halt, Move};
 use power::Power;
 
@@ -61,6 +70,7 @@ enum Activity {
     Move(Move),
     Halt(Halt),
     Homing(Homing),
+    Latch(LatchChange),
 }
 
 impl Activity {
@@ -72,6 +82,7 @@ impl Activity {
             Self::Move(_) => "the move",
             Self::Halt(_) => "the halt",
             Self::Homing(_) => "homing",
+            Self::Latch(_) => "setting the touch probe",
         }
     }
 }
@@ -94,7 +105,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     /// Velocity and acceleration that the drive confirmed.
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
-    reached: Option<i32>,
+    reached: Option<i64>,
     homed: bool,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
@@ -102,6 +113,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     kept: Option<PowerState>,
     /// Where the motion under way began.
     course: Option<course::Course>,
+    probe: Probe,
     /// Alarms that were told and whose cause lasts.
     told_state: bool,
     told_following: bool,
@@ -117,6 +129,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     pub fn new(settings: Cia402Settings<Q>) -> Self {
         let counts = |si: f64| si / settings.scale.resolution().abs().value();
         let image = Image::new(
+            settings.modulo(),
             counts(settings.speed_max.value()),
             counts(settings.jump_margin.value()) as i64,
             settings.tolerance_counts(),
@@ -139,6 +152,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             first: None,
             kept: None,
             course: None,
+            probe: Probe::default(),
             told_state: false,
             told_following: false,
             told_short: false,
@@ -233,7 +247,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             // has nothing left to stop.
             (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
             (Activity::Power(_) | Activity::Halt(_), _) => false,
-            (Activity::Move(_) | Activity::Homing(_), _) => true,
+            (Activity::Move(_) | Activity::Homing(_) | Activity::Latch(_), _) => true,
         };
         if ends_it {
             let step = self.activity.name();
@@ -266,8 +280,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn take_description(&mut self, now: Time, script: &Script) {
+        self.probe.counts_edges = latch::counts_edges(&self.settings, script);
         let steps = start::check_description(&self.settings, script)
-            .and_then(|()| start::configuration(&self.settings));
+            .and_then(|()| start::configuration(&self.settings, self.probe.counts_edges));
         match steps {
             Ok(steps) => self.node.configure(now, steps),
             Err(error) => {
@@ -282,6 +297,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Activity::Starting => self.end_start(now, script),
             Activity::Move(_) => self.move_prepared(now),
             Activity::Homing(_) => self.homing_prepared(now),
+            Activity::Latch(_) => self.latch_written(now),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -293,6 +309,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.profile = None;
                 self.finish(Err(error));
             }
+            Activity::Latch(_) => self.finish(Err(error)),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -334,6 +351,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Move(_) => self.move_timeout(now),
             Activity::Halt(_) => self.halt_timeout(now),
             Activity::Homing(_) => self.homing_timeout(now),
+            Activity::Latch(_) => self.latch_timeout(now),
         }
         self.repeat_control(now);
     }
@@ -345,6 +363,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Move(moving) => moving.deadline(),
             Activity::Halt(halt) => halt.deadline(),
             Activity::Homing(homing) => homing.deadline(),
+            Activity::Latch(change) => change.deadline(),
         };
         activity.min(self.repeat_at).min(self.node.poll_timeout())
     }
@@ -366,8 +385,9 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.reached = None;
         self.kept = None;
         self.first = None;
+        self.probe.disarm();
         self.activity = Activity::Starting;
-        self.node.start(now, start::description());
+        self.node.start(now, start::description(&self.settings));
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
@@ -383,6 +403,10 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         counters.push(("pdos too short", self.short_pdos));
         counters.push(("positions not believed", self.image.rejected()));
         counters.push(("commands repeated", self.repeated_commands));
+        if self.settings.latch.is_some() {
+            counters.push(("edges latched", self.probe.latched));
+            counters.push(("edges missed", self.probe.missed));
+        }
         counters
     }
 }
@@ -428,9 +452,16 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
                 acceleration,
             } => self.begin_move(now, target, speed, acceleration),
             AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, Some(speed));
+                self.begin_homing(now, Home::NegativeLimit, position, Some(speed));
             }
-            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+            AxisCommand::HomeIndex {
+                position,
+                speed,
+                approach,
+            } => self.begin_homing(now, Home::Index(approach), position, Some(speed)),
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, Home::Here, position, None);
+            }
         }
     }
 
