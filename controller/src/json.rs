@@ -54,6 +54,16 @@ pub fn figures(figures: &Figures) -> Value {
     })
 }
 
+/// What devices counted, as `{device: {what: count}}`; what never happened is left out.
+pub fn counters(counters: &[(String, &'static str, u64)]) -> Value {
+    let mut devices = serde_json::Map::new();
+    for (device, what, count) in counters.iter().filter(|(_, _, count)| *count > 0) {
+        let device = devices.entry(device.clone()).or_insert_with(|| json!({}));
+        device[*what] = json!(count);
+    }
+    Value::Object(devices)
+}
+
 /// An error table: deviations (actual − target) in micrometres.
 pub fn table(table: &ErrorTable) -> Value {
     let length = |value: Option<Metres>| value.map(um);

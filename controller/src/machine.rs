@@ -18,6 +18,7 @@ use drivers::device::{
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
+use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
 use crate::assemble;
@@ -214,6 +215,14 @@ impl Machine {
     /// When there is no such axis.
     pub fn reading(&self, axis: &str) -> Result<Option<AxisReading>, Failure> {
         Ok(self.axis(axis)?.device.reading())
+    }
+
+    /// The newest power state of `axis`, `None` before its drive has said one.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
+        Ok(self.axis(axis)?.device.power_state())
     }
 
     /// What every device said it is, by its name in the configuration.

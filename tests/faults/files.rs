@@ -5,7 +5,7 @@ use std::fs;
 
 use tests::Bench;
 use truestage::cycle::CalibrateOptions;
-use truestage::store::{CalibrationRecord, Lease, StoreError};
+use truestage::store::{CalibrationRecord, Content, Lease, RotaryContent, StoreError};
 use truestage::{Failure, Machine, Store};
 
 use crate::scene::shortened;
@@ -135,7 +135,7 @@ fn a_save_interrupted_at_any_step_leaves_the_old_one_or_the_new_one() {
     assert_eq!(shelf.store().list().unwrap().len(), 2);
     // After the calibration's rename, before the pointer's: stored, and not in use.
     let mut record = shelf.record.clone();
-    record.created = "2030-01-01T00:00:00Z".into();
+    record.head.created = "2030-01-01T00:00:00Z".into();
     let stored = shelf.store().save(&record).unwrap();
     assert_eq!(shelf.load().unwrap(), Some(shelf.newer.clone()));
     shelf.store().activate("x", &stored).unwrap();
@@ -151,7 +151,7 @@ fn a_disk_that_takes_nothing_leaves_the_calibration_in_use() {
     // A file where the folder was: nothing can be created below it, whoever asks.
     fs::write(&folder, b"").unwrap();
     let mut record = shelf.record.clone();
-    record.created = "2031-01-01T00:00:00Z".into();
+    record.head.created = "2031-01-01T00:00:00Z".into();
     let error = shelf.store().save(&record).unwrap_err();
     assert!(matches!(error, StoreError::Io { .. }), "{error}");
     assert!(error.to_string().contains("untouched"), "{error}");
@@ -195,25 +195,25 @@ fn check_foreign(change: impl FnOnce(&mut CalibrationRecord), words: &[&str]) {
 #[test]
 fn a_calibration_of_another_stage_drive_scale_or_setup_is_refused_by_name() {
     check_foreign(
-        |it| it.stage_serial = "TS-LIN-0002".into(),
+        |it| it.head.stage_serial = "TS-LIN-0002".into(),
         &["serial number", "TS-LIN-0002"],
     );
-    check_foreign(|it| it.drive.serial = 77, &["the drive", "serial 77"]);
+    check_foreign(|it| it.head.drive.serial = 77, &["the drive", "serial 77"]);
     check_foreign(
-        |it| it.resolution_m = 2e-8,
+        |it| it.head.resolution_m = Some(2e-8),
         &["encoder count", "0.00000002"],
     );
     check_foreign(
-        |it| it.config_hash = "0000".into(),
+        |it| it.head.config_hash = "0000".into(),
         &["configuration", "0000"],
     );
-    check_foreign(|it| it.axis = "y".into(), &["the axis", "`y`"]);
+    check_foreign(|it| it.head.axis = "y".into(), &["the axis", "`y`"]);
 }
 
 #[test]
 fn a_file_of_a_newer_program_or_of_another_kind_is_refused_clearly() {
     let mut shelf = Shelf::new();
-    shelf.activate(|record| record.schema_version = 2);
+    shelf.activate(|record| record.head.schema_version = 2);
     let failure = shelf.load().unwrap_err();
     assert!(
         matches!(failure, Failure::Store(StoreError::Newer { seen: 2, .. })),
@@ -224,8 +224,10 @@ fn a_file_of_a_newer_program_or_of_another_kind_is_refused_clearly() {
         "{failure}"
     );
     let mut shelf = Shelf::new();
-    shelf.activate(|record| record.kind = "rotary_error_table".into());
+    shelf.activate(|record| record.content = Content::RotaryErrorTable(RotaryContent::default()));
     let failure = shelf.load().unwrap_err();
+    let other = matches!(failure, Failure::Store(StoreError::OtherKind { .. }));
+    assert!(other, "{failure:?}");
     assert!(
         failure.to_string().contains("rotary_error_table"),
         "{failure}"

@@ -3,7 +3,7 @@
 
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
-use truestage::store::CalibrationRecord;
+use truestage::store::{CalibrationRecord, Content};
 use truestage::{Failure, Machine, Store};
 use units::Metres;
 
@@ -82,7 +82,10 @@ fn activate(
     change: impl Fn(usize, f64) -> f64,
 ) -> String {
     let mut changed = record.clone();
-    for (at, node) in changed.nodes.iter_mut().enumerate() {
+    let Content::LinearErrorTable(content) = &mut changed.content else {
+        panic!("another kind")
+    };
+    for (at, node) in content.nodes.iter_mut().enumerate() {
         node.forward_m = node.forward_m.map(|it| change(at, it));
         node.reverse_m = node.reverse_m.map(|it| change(at, it));
     }

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use serde_json::json;
-use truestage::store::{CalibrationRecord, NodeRecord, Store, short};
+use serde_json::{Value, json};
+use truestage::store::{
+    CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, RotaryContent, Store, short,
+};
 use truestage::{Failure, config};
-use units::Metres;
+use units::{Metres, Radians};
 
 use super::output::{Ended, Output};
 
@@ -77,18 +79,20 @@ fn list(store: &Store, output: Output) -> Ended {
     for id in store.list()? {
         match store.load(&id) {
             Ok(record) => {
-                let used = store.active(&record.axis)?.current.as_deref() == Some(&id);
+                let CalibrationRecord { head, content } = record;
+                let used = store.active(&head.axis)?.current.as_deref() == Some(&id);
                 lines.push(format!(
-                    "{} {}  {}  axis {}  {} nodes  {}",
+                    "{} {}  {}  axis {}  {}  {}",
                     if used { '*' } else { ' ' },
                     short(&id),
-                    record.created,
-                    record.axis,
-                    record.nodes.len(),
-                    record.source
+                    head.created,
+                    head.axis,
+                    content.summary(),
+                    head.source
                 ));
-                values.push(json!({"id": id, "active": used, "axis": record.axis,
-                                   "created": record.created, "source": record.source}));
+                values.push(json!({"id": id, "active": used, "axis": head.axis,
+                                   "kind": content.kind(), "created": head.created,
+                                   "source": head.source}));
             }
             Err(error) => {
                 lines.push(format!("! {}  {error}", short(&id)));
@@ -105,23 +109,50 @@ fn list(store: &Store, output: Output) -> Ended {
 fn show(store: &Store, id: &str, output: Output) -> Ended {
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
+    let head = &record.head;
     let mut text = format!(
-        "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, {} runs, \
-         closure {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
-        record.machine,
-        record.stage_serial,
-        record.axis,
-        record.created,
-        record.program,
-        record.source,
-        record.runs,
-        micrometres(record.closure_m),
+        "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, ",
+        head.machine, head.stage_serial, head.axis, head.created, head.program, head.source,
     );
-    for node in &record.nodes {
-        text += &node_line(node);
-    }
+    text += &match &record.content {
+        Content::LinearErrorTable(content) => linear_lines(content),
+        Content::RotaryErrorTable(content) => rotary_lines(content),
+    };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
     output.result(&text, &json!({"id": id, "record": value}))
+}
+
+fn linear_lines(content: &LinearContent) -> String {
+    let head = format!(
+        "{} runs, closure {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
+        content.runs,
+        micrometres(content.closure_m),
+    );
+    content
+        .nodes
+        .iter()
+        .fold(head, |text, node| text + &node_line(node))
+}
+
+fn rotary_lines(content: &RotaryContent) -> String {
+    let arcsec = |value: f64| format!("{:.4}", Radians(value).arcsec());
+    let mut text = format!(
+        "{} lines, plate offsets {:?}, residual rms {} ″\n  line   table error (″)   u (″)   plate (″)",
+        content.lines,
+        content.offsets,
+        arcsec(content.residual_rms_rad),
+    );
+    let errors = content.table_error_rad.iter();
+    for (line, error) in errors.enumerate() {
+        let cell = |value: Option<f64>| value.map_or("–".to_owned(), arcsec);
+        text += &format!(
+            "\n  {line:>4}   {:>15}   {:>5}   {:>9}",
+            arcsec(*error),
+            cell(content.standard_uncertainty_rad.get(line).copied()),
+            cell(content.plate_error_rad.get(line).copied().flatten()),
+        );
+    }
+    text
 }
 
 fn micrometres(metres: Option<f64>) -> String {
@@ -139,9 +170,16 @@ fn node_line(node: &NodeRecord) -> String {
 }
 
 fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
-    let load =
-        |id: &str| -> Result<CalibrationRecord, Failure> { Ok(store.load(&store.resolve(id)?)?) };
-    let (before, after) = (load(before)?, load(after)?);
+    let (before_id, after_id) = (store.resolve(before)?, store.resolve(after)?);
+    let (before, after) = (store.load(&before_id)?, store.load(&after_id)?);
+    let (lines, values) = match &after.content {
+        Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
+        Content::RotaryErrorTable(new) => rotary_changes(before.rotary(&before_id)?, new),
+    };
+    output.result(&lines.join("\n"), &json!({"changes": values}))
+}
+
+fn linear_changes(before: &LinearContent, after: &LinearContent) -> (Vec<String>, Vec<Value>) {
     let mut lines = vec!["  position (mm)   Δ forward (µm)   Δ reverse (µm)".to_owned()];
     let mut values = Vec::new();
     for new in &after.nodes {
@@ -171,7 +209,23 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
     if values.is_empty() {
         lines.push("  no position stands in both".into());
     }
-    output.result(&lines.join("\n"), &json!({"changes": values}))
+    (lines, values)
+}
+
+fn rotary_changes(before: &RotaryContent, after: &RotaryContent) -> (Vec<String>, Vec<Value>) {
+    if before.lines != after.lines {
+        let text = format!("  {} lines before, {} after", before.lines, after.lines);
+        return (vec![text], Vec::new());
+    }
+    let mut lines = vec!["  line   Δ table error (″)".to_owned()];
+    let mut values = Vec::new();
+    let pairs = before.table_error_rad.iter().zip(&after.table_error_rad);
+    for (line, (old, new)) in pairs.enumerate() {
+        let change = Radians(new - old).arcsec();
+        lines.push(format!("  {line:>4}   {change:>17.4}"));
+        values.push(json!({"line": line, "table_error_arcsec": change}));
+    }
+    (lines, values)
 }
 
 /// The stage and the configuration are checked here; the drive itself when it is used.
@@ -181,13 +235,14 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let store = Store::new(&section.data_dir, &section.name);
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
-    let here = CalibrationRecord {
+    let CalibrationRecord { head, .. } = record;
+    let here = RecordHead {
         stage_serial: section.stage_serial.clone(),
         config_hash: loaded.hash.clone(),
-        ..record.clone()
+        ..head.clone()
     };
-    record.belongs_to(&id, &here)?;
-    if !loaded.config.axis.contains_key(&record.axis) {
+    head.belongs_to(&id, &here)?;
+    if !loaded.config.axis.contains_key(&head.axis) {
         let known = loaded
             .config
             .axis
@@ -196,13 +251,13 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
             .collect::<Vec<_>>()
             .join(", ");
         return Err(Failure::NoSuchAxis {
-            axis: record.axis,
+            axis: head.axis,
             known,
         });
     }
-    store.activate(&record.axis, &id)?;
-    let text = format!("axis {}: {} is in use", record.axis, short(&id));
-    output.result(&text, &json!({"axis": record.axis, "active": id}))
+    store.activate(&head.axis, &id)?;
+    let text = format!("axis {}: {} is in use", head.axis, short(&id));
+    output.result(&text, &json!({"axis": head.axis, "active": id}))
 }
 
 fn rollback(store: &Store, axis: &str, output: Output) -> Ended {

@@ -10,8 +10,8 @@ use compensator::measurement::{HallSeries, LinearSeries};
 use serde_json::json;
 use truestage::cycle::utc_now;
 use truestage::store::{
-    CalibrationRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord, SCHEMA_VERSION, Store,
-    short,
+    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
+    RecordHead, SCHEMA_VERSION, Store, short,
 };
 use truestage::{Failure, assemble, config, json as to_json, text};
 
@@ -128,10 +128,8 @@ fn store_fit(
         assemble::compensation(limits, &name, fitted.table.clone())?;
     }
     let section = &loaded.config.machine;
-    let lost_motion = fitted.table.lost_motion();
-    let record = CalibrationRecord {
+    let head = RecordHead {
         schema_version: SCHEMA_VERSION,
-        kind: "linear_error_table".into(),
         machine: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
         config_hash: loaded.hash.clone(),
@@ -144,7 +142,8 @@ fn store_fit(
             serial: axis.identity.serial_number.unwrap_or(0),
             name: String::new(),
         },
-        resolution_m: axis.resolution_nm * 1e-9,
+        resolution_m: Some(axis.resolution_nm * 1e-9),
+        resolution_rad: None,
         created: utc_now(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
         source: data
@@ -157,11 +156,11 @@ fn store_fit(
             ..Default::default()
         },
         environment: EnvironmentRecord::default(),
-        runs: series.runs().len() as u32,
-        closure_m: None,
-        lost_motion_m: lost_motion.map(|it| it.mean.value()),
-        lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
-        nodes: CalibrationRecord::nodes_of(&fitted.table),
+    };
+    let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
+    let record = CalibrationRecord {
+        head,
+        content: Content::LinearErrorTable(content),
     };
     Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
 }

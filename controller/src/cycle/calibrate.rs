@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
-use super::measure::{MeasureOptions, Measured, RunPlan};
+use super::measure::{EarlierRuns, MeasureOptions, Measured, RunPlan};
 use super::utc_now;
 use crate::assemble;
 use crate::config::CalibrateConfig;
@@ -14,8 +14,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader, PointEntry,
-    SCHEMA_VERSION, Store,
+    CalibrationRecord, Content, Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord,
+    Journal, JournalHeader, LinearContent, RecordHead, SCHEMA_VERSION, Store,
 };
 
 /// How a calibration is made.
@@ -64,7 +64,11 @@ impl Machine {
                 axis: axis.to_owned(),
             });
         }
-        let plan = run_plan(&config);
+        let plan = RunPlan {
+            closure_limit: (!options.accept_drift)
+                .then(|| Metres::from_um(config.closure_limit_um)),
+            ..run_plan(&config)
+        };
         // Before the header, which says who measures.
         self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", axis, &plan, None);
@@ -73,18 +77,8 @@ impl Machine {
             stage: Stage::Calibrate,
             compensated: false,
         };
-        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, &earlier);
+        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let limit = Metres::from_um(config.closure_limit_um);
-        // Written so that NaN is refused too.
-        let closed = measured.closure.abs() <= limit;
-        if !closed && !options.accept_drift {
-            return Err(Failure::Closure {
-                axis: axis.to_owned(),
-                seen: measured.closure,
-                limit,
-            });
-        }
         let fitted = self.fit_table(axis, &plan, &measured)?;
         let compensation = self.prepare(axis, fitted.table.clone())?;
         let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
@@ -111,8 +105,8 @@ impl Machine {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record.belongs_to(&id, &self.this_machine(axis))?;
-        let compensation = self.prepare(axis, record.table(&id)?)?;
+        record.head.belongs_to(&id, &self.this_machine(axis))?;
+        let compensation = self.prepare(axis, record.linear(&id)?.table(&id)?)?;
         self.set_compensation(axis, Some(compensation))?;
         Ok(Some(id))
     }
@@ -153,8 +147,7 @@ impl Machine {
         measured: &Measured,
         fitted: &Fitted,
     ) -> CalibrationRecord {
-        let lost_motion = fitted.table.lost_motion();
-        CalibrationRecord {
+        let head = RecordHead {
             created: utc_now(),
             source: journal
                 .path()
@@ -164,41 +157,32 @@ impl Machine {
                 .into_owned(),
             instrument: self.instrument_record(&plan.instrument),
             environment: measured.environment,
-            runs: plan.runs,
-            closure_m: Some(measured.closure.value()),
-            lost_motion_m: lost_motion.map(|it| it.mean.value()),
-            lost_motion_u_m: lost_motion.and_then(|it| Some(it.standard_uncertainty?.value())),
-            nodes: CalibrationRecord::nodes_of(&fitted.table),
             ..self.this_machine(axis)
+        };
+        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
+        CalibrationRecord {
+            head,
+            content: Content::LinearErrorTable(content),
         }
     }
 
-    /// A record without measurements that says who this machine is.
-    pub fn this_machine(&self, axis: &str) -> CalibrationRecord {
-        let resolution_nm = self
-            .config
-            .axis
-            .get(axis)
-            .map_or(0.0, |axis| axis.resolution_nm);
-        CalibrationRecord {
+    /// The head of a record without measurements, which says who this machine is.
+    pub fn this_machine(&self, axis: &str) -> RecordHead {
+        let config = self.config.axis.get(axis);
+        RecordHead {
             schema_version: SCHEMA_VERSION,
-            kind: "linear_error_table".into(),
             machine: self.config.machine.name.clone(),
             stage_serial: self.config.machine.stage_serial.clone(),
             config_hash: self.config_hash.clone(),
             axis: axis.to_owned(),
             drive: self.drive_record(axis),
-            resolution_m: resolution_nm * 1e-9,
+            resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
+            resolution_rad: None,
             created: String::new(),
             program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
             source: String::new(),
             instrument: InstrumentRecord::default(),
-            environment: crate::store::EnvironmentRecord::default(),
-            runs: 0,
-            closure_m: None,
-            lost_motion_m: None,
-            lost_motion_u_m: None,
-            nodes: Vec::new(),
+            environment: EnvironmentRecord::default(),
         }
     }
 
@@ -267,12 +251,19 @@ pub(super) fn open_journal(
     store: &Store,
     header: &JournalHeader,
     resume: Option<&PathBuf>,
-) -> Result<(Journal, Vec<PointEntry>), Failure> {
+) -> Result<(Journal, EarlierRuns), Failure> {
     match resume {
-        None => Ok((Journal::create(&store.runs(), header)?, Vec::new())),
+        None => Ok((
+            Journal::create(&store.runs(), header)?,
+            EarlierRuns::default(),
+        )),
         Some(path) => {
             let (journal, read) = Journal::resume(path, header)?;
-            Ok((journal, read.points))
+            let earlier = EarlierRuns {
+                points: read.points,
+                closures: read.closures,
+            };
+            Ok((journal, earlier))
         }
     }
 }
@@ -296,5 +287,6 @@ fn run_plan(config: &CalibrateConfig) -> RunPlan {
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
         scale_limit_ppm: config.scale_limit_ppm,
+        closure_limit: None,
     }
 }

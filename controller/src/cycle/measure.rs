@@ -7,13 +7,13 @@ use compensator::measurement::{LinearSeries, Measurement};
 use drivers::device::{DisplacementReading, Environment};
 use units::{Approach, Metres};
 
-use super::cross_check::{CrossCheck, Plausible, judge_scale};
+use super::cross_check::{CrossCheck, Plausible, Run, judge_scale};
 use super::travel::Correction;
 use crate::assemble;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::{Entry, EnvironmentRecord, Journal, PointEntry};
+use crate::store::{ClosureEntry, Entry, EnvironmentRecord, Journal, PointEntry};
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +32,8 @@ pub struct RunPlan {
     pub average_samples: u32,
     /// Largest relative difference of instrument and encoder believed, where it is judged.
     pub scale_limit_ppm: f64,
+    /// How far the datum may have drifted at the end of each run; `None` for any distance.
+    pub closure_limit: Option<Metres>,
 }
 
 /// How a series is measured.
@@ -43,12 +45,28 @@ pub struct MeasureOptions {
     pub compensated: bool,
 }
 
+/// The whole runs of a measurement that was interrupted; none for a new one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct EarlierRuns {
+    pub(crate) points: Vec<PointEntry>,
+    pub(crate) closures: Vec<ClosureEntry>,
+}
+
+impl EarlierRuns {
+    fn last(&self) -> Option<Run<'_>> {
+        let closure = *self.closures.last()?;
+        let begin = self.points.partition_point(|it| it.run < closure.run);
+        let points = &self.points[begin..];
+        Some(Run { points, closure })
+    }
+}
+
 /// A measured series.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// Every point.
     pub points: Vec<PointEntry>,
-    /// The same place, measured last minus first.
+    /// The same place, measured after a run minus before the first: the largest of all runs.
     pub closure: Metres,
     /// Mean environment of the points.
     pub environment: EnvironmentRecord,
@@ -109,32 +127,35 @@ struct Session<'a> {
 
 /// Values that the instrument's sensors sent are never older than this.
 const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
+/// A closure that is shaken says nothing: it is measured again, so often at most …
+const CLOSURE_ATTEMPTS: u32 = 10;
+/// … and so long after.
+const CALM: Duration = Duration::from_millis(200);
 /// What a stage can do at most where the configuration says nothing.
 const SLOPE_MAX: f64 = 0.01;
 const STEP_MAX: Metres = Metres(5e-6);
 
 impl Machine {
     /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
-    /// `earlier` are the points of an interrupted run: its complete runs are kept.
+    /// The runs of an interrupted measurement are kept (`earlier`).
     ///
     /// The datum is the axis's zero, approached forward; the same place is measured again at
-    /// the end.
+    /// the end of each run.
     ///
     /// # Errors
-    /// Whatever stops the machine, and an instrument that disagrees with the encoder beyond
-    /// reason.
-    pub fn measure_runs(
+    /// Whatever stops the machine, a datum that drifted, and an instrument that disagrees
+    /// with the encoder beyond reason.
+    pub(crate) fn measure_runs(
         &mut self,
         axis: &str,
         plan: &RunPlan,
         options: MeasureOptions,
         journal: &mut Journal,
-        earlier: &[PointEntry],
+        mut runs: EarlierRuns,
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
-        let mut points = whole_runs(earlier, per_run);
         // A run that was whole but wrong ended the measurement that is continued here.
-        for run in points.chunk_by(|a, b| a.run == b.run) {
+        for run in runs.points.chunk_by(|a, b| a.run == b.run) {
             judge_scale(axis, plan.scale_limit_ppm, run)?;
         }
         self.use_instrument(&plan.instrument)?;
@@ -142,7 +163,7 @@ impl Machine {
         self.remember(axis).datum = Some((plan.clone(), correction_of_length));
         let counter = Counter {
             stage: options.stage,
-            done: points.len() as u64,
+            done: runs.points.len() as u64,
             total: per_run as u64 * u64::from(plan.runs),
         };
         let correction = if options.compensated {
@@ -160,21 +181,22 @@ impl Machine {
             check: CrossCheck::new(axis, self.plausible(axis, plan)?),
             watch: self.environment_watch(plan),
         };
-        let first = points.last().map_or(1, |point| point.run + 1);
+        let first = runs.points.last().map_or(1, |point| point.run + 1);
+        let mut start = Metres::ZERO;
         for run in first..=plan.runs {
-            let measured = self.measure_run(&mut session, run)?;
-            let before = points.len().saturating_sub(per_run);
-            session.check.compare(&points[before..], &measured)?;
-            points.extend(measured);
+            let points = self.measure_run(&mut session, run)?;
+            let closure = self.close_run(&mut session, run, start, &runs, &points)?;
+            start = Metres(closure.closure_m);
+            runs.points.extend(points);
+            runs.closures.push(closure);
         }
-        let closure = self.measure_closure(&mut session)?;
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
         self.instrument_in_use = None;
-        let environment = mean_environment(&points);
+        let environment = mean_environment(&runs.points);
         Ok(Measured {
-            points,
-            closure,
+            closure: largest(&runs.closures),
+            points: runs.points,
             environment,
         })
     }
@@ -285,9 +307,47 @@ impl Machine {
         Ok(())
     }
 
+    /// Measures the datum's place again; a run after which it has moved is worth nothing.
+    fn close_run(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+        start: Metres,
+        earlier: &EarlierRuns,
+        points: &[PointEntry],
+    ) -> Result<ClosureEntry, Failure> {
+        let seen = self.measure_closure(session)?;
+        let closure = ClosureEntry {
+            run,
+            start_m: start.value(),
+            closure_m: seen.value(),
+        };
+        if let Some(before) = earlier.last() {
+            session.check.compare(&before, &Run { points, closure })?;
+        }
+        // A comparison with NaN is false, so that it is refused too.
+        let is_closed = |limit| seen.abs() <= limit;
+        if let Some(limit) = session.plan.closure_limit.filter(|it| !is_closed(*it)) {
+            return Err(Failure::Closure {
+                axis: session.axis.to_owned(),
+                seen,
+                limit,
+            });
+        }
+        session.journal.write(&Entry::Closed(closure))?;
+        Ok(closure)
+    }
+
     fn measure_closure(&mut self, session: &mut Session<'_>) -> Result<Metres, Failure> {
         self.go_to_datum(session.axis, session.plan)?;
-        let reading = self.read_displacement(session.axis, session.plan)?;
+        let mut reading = self.read_displacement(session.axis, session.plan)?;
+        for _ in 1..CLOSURE_ATTEMPTS {
+            if !session.check.is_shaken(reading.standard_deviation) {
+                break;
+            }
+            self.stand_still(session.axis, CALM)?;
+            reading = self.read_displacement(session.axis, session.plan)?;
+        }
         let environment = self.watched_environment(session)?;
         self.correct(
             session.plan,
@@ -374,14 +434,12 @@ impl Machine {
     }
 }
 
-/// The points of the runs that are whole.
-fn whole_runs(points: &[PointEntry], per_run: usize) -> Vec<PointEntry> {
-    let count = |run: u32| points.iter().filter(|point| point.run == run).count();
-    points
+fn largest(closures: &[ClosureEntry]) -> Metres {
+    closures
         .iter()
-        .filter(|point| count(point.run) == per_run)
-        .copied()
-        .collect()
+        .map(|closure| Metres(closure.closure_m))
+        .max_by(|a, b| a.abs().value().total_cmp(&b.abs().value()))
+        .unwrap_or(Metres::ZERO)
 }
 
 fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {

@@ -85,7 +85,7 @@ impl Machine {
             compensated: options.compensated,
         };
         let measured = self
-            .measure_runs(axis, &plan, measuring, &mut journal, &earlier)
+            .measure_runs(axis, &plan, measuring, &mut journal, earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         let verified = Verified {
             figures: iso230::evaluate(&measured.series()?)?,
@@ -175,5 +175,6 @@ fn run_plan(config: &VerifyConfig) -> RunPlan {
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
         scale_limit_ppm: SCALE_LIMIT_PPM,
+        closure_limit: None,
     }
 }

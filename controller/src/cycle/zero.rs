@@ -115,10 +115,7 @@ impl Machine {
     /// Coarse reference on the negative limit switch.
     fn reference(&mut self, axis: &str, config: &ZeroConfig) -> Result<(), Failure> {
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
-        let axis_config = self.axis_config(axis)?;
-        let travel_mm = axis_config.soft_max_mm - axis_config.soft_min_mm + 50.0;
-        let limit =
-            Duration::from_secs_f64(10.0 + 2.0 * travel_mm / config.reference_speed_mm_per_s);
+        let limit = assemble::reference_limit(config, self.axis_config(axis)?);
         let position = Metres::from_mm(config.negative_limit_mm);
         self.command(
             axis,

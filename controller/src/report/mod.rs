@@ -5,9 +5,11 @@ mod svg;
 use core::fmt::Write as _;
 
 use compensator::iso230::Figures;
-use units::Metres;
+use units::{Metres, Radians};
 
-use crate::store::{CalibrationRecord, PointEntry, ReadJournal, ZeroEntry};
+use crate::store::{
+    CalibrationRecord, Content, LinearContent, PointEntry, ReadJournal, RotaryContent, ZeroEntry,
+};
 use crate::text;
 
 /// One measured series on the page.
@@ -64,7 +66,10 @@ pub fn render(page: &Page<'_>) -> String {
     }
     if let Some(calibration) = page.calibration {
         html += "<h2>Calibration</h2>";
-        html += &calibration_table(calibration);
+        html += &match &calibration.content {
+            Content::LinearErrorTable(content) => linear_table(content),
+            Content::RotaryErrorTable(content) => rotary_table(content),
+        };
     }
     if !page.zeros.is_empty() {
         html += "<h2>Zeros</h2>";
@@ -159,7 +164,7 @@ fn figures(sections: &[Section<'_>]) -> String {
     html + "</table>"
 }
 
-fn calibration_table(record: &CalibrationRecord) -> String {
+fn linear_table(content: &LinearContent) -> String {
     let cell = |value: Option<f64>| {
         value.map_or("–".to_owned(), |metres| {
             format!("{:.3}", Metres(metres).um())
@@ -169,7 +174,7 @@ fn calibration_table(record: &CalibrationRecord) -> String {
         "<table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
          <th>u ↑ (µm)</th><th>u ↓ (µm)</th></tr>",
     );
-    for node in &record.nodes {
+    for node in &content.nodes {
         let _ = write!(
             html,
             "<tr><td>{:.3}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
@@ -178,6 +183,27 @@ fn calibration_table(record: &CalibrationRecord) -> String {
             cell(node.reverse_m),
             cell(node.forward_u_m),
             cell(node.reverse_u_m)
+        );
+    }
+    html + "</table>"
+}
+
+fn rotary_table(content: &RotaryContent) -> String {
+    let cell = |value: Option<f64>| {
+        value.map_or("–".to_owned(), |radians| {
+            format!("{:.4}", Radians(radians).arcsec())
+        })
+    };
+    let mut html = String::from(
+        "<table><tr><th>line</th><th>table error (″)</th><th>u (″)</th><th>plate (″)</th></tr>",
+    );
+    for (line, error) in content.table_error_rad.iter().enumerate() {
+        let _ = write!(
+            html,
+            "<tr><td>{line}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            cell(Some(*error)),
+            cell(content.standard_uncertainty_rad.get(line).copied()),
+            cell(content.plate_error_rad.get(line).copied().flatten()),
         );
     }
     html + "</table>"

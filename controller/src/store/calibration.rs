@@ -3,227 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use compensator::error_table::{ErrorTable, Node};
-use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
-use units::Metres;
 
+use super::record::CalibrationRecord;
 use super::{SCHEMA_VERSION, StoreError, io_error, write_new_or_replace};
-
-/// One calibration of one axis: a signed statement of what was measured, with what, when,
-/// on which machine, and how well.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CalibrationRecord {
-    /// Of this struct.
-    pub schema_version: u32,
-    /// What kind of model it is: `linear_error_table`.
-    pub kind: String,
-    /// The machine's name.
-    pub machine: String,
-    /// The stage's serial number.
-    pub stage_serial: String,
-    /// BLAKE3 of what a calibration depends on in the configuration.
-    pub config_hash: String,
-    /// Which axis.
-    pub axis: String,
-    /// Who the drive was.
-    pub drive: IdentityRecord,
-    /// One encoder count, metres.
-    pub resolution_m: f64,
-    /// When, UTC, RFC 3339.
-    pub created: String,
-    /// The program that made it.
-    pub program: String,
-    /// The run journal or data file it was made from.
-    pub source: String,
-    /// What measured, and which corrections its readings got.
-    pub instrument: InstrumentRecord,
-    /// Means over the run, where known.
-    pub environment: EnvironmentRecord,
-    /// How many runs.
-    pub runs: u32,
-    /// Difference of the same place measured first and last, metres, where measured.
-    pub closure_m: Option<f64>,
-    /// Mean lost motion (reverse − forward), metres, where both approaches were measured.
-    pub lost_motion_m: Option<f64>,
-    /// Its standard uncertainty, metres.
-    pub lost_motion_u_m: Option<f64>,
-    /// Deviation (actual − target) at each calibrated position.
-    pub nodes: Vec<NodeRecord>,
-}
-
-/// The identity of a device.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(
-    missing_docs,
-    reason = "the fields of objects 0x1000, 0x1018 and 0x1008"
-)]
-pub struct IdentityRecord {
-    pub device_type: u32,
-    pub vendor: u32,
-    pub product: u32,
-    pub revision: u32,
-    pub serial: u32,
-    pub name: String,
-}
-
-impl From<&Identity> for IdentityRecord {
-    fn from(identity: &Identity) -> Self {
-        Self {
-            device_type: identity.device_type,
-            vendor: identity.vendor,
-            product: identity.product,
-            revision: identity.revision,
-            serial: identity.serial,
-            name: identity.name.clone(),
-        }
-    }
-}
-
-/// What measured, and how its readings were corrected.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names say which correction was on")]
-pub struct InstrumentRecord {
-    pub name: String,
-    pub identity: String,
-    pub air_corrected: bool,
-    pub material_corrected: bool,
-    pub dead_path_corrected: bool,
-    pub cosine_corrected: bool,
-    pub standard_uncertainty_m: f64,
-}
-
-/// The environment, SI (temperatures in °C); `None` where no sensor said.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry the units")]
-pub struct EnvironmentRecord {
-    pub air_temperature_c: Option<f64>,
-    pub material_temperature_c: Option<f64>,
-    pub pressure_pa: Option<f64>,
-    pub relative_humidity: Option<f64>,
-}
-
-impl From<&Environment> for EnvironmentRecord {
-    fn from(environment: &Environment) -> Self {
-        Self {
-            air_temperature_c: environment.air_temperature.map(|it| it.value()),
-            material_temperature_c: environment.material_temperature.map(|it| it.value()),
-            pressure_pa: environment.pressure.map(|it| it.value()),
-            relative_humidity: environment.humidity.map(|it| it.value()),
-        }
-    }
-}
-
-/// One calibrated position, metres.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry quantity and unit")]
-pub struct NodeRecord {
-    pub position_m: f64,
-    pub forward_m: Option<f64>,
-    pub reverse_m: Option<f64>,
-    pub forward_u_m: Option<f64>,
-    pub reverse_u_m: Option<f64>,
-}
-
-impl CalibrationRecord {
-    /// The nodes of `table` as they are stored.
-    pub fn nodes_of(table: &ErrorTable) -> Vec<NodeRecord> {
-        let metres = |value: Option<Metres>| value.map(Metres::value);
-        table
-            .nodes()
-            .iter()
-            .map(|node| NodeRecord {
-                position_m: node.position.value(),
-                forward_m: metres(node.forward),
-                reverse_m: metres(node.reverse),
-                forward_u_m: metres(node.u_forward),
-                reverse_u_m: metres(node.u_reverse),
-            })
-            .collect()
-    }
-
-    /// The error table this record holds.
-    ///
-    /// # Errors
-    /// When its nodes make no table.
-    pub fn table(&self, id: &str) -> Result<ErrorTable, StoreError> {
-        let nodes = self
-            .nodes
-            .iter()
-            .map(|node| Node {
-                position: Metres(node.position_m),
-                forward: node.forward_m.map(Metres),
-                reverse: node.reverse_m.map(Metres),
-                u_forward: node.forward_u_m.map(Metres),
-                u_reverse: node.reverse_u_m.map(Metres),
-            })
-            .collect();
-        ErrorTable::new(nodes).map_err(|source| StoreError::Table {
-            id: id.to_owned(),
-            source,
-        })
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        let mut bytes = serde_json::to_vec_pretty(self).expect("plain data always serialises");
-        bytes.push(b'\n');
-        bytes
-    }
-
-    /// Whether this record belongs to `here`.
-    ///
-    /// # Errors
-    /// Naming the first thing that differs.
-    pub fn belongs_to(&self, id: &str, here: &Self) -> Result<(), StoreError> {
-        // A table measured elsewhere may not know the drive's serial number (0 in 0x1018:04).
-        let serial_known = self.drive.serial != 0;
-        let drive = |record: &Self| {
-            let it = &record.drive;
-            let product = format!("{:#X}:{:#X}", it.vendor, it.product);
-            if serial_known {
-                format!("{product} serial {}", it.serial)
-            } else {
-                product
-            }
-        };
-        let comparisons = [
-            ("the kind of model", self.kind.clone(), here.kind.clone()),
-            (
-                "the stage's serial number",
-                self.stage_serial.clone(),
-                here.stage_serial.clone(),
-            ),
-            ("the axis", self.axis.clone(), here.axis.clone()),
-            ("the drive", drive(self), drive(here)),
-            (
-                "one encoder count (m)",
-                self.resolution_m.to_string(),
-                here.resolution_m.to_string(),
-            ),
-            (
-                "the configuration's hash",
-                self.config_hash.clone(),
-                here.config_hash.clone(),
-            ),
-        ];
-        for (what, expected, seen) in comparisons {
-            if expected != seen {
-                return Err(StoreError::Foreign {
-                    id: short(id),
-                    what,
-                    expected,
-                    seen,
-                });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Which calibration an axis uses, and which it used before (oldest first).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -462,41 +245,8 @@ fn parse_versioned<T: for<'de> Deserialize<'de>>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::record::tests::record;
     use super::*;
-
-    fn record(serial: &str) -> CalibrationRecord {
-        let node = |position_m| NodeRecord {
-            position_m,
-            forward_m: Some(1e-6),
-            reverse_m: Some(2e-6),
-            forward_u_m: Some(1e-8),
-            reverse_u_m: Some(1e-8),
-        };
-        CalibrationRecord {
-            schema_version: SCHEMA_VERSION,
-            kind: "linear_error_table".into(),
-            machine: "m".into(),
-            stage_serial: serial.into(),
-            config_hash: "h".into(),
-            axis: "x".into(),
-            drive: IdentityRecord {
-                vendor: 1,
-                serial: 7,
-                ..IdentityRecord::default()
-            },
-            resolution_m: 1e-8,
-            created: "2026-01-01T00:00:00Z".into(),
-            program: "test".into(),
-            source: "run".into(),
-            instrument: InstrumentRecord::default(),
-            environment: EnvironmentRecord::default(),
-            runs: 3,
-            closure_m: None,
-            lost_motion_m: None,
-            lost_motion_u_m: None,
-            nodes: vec![node(0.0), node(0.003)],
-        }
-    }
 
     fn store() -> (tempfile::TempDir, Store) {
         let folder = tempfile::tempdir().unwrap();
@@ -510,10 +260,9 @@ mod tests {
         let id = store.save(&record("A")).unwrap();
         assert_eq!(store.resolve(&id[..6]).unwrap(), id);
         assert_eq!(store.load(&id).unwrap(), record("A"));
-        assert_eq!(
-            store.load(&id).unwrap().table(&id).unwrap().nodes().len(),
-            2
-        );
+        let stored = store.load(&id).unwrap();
+        let table = stored.linear(&id).unwrap().table(&id).unwrap();
+        assert_eq!(table.nodes().len(), 2);
         assert!(matches!(
             store.resolve("zz"),
             Err(StoreError::Unknown { .. })
@@ -553,35 +302,6 @@ mod tests {
         assert_eq!(store.active("x").unwrap().current, Some(second));
         assert_eq!(store.rollback("x").unwrap(), first);
         assert_eq!(store.active("x").unwrap().current, Some(first));
-    }
-
-    #[test]
-    fn a_calibration_of_another_stage_or_drive_is_foreign() {
-        let mine = record("A");
-        let mut other = record("B");
-        assert!(mine.belongs_to("id", &mine).is_ok());
-        let error = mine.belongs_to("id", &other).unwrap_err().to_string();
-        assert!(
-            error.contains("serial number") && error.contains("`A`"),
-            "{error}"
-        );
-        other = record("A");
-        other.drive.serial = 8;
-        let error = mine.belongs_to("id", &other).unwrap_err().to_string();
-        assert!(error.contains("the drive"), "{error}");
-        other = record("A");
-        other.kind = "rotary".into();
-        assert!(mine.belongs_to("id", &other).is_err());
-    }
-
-    #[test]
-    fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_down() {
-        let machine = record("A");
-        let mut elsewhere = record("A");
-        elsewhere.drive.serial = 0;
-        assert!(elsewhere.belongs_to("id", &machine).is_ok());
-        elsewhere.drive.vendor = 2;
-        assert!(elsewhere.belongs_to("id", &machine).is_err());
     }
 
     #[test]

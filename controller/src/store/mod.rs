@@ -14,17 +14,19 @@ mod atomic;
 mod calibration;
 mod journal;
 mod lease;
+mod record;
 
 use std::path::{Path, PathBuf};
 
-pub use calibration::{
-    ActivePointer, CalibrationRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord,
-    NodeRecord, Store, short,
-};
+pub use calibration::{ActivePointer, Store, short};
 pub use journal::{
-    Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
+    ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
+pub use record::{
+    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
+    NodeRecord, ReadingName, RecordHead, RotaryContent,
+};
 
 pub(crate) use atomic::write_new_or_replace;
 
@@ -87,6 +89,21 @@ pub enum StoreError {
         expected: String,
         /// What this machine is.
         seen: String,
+    },
+    /// The calibration holds another kind of model than is needed.
+    #[error(
+        "calibration {id} of axis {axis} is of the kind `{seen}`, but `{expected}` is needed here; \
+         calibrate the axis again, or roll back to a calibration of that kind"
+    )]
+    OtherKind {
+        /// The calibration.
+        id: String,
+        /// Its axis.
+        axis: String,
+        /// The kind wanted.
+        expected: &'static str,
+        /// The kind it is.
+        seen: &'static str,
     },
     /// Another program uses the machine.
     #[error("the machine is in use by {owner}; stop that first")]

@@ -55,7 +55,7 @@ impl<'a> Truth<'a> {
     }
 
     /// The platform, where the machine is one.
-    pub fn platform(&self) -> Option<PlatformTruth<'_>> {
+    pub fn platform(&self) -> Option<PlatformTruth<'a>> {
         let platform = self.plant.machine.platform()?;
         Some(PlatformTruth::new(platform, self.plant.now))
     }

@@ -31,6 +31,13 @@ const fn step_name(goal: Goal) -> &'static str {
     }
 }
 
+const fn stops(goal: Goal) -> bool {
+    match goal {
+        Goal::SwitchOnDisabled | Goal::QuickStop => true,
+        Goal::OperationEnabled | Goal::FaultReset => false,
+    }
+}
+
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time) {
         if let Some(sample) = self.image.sample() {
@@ -83,6 +90,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         };
         let goal = power.sequence.goal();
         let since = power.since;
+        // Stopped is what the drive says after it has had the command, not what it said before.
+        let fresh = sample.at.since(since) >= self.settings.common.sync_period * 2;
         match power.sequence.next(now, sample.status, standing) {
             PowerStep::Command(control) if control == self.control => {
                 if self.repeat_at == Time::NEVER {
@@ -90,6 +99,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             PowerStep::Command(control) => self.send_control(now, control),
+            PowerStep::Done(_) if !fresh && stops(goal) => {
+                if now >= power.poll_timeout() {
+                    let seen = Seen::Power(sample.status.state());
+                    self.time_out(now, since, "a statusword after the command", seen);
+                }
+            }
             PowerStep::Done(control) => {
                 if control != self.control {
                     self.send_control(now, control);

@@ -768,6 +768,19 @@ fn a_quick_stop_goes_out_at_once_while_an_sdo_is_pending() {
 }
 
 #[test]
+fn a_stop_is_not_confirmed_by_what_the_drive_said_before_it() {
+    let mut rig = Rig::new();
+    rig.start().unwrap();
+    rig.drive.control(rig.now, DriveCommand::QuickStop);
+    // Sampled before it heard the command: "switch on disabled", and it was so.
+    rig.fake.sync();
+    rig.exchange();
+    assert_eq!(rig.drive.poll_outcome(), None);
+    rig.passes_ms(3 * SYNC_MS);
+    assert_eq!(rig.drive.poll_outcome(), Some(Ok(())));
+}
+
+#[test]
 fn a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() {
     let mut rig = Rig::enabled();
     rig.fake.stays_in_quick_stop = true;

@@ -84,12 +84,17 @@ impl Kinematics {
     fn holds_the_platform(&self) -> bool {
         let [xx, xy, yy] = self.moments();
         let weakest = f64::midpoint(xx, yy) - f64::midpoint(xx, -yy).hypot(xy);
-        if !(weakest > SHARE_MIN) {
+        if weakest.is_nan() || weakest <= SHARE_MIN {
             return false;
         }
-        let mut arms = self.turned(0.0).map(|(_, arm)| arm).collect::<Vec<_>>();
+        self.grip_m() > ARM_MIN_M
+    }
+
+    /// The arm at which the screws hold the turn.
+    pub(super) fn grip_m(&self) -> f64 {
+        let mut arms: Vec<f64> = self.turned(0.0).map(|(_, arm)| arm).collect();
         self.displace(&mut arms);
-        arms.iter().map(|arm| arm * arm).sum::<f64>() > ARM_MIN_M * ARM_MIN_M
+        arms.iter().map(|arm| arm * arm).sum::<f64>().sqrt()
     }
 
     /// Sums of d dᵀ.

@@ -26,8 +26,8 @@ pub(super) struct Screw {
     encoder: Encoder,
     index: Index,
     error: LeadError,
-    /// Where the flanks have pushed the table; the error of the stop comes on top.
-    table_m: f64,
+    play: Play,
+    /// On top of where the flanks have pushed the table.
     stop_error: StopError,
     switches: [LimitSwitch; 2],
     shift: Stream,
@@ -41,14 +41,14 @@ impl Screw {
         let error = LeadError::new(config, &mut stream("lead error"));
         let mut shift = stream("start position");
         let start_m = 1e-3 * shift.between(-config.start_mm, config.start_mm);
-        let half_m = error.lost_motion_m() / 2.0;
-        let engagement_m = shift.between(-half_m, half_m);
+        let mut play = Play::new(error.lost_motion_m());
+        play.lie_anywhere(start_m + error.at(start_m), &mut shift);
         let mut screw = Self {
             mass: Mass::new(config.motion(), start_m, stream("servo rest")),
             encoder: Encoder::new(config.resolution_nm, start_m),
             index: Index::new(config, stream("index")),
-            table_m: start_m + error.at(start_m) + engagement_m,
             error,
+            play,
             stop_error: StopError::new(config.repeatability_nm * 1e-9, stream("stop error")),
             switches: LimitSwitch::pair(&config.limits(), seed, &whose),
             shift,
@@ -71,7 +71,7 @@ impl Screw {
     }
 
     fn travel(&mut self, from: f64, to: f64) {
-        self.table_m = self.pushed_m(to);
+        self.play.push(to + self.error.at(to));
         self.stop_error.travel(to - from);
         self.index.watch(from, to, &self.encoder);
         self.watch_switches(to);
@@ -85,13 +85,6 @@ impl Screw {
         }
     }
 
-    /// Where the table is pushed to when the screw goes straight to `screw_m`.
-    fn pushed_m(&self, screw_m: f64) -> f64 {
-        let nut_m = screw_m + self.error.at(screw_m);
-        let half_m = self.error.lost_motion_m() / 2.0;
-        self.table_m.clamp(nut_m - half_m, nut_m + half_m)
-    }
-
     /// Without power the screw can be turned, and the table moves within the play.
     pub(super) fn push_a_little(&mut self) {
         let limit_m = self.config.power_cycle_shift_um * 1e-6;
@@ -99,15 +92,18 @@ impl Screw {
         self.mass.push(by_m);
         self.stop_error.leave();
         self.stop_error.travel(by_m);
-        let screw_m = self.mass.position_at(Time::ZERO);
-        let half_m = self.error.lost_motion_m() / 2.0;
-        let engagement_m = self.shift.between(-half_m, half_m);
-        self.table_m = screw_m + self.error.at(screw_m) + engagement_m;
+        let nut_m = self.nut_m(Time::ZERO);
+        self.play.lie_anywhere(nut_m, &mut self.shift);
+    }
+
+    fn nut_m(&self, now: Time) -> f64 {
+        let screw_m = self.mass.position_at(now);
+        screw_m + self.error.at(screw_m)
     }
 
     /// The stroke that the table has really made, from the middle of the screw.
     pub(super) fn stroke_m(&self, now: Time) -> f64 {
-        self.pushed_m(self.mass.position_at(now)) + self.stop_error.error_m()
+        self.play.pushed_m(self.nut_m(now)) + self.stop_error.error_m()
     }
 
     /// The stroke that the screw's turns say.
@@ -117,8 +113,8 @@ impl Screw {
 
     /// Where within the play the table lies: minus half the play after a forward move.
     pub(super) fn engagement_m(&self, now: Time) -> f64 {
-        let screw_m = self.mass.position_at(now);
-        self.pushed_m(screw_m) - screw_m - self.error.at(screw_m)
+        let nut_m = self.nut_m(now);
+        self.play.pushed_m(nut_m) - nut_m
     }
 
     pub(super) const fn lost_motion_m(&self) -> f64 {
@@ -186,6 +182,37 @@ impl Actuator for Screw {
 
     fn torque_off(&self) -> bool {
         self.mass.torque_off()
+    }
+}
+
+/// The table between the two flanks of a nut.
+#[derive(Clone, Debug)]
+pub(super) struct Play {
+    half_m: f64,
+    table_m: f64,
+}
+
+impl Play {
+    pub(super) const fn new(width_m: f64) -> Self {
+        Self {
+            half_m: width_m / 2.0,
+            table_m: 0.0,
+        }
+    }
+
+    /// The nut has gone straight to `nut_m`.
+    pub(super) fn push(&mut self, nut_m: f64) {
+        self.table_m = self.pushed_m(nut_m);
+    }
+
+    /// Where the table is pushed to when the nut goes straight to `nut_m`.
+    pub(super) fn pushed_m(&self, nut_m: f64) -> f64 {
+        self.table_m.clamp(nut_m - self.half_m, nut_m + self.half_m)
+    }
+
+    /// Nobody knows where between the flanks of a nut at `nut_m` it lies.
+    fn lie_anywhere(&mut self, nut_m: f64, chance: &mut Stream) {
+        self.table_m = nut_m + chance.between(-self.half_m, self.half_m);
     }
 }
 

@@ -1,0 +1,62 @@
+//! The errors of a rotary table at the lines of a plate (`rotary_error_table`).
+
+use serde::{Deserialize, Serialize};
+
+use super::super::StoreError;
+use super::{CalibrationRecord, Content};
+
+/// One reading of the run: a line of the plate in one placement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "both are counted in lines of the plate")]
+pub struct ReadingName {
+    pub offset: u32,
+    pub line: u32,
+}
+
+/// A self-calibration as it is stored. Lists have one value for each line; the table error is
+/// reading − true angle at line n's nominal table position, so the deviation is its negative.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RotaryContent {
+    /// Lines of the plate, equally spaced over the circle.
+    pub lines: u32,
+    /// How the plate was placed: by how many lines it was turned against the table.
+    pub offsets: Vec<u32>,
+    /// Error of the table's reading at each line, radians; its sum is zero.
+    pub table_error_rad: Vec<f64>,
+    /// Its standard uncertainty, radians.
+    pub standard_uncertainty_rad: Vec<f64>,
+    /// Error of the plate's lines, radians; `None` for a line that was never read.
+    pub plate_error_rad: Vec<Option<f64>>,
+    /// Standard uncertainty of one reading as it was stated beforehand, radians.
+    pub reading_noise_rad: Option<f64>,
+    /// Scatter of the readings about the model, radians.
+    pub residual_rms_rad: f64,
+    /// Readings less unknowns.
+    pub degrees_of_freedom: u32,
+    /// Standard uncertainty of a table error in units of that of one reading, rms.
+    pub noise_amplification: f64,
+    /// Readings that were not made.
+    pub missing: Vec<ReadingName>,
+    /// Readings that were left out because they belong to no model.
+    pub outliers: Vec<ReadingName>,
+}
+
+impl RotaryContent {
+    /// The name of this kind.
+    pub const KIND: &'static str = "rotary_error_table";
+}
+
+impl CalibrationRecord {
+    /// The error table of a rotary axis.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn rotary(&self, id: &str) -> Result<&RotaryContent, StoreError> {
+        match &self.content {
+            Content::RotaryErrorTable(content) => Ok(content),
+            _ => Err(self.other_kind(id, RotaryContent::KIND)),
+        }
+    }
+}

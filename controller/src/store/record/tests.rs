@@ -1,0 +1,162 @@
+use super::*;
+use crate::store::{SCHEMA_VERSION, Store, write_new_or_replace};
+
+/// Written by the first program, before there were other kinds, and named by its hash then.
+const EARLIER: &str = include_str!("earlier_linear.json");
+const EARLIER_ID: &str = "9e34c78936a61aa45d4971e6a4bf2e81a7d2b24d48795819cae1e3a5ae244e9d";
+
+pub(in crate::store) fn record(serial: &str) -> CalibrationRecord {
+    let node = |position_m| NodeRecord {
+        position_m,
+        forward_m: Some(1e-6),
+        reverse_m: Some(2e-6),
+        forward_u_m: Some(1e-8),
+        reverse_u_m: Some(1e-8),
+    };
+    let head = RecordHead {
+        schema_version: SCHEMA_VERSION,
+        machine: "m".into(),
+        stage_serial: serial.into(),
+        config_hash: "h".into(),
+        axis: "x".into(),
+        drive: IdentityRecord {
+            vendor: 1,
+            serial: 7,
+            ..IdentityRecord::default()
+        },
+        resolution_m: Some(1e-8),
+        created: "2026-01-01T00:00:00Z".into(),
+        program: "test".into(),
+        source: "run".into(),
+        ..RecordHead::default()
+    };
+    let content = Content::LinearErrorTable(LinearContent {
+        runs: 3,
+        nodes: vec![node(0.0), node(0.003)],
+        ..LinearContent::default()
+    });
+    CalibrationRecord { head, content }
+}
+
+fn rotary() -> CalibrationRecord {
+    let mut record = record("A");
+    record.head.resolution_m = None;
+    record.head.resolution_rad = Some(1e-7);
+    record.content = Content::RotaryErrorTable(RotaryContent {
+        lines: 3,
+        offsets: vec![0, 1],
+        table_error_rad: vec![1e-6, -2e-6, 1e-6],
+        standard_uncertainty_rad: vec![0.1; 3],
+        plate_error_rad: vec![Some(0.0), None, Some(0.0)],
+        reading_noise_rad: None,
+        residual_rms_rad: 0.1,
+        degrees_of_freedom: 0,
+        noise_amplification: 0.7,
+        missing: vec![ReadingName { offset: 1, line: 2 }],
+        outliers: vec![],
+    });
+    record
+}
+
+fn store() -> (tempfile::TempDir, Store) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::new(folder.path(), "m");
+    (folder, store)
+}
+
+#[test]
+fn a_calibration_of_the_first_program_is_read_under_its_old_name() {
+    let (_folder, store) = store();
+    write_new_or_replace(&store.calibration_path(EARLIER_ID), EARLIER.as_bytes()).unwrap();
+    assert_eq!(store.load(EARLIER_ID).unwrap(), record("A"));
+    store.activate("x", EARLIER_ID).unwrap();
+    assert_eq!(store.active("x").unwrap().current.unwrap(), EARLIER_ID);
+}
+
+#[test]
+fn every_kind_is_read_as_it_was_stored_and_says_what_it_is() {
+    let (_folder, store) = store();
+    for (stored, kind, summary) in [
+        (record("A"), LinearContent::KIND, "2 nodes"),
+        (rotary(), RotaryContent::KIND, "3 lines, 2 placements"),
+    ] {
+        let id = store.save(&stored).unwrap();
+        assert_eq!(store.load(&id).unwrap(), stored);
+        assert_eq!(
+            (stored.content.kind(), &*stored.content.summary()),
+            (kind, summary)
+        );
+        let text = String::from_utf8(stored.bytes()).unwrap();
+        assert!(text.contains(&format!("\"kind\": \"{kind}\"")), "{text}");
+    }
+}
+
+#[test]
+fn a_calibration_of_another_kind_is_refused_by_name() {
+    let error = rotary().linear("0123456789abcdef").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "calibration 0123456789ab of axis x is of the kind `rotary_error_table`, but \
+         `linear_error_table` is needed here; calibrate the axis again, or roll back to a \
+         calibration of that kind"
+    );
+    assert!(record("A").rotary("id").is_err());
+    assert!(rotary().rotary("id").is_ok());
+}
+
+#[track_caller]
+fn check_unreadable(change: impl Fn(String) -> String, says: &str) {
+    let text = change(EARLIER.to_owned());
+    assert_ne!(text, EARLIER);
+    let error = serde_json::from_str::<CalibrationRecord>(&text).unwrap_err();
+    assert!(error.to_string().contains(says), "{error}");
+}
+
+#[test]
+fn a_key_that_is_unknown_or_missing_in_head_or_content_is_refused() {
+    let replace = |from: &'static str, to: &'static str| move |it: String| it.replace(from, to);
+    check_unreadable(replace("\"runs\"", "\"walks\""), "unknown field `walks`");
+    check_unreadable(replace("\"axis\"", "\"axes\""), "missing field `axis`");
+    check_unreadable(
+        replace("\"machine\": \"m\"", "\"machine\": \"m\", \"more\": 1"),
+        "unknown field `more`",
+    );
+    check_unreadable(
+        replace("\"runs\": 3,", "\"runs\": 3, \"lines\": 3,"),
+        "unknown field `lines`",
+    );
+    check_unreadable(
+        replace("linear_error_table", "tea_leaves"),
+        "unknown variant `tea_leaves`",
+    );
+}
+
+#[test]
+fn a_calibration_of_another_stage_or_drive_is_foreign() {
+    let mine = record("A").head;
+    let mut other = record("B").head;
+    assert!(mine.belongs_to("id", &mine).is_ok());
+    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    assert!(
+        error.contains("serial number") && error.contains("`A`"),
+        "{error}"
+    );
+    other = record("A").head;
+    other.drive.serial = 8;
+    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    assert!(error.contains("the drive"), "{error}");
+    other = record("A").head;
+    other.resolution_m = Some(2e-8);
+    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    assert!(error.contains("encoder count"), "{error}");
+}
+
+#[test]
+fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_down() {
+    let machine = record("A").head;
+    let mut elsewhere = record("A").head;
+    elsewhere.drive.serial = 0;
+    assert!(elsewhere.belongs_to("id", &machine).is_ok());
+    elsewhere.drive.vendor = 2;
+    assert!(elsewhere.belongs_to("id", &machine).is_err());
+}
