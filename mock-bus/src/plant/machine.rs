@@ -17,8 +17,8 @@ pub(super) trait Actuator {
     /// The encoder's counts since its power came on.
     fn counts(&self, now: Time) -> i64;
     fn counts_per_s(&self, now: Time) -> f64;
-    /// Metres of encoder travel per count.
-    fn resolution_m(&self) -> f64;
+    /// Metres or radians of encoder travel per count.
+    fn resolution(&self) -> f64;
     fn encoder_power(&mut self, on: bool);
     /// The encoder's last index pulse since its power came on; `None` before, and where the
     /// encoder has no index.

@@ -49,10 +49,11 @@ const ANALOG_INPUTS: usize = 8;
 pub enum Servo {
     /// No torque: the axis coasts to a stop by friction.
     Off,
-    /// The position controller follows this demand (metres of encoder travel since power-on).
+    /// The position controller follows this demand.
     Follow {
-        /// Demanded encoder position in metres since the encoder was powered.
-        demand_m: f64,
+        /// Demanded encoder travel since the encoder was powered, in metres or, of a rotary
+        /// axis, radians.
+        demand: f64,
     },
 }
 
@@ -120,11 +121,12 @@ impl Plant {
         self.read(axis, |actuator| actuator.counts_per_s(self.now))
     }
 
-    /// Metres of encoder travel per count of `axis`; of axis 0 for an axis that is not there.
-    pub fn encoder_resolution_m(&self, axis: usize) -> f64 {
+    /// Metres or radians of encoder travel per count of `axis`; of axis 0 for an axis that is
+    /// not there.
+    pub fn encoder_resolution(&self, axis: usize) -> f64 {
         let actuator = self.machine.actuator(axis);
         let actuator = actuator.or_else(|| self.machine.actuator(0));
-        actuator.map_or(0.0, |actuator| actuator.resolution_m())
+        actuator.map_or(0.0, |actuator| actuator.resolution())
     }
 
     /// The last index pulse of `axis`'s encoder since its power came on.

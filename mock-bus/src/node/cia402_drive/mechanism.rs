@@ -8,8 +8,8 @@ pub(super) trait Mechanism {
     fn counts(&self) -> i64;
     /// Counts per second.
     fn speed(&self) -> f64;
-    /// Metres per count.
-    fn resolution_m(&self) -> f64;
+    /// Metres or radians per count.
+    fn resolution(&self) -> f64;
     /// Negative and positive limit switch.
     fn limit_switches(&self) -> (bool, bool);
     fn set_servo(&mut self, servo: Servo);
@@ -31,8 +31,8 @@ impl Mechanism for PlantAxis<'_> {
         self.plant.encoder_speed(self.axis)
     }
 
-    fn resolution_m(&self) -> f64 {
-        self.plant.encoder_resolution_m(self.axis)
+    fn resolution(&self) -> f64 {
+        self.plant.encoder_resolution(self.axis)
     }
 
     fn limit_switches(&self) -> (bool, bool) {

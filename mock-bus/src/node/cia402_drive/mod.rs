@@ -173,7 +173,7 @@ struct Drive {
     homing: HomingStatus,
     /// Whether the power stage controls the motor.
     servo_on: bool,
-    /// The last demand given to the plant, in metres.
+    /// The last demand given to the plant, in metres or radians.
     sent_demand: Option<f64>,
     /// Where the demand was when the power stage was switched on.
     enabled_at: f64,

@@ -127,10 +127,10 @@ impl Drive {
             position = 2.0 * self.enabled_at - position;
         }
         let counts = self.sign() as f64 * (position - self.offset as f64);
-        let demand_m = counts * m.resolution_m();
-        if self.sent_demand != Some(demand_m) {
-            self.sent_demand = Some(demand_m);
-            m.set_servo(Servo::Follow { demand_m });
+        let demand = counts * m.resolution();
+        if self.sent_demand != Some(demand) {
+            self.sent_demand = Some(demand);
+            m.set_servo(Servo::Follow { demand });
         }
     }
 

@@ -45,7 +45,7 @@ impl Screw {
         play.lie_anywhere(start_m + error.at(start_m), &mut shift);
         let mut screw = Self {
             mass: Mass::new(config.motion(), start_m, stream("servo rest")),
-            encoder: Encoder::new(config.resolution_nm, start_m),
+            encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
             index: Index::new(config, stream("index")),
             error,
             play,
@@ -59,7 +59,7 @@ impl Screw {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero_m();
+        let offset_m = self.encoder.count_zero();
         while let Some((from, to)) = self.mass.step_until(now, offset_m) {
             if to != from {
                 self.travel(from, to);
@@ -128,7 +128,7 @@ impl Screw {
     }
 
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero_m()
+        self.encoder.count_zero()
     }
 }
 
@@ -146,11 +146,11 @@ impl Actuator for Screw {
     }
 
     fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution_m()
+        self.mass.speed_at(now) / self.encoder.resolution()
     }
 
-    fn resolution_m(&self) -> f64 {
-        self.encoder.resolution_m()
+    fn resolution(&self) -> f64 {
+        self.encoder.resolution()
     }
 
     fn encoder_power(&mut self, on: bool) {

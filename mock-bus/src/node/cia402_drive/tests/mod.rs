@@ -39,7 +39,7 @@ impl Mechanism for IdealAxis {
         0.0
     }
 
-    fn resolution_m(&self) -> f64 {
+    fn resolution(&self) -> f64 {
         RESOLUTION_M
     }
 
@@ -53,10 +53,10 @@ impl Mechanism for IdealAxis {
     fn set_servo(&mut self, servo: Servo) {
         self.servo = servo;
         self.commands += 1;
-        if let Servo::Follow { demand_m } = servo
+        if let Servo::Follow { demand } = servo
             && !self.blocked
         {
-            self.counts = (demand_m / RESOLUTION_M).round() as i64;
+            self.counts = (demand / RESOLUTION_M).round() as i64;
         }
     }
 
