@@ -281,7 +281,12 @@ pub(super) fn homing_steps<Q: Coordinate>(
         let acceleration =
             acceleration_counts(settings, HOMING_ACCELERATION, settings.homing_acceleration)?;
         steps.push(Step::check(HOMING_SPEED_SEARCH, search, TEXT));
-        steps.push(Step::check(HOMING_SPEED_ZERO, (search / 5).max(1), TEXT));
+        // The search of a switch is followed by a slow one; that of an index pulse is the only one.
+        let zero = match method {
+            33 | 34 => search,
+            _ => (search / 5).max(1),
+        };
+        steps.push(Step::check(HOMING_SPEED_ZERO, zero, TEXT));
         steps.push(Step::check(HOMING_ACCELERATION, acceleration, TEXT));
     }
     steps.push(Step::write(

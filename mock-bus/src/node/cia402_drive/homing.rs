@@ -1,7 +1,9 @@
-//! Homing mode: methods 17, 18 (limit switch), 35 and 37 (here) (CiA 402-2, 10.2).
+//! Homing mode: methods 17, 18 (limit switch), 33, 34 (index pulse), 35 and 37 (here)
+//! (CiA 402-2, 10.2).
 //!
 //! The position of the home is 0x607C afterwards. A limit-switch run searches the switch at
-//! 0x6099:01, leaves it at 0x6099:02, and the edge at which it is released is the home.
+//! 0x6099:01, leaves it at 0x6099:02, and the edge at which it is released is the home. A search
+//! of the index pulse runs at 0x6099:02; the home is where the encoder's mark was.
 
 use drivers::wire::cia402::{Controlword, HomingStatus};
 use units::Time;
@@ -10,6 +12,7 @@ use super::Drive;
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};
 use crate::node::profile::{MotionLimits, Profile};
+use crate::plant::IndexPulse;
 
 /// Farther than any axis, in counts.
 const FAR: f64 = 1e12;
@@ -21,6 +24,8 @@ pub(super) struct HomingRun {
     direction: f64,
     step: Step,
     started_at: f64,
+    /// The last index pulse before the run.
+    pulse: Option<IndexPulse>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +36,9 @@ enum Step {
     Stop,
     /// Until it is released: that is home.
     BackOff,
-    /// Slowing down behind it.
+    /// Until the index pulse.
+    SeekIndex,
+    /// Slowing down behind home.
     Settle,
 }
 
@@ -67,6 +74,8 @@ impl Drive {
             }
             17 => self.search(now, -1.0, m),
             18 => self.search(now, 1.0, m),
+            33 => self.search_index(now, -1.0, m),
+            34 => self.search_index(now, 1.0, m),
             _ => self.fail_homing(now),
         }
     }
@@ -78,8 +87,19 @@ impl Drive {
             direction,
             step,
             started_at: self.demand(now).position,
+            pulse: m.index_pulse(),
         };
         self.enter(now, run, step);
+    }
+
+    fn search_index(&mut self, now: Time, direction: f64, m: &mut impl Mechanism) {
+        let run = HomingRun {
+            direction,
+            step: Step::SeekIndex,
+            started_at: self.demand(now).position,
+            pulse: m.index_pulse(),
+        };
+        self.enter(now, run, Step::SeekIndex);
     }
 
     /// Plans the motion of a step.
@@ -97,6 +117,7 @@ impl Drive {
         self.profile = match step {
             Step::Seek => towards(run.direction, self.server.get(0x6099, 1)),
             Step::BackOff => towards(-run.direction, self.server.get(0x6099, 2)),
+            Step::SeekIndex => towards(run.direction, self.server.get(0x6099, 2)),
             Step::Stop | Step::Settle => Profile::stopping(now, from, acceleration),
         };
         self.activity = Activity::Homing(HomingRun { step, ..run });
@@ -109,8 +130,7 @@ impl Drive {
         let pressed = switch(run.direction, limits);
         let opposite = switch(-run.direction, limits);
         let travelled = (self.demand(now).position - run.started_at).abs();
-        let search_limit = self.config.counts_of_mm(self.config.homing_search_limit_mm);
-        let lost = travelled > search_limit as f64;
+        let lost = travelled > self.config.power_on().homing_search_limit as f64;
         match run.step {
             Step::Seek if pressed && opposite => self.fail_homing(now),
             Step::Seek if pressed => self.enter(now, run, Step::Stop),
@@ -123,19 +143,28 @@ impl Drive {
                 self.homing = HomingStatus::Attained;
                 self.enter(now, run, Step::Settle);
             }
+            Step::SeekIndex if m.index_pulse() != run.pulse => self.found_index(now, run, m),
+            Step::SeekIndex if lost => self.fail_homing(now),
             Step::Stop if self.profile.is_done(now) => self.enter(now, run, Step::BackOff),
             Step::Settle if self.profile.is_done(now) => {
                 self.activity = Activity::Standing;
                 self.homing = HomingStatus::Done;
             }
-            Step::Seek | Step::Stop | Step::BackOff | Step::Settle => {}
+            Step::Seek | Step::Stop | Step::BackOff | Step::SeekIndex | Step::Settle => {}
         }
+    }
+
+    fn found_index(&mut self, now: Time, run: HomingRun, m: &mut impl Mechanism) {
+        if let Some(pulse) = m.index_pulse() {
+            self.set_home(self.sign() * pulse.count + self.offset);
+            self.homing = HomingStatus::Attained;
+        }
+        self.enter(now, run, Step::Settle);
     }
 
     /// The opposite switch, on which a run may begin but which it must leave soon.
     fn runs_into(&self, opposite: bool, travelled: f64) -> bool {
-        const MAY_BEGIN_WITHIN_MM: f64 = 10.0;
-        opposite && travelled > self.config.counts_of_mm(MAY_BEGIN_WITHIN_MM) as f64
+        opposite && travelled > self.config.power_on().homing_may_begin_within as f64
     }
 
     /// The zero moves so that `position` becomes 0x607C.

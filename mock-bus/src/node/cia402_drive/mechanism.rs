@@ -1,6 +1,6 @@
 //! What the drive's power stage and encoder are wired to.
 
-use crate::plant::{Plant, Servo};
+use crate::plant::{IndexPulse, Plant, ProbeEdge, Servo};
 
 /// One axis, seen from its drive.
 pub(super) trait Mechanism {
@@ -12,6 +12,10 @@ pub(super) trait Mechanism {
     fn resolution(&self) -> f64;
     /// Negative and positive limit switch.
     fn limit_switches(&self) -> (bool, bool);
+    /// The encoder's last index pulse.
+    fn index_pulse(&self) -> Option<IndexPulse>;
+    /// The next edge at the fast input.
+    fn probe_edge(&mut self) -> Option<ProbeEdge>;
     fn set_servo(&mut self, servo: Servo);
     fn encoder_power(&mut self, on: bool);
 }
@@ -37,6 +41,14 @@ impl Mechanism for PlantAxis<'_> {
 
     fn limit_switches(&self) -> (bool, bool) {
         self.plant.limit_switches(self.axis)
+    }
+
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.plant.index_pulse(self.axis)
+    }
+
+    fn probe_edge(&mut self) -> Option<ProbeEdge> {
+        self.plant.probe_edge(self.axis)
     }
 
     fn set_servo(&mut self, servo: Servo) {

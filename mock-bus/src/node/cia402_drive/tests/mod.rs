@@ -4,8 +4,10 @@ mod faults;
 mod homing;
 mod modes;
 mod positioning;
+mod rotary;
 mod states;
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use drivers::wire::can::CanFrame;
@@ -15,7 +17,7 @@ use units::Time;
 
 use super::mechanism::Mechanism;
 use super::{Cia402DriveConfig, Drive};
-use crate::plant::Servo;
+use crate::plant::{IndexPulse, ProbeEdge, Servo};
 
 const RESOLUTION_M: f64 = 10e-9;
 
@@ -28,6 +30,10 @@ pub(super) struct IdealAxis {
     pub(super) blocked: bool,
     pub(super) servo: Servo,
     pub(super) commands: u64,
+    /// Counts between two index marks, one of them at 0.
+    pub(super) index_counts: i64,
+    pub(super) index: Option<IndexPulse>,
+    pub(super) edges: VecDeque<ProbeEdge>,
 }
 
 impl Mechanism for IdealAxis {
@@ -50,13 +56,29 @@ impl Mechanism for IdealAxis {
         )
     }
 
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.index
+    }
+
+    fn probe_edge(&mut self) -> Option<ProbeEdge> {
+        self.edges.pop_front()
+    }
+
     fn set_servo(&mut self, servo: Servo) {
         self.servo = servo;
         self.commands += 1;
         if let Servo::Follow { demand } = servo
             && !self.blocked
         {
+            let before = self.counts.div_euclid(self.index_counts);
             self.counts = (demand / RESOLUTION_M).round() as i64;
+            let after = self.counts.div_euclid(self.index_counts);
+            if before != after {
+                self.index = Some(IndexPulse {
+                    count: before.max(after) * self.index_counts,
+                    number: self.index.map_or(1, |last| last.number + 1),
+                });
+            }
         }
     }
 
@@ -87,6 +109,9 @@ impl Bench {
             blocked: false,
             servo: Servo::Off,
             commands: 0,
+            index_counts: 1_000_000,
+            index: None,
+            edges: VecDeque::new(),
         };
         let drive = Drive::new(config);
         let mut bench = Self {
