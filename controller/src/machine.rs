@@ -12,7 +12,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
-use compensator::length_correction::LengthCorrection;
 use drivers::device::{
     AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
 };
@@ -24,7 +23,7 @@ use units::{Metres, Time};
 use crate::assemble;
 use crate::bus_watch::BusWatch;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
-use crate::cycle::RunPlan;
+use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
@@ -65,7 +64,7 @@ pub(crate) struct AxisMemory {
     /// The calibration in use.
     pub(crate) compensation: Option<Compensation>,
     /// What was measured last, and how lengths were corrected since its datum.
-    pub(crate) datum: Option<(RunPlan, LengthCorrection)>,
+    pub(crate) datum: Option<(RunPlan, Datum)>,
     /// The direction of the last motion.
     pub(crate) approach: ApproachTracker,
 }
@@ -188,6 +187,16 @@ impl Machine {
     pub fn is_zeroed(&self, axis: &str) -> bool {
         self.memory.get(axis).is_some_and(|memory| memory.zeroed)
             && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
+    }
+
+    /// Coordinates mean something only after the zero.
+    pub(crate) fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        if self.is_zeroed(axis) {
+            return Ok(());
+        }
+        Err(Failure::NotZeroed {
+            axis: axis.to_owned(),
+        })
     }
 
     /// The calibration `axis` uses now.

@@ -328,6 +328,15 @@ fn journal_to_resume(
     axis: &str,
 ) -> Result<Option<PathBuf>, Failure> {
     let Some(path) = resume else { return Ok(None) };
+    if path.extension().is_some_and(|it| it == "toml") {
+        return Err(Failure::Usage {
+            what: format!("--resume {}: that is no journal", path.display()),
+            help: format!(
+                "write the configuration first: truestage {verb} {} --resume",
+                path.display()
+            ),
+        });
+    }
     if path.as_os_str() != NEWEST_RUN {
         return Ok(Some(path.clone()));
     }

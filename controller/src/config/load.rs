@@ -336,6 +336,14 @@ mod tests {
     }
 
     #[test]
+    fn a_key_of_another_kind_of_module_is_refused() {
+        let keys = "device = \"cia401\"\npoll_period_ms = 50.0";
+        let text = LINEAR.replacen("device = \"cia401\"", keys, 1);
+        let error = parse(&text, "m").unwrap_err().to_string();
+        assert!(error.contains("a cia401 module has no such key"), "{error}");
+    }
+
+    #[test]
     fn the_hash_follows_what_a_calibration_depends_on() {
         let hash = |text: &str| parse(text, "m").unwrap().hash;
         let same = LINEAR.replace("runs = 3", "runs = 4");

@@ -59,11 +59,7 @@ impl Machine {
     ) -> Result<Calibrated, Failure> {
         let config = self.axis_config(axis)?.calibrate.clone();
         let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_zeroed(axis)?;
         let plan = RunPlan {
             closure_limit: (!options.accept_drift)
                 .then(|| Metres::from_um(config.closure_limit_um)),

@@ -28,6 +28,13 @@ pub(super) struct Plausible {
     pub(super) half_wavelength: Metres,
 }
 
+impl Plausible {
+    /// Whether samples that scatter so much say nothing of the place.
+    pub(super) fn is_shaken(&self, scatter: Metres) -> bool {
+        scatter > self.step / 2.0
+    }
+}
+
 /// A whole run, and its datum's place before and after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run<'a> {
@@ -58,9 +65,8 @@ impl CrossCheck {
         }
     }
 
-    /// Whether samples that scatter so much say anything of the place.
-    pub(super) fn is_shaken(&self, scatter: Metres) -> bool {
-        scatter > self.plausible.step / 2.0
+    pub(super) const fn plausible(&self) -> &Plausible {
+        &self.plausible
     }
 
     /// Judges a point against the one before it. A point whose own samples lie far apart says
@@ -69,7 +75,7 @@ impl CrossCheck {
     /// # Errors
     /// When the instrument went another way than the encoder, beyond what a stage can do.
     pub(super) fn take(&mut self, point: &PointEntry) -> Result<(), Failure> {
-        if self.is_shaken(Metres(point.scatter_m)) {
+        if self.plausible.is_shaken(Metres(point.scatter_m)) {
             return Ok(());
         }
         let Some(last) = self.last.replace(*point) else {

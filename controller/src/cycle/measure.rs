@@ -2,12 +2,13 @@
 
 use core::time::Duration;
 
-use compensator::length_correction::{EnvironmentWatch, LengthCorrection};
+use compensator::length_correction::EnvironmentWatch;
 use compensator::measurement::{LinearSeries, Measurement};
-use drivers::device::{DisplacementReading, Environment};
+use drivers::device::Environment;
 use units::{Approach, Metres};
 
 use super::cross_check::{CrossCheck, Plausible, Run, judge_scale};
+use super::datum::Datum;
 use super::travel::Correction;
 use crate::assemble;
 use crate::failure::Failure;
@@ -118,7 +119,7 @@ struct Session<'a> {
     axis: &'a str,
     plan: &'a RunPlan,
     correction: Correction,
-    correction_of_length: LengthCorrection,
+    datum: Datum,
     journal: &'a mut Journal,
     counter: Counter,
     check: CrossCheck,
@@ -127,10 +128,6 @@ struct Session<'a> {
 
 /// Values that the instrument's sensors sent are never older than this.
 const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
-/// A closure that is shaken says nothing: it is measured again, so often at most …
-const CLOSURE_ATTEMPTS: u32 = 10;
-/// … and so long after.
-const CALM: Duration = Duration::from_millis(200);
 /// What a stage can do at most where the configuration says nothing.
 const SLOPE_MAX: f64 = 0.01;
 const STEP_MAX: Metres = Metres(5e-6);
@@ -159,8 +156,9 @@ impl Machine {
             judge_scale(axis, plan.scale_limit_ppm, run)?;
         }
         self.use_instrument(&plan.instrument)?;
-        let correction_of_length = self.set_datum(axis, plan)?;
-        self.remember(axis).datum = Some((plan.clone(), correction_of_length));
+        let plausible = self.plausible(axis, plan)?;
+        let datum = self.set_datum(axis, plan, &plausible)?;
+        self.remember(axis).datum = Some((plan.clone(), datum));
         let counter = Counter {
             stage: options.stage,
             done: runs.points.len() as u64,
@@ -175,10 +173,10 @@ impl Machine {
             axis,
             plan,
             correction,
-            correction_of_length,
+            datum,
             journal,
             counter,
-            check: CrossCheck::new(axis, self.plausible(axis, plan)?),
+            check: CrossCheck::new(axis, plausible),
             watch: self.environment_watch(plan),
         };
         let first = runs.points.last().map_or(1, |point| point.run + 1);
@@ -232,12 +230,7 @@ impl Machine {
         let set_point = self.travel(axis, target, session.correction)?;
         let reading = self.read_displacement(session.axis, session.plan)?;
         let environment = self.watched_environment(session)?;
-        let measured = self.correct(
-            session.plan,
-            &reading,
-            &environment,
-            &session.correction_of_length,
-        )?;
+        let measured = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let encoder = self
             .reading(axis)?
             .expect("an axis that moved has been read")
@@ -261,52 +254,6 @@ impl Machine {
         Ok(point)
     }
 
-    /// What the instrument of the last measurement reads at the axis's zero, approached
-    /// forward, against its datum: by how much the zero has moved since.
-    ///
-    /// # Errors
-    /// Whatever stops the machine; [`Failure::Usage`] when nothing was measured before.
-    pub fn displacement_at_zero(&mut self, axis: &str) -> Result<Metres, Failure> {
-        let (plan, length) = self
-            .remember(axis)
-            .datum
-            .clone()
-            .ok_or_else(|| Failure::Usage {
-                what: format!("axis {axis} has no datum"),
-                help: "calibrate or verify first".into(),
-            })?;
-        self.use_instrument(&plan.instrument)?;
-        self.go_to_datum(axis, &plan)?;
-        let reading = self.read_displacement(axis, &plan)?;
-        let environment = self.instrument_environment(&plan.instrument);
-        self.instrument_in_use = None;
-        self.correct(&plan, &reading, &environment, &length)
-    }
-
-    /// Goes to the axis's zero, forward, and makes the instrument read zero there.
-    fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
-        self.go_to_datum(axis, plan)?;
-        self.stand_still(axis, plan.settle)?;
-        let now = self.now();
-        let at = self.instrument_index(&plan.instrument);
-        self.instruments[at].device.set_datum(now);
-        let environment = self.instrument_environment(&plan.instrument);
-        let config = &self.config.instrument[&plan.instrument];
-        let environment = assemble::correction_environment(&environment);
-        LengthCorrection::new(assemble::correction_settings(config), &environment).map_err(
-            |source| Failure::Correction {
-                instrument: plan.instrument.clone(),
-                source,
-            },
-        )
-    }
-
-    fn go_to_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<(), Failure> {
-        self.travel(axis, Metres::ZERO - plan.overrun, Correction::Off)?;
-        self.travel(axis, Metres::ZERO, Correction::Off)?;
-        Ok(())
-    }
-
     /// Measures the datum's place again; a run after which it has moved is worth nothing.
     fn close_run(
         &mut self,
@@ -316,7 +263,10 @@ impl Machine {
         earlier: &EarlierRuns,
         points: &[PointEntry],
     ) -> Result<ClosureEntry, Failure> {
-        let seen = self.measure_closure(session)?;
+        self.go_to_datum(session.axis, session.plan)?;
+        let reading = self.read_calm(session.axis, session.plan, session.check.plausible())?;
+        let environment = self.watched_environment(session)?;
+        let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let closure = ClosureEntry {
             run,
             start_m: start.value(),
@@ -336,25 +286,6 @@ impl Machine {
         }
         session.journal.write(&Entry::Closed(closure))?;
         Ok(closure)
-    }
-
-    fn measure_closure(&mut self, session: &mut Session<'_>) -> Result<Metres, Failure> {
-        self.go_to_datum(session.axis, session.plan)?;
-        let mut reading = self.read_displacement(session.axis, session.plan)?;
-        for _ in 1..CLOSURE_ATTEMPTS {
-            if !session.check.is_shaken(reading.standard_deviation) {
-                break;
-            }
-            self.stand_still(session.axis, CALM)?;
-            reading = self.read_displacement(session.axis, session.plan)?;
-        }
-        let environment = self.watched_environment(session)?;
-        self.correct(
-            session.plan,
-            &reading,
-            &environment,
-            &session.correction_of_length,
-        )
     }
 
     /// What a stage like this can do from one point to the next.
@@ -385,52 +316,6 @@ impl Machine {
                 source,
             }),
         }
-    }
-
-    /// Lets the stage stand, then averages.
-    pub(crate) fn read_displacement(
-        &mut self,
-        axis: &str,
-        plan: &RunPlan,
-    ) -> Result<DisplacementReading, Failure> {
-        self.stand_still(axis, plan.settle)?;
-        let at = self.instrument_index(&plan.instrument);
-        let now = self.now();
-        self.instruments[at]
-            .device
-            .begin_average(now, plan.average_samples);
-        let rate = self.config.instrument[&plan.instrument].sample_rate_hz;
-        // Four times the nominal time: the stream comes in batches over USB.
-        let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(plan.average_samples) / rate);
-        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        Ok(self.instruments[at]
-            .device
-            .average()
-            .expect("an average that ended well is there"))
-    }
-
-    pub(crate) fn instrument_environment(&self, instrument: &str) -> Environment {
-        self.instruments[self.instrument_index(instrument)]
-            .device
-            .environment()
-    }
-
-    fn correct(
-        &self,
-        plan: &RunPlan,
-        reading: &DisplacementReading,
-        environment: &Environment,
-        length: &LengthCorrection,
-    ) -> Result<Metres, Failure> {
-        let failed = |source| Failure::Correction {
-            instrument: plan.instrument.clone(),
-            source,
-        };
-        let environment = assemble::correction_environment(environment);
-        length
-            .correct(reading.vacuum, &environment)
-            .map(|corrected| corrected.displacement)
-            .map_err(failed)
     }
 }
 

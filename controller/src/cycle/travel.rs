@@ -64,11 +64,7 @@ impl Machine {
     /// Before anything moves: not zeroed, outside the soft limits, outside the calibrated
     /// range. While moving: whatever stops the machine.
     pub fn move_to(&mut self, axis: &str, target: Metres) -> Result<Metres, Failure> {
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_zeroed(axis)?;
         self.travel(axis, target, Correction::On)
     }
 

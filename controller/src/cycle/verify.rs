@@ -64,11 +64,7 @@ impl Machine {
     ) -> Result<Verified, Failure> {
         let config = self.axis_config(axis)?.verify.clone();
         let config = config.ok_or_else(|| missing(axis, "verify"))?;
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_zeroed(axis)?;
         if options.compensated && self.compensation(axis).is_none() {
             return Err(Failure::Usage {
                 what: format!("axis {axis} uses no calibration"),
