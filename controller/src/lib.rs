@@ -33,6 +33,7 @@ pub mod bus_plan;
 mod bus_watch;
 pub mod config;
 pub mod cycle;
+mod devices;
 pub mod emulated;
 pub mod failure;
 pub mod json;

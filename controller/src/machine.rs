@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
 use drivers::device::{
-    AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
+    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand, RotaryAxis,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
@@ -69,6 +69,13 @@ pub(crate) struct AxisMemory {
     pub(crate) approach: ApproachTracker,
 }
 
+/// What is known about a rotary axis beyond what its drive says.
+#[derive(Default)]
+pub(crate) struct RotaryMemory {
+    /// Zeroed on the index mark since the drive was last powered.
+    pub(crate) zeroed: bool,
+}
+
 /// How alarms are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Supervision {
@@ -89,10 +96,12 @@ pub struct Machine {
     pub(crate) outbox: Outbox,
     pub(crate) port_names: BTreeMap<Port, String>,
     pub(crate) axes: Vec<Unit<dyn Axis>>,
+    pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
+    pub(crate) rotary_memory: BTreeMap<String, RotaryMemory>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
     /// The instruments that were started, by name.
@@ -111,6 +120,7 @@ impl Machine {
         let ports = assemble::ports(&config);
         Self {
             axes: assemble::axes(&config, &ports, loaded.patience),
+            rotaries: assemble::rotaries(&config, &ports, loaded.patience),
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
@@ -120,6 +130,7 @@ impl Machine {
                 .keys()
                 .map(|name| (name.clone(), AxisMemory::default()))
                 .collect(),
+            rotary_memory: BTreeMap::new(),
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
@@ -226,56 +237,13 @@ impl Machine {
         Ok(self.axis(axis)?.device.reading())
     }
 
-    /// The newest power state of `axis`, `None` before its drive has said one.
+    /// The newest power state of the (linear or rotary) `axis`, `None` before its drive has
+    /// said one.
     ///
     /// # Errors
     /// When there is no such axis.
     pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
-        Ok(self.axis(axis)?.device.power_state())
-    }
-
-    /// What every device said it is, by its name in the configuration.
-    pub fn identities(&self) -> BTreeMap<String, Identity> {
-        let axes = self
-            .axes
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        let analogs = self
-            .analogs
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        let instruments = self
-            .instruments
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        axes.chain(analogs)
-            .chain(instruments)
-            .filter_map(|(name, identity)| Some((name.clone(), identity?)))
-            .collect()
-    }
-
-    /// Counters of every device: dropped, late, mismatched and the like.
-    pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
-        let axes = self
-            .axes
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        let analogs = self
-            .analogs
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        let instruments = self
-            .instruments
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        axes.chain(analogs)
-            .chain(instruments)
-            .flat_map(|(name, counters)| {
-                counters
-                    .into_iter()
-                    .map(move |(what, count)| (name.clone(), what, count))
-            })
-            .collect()
+        Ok(self.drive(self.drive_index(axis)?).power_state())
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
@@ -290,8 +258,9 @@ impl Machine {
             memory.zeroed = false;
             memory.approach.forget();
         }
+        self.rotary_memory.clear();
         self.set_sync(true)?;
-        let machine_devices = self.axes.len() + self.analogs.len();
+        let machine_devices = self.instrument_device(0);
         let now = self.now();
         for at in 0..machine_devices {
             self.device_mut(at).device.start(now);
@@ -301,14 +270,6 @@ impl Machine {
         }
         self.supervision = Supervision::On;
         Ok(())
-    }
-
-    /// The names of all devices: axes, then analog modules, then instruments.
-    pub fn device_names(&self) -> Vec<String> {
-        let axes = self.axes.iter().map(|unit| unit.name.clone());
-        let analogs = self.analogs.iter().map(|unit| unit.name.clone());
-        let instruments = self.instruments.iter().map(|unit| unit.name.clone());
-        axes.chain(analogs).chain(instruments).collect()
     }
 
     /// Starts an instrument, unless it runs already (its datum stands then), and counts its
@@ -336,6 +297,19 @@ impl Machine {
         let at = self.axis_index(axis)?;
         let now = self.now();
         self.axes[at].device.command(now, command.into());
+        self.await_outcome(at, step, limit)
+    }
+
+    /// Gives `command` to drive number `at`, whatever it moves, and waits until it is done.
+    pub(crate) fn control(
+        &mut self,
+        at: usize,
+        command: DriveCommand,
+        step: &'static str,
+        limit: Duration,
+    ) -> Result<(), Failure> {
+        let now = self.now();
+        self.drive_mut(at).control(now, command);
         self.await_outcome(at, step, limit)
     }
 
@@ -399,59 +373,6 @@ impl Machine {
             })
     }
 
-    /// The number of a named instrument among all devices.
-    pub(crate) fn instrument_index(&self, name: &str) -> usize {
-        self.instruments
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
-    }
-
-    /// The number of a named analog module.
-    pub(crate) fn analog_index(&self, name: &str) -> usize {
-        self.analogs
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
-    }
-
-    /// The number, among all devices, of instrument number `at`.
-    pub(crate) fn instrument_device(&self, at: usize) -> usize {
-        self.axes.len() + self.analogs.len() + at
-    }
-
-    pub(crate) fn device_count(&self) -> usize {
-        self.axes.len() + self.analogs.len() + self.instruments.len()
-    }
-
-    pub(crate) fn device_name(&self, at: usize) -> String {
-        self.device_names().swap_remove(at)
-    }
-
-    /// Device number `at`: axes first, then analog modules, then instruments.
-    pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
-        let (axes, analogs) = (self.axes.len(), self.analogs.len());
-        if at < axes {
-            let unit = &mut self.axes[at];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
-        } else if at < axes + analogs {
-            let unit = &mut self.analogs[at - axes];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
-        } else {
-            let unit = &mut self.instruments[at - axes - analogs];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
-        }
-    }
-
     /// Where `axis` should be sent so that the point arrives at `target`.
     pub(crate) fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
         let config = self.axis_config(axis)?;
@@ -460,12 +381,6 @@ impl Machine {
             Metres::from_mm(config.soft_max_mm),
         ))
     }
-}
-
-/// Any device, with its port.
-pub(crate) struct UnitMut<'a> {
-    pub(crate) port: Port,
-    pub(crate) device: &'a mut dyn Device,
 }
 
 /// The longest a device may take to start: some boot for seconds.

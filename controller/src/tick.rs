@@ -204,7 +204,7 @@ impl Machine {
 
     /// An instrument that nobody reads may have its beam blocked.
     fn alarm_counts(&self, at: usize) -> bool {
-        let first_instrument = self.axes.len() + self.analogs.len();
+        let first_instrument = self.instrument_device(0);
         match at.checked_sub(first_instrument) {
             None => true,
             Some(at) => self.instrument_in_use.as_ref() == Some(&self.instruments[at].name),
@@ -217,11 +217,15 @@ impl Machine {
             alarm,
             Alarm::UnexpectedBootUp { .. } | Alarm::DuplicateNode { .. }
         );
-        if !lost || at >= self.axes.len() {
+        if !lost || at >= self.drive_count() {
             return;
         }
-        let name = self.axes[at].name.clone();
-        self.remember(&name).zeroed = false;
+        let name = self.device_name(at);
+        if at < self.axes.len() {
+            self.remember(&name).zeroed = false;
+        } else {
+            self.rotary_memory.remove(&name);
+        }
     }
 
     fn port_name(&self, port: Port) -> String {

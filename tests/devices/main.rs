@@ -3,3 +3,4 @@
 mod analog;
 mod drive;
 mod interferometer;
+mod rotary;

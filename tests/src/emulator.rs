@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{EMULATED, MACHINE, Rig, machine_config};
+use crate::rig::{EMULATED, MACHINE, ROTARY_EMULATED, ROTARY_MACHINE, Rig, config_of};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -21,6 +21,8 @@ static REAL_TIME: Mutex<()> = Mutex::new(());
 #[derive(Clone, Debug)]
 pub struct Setup {
     seed: u64,
+    machine_text: &'static str,
+    emulated_text: &'static str,
     interface: &'static str,
     machine: Vec<(String, String)>,
     emulated: Vec<(String, String)>,
@@ -31,9 +33,21 @@ impl Setup {
     pub const fn new(seed: u64) -> Self {
         Self {
             seed,
+            machine_text: MACHINE,
+            emulated_text: EMULATED,
             interface: INTERFACE,
             machine: Vec::new(),
             emulated: Vec::new(),
+        }
+    }
+
+    /// The shipped rotary table with the noise and errors of `seed`.
+    pub fn rotary(seed: u64) -> Self {
+        let usual = Self::new(seed);
+        Self {
+            machine_text: ROTARY_MACHINE,
+            emulated_text: ROTARY_EMULATED,
+            ..usual
         }
     }
 
@@ -111,9 +125,10 @@ impl Emulator {
         let turn = (rig != Rig::InProcess)
             .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let mut loaded = machine_config(folder.path(), |text| replace(text, &setup.machine));
+        let machine = |text| replace(text, &setup.machine);
+        let mut loaded = config_of(setup.machine_text, folder.path(), machine);
         loaded.patience = ports::patience(rig.speed());
-        let text = replace(EMULATED.to_owned(), &setup.emulated);
+        let text = replace(setup.emulated_text.to_owned(), &setup.emulated);
         let (speed, seed) = (rig.speed(), setup.seed);
         let emulation = match rig {
             Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),

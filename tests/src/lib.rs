@@ -14,6 +14,6 @@ mod stand;
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use interface::{Interface, run};
-pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};
+pub use rig::{Bench, EMULATED, MACHINE, Rig, config_of, machine_config, rigs};
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};

@@ -12,6 +12,10 @@ use units::Metres;
 pub const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
 /// The shipped description of its emulation.
 pub const EMULATED: &str = include_str!("../../configs/emulated/linear.toml");
+/// The shipped configuration of the rotary table.
+pub const ROTARY_MACHINE: &str = include_str!("../../configs/machines/rotary.toml");
+/// The shipped description of its emulation.
+pub const ROTARY_EMULATED: &str = include_str!("../../configs/emulated/rotary.toml");
 
 /// Which bus a test runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,11 +60,19 @@ pub fn rigs() -> Vec<Rig> {
 /// # Panics
 /// When the changed text is no configuration.
 pub fn machine_config(folder: &Path, change: impl Fn(String) -> String) -> Loaded {
-    let text = change(MACHINE.replace(
+    config_of(MACHINE, folder, change)
+}
+
+/// The same of any machine.
+///
+/// # Panics
+/// When the changed text is no configuration.
+pub fn config_of(text: &str, folder: &Path, change: impl Fn(String) -> String) -> Loaded {
+    let text = change(text.replace(
         "\"machine-data\"",
         &format!("{:?}", folder.display().to_string()),
     ));
-    config::parse(&text, "linear.toml").unwrap_or_else(|error| panic!("{error}"))
+    config::parse(&text, "machine.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A machine in virtual time with everything a test looks at.
@@ -93,6 +105,29 @@ impl Bench {
         emulated: impl Fn(String) -> String,
     ) -> Self {
         Self::wrapped(seed, machine, emulated, |transport| Box::new(transport))
+    }
+
+    /// The shipped rotary table with changes to its configuration and to its emulation.
+    ///
+    /// # Panics
+    /// When a changed text is none any more.
+    pub fn rotary(
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+    ) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let loaded = config_of(ROTARY_MACHINE, folder.path(), machine);
+        let text = emulated(ROTARY_EMULATED.to_owned());
+        let emulated =
+            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
+        Self {
+            machine: Machine::new(&loaded, Box::new(emulated.transport())),
+            emulated,
+            store: Store::new(folder.path(), &loaded.config.machine.name),
+            loaded,
+            folder,
+        }
     }
 
     /// The same, with the transport wrapped (recorded, say).

@@ -80,7 +80,19 @@ fn calibration_hash(config: &MachineConfig) -> String {
             )
         })
         .collect();
-    let text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    let mut text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    for (name, rotary) in &config.rotary {
+        let zero = rotary.zero.as_ref();
+        text.push_str(&format!(
+            "\nrotary {name} {:?} {} {} {} {:?} {:?}",
+            rotary.device,
+            rotary.node_id,
+            rotary.counts_per_turn,
+            rotary.reverse,
+            rotary.identity,
+            zero.map(|zero| (zero.index_direction, zero.index_deg)),
+        ));
+    }
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 

@@ -6,6 +6,7 @@
 mod diagnostic;
 mod load;
 mod model;
+mod rotary;
 mod validate;
 
 pub use diagnostic::{ConfigError, Diagnostic};
@@ -15,4 +16,7 @@ pub use model::{
     CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
     InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
     SerialLine, VerifyConfig, ZeroConfig,
+};
+pub use rotary::{
+    DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryZeroConfig,
 };

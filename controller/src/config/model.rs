@@ -4,6 +4,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::rotary::RotaryConfig;
+
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -18,8 +20,12 @@ pub struct MachineConfig {
     /// Serial lines by name.
     #[serde(default)]
     pub serial: BTreeMap<String, SerialLine>,
-    /// Axes by name.
+    /// Linear axes by name.
+    #[serde(default)]
     pub axis: BTreeMap<String, AxisConfig>,
+    /// Rotary axes by name.
+    #[serde(default)]
+    pub rotary: BTreeMap<String, RotaryConfig>,
     /// Analog modules by name.
     #[serde(default)]
     pub analog: BTreeMap<String, AnalogConfig>,

@@ -7,13 +7,17 @@ mod cross_check;
 mod datum;
 mod measure;
 mod scan;
+mod sweep;
 mod travel;
+mod turn;
 mod verify;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
 pub use measure::{MeasureOptions, Measured, RunPlan};
 pub use scan::Found;
+pub use sweep::{Sweep, SweepOptions};
+pub use turn::Way;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;
 

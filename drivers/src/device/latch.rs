@@ -28,15 +28,15 @@ pub trait PositionLatch<Q: Coordinate = Metres>: ServoDrive {
 /// What a latch can be told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LatchCommand<Q: Coordinate = Metres> {
-    /// Latch from now on; needs an axis that stands. Done when the drive says it is armed.
-    /// Until it is disarmed, moves too fast for `spacing` are refused.
+    /// Latch from now on, and forget what was latched before; needs an axis that stands. Done
+    /// when the drive says it is armed. Until it is disarmed, moves too fast for `spacing` are refused.
     Arm {
         /// How many edges.
         repeat: Repeat,
         /// The smallest distance between two edges.
         spacing: Q,
     },
-    /// Latch no more.
+    /// Latch no more. What was latched before can still be polled.
     Disarm,
 }
 

@@ -4,4 +4,5 @@
 mod linear;
 mod linear_zero;
 mod repeatable;
+mod rotary_table;
 mod serial_zero;

@@ -248,7 +248,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     fn begin_latch(&mut self, now: Time, arming: Option<Arming>) {
         self.probe.disarm();
-        self.probe.events.clear();
+        if arming.is_some() {
+            self.probe.events.clear();
+        }
         self.activity = Activity::Latch(LatchChange {
             arming,
             phase: LatchPhase::SwitchingOff,

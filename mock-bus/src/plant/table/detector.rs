@@ -100,7 +100,11 @@ impl Detector {
 
     /// The next edge that has come by `now`.
     pub(super) fn take(&mut self, now: Time) -> Option<ProbeEdge> {
-        self.edges.pop_front_if(|edge| edge.at <= now)
+        let first = self.edges.front()?;
+        if first.at > now {
+            return None;
+        }
+        self.edges.pop_front()
     }
 }
 
