@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use units::{Radians, Time};
 
+use crate::node::cia402_drive::{RotaryDriveConfig, TouchProbeConfig};
 use crate::plant::config::PlantConfig;
 use crate::plant::table::config::TableConfig;
 use crate::plant::{Plant, ProbeEdge, Servo};
@@ -47,6 +48,42 @@ fn turn(plant: &mut Plant, now: &mut Time, angle: f64, speed: f64) -> Vec<ProbeE
         edges.extend(std::iter::from_fn(|| plant.probe_edge(0)));
     }
     edges
+}
+
+#[test]
+fn the_shipped_file_says_what_the_defaults_are() {
+    let text = include_str!("../../../../configs/emulated/rotary.toml");
+    let machine = crate::config::MachineConfig::parse(text).unwrap();
+    assert_eq!(machine.plant.table, Some(TableConfig::default()));
+    let crate::config::DeviceConfig::Cia402Drive(drive) = &machine.nodes[0].device else {
+        panic!("the first node is the drive");
+    };
+    assert_eq!(drive.rotary, Some(RotaryDriveConfig::default()));
+    assert_eq!(drive.touch_probe, Some(TouchProbeConfig::default()));
+}
+
+#[test]
+fn what_no_table_can_be_is_refused() {
+    let text = include_str!("../../../../configs/emulated/rotary.toml");
+    for (from, to, key) in [
+        ("lines = 360", "lines = 0", "lines"),
+        ("lines = 360", "lines = 36000", "half the line spacing"),
+        (
+            "[plant.table.motion]",
+            "[plant.platform]\n[plant.table.motion]",
+            "platform and table",
+        ),
+        (
+            "counts_per_turn = 129600000\nupper",
+            "counts_per_turn = 1000\nupper",
+            "counts_per_turn",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let refused = crate::config::MachineConfig::parse(&text.replace(from, to));
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains(key), "{refused}");
+    }
 }
 
 #[test]
