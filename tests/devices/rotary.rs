@@ -58,7 +58,7 @@ fn to(degrees: f64, degrees_per_s: f64) -> AxisCommand<Radians> {
 }
 
 const fn index(approach: Approach) -> AxisCommand<Radians> {
-    AxisCommand::HomeIndex {
+    AxisCommand::HomeNextIndex {
         position: Radians::ZERO,
         speed: RadiansPerSecond(0.7),
         approach,

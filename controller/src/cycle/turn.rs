@@ -84,7 +84,7 @@ impl Machine {
                 section: "zero",
             });
         };
-        let command = AxisCommand::HomeIndex {
+        let command = AxisCommand::HomeNextIndex {
             position: Radians::from_degrees(zero.index_deg),
             speed: RadiansPerSecond(zero.index_speed_deg_per_s.to_radians()),
             approach: match zero.index_direction {

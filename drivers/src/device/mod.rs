@@ -7,22 +7,26 @@ mod alarm;
 pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
+pub mod copley;
 pub mod dcon;
 #[cfg(test)]
 mod fake_node;
+pub mod in_sight;
 mod latch;
 pub mod serial_line;
+mod shared_line;
 pub mod umd2;
 
 use core::fmt;
 use core::time::Duration;
 use units::{
-    Approach, Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time,
-    Volts,
+    Approach, Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, Radians,
+    RelativeHumidity, Time, Volts,
 };
 
-pub use alarm::Alarm;
+pub use alarm::{Alarm, AmplifierTrouble};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis};
+pub use shared_line::{LineUse, Urgency};
 
 use crate::transport::Input;
 use crate::wire::Payload;
@@ -30,6 +34,7 @@ use crate::wire::canopen::nmt::NmtState;
 use crate::wire::canopen::sdo::AbortCode;
 use crate::wire::canopen::{NodeId, Object};
 use crate::wire::cia402::PowerState;
+use crate::wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
 
 /// The sans-io face that every device shows to the loop that drives it.
 pub trait Device {
@@ -42,8 +47,14 @@ pub trait Device {
     /// When [`Device::handle_timeout`] wants to be called next; [`Time::NEVER`] for never.
     fn poll_timeout(&self) -> Time;
 
-    /// The next payload to send, in order.
+    /// The next payload to send, in order. A device that shares its line is asked only when
+    /// [`LineUse::may_speak`].
     fn poll_transmit(&mut self) -> Option<Payload>;
+
+    /// What the device wants of its line; [`LineUse::Unshared`] unless it takes turns.
+    fn line_use(&self) -> LineUse {
+        LineUse::Unshared
+    }
 
     /// The next alarm.
     fn poll_alarm(&mut self) -> Option<Alarm>;
@@ -72,6 +83,11 @@ pub trait ServoDrive: Device {
 
     /// Whether the drive has a reference since it was last powered.
     fn is_homed(&self) -> bool;
+
+    /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
+    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`. `None`
+    /// before the first motion and from a new command until its motion begins.
+    fn started_at(&self) -> Option<Time>;
 }
 
 /// What every drive can be told, whatever it moves.
@@ -113,6 +129,19 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         /// Profile acceleration and deceleration.
         acceleration: Q::Acceleration,
     },
+    /// Everything of a move loaded into the drive and confirmed, but nothing moves; done when
+    /// [`AxisCommand::Start`] is all that is missing. Any other command gives it up.
+    Prepare {
+        /// Where to, in drive coordinates.
+        target: Q,
+        /// Profile velocity.
+        speed: Q::Speed,
+        /// Profile acceleration and deceleration.
+        acceleration: Q::Acceleration,
+    },
+    /// Begins the move that was prepared last; done when target reached. Refused when nothing
+    /// is prepared.
+    Start,
     /// Home on the negative limit switch (method 17); the drive's coordinates become
     /// `position` there.
     HomeNegativeLimit {
@@ -121,9 +150,17 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         /// Search speed.
         speed: Q::Speed,
     },
-    /// Home on the next index pulse of the encoder (methods 33 and 34); the drive's coordinates
-    /// become `position` there.
+    /// Home on the first index pulse off the negative limit switch (method 1); the drive's
+    /// coordinates become `position` there.
     HomeIndex {
+        /// The coordinate of the index pulse.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+    },
+    /// Home on the next index pulse of the encoder in a direction (methods 33 and 34); the
+    /// drive's coordinates become `position` there.
+    HomeNextIndex {
         /// The coordinate of the index mark.
         position: Q,
         /// Search speed.
@@ -210,6 +247,39 @@ pub struct DisplacementReading {
     pub standard_deviation: Metres,
     /// How many samples were averaged.
     pub samples: u32,
+}
+
+/// An instrument that sees where a body is in a plane.
+pub trait PoseInstrument: Device {
+    /// Begins to take pictures until `exposures` of them are good, and averages their poses.
+    /// Only pictures taken after this call count. [`Device::poll_outcome`] says when it is
+    /// done; then [`PoseInstrument::pose`].
+    fn begin_pose(&mut self, now: Time, exposures: u32);
+
+    /// The last pose, `None` before the first and after a measurement that failed: a picture
+    /// that was judged bad never becomes a number.
+    fn pose(&self) -> Option<PoseReading>;
+}
+
+/// Where a body was seen, in the machine's frame, from where the instrument was taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseReading {
+    /// When the answer about the last picture arrived.
+    pub at: Time,
+    /// Displacement of the body's origin along x.
+    pub x: Metres,
+    /// Displacement of the body's origin along y.
+    pub y: Metres,
+    /// Turn, counter-clockwise.
+    pub angle: Radians,
+    /// Standard deviations of the single pictures in x, y and angle, zero for a single one.
+    pub standard_deviation: (Metres, Metres, Radians),
+    /// How like the taught target the worst picture was, 0 to 1.
+    pub score: f64,
+    /// How many pictures were averaged.
+    pub samples: u32,
+    /// How many more were taken and judged bad.
+    pub rejected: u32,
 }
 
 /// What an instrument's weather sensors say; `None` where it has none or they fell silent.
@@ -334,6 +404,28 @@ pub enum DeviceError {
         limit: f64,
         unit: &'static str,
     },
+    /// A device answered a command with something else than success.
+    #[error("{device}: {step} refused with {status}")]
+    Refused {
+        device: DeviceName,
+        step: &'static str,
+        status: crate::wire::in_sight::Status,
+    },
+    /// Too few good pictures.
+    #[error(
+        "{device}: {good} good pictures of {wanted}; of {} bad ones {without_target} showed no \
+         target and {judged_bad} were judged bad (best score {:.0} %); is the target in the \
+         field, clean, lit and at rest?",
+        without_target + judged_bad, best_score * 100.0
+    )]
+    NoGoodPicture {
+        device: DeviceName,
+        good: u32,
+        wanted: u32,
+        without_target: u32,
+        judged_bad: u32,
+        best_score: f64,
+    },
     /// An alarm ended the command.
     #[error("{device}: {step} ended by an alarm: {alarm}")]
     Alarmed {
@@ -341,6 +433,74 @@ pub enum DeviceError {
         step: &'static str,
         alarm: Alarm,
     },
+    /// An amplifier on a serial line did not answer.
+    #[error(
+        "{device}: no answer ({attempts} attempts) while {step}; its power, address, cable or \
+         the line's baud rate?"
+    )]
+    Unanswered {
+        device: DeviceName,
+        step: &'static str,
+        attempts: u32,
+    },
+    /// An amplifier on a serial line refused a command.
+    #[error("{device}{}: {code} while {step}", of_parameter(*parameter))]
+    RefusedByAmplifier {
+        device: DeviceName,
+        parameter: Option<Parameter>,
+        code: ErrorCode,
+        step: &'static str,
+    },
+    /// A parameter read back differs from what was written, or is no number.
+    #[error("{device}, parameter {parameter}: read back {seen}, wrote {expected} ({step})")]
+    ParameterReadBack {
+        device: DeviceName,
+        parameter: Parameter,
+        expected: i64,
+        seen: String,
+        step: &'static str,
+    },
+    /// The amplifier is not the one the configuration names.
+    #[error(
+        "{device}: {what} is {seen}, the configuration says {expected}; fit the right device or \
+         correct the configuration"
+    )]
+    WrongAmplifier {
+        device: DeviceName,
+        what: &'static str,
+        expected: String,
+        seen: String,
+    },
+    /// A value cannot be represented in the amplifier's units.
+    #[error(
+        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
+    )]
+    ParameterOutOfRange {
+        device: DeviceName,
+        parameter: Parameter,
+        what: &'static str,
+        value: f64,
+        limit: f64,
+        unit: &'static str,
+    },
+    /// Latched faults are in the way.
+    #[error("{device}: {step} is not possible with latched faults: {faults}")]
+    Faulted {
+        device: DeviceName,
+        step: &'static str,
+        faults: Faults,
+    },
+    /// The amplifier broke a move off.
+    #[error("{device}: {step} was aborted by the amplifier, last saw {seen}")]
+    Aborted {
+        device: DeviceName,
+        step: &'static str,
+        seen: Seen,
+    },
+}
+
+fn of_parameter(parameter: Option<Parameter>) -> String {
+    parameter.map_or_else(String::new, |parameter| format!(", parameter {parameter}"))
 }
 
 /// Which device speaks: a node on the bus or a serial device by its kind.
@@ -350,6 +510,8 @@ pub enum DeviceName {
     Node(NodeId),
     /// On a serial line.
     Serial(&'static str),
+    /// One of several amplifiers behind a serial line.
+    Amplifier(Address),
 }
 
 impl fmt::Display for DeviceName {
@@ -357,6 +519,7 @@ impl fmt::Display for DeviceName {
         match self {
             Self::Node(node) => node.fmt(f),
             Self::Serial(kind) => f.write_str(kind),
+            Self::Amplifier(address) => write!(f, "amplifier {address}"),
         }
     }
 }
@@ -372,6 +535,7 @@ pub enum Seen {
     Mode(i8),
     Position(LengthOrAngle),
     Samples(u32),
+    Events(EventStatus),
 }
 
 impl fmt::Display for Seen {
@@ -384,6 +548,7 @@ impl fmt::Display for Seen {
             Self::Mode(raw) => write!(f, "mode {raw}"),
             Self::Position(at) => write!(f, "position {at:.6}"),
             Self::Samples(count) => write!(f, "{count} samples"),
+            Self::Events(events) => write!(f, "event status {:#010X}", events.bits()),
         }
     }
 }

@@ -50,45 +50,53 @@ impl Homing {
     }
 }
 
-/// Where home is.
+/// Where the home is, and how fast it is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Home {
-    /// On the negative limit switch.
-    NegativeLimit,
-    /// On the next index pulse in this direction.
-    Index(Approach),
-    /// Here.
+pub(super) enum HomingPlace<S> {
+    /// Where the axis stands.
     Here,
+    /// Where it leaves its negative limit switch.
+    NegativeLimit(S),
+    /// At the first index pulse off that switch.
+    Index(S),
+    /// At the next index pulse in this direction.
+    NextIndex(S, Approach),
 }
 
-impl Home {
-    /// The method in 0x6098; a drive that counts against the axis has the other direction.
-    const fn method(self, reversed: bool) -> i8 {
+impl<S: Copy> HomingPlace<S> {
+    /// 0x6098. The negative end of the axis is the drive's positive one when the drive counts
+    /// against the axis.
+    pub(super) const fn method(&self, reversed: bool) -> i8 {
+        use Approach::{Forward, Reverse};
         match (self, reversed) {
-            (Self::NegativeLimit, false) => 17,
-            (Self::NegativeLimit, true) => 18,
-            (Self::Index(Approach::Reverse), false) | (Self::Index(Approach::Forward), true) => 33,
-            (Self::Index(Approach::Forward), false) | (Self::Index(Approach::Reverse), true) => 34,
             (Self::Here, _) => 37,
+            (Self::NegativeLimit(_), false) => 17,
+            (Self::NegativeLimit(_), true) => 18,
+            (Self::Index(_), false) => 1,
+            (Self::Index(_), true) => 2,
+            (Self::NextIndex(_, Reverse), false) | (Self::NextIndex(_, Forward), true) => 33,
+            (Self::NextIndex(_, Forward), false) | (Self::NextIndex(_, Reverse), true) => 34,
+        }
+    }
+
+    const fn speed(&self) -> Option<S> {
+        match self {
+            Self::Here => None,
+            Self::NegativeLimit(speed) | Self::Index(speed) | Self::NextIndex(speed, _) => {
+                Some(*speed)
+            }
         }
     }
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
-    /// The drive's coordinate becomes `position` at `home`, for which it searches at a speed.
-    pub(super) fn begin_homing(
-        &mut self,
-        now: Time,
-        home: Home,
-        position: Q,
-        search: Option<Q::Speed>,
-    ) {
-        let here = home == Home::Here;
-        if here && !self.image.stands() {
+    pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
+        let search = place.speed();
+        if search.is_none() && !self.image.stands() {
             self.refuse("homing here", "an axis that stands");
             return;
         }
-        let method = home.method(self.settings.scale.resolution() < Q::ZERO);
+        let method = place.method(self.settings.scale.resolution() < Q::ZERO);
         let plan = self.home_counts(position).and_then(|(counts, shown)| {
             let offset = match self.settings.home_offset {
                 HomeOffset::IsPositionAtHome => shown,
@@ -106,7 +114,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,
                     position,
-                    here,
+                    here: search.is_none(),
                     since: now,
                     deadline: Time::NEVER,
                 });

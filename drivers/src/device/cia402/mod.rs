@@ -4,8 +4,9 @@
 //! or turning endlessly, and its touch probe.
 //!
 //! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
-//! error, TPDO 3 (if wanted) the touch probe, all at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
-//! taken over at once: no adapter that re-orders frames can part a target from the edge that
+//! error, TPDO 3 (if wanted) the touch probe, all at every SYNC. RPDO 1 carries controlword **and**
+//! target position in one frame, taken over at once (or, in a group that starts together, at the
+//! next SYNC): no adapter that re-orders frames can part a target from the edge that
 //! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
 //! they are written by SDO, read back, before the move that needs them.
 //!
@@ -52,7 +53,7 @@ use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
-use homing::{Home, Homing};
+use homing::{Homing, HomingPlace};
 use image::{Image, Sample};
 use latch::{LatchChange, Probe};
 use motion::{Halt, Move};
@@ -106,6 +107,9 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i64>,
+    /// A move that only has to be started.
+    prepared: Option<Move>,
+    started_at: Option<Time>,
     homed: bool,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
@@ -148,6 +152,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             commanded_mode: None,
             profile: None,
             reached: None,
+            prepared: None,
+            started_at: None,
             homed: false,
             first: None,
             kept: None,
@@ -241,6 +247,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     fn alarm(&mut self, alarm: Alarm) {
         self.alarms.push_back(alarm);
+        self.prepared = None;
         let ends_it = match (&self.activity, alarm) {
             (Activity::Idle | Activity::Starting, _) => false,
             // Stopping and resetting go on: they are the answer to alarms. A drive that booted
@@ -317,6 +324,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     /// Ends whatever runs, without an outcome.
     fn supersede(&mut self, now: Time) {
         self.outcome = None;
+        self.prepared = None;
         self.repeat_at = Time::NEVER;
         self.image.allow_jumps(false);
         self.course = None;
@@ -433,6 +441,10 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
     fn is_homed(&self) -> bool {
         self.homed
     }
+
+    fn started_at(&self) -> Option<Time> {
+        self.started_at
+    }
 }
 
 impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
@@ -441,6 +453,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             self.control(now, command);
             return;
         }
+        let prepared = self.prepared.take();
         self.supersede(now);
         match command {
             AxisCommand::Drive(_) => {}
@@ -450,17 +463,29 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
                 target,
                 speed,
                 acceleration,
-            } => self.begin_move(now, target, speed, acceleration),
+            } => self.begin_move(now, (target, speed, acceleration), false),
+            AxisCommand::Prepare {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, (target, speed, acceleration), true),
+            AxisCommand::Start => match prepared {
+                Some(prepared) => self.begin_prepared(now, prepared),
+                None => self.refuse("starting", "a move that was prepared right before"),
+            },
             AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, Home::NegativeLimit, position, Some(speed));
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
             }
-            AxisCommand::HomeIndex {
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeNextIndex {
                 position,
                 speed,
                 approach,
-            } => self.begin_homing(now, Home::Index(approach), position, Some(speed)),
+            } => self.begin_homing(now, position, HomingPlace::NextIndex(speed, approach)),
             AxisCommand::HomeHere { position } => {
-                self.begin_homing(now, Home::Here, position, None);
+                self.begin_homing(now, position, HomingPlace::Here);
             }
         }
     }

@@ -30,12 +30,14 @@ enum MovePhase {
     Running,
 }
 
-/// A move under way.
-#[derive(Debug)]
+/// A move under way, or one that only has to be started.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Move {
     target: i64,
     /// Where the drive is sent now: the target, or a point on a long way round to it.
     set_point: i64,
+    /// Ends where only the edge of the set-point bit is missing.
+    only_prepared: bool,
     profile: (u32, u32),
     phase: MovePhase,
     since: Time,
@@ -78,16 +80,20 @@ impl Halt {
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
+    /// Up to its end, or `only_prepared`.
     pub(super) fn begin_move(
         &mut self,
         now: Time,
-        target: Q,
-        speed: Q::Speed,
-        acceleration: Q::Acceleration,
+        wanted: (Q, Q::Speed, Q::Acceleration),
+        only_prepared: bool,
     ) {
-        match self.plan_move(now, target, speed, acceleration) {
+        self.started_at = None;
+        match self.plan_move(now, wanted, only_prepared) {
             Err(error) => self.finish(Err(error)),
-            Ok(planned) if self.is_there(planned.target) => self.finish(Ok(())),
+            Ok(planned) if self.is_there(planned.target) => {
+                self.finish(Ok(()));
+                self.prepared = only_prepared.then_some(planned);
+            }
             Ok(planned) => {
                 let mut steps = Vec::new();
                 if self.profile != Some(planned.profile) {
@@ -125,9 +131,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     fn plan_move(
         &self,
         now: Time,
-        target: Q,
-        speed: Q::Speed,
-        acceleration: Q::Acceleration,
+        (target, speed, acceleration): (Q, Q::Speed, Q::Acceleration),
+        only_prepared: bool,
     ) -> Result<Move, DeviceError> {
         let settings = &self.settings;
         let object = TARGET_POSITION.object;
@@ -152,6 +157,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         Ok(Move {
             target: counts,
             set_point: self.way_point(counts),
+            only_prepared,
             profile,
             phase: MovePhase::Preparing,
             since: now,
@@ -250,12 +256,19 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             }
             MovePhase::Releasing => {
                 self.target = self.on_the_wire(set_point).unwrap_or(self.target);
-                self.enter(now, MovePhase::Raising, patience);
-                let new = Controlword::MODE_4 | Controlword::MODE_5;
-                self.send_control(now, Controlword::ENABLE_COMMAND | new);
+                if moving.only_prepared {
+                    let prepared = *moving;
+                    // The target without its edge: nothing moves.
+                    self.release_set_point(now);
+                    self.finish(Ok(()));
+                    self.prepared = Some(prepared);
+                } else {
+                    self.raise_set_point(now);
+                }
             }
             MovePhase::Raising => {
                 if acknowledged {
+                    self.started_at = Some(now);
                     self.enter(now, MovePhase::Lowering, patience);
                     self.send_control(now, Controlword::ENABLE_COMMAND);
                 }
@@ -282,6 +295,35 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
         self.enter(now, MovePhase::Releasing, self.settings.timeouts.set_point);
         self.advance_move(now);
+    }
+
+    /// Begins what was prepared: only the edge is missing.
+    pub(super) fn begin_prepared(&mut self, now: Time, prepared: Move) {
+        if self.is_there(prepared.target) {
+            self.finish(Ok(()));
+            return;
+        }
+        let ready = self.image.sample().is_some_and(|sample| {
+            sample.mode == OperationMode::ProfilePosition
+                && !sample.status.contains(Statusword::MODE_12)
+        });
+        if !ready || self.on_the_wire(prepared.set_point) != Some(self.target) {
+            self.refuse("starting", "a drive that is still as it was prepared");
+            return;
+        }
+        self.reached = None;
+        self.activity = Activity::Move(Move {
+            only_prepared: false,
+            ..prepared
+        });
+        self.raise_set_point(now);
+    }
+
+    fn raise_set_point(&mut self, now: Time) {
+        let patience = self.settings.timeouts.set_point;
+        self.enter(now, MovePhase::Raising, patience);
+        let new = Controlword::MODE_4 | Controlword::MODE_5;
+        self.send_control(now, Controlword::ENABLE_COMMAND | new);
     }
 
     /// Takes the set-point bit back. Halt stays: an older target must not be resumed.

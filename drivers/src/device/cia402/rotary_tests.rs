@@ -408,7 +408,7 @@ fn homing_on_the_index_asks_for_the_direction_and_begins_the_turns_anew() {
     let mut rig = Rig::enabled(PositionRange::ToLastCount, 0);
     rig.does(to(800.0, 200.0)).unwrap();
     for (approach, method) in [(Approach::Reverse, 33), (Approach::Forward, 34)] {
-        let home = AxisCommand::HomeIndex {
+        let home = AxisCommand::HomeNextIndex {
             position: degrees(370.0),
             speed: RadiansPerSecond(degrees(20.0).value()),
             approach,

@@ -52,6 +52,10 @@ pub struct Cia402Settings<Q: Coordinate = Metres> {
     pub home_offset: HomeOffset,
     /// Whether TPDO 2 carries the following error (0x60F4).
     pub map_following_error: bool,
+    /// Whether RPDO 1 takes effect at the next SYNC (transmission type 1) instead of at once, so
+    /// that axes which are started together start at the same one. Every controlword then takes
+    /// up to one SYNC period longer, a quick stop too; and none without SYNC.
+    pub synchronous_start: bool,
     /// How long each thing is waited for.
     pub timeouts: Cia402Timeouts,
 }
@@ -234,6 +238,7 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             homing_acceleration: acceleration_max * 0.1,
             home_offset: HomeOffset::IsPositionAtHome,
             map_following_error: true,
+            synchronous_start: false,
             timeouts: Cia402Timeouts::default(),
         }
     }

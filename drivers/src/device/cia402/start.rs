@@ -141,7 +141,12 @@ fn pdo_steps<Q: Coordinate>(
     let mut steps = transmit(1).configure(node, &sample, SYNC)?;
     // Controlword and target in one frame: no bus can part the new target from its edge.
     let command = [CONTROLWORD, TARGET_POSITION];
-    steps.extend(receive(1).configure(node, &command, Transmission::Event)?);
+    let taken_over = if settings.synchronous_start {
+        SYNC
+    } else {
+        Transmission::Event
+    };
+    steps.extend(receive(1).configure(node, &command, taken_over)?);
     if settings.map_following_error {
         steps.extend(transmit(2).configure(node, &[FOLLOWING_ERROR_ACTUAL], SYNC)?);
     } else {

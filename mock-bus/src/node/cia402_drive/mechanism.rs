@@ -10,10 +10,10 @@ pub(super) trait Mechanism {
     fn speed(&self) -> f64;
     /// Metres or radians per count.
     fn resolution(&self) -> f64;
+    /// The encoder's last index pulse since its power came on.
+    fn index_pulse(&self) -> Option<IndexPulse>;
     /// Negative and positive limit switch.
     fn limit_switches(&self) -> (bool, bool);
-    /// The encoder's last index pulse.
-    fn index_pulse(&self) -> Option<IndexPulse>;
     /// The next edge at the fast input.
     fn probe_edge(&mut self) -> Option<ProbeEdge>;
     fn set_servo(&mut self, servo: Servo);
@@ -39,12 +39,12 @@ impl Mechanism for PlantAxis<'_> {
         self.plant.encoder_resolution(self.axis)
     }
 
-    fn limit_switches(&self) -> (bool, bool) {
-        self.plant.limit_switches(self.axis)
-    }
-
     fn index_pulse(&self) -> Option<IndexPulse> {
         self.plant.index_pulse(self.axis)
+    }
+
+    fn limit_switches(&self) -> (bool, bool) {
+        self.plant.limit_switches(self.axis)
     }
 
     fn probe_edge(&mut self) -> Option<ProbeEdge> {

@@ -27,12 +27,10 @@ pub(super) struct IdealAxis {
     pub(super) counts: i64,
     /// Counts at and below which the negative switch is pressed, and the positive above.
     pub(super) switches: (i64, i64),
+    pub(super) index: Option<IndexPulse>,
     pub(super) blocked: bool,
     pub(super) servo: Servo,
     pub(super) commands: u64,
-    /// Counts between two index marks, one of them at 0.
-    pub(super) index_counts: i64,
-    pub(super) index: Option<IndexPulse>,
     pub(super) edges: VecDeque<ProbeEdge>,
 }
 
@@ -49,15 +47,15 @@ impl Mechanism for IdealAxis {
         RESOLUTION_M
     }
 
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.index
+    }
+
     fn limit_switches(&self) -> (bool, bool) {
         (
             self.counts <= self.switches.0,
             self.counts >= self.switches.1,
         )
-    }
-
-    fn index_pulse(&self) -> Option<IndexPulse> {
-        self.index
     }
 
     fn probe_edge(&mut self) -> Option<ProbeEdge> {
@@ -70,21 +68,29 @@ impl Mechanism for IdealAxis {
         if let Servo::Follow { demand } = servo
             && !self.blocked
         {
-            let before = self.counts.div_euclid(self.index_counts);
+            let before = self.counts;
             self.counts = (demand / RESOLUTION_M).round() as i64;
-            let after = self.counts.div_euclid(self.index_counts);
-            if before != after {
-                self.index = Some(IndexPulse {
-                    count: before.max(after) * self.index_counts,
-                    number: self.index.map_or(1, |last| last.number + 1),
-                });
-            }
+            self.pass_marks(before);
         }
     }
 
     fn encoder_power(&mut self, on: bool) {
         if on {
             self.counts = 0;
+        }
+    }
+}
+
+impl IdealAxis {
+    /// One index mark every millimetre, at odd multiples of half of one.
+    fn pass_marks(&mut self, before: i64) {
+        const MARKS: i64 = 100_000;
+        let turn = |counts: i64| (counts + MARKS / 2).div_euclid(MARKS);
+        if turn(before) != turn(self.counts) {
+            self.index = Some(IndexPulse {
+                count: turn(before).max(turn(self.counts)) * MARKS - MARKS / 2,
+                number: self.index.map_or(1, |pulse| pulse.number + 1),
+            });
         }
     }
 }
@@ -106,11 +112,10 @@ impl Bench {
         let axis = IdealAxis {
             counts: 0,
             switches: (i64::MIN, i64::MAX),
+            index: None,
             blocked: false,
             servo: Servo::Off,
             commands: 0,
-            index_counts: 1_000_000,
-            index: None,
             edges: VecDeque::new(),
         };
         let drive = Drive::new(config);

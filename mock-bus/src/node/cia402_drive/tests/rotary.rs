@@ -22,6 +22,7 @@ fn bench_with(touch_probe: TouchProbeConfig, upper_limit_is_a_position: bool) ->
     Bench::with(Cia402DriveConfig {
         rotary: Some(rotary),
         touch_probe: Some(touch_probe),
+        has_index: true,
         ..Cia402DriveConfig::default()
     })
 }
@@ -94,10 +95,9 @@ fn the_way_to_a_target_beyond_the_seam_is_what_0x60f2_says() {
 
 #[test]
 fn homing_on_the_index_makes_the_marks_place_the_home() {
-    for (method, mark) in [(34_i8, 0), (33, -TURN)] {
+    for (method, from) in [(34_i8, 30_000), (33, 70_000)] {
         let mut bench = bench();
-        bench.axis.index_counts = TURN;
-        bench.axis.counts = if method == 34 { -20_000 } else { 20_000 - TURN };
+        bench.axis.counts = from;
         bench.enable();
         bench.write_i32(0x607C, 1_000);
         bench.write(0x6098, &method.to_le_bytes());
@@ -106,7 +106,8 @@ fn homing_on_the_index_makes_the_marks_place_the_home() {
         let _ = bench.wait_ms(20);
         bench.control(0x1F);
         let _ = bench.wait_until("homed", |bench| bench.status() & 0x3400 == 0x1400);
-        let moved = bench.axis.counts - mark;
+        // One of the ideal axis's marks.
+        let moved = bench.axis.counts - 50_000;
         assert_eq!(i64::from(bench.position()), 1_000 + moved, "{method}");
         // It stops beyond the mark.
         assert_ne!(moved, 0);
