@@ -1,8 +1,12 @@
-//! The devices of a machine by number: linear axes, rotary axes, analog modules, instruments.
+//! The devices of a machine by number: linear axes, rotary axes, analog modules, instruments,
+//! cameras.
 
 use std::collections::BTreeMap;
 
-use drivers::device::{Device, Identity, ServoDrive};
+use drivers::device::{
+    AnalogInput, Axis, Device, DisplacementInstrument, Identity, PoseInstrument, RotaryAxis,
+    ServoDrive,
+};
 use drivers::transport::Port;
 
 use crate::failure::Failure;
@@ -14,21 +18,41 @@ pub(crate) struct UnitMut<'a> {
     pub(crate) device: &'a mut dyn Device,
 }
 
+macro_rules! as_device {
+    ($($kind:path),*) => {$(
+        impl Unit<dyn $kind> {
+            fn as_device(&mut self) -> UnitMut<'_> {
+                UnitMut {
+                    port: self.port,
+                    device: &mut *self.device,
+                }
+            }
+        }
+    )*};
+}
+
+as_device!(
+    Axis,
+    RotaryAxis,
+    AnalogInput,
+    DisplacementInstrument,
+    PoseInstrument
+);
+
 impl Machine {
     /// Every device with its name.
     fn devices(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
-        let axes = self.axes.iter();
-        let axes = axes.map(|unit| (&unit.name, &*unit.device as &dyn Device));
-        let rotaries = self.rotaries.iter();
-        let rotaries = rotaries.map(|unit| (&unit.name, &*unit.device as &dyn Device));
-        let analogs = self.analogs.iter();
-        let analogs = analogs.map(|unit| (&unit.name, &*unit.device as &dyn Device));
+        let axes = self.axes.iter().map(|it| (&it.name, &*it.device as _));
+        let rotaries = self.rotaries.iter().map(|it| (&it.name, &*it.device as _));
+        let analogs = self.analogs.iter().map(|it| (&it.name, &*it.device as _));
         let instruments = self.instruments.iter();
-        let instruments = instruments.map(|unit| (&unit.name, &*unit.device as &dyn Device));
-        axes.chain(rotaries).chain(analogs).chain(instruments)
+        let instruments = instruments.map(|it| (&it.name, &*it.device as _));
+        let cameras = self.cameras.iter().map(|it| (&it.name, &*it.device as _));
+        let machines_own = axes.chain(rotaries).chain(analogs);
+        machines_own.chain(instruments).chain(cameras)
     }
 
-    /// The names of all devices: axes, then rotary axes, then analog modules, then instruments.
+    /// The names of all devices: axes, rotary axes, analog modules, instruments and cameras.
     pub fn device_names(&self) -> Vec<String> {
         self.devices().map(|(name, _)| name.clone()).collect()
     }
@@ -51,34 +75,29 @@ impl Machine {
     }
 
     pub(crate) fn device_count(&self) -> usize {
-        self.instrument_device(self.instruments.len())
+        self.instrument_device(self.instruments.len()) + self.cameras.len()
     }
 
     pub(crate) fn device_name(&self, at: usize) -> String {
         self.device_names().swap_remove(at)
     }
 
-    /// Device number `at`.
+    /// Device number `at`, in the order of [`Machine::device_names`].
     pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
-        fn with_port<D: ?Sized>(unit: &mut Unit<D>) -> (Port, &mut D) {
-            (unit.port, &mut *unit.device)
-        }
         let (axes, drives) = (self.axes.len(), self.drive_count());
-        let machine_devices = drives + self.analogs.len();
-        let (port, device): (Port, &mut dyn Device) = if at < axes {
-            let (port, device) = with_port(&mut self.axes[at]);
-            (port, device)
+        let machines_own = drives + self.analogs.len();
+        let instruments = machines_own + self.instruments.len();
+        if at < axes {
+            self.axes[at].as_device()
         } else if at < drives {
-            let (port, device) = with_port(&mut self.rotaries[at - axes]);
-            (port, device)
-        } else if at < machine_devices {
-            let (port, device) = with_port(&mut self.analogs[at - drives]);
-            (port, device)
+            self.rotaries[at - axes].as_device()
+        } else if at < machines_own {
+            self.analogs[at - drives].as_device()
+        } else if at < instruments {
+            self.instruments[at - machines_own].as_device()
         } else {
-            let (port, device) = with_port(&mut self.instruments[at - machine_devices]);
-            (port, device)
-        };
-        UnitMut { port, device }
+            self.cameras[at - instruments].as_device()
+        }
     }
 
     /// How many of the devices, the first ones, are drives.

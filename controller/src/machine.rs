@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
 use drivers::device::{
-    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand, RotaryAxis,
+    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand,
+    PoseInstrument, RotaryAxis,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
@@ -22,7 +23,9 @@ use units::{Metres, Time};
 
 use crate::assemble;
 use crate::bus_watch::BusWatch;
+use crate::camera;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::cycle::platform::PlatformState;
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
@@ -99,14 +102,16 @@ pub struct Machine {
     pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
+    pub(crate) cameras: Vec<Unit<dyn PoseInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) rotary_memory: BTreeMap<String, RotaryMemory>,
+    pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
-    /// The instruments that were started, by name.
+    /// The instruments and cameras that were started, by name.
     pub(crate) started_instruments: BTreeSet<String>,
-    /// The instrument whose readings a procedure needs now: only its alarms count.
+    /// The instrument or camera whose readings a procedure needs now: only its alarms count.
     pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
@@ -123,6 +128,7 @@ impl Machine {
             rotaries: assemble::rotaries(&config, &ports, loaded.patience),
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
+            cameras: camera::cameras(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
             bus_watch: BusWatch::new(&config, &ports),
             memory: config
@@ -134,6 +140,7 @@ impl Machine {
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
+            platform: PlatformState::of(&config),
             config,
             transport,
             outbox: Outbox::default(),
@@ -247,8 +254,8 @@ impl Machine {
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
-    /// moves. Instruments are started when a procedure first needs them: a machine in
-    /// production has none.
+    /// moves. Instruments and cameras are started when a procedure first needs them: a machine
+    /// in production may have none.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
@@ -259,6 +266,9 @@ impl Machine {
             memory.approach.forget();
         }
         self.rotary_memory.clear();
+        if let Some(platform) = &mut self.platform {
+            platform.forget();
+        }
         self.set_sync(true)?;
         let machine_devices = self.instrument_device(0);
         let now = self.now();
@@ -275,8 +285,12 @@ impl Machine {
     /// Starts an instrument, unless it runs already (its datum stands then), and counts its
     /// alarms from now on.
     pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
+        self.use_device(self.instrument_device(self.instrument_index(name)), name)
+    }
+
+    /// The same for device number `at`, an instrument or a camera called `name`.
+    pub(crate) fn use_device(&mut self, at: usize, name: &str) -> Result<(), Failure> {
         if !self.started_instruments.contains(name) {
-            let at = self.instrument_device(self.instrument_index(name));
             let now = self.now();
             self.device_mut(at).device.start(now);
             self.await_outcome(at, "start", START_LIMIT)?;

@@ -219,13 +219,9 @@ impl Machine {
         }
     }
 
-    /// An instrument that nobody reads may have its beam blocked.
+    /// An instrument or a camera that nobody reads may have its beam blocked.
     fn alarm_counts(&self, at: usize) -> bool {
-        let first_instrument = self.instrument_device(0);
-        match at.checked_sub(first_instrument) {
-            None => true,
-            Some(at) => self.instrument_in_use.as_ref() == Some(&self.instruments[at].name),
-        }
+        at < self.instrument_device(0) || self.instrument_in_use == Some(self.device_name(at))
     }
 
     /// A drive that was reset has lost its origin, whoever is listening.

@@ -1,6 +1,7 @@
 //! Each device's driver against its emulation, the same on every bus.
 
 mod analog;
+mod camera;
 mod drive;
 mod interferometer;
 mod rotary;

@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{EMULATED, MACHINE, ROTARY_EMULATED, ROTARY_MACHINE, Rig, config_of};
+use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, shipped_config};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -20,21 +20,28 @@ static REAL_TIME: Mutex<()> = Mutex::new(());
 /// What a machine is made from: seed, configuration, description of the emulation.
 #[derive(Clone, Debug)]
 pub struct Setup {
+    shipped: Shipped,
     seed: u64,
-    machine_text: &'static str,
-    emulated_text: &'static str,
     interface: &'static str,
     machine: Vec<(String, String)>,
     emulated: Vec<(String, String)>,
 }
 
 impl Setup {
-    /// The shipped machine with the noise and errors of `seed`.
+    /// The shipped linear machine with the noise and errors of `seed`.
     pub const fn new(seed: u64) -> Self {
+        Self::of(LINEAR, seed)
+    }
+
+    /// The shipped alignment platform with the noise and errors of `seed`.
+    pub const fn uvw(seed: u64) -> Self {
+        Self::of(UVW, seed)
+    }
+
+    const fn of(shipped: Shipped, seed: u64) -> Self {
         Self {
+            shipped,
             seed,
-            machine_text: MACHINE,
-            emulated_text: EMULATED,
             interface: INTERFACE,
             machine: Vec::new(),
             emulated: Vec::new(),
@@ -42,13 +49,8 @@ impl Setup {
     }
 
     /// The shipped rotary table with the noise and errors of `seed`.
-    pub fn rotary(seed: u64) -> Self {
-        let usual = Self::new(seed);
-        Self {
-            machine_text: ROTARY_MACHINE,
-            emulated_text: ROTARY_EMULATED,
-            ..usual
-        }
+    pub const fn rotary(seed: u64) -> Self {
+        Self::of(ROTARY, seed)
     }
 
     /// On another SocketCAN interface than the usual one.
@@ -125,10 +127,10 @@ impl Emulator {
         let turn = (rig != Rig::InProcess)
             .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let machine = |text| replace(text, &setup.machine);
-        let mut loaded = config_of(setup.machine_text, folder.path(), machine);
+        let change = |text| replace(text, &setup.machine);
+        let mut loaded = shipped_config(&setup.shipped, folder.path(), change);
         loaded.patience = ports::patience(rig.speed());
-        let text = replace(setup.emulated_text.to_owned(), &setup.emulated);
+        let text = replace(setup.shipped.emulated.to_owned(), &setup.emulated);
         let (speed, seed) = (rig.speed(), setup.seed);
         let emulation = match rig {
             Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),

@@ -3,12 +3,15 @@
 //! Micrometres and millimetres live here and on the screen only; every key carries its unit
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
+mod camera;
 mod diagnostic;
 mod load;
 mod model;
+mod platform;
 mod rotary;
 mod validate;
 
+pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
@@ -16,6 +19,10 @@ pub use model::{
     CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
     InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
     SerialLine, VerifyConfig, ZeroConfig,
+};
+pub use platform::{
+    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
+    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };
 pub use rotary::{
     DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryZeroConfig,

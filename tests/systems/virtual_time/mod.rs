@@ -3,6 +3,7 @@
 
 mod linear;
 mod linear_zero;
+mod platform;
 mod repeatable;
 mod rotary_table;
 mod serial_zero;

@@ -6,7 +6,9 @@ use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared, Time};
 use super::*;
 use crate::device::canopen_node::NodeSettings;
 use crate::device::fake_node::FakeNode;
-use crate::device::{LatchCommand, Latched, PositionLatch, Repeat};
+use crate::device::{
+    Axis, AxisCommand, DriveCommand, LatchCommand, Latched, PositionLatch, Repeat, ServoDrive,
+};
 use crate::wire::canopen::NodeId;
 
 const SYNC_MS: u64 = 2;
