@@ -3,15 +3,22 @@
 //! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
+mod patience;
+mod rotary;
+
 use core::time::Duration;
 use std::collections::BTreeMap;
+
+use patience::{patient_drive, patient_node, patient_pdos};
+pub use rotary::rotary_settings;
+pub(crate) use rotary::{index_limit, rotaries};
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use compensator::hall_zero;
 use compensator::length_correction::{
     self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
 };
-use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings, NodeTimeouts};
+use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
@@ -20,7 +27,6 @@ use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use drivers::transport::Port;
 use drivers::wire::canopen::NodeId;
 use units::{
@@ -160,7 +166,12 @@ pub(crate) fn expected_nodes(
         .iter()
         .filter(|(_, analog)| analog.bus.as_deref() == Some(bus))
         .filter_map(|(name, it)| Some((it.node_id?, (name.clone(), it.identity.clone()?))));
-    axes.chain(analogs).collect()
+    let rotaries = config
+        .rotary
+        .iter()
+        .filter(|(_, rotary)| rotary.bus == bus)
+        .map(|(name, rotary)| (rotary.node_id, (name.clone(), rotary.identity.clone())));
+    axes.chain(rotaries).chain(analogs).collect()
 }
 
 fn node_id(raw: u8) -> NodeId {
@@ -199,39 +210,10 @@ fn node_settings(
     }
 }
 
-/// Where the clock is faster than the wall's, a pause of the host silences process data and
-/// heartbeats alike, so they are waited for alike.
-fn patient_pdos(usual: &NodeSettings, consumer_time: Duration, patience: u32) -> u32 {
-    if patience == 1 {
-        return usual.missed_pdos_max;
-    }
-    let periods = (consumer_time * patience).as_nanos() / usual.sync_period.as_nanos().max(1);
-    u32::try_from(periods).map_or(u32::MAX, |it| it.max(usual.missed_pdos_max))
-}
-
-/// See [`crate::config::Loaded::patience`].
-fn patient_node(usual: NodeTimeouts, patience: u32) -> NodeTimeouts {
-    NodeTimeouts {
-        boot: usual.boot * patience,
-        sdo: SdoTimeouts {
-            response: usual.sdo.response * patience,
-            block_segment: usual.sdo.block_segment * patience,
-            ..usual.sdo
-        },
-        operational: usual.operational * patience,
-    }
-}
-
-fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
-    Cia402Timeouts {
-        transition: usual.transition * patience,
-        mode: usual.mode * patience,
-        set_point: usual.set_point * patience,
-        settling: usual.settling * patience,
-        standing: usual.standing * patience,
-        homing: usual.homing * patience,
-        new_position: usual.new_position * patience,
-        repeat: usual.repeat * patience,
+const fn home_offset(name: HomeOffsetName) -> HomeOffset {
+    match name {
+        HomeOffsetName::PositionAtHome => HomeOffset::IsPositionAtHome,
+        HomeOffsetName::ZeroFromHome => HomeOffset::IsZeroFromHome,
     }
 }
 
@@ -279,10 +261,7 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
         stall_max: usual.common.sync_period * (patience - 1),
-        home_offset: match axis.home_offset {
-            HomeOffsetName::PositionAtHome => HomeOffset::IsPositionAtHome,
-            HomeOffsetName::ZeroFromHome => HomeOffset::IsZeroFromHome,
-        },
+        home_offset: home_offset(axis.home_offset),
         options: option_codes(&axis.option_codes, usual.options),
         timeouts: patient_drive(
             Cia402Timeouts {

@@ -9,6 +9,8 @@ use crate::config::MachineConfig;
 /// Bytes of the PDOs a CiA 402 drive sends at every SYNC: statusword, position and mode; then
 /// the following error.
 const DRIVE_PDO_BYTES: [u8; 2] = [7, 4];
+/// A touch probe adds its status, a position and a count.
+const LATCH_PDO_BYTES: u8 = 8;
 
 /// The load of CAN bus `name`.
 ///
@@ -27,6 +29,14 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
         plan = plan
             .with_pdos(&DRIVE_PDO_BYTES)
             .with_heartbeat(ms(axis.heartbeat_producer_ms));
+    }
+    for rotary in config.rotary.values().filter(|it| it.bus == name) {
+        plan = plan
+            .with_pdos(&DRIVE_PDO_BYTES)
+            .with_heartbeat(ms(rotary.heartbeat_producer_ms));
+        if rotary.line_detector.is_some() {
+            plan = plan.with_pdos(&[LATCH_PDO_BYTES]);
+        }
     }
     for analog in config
         .analog

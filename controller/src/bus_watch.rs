@@ -162,8 +162,10 @@ fn masters_own(config: &MachineConfig, bus: &str, master: u8) -> BTreeMap<u16, &
             "a heartbeat with this controller's own node number",
         );
     }
-    for axis in config.axis.values().filter(|axis| axis.bus == bus) {
-        if let Some(node) = NodeId::new(axis.node_id) {
+    let axes = config.axis.values().map(|it| (&it.bus, it.node_id));
+    let rotaries = config.rotary.values().map(|it| (&it.bus, it.node_id));
+    for (_, node_id) in axes.chain(rotaries).filter(|(on, _)| *on == bus) {
+        if let Some(node) = NodeId::new(node_id) {
             own.insert(
                 node.cob_id(Function::Rpdo1),
                 "a command to one of the drives",

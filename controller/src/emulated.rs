@@ -207,6 +207,14 @@ impl EmulatedOnPtys {
     pub fn power_cycle(&self, drift: HallDrift) -> Result<(), EmulatedError> {
         Ok(self.running.power_cycle(drift)?)
     }
+
+    /// Somebody turns the plate on the rotary table by so many lines and fixes it again.
+    ///
+    /// # Errors
+    /// When the machine's thread has ended.
+    pub fn turn_plate(&self, lines: i64) -> Result<(), EmulatedError> {
+        Ok(self.running.turn_plate(lines)?)
+    }
 }
 
 fn no_port(name: &str, emulated: &EmulatedConfig) -> EmulatedError {

@@ -122,7 +122,7 @@ pub enum Failure {
         axis: String,
     },
     /// The verb needs something the configuration does not have.
-    #[error("axis {axis}: the configuration has no [axis.{axis}.{section}]")]
+    #[error("axis {axis}: the configuration has no section `{section}` for it")]
     NotConfigured {
         /// Which axis.
         axis: String,
@@ -136,6 +136,17 @@ pub enum Failure {
         axis: String,
         /// What there is.
         known: String,
+    },
+    /// A turn over a plate saw none of its lines.
+    #[error(
+        "axis {axis}: none of {lines} lines was seen in a whole turn; is the plate there, the \
+         detector on and wired to the drive's touch probe?"
+    )]
+    NoLines {
+        /// Which axis.
+        axis: String,
+        /// How many there should be.
+        lines: u32,
     },
     /// There is no such image controller.
     #[error("there is no camera `{camera}`; known: {known}")]
@@ -429,6 +440,7 @@ impl Failure {
             | Self::Device { .. }
             | Self::Overdue { .. }
             | Self::Search { .. }
+            | Self::NoLines { .. }
             | Self::Correction { .. }
             | Self::Interrupted
             | Self::ScanMismatch { .. }

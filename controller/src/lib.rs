@@ -34,6 +34,7 @@ mod bus_watch;
 pub mod camera;
 pub mod config;
 pub mod cycle;
+mod devices;
 pub mod emulated;
 pub mod failure;
 pub mod json;

@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
 use drivers::device::{
-    AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
-    PoseInstrument,
+    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand,
+    PoseInstrument, RotaryAxis,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
@@ -59,21 +59,6 @@ pub(crate) struct Unit<D: ?Sized> {
     pub(crate) device: Box<D>,
 }
 
-macro_rules! as_device {
-    ($($kind:path),*) => {$(
-        impl Unit<dyn $kind> {
-            fn as_device(&mut self) -> UnitMut<'_> {
-                UnitMut {
-                    port: self.port,
-                    device: &mut *self.device,
-                }
-            }
-        }
-    )*};
-}
-
-as_device!(Axis, AnalogInput, DisplacementInstrument, PoseInstrument);
-
 /// What is known about an axis beyond what its drive says.
 #[derive(Default)]
 pub(crate) struct AxisMemory {
@@ -85,6 +70,13 @@ pub(crate) struct AxisMemory {
     pub(crate) datum: Option<(RunPlan, Datum)>,
     /// The direction of the last motion.
     pub(crate) approach: ApproachTracker,
+}
+
+/// What is known about a rotary axis beyond what its drive says.
+#[derive(Default)]
+pub(crate) struct RotaryMemory {
+    /// Zeroed on the index mark since the drive was last powered.
+    pub(crate) zeroed: bool,
 }
 
 /// How alarms are taken.
@@ -107,11 +99,13 @@ pub struct Machine {
     pub(crate) outbox: Outbox,
     pub(crate) port_names: BTreeMap<Port, String>,
     pub(crate) axes: Vec<Unit<dyn Axis>>,
+    pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
     pub(crate) cameras: Vec<Unit<dyn PoseInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
+    pub(crate) rotary_memory: BTreeMap<String, RotaryMemory>,
     pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
@@ -131,6 +125,7 @@ impl Machine {
         let ports = assemble::ports(&config);
         Self {
             axes: assemble::axes(&config, &ports, loaded.patience),
+            rotaries: assemble::rotaries(&config, &ports, loaded.patience),
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
             cameras: camera::cameras(&config, &ports, loaded.patience),
@@ -141,6 +136,7 @@ impl Machine {
                 .keys()
                 .map(|name| (name.clone(), AxisMemory::default()))
                 .collect(),
+            rotary_memory: BTreeMap::new(),
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
@@ -248,39 +244,13 @@ impl Machine {
         Ok(self.axis(axis)?.device.reading())
     }
 
-    /// The newest power state of `axis`, `None` before its drive has said one.
+    /// The newest power state of the (linear or rotary) `axis`, `None` before its drive has
+    /// said one.
     ///
     /// # Errors
     /// When there is no such axis.
     pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
-        Ok(self.axis(axis)?.device.power_state())
-    }
-
-    /// Every device with its name: axes, then analog modules, instruments and cameras.
-    fn devices(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
-        let axes = self.axes.iter().map(|it| (&it.name, &*it.device as _));
-        let analogs = self.analogs.iter().map(|it| (&it.name, &*it.device as _));
-        let instruments = self.instruments.iter();
-        let instruments = instruments.map(|it| (&it.name, &*it.device as _));
-        let cameras = self.cameras.iter().map(|it| (&it.name, &*it.device as _));
-        axes.chain(analogs).chain(instruments).chain(cameras)
-    }
-
-    /// What every device said it is, by its name in the configuration.
-    pub fn identities(&self) -> BTreeMap<String, Identity> {
-        self.devices()
-            .filter_map(|(name, device)| Some((name.clone(), device.identity()?)))
-            .collect()
-    }
-
-    /// Counters of every device: dropped, late, mismatched and the like.
-    pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
-        self.devices()
-            .flat_map(|(name, device)| {
-                let counters = device.counters().into_iter();
-                counters.map(move |(what, count)| (name.clone(), what, count))
-            })
-            .collect()
+        Ok(self.drive(self.drive_index(axis)?).power_state())
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
@@ -295,11 +265,12 @@ impl Machine {
             memory.zeroed = false;
             memory.approach.forget();
         }
+        self.rotary_memory.clear();
         if let Some(platform) = &mut self.platform {
             platform.forget();
         }
         self.set_sync(true)?;
-        let machine_devices = self.axes.len() + self.analogs.len();
+        let machine_devices = self.instrument_device(0);
         let now = self.now();
         for at in 0..machine_devices {
             self.device_mut(at).device.start(now);
@@ -309,11 +280,6 @@ impl Machine {
         }
         self.supervision = Supervision::On;
         Ok(())
-    }
-
-    /// The names of all devices: axes, then analog modules, instruments and cameras.
-    pub fn device_names(&self) -> Vec<String> {
-        self.devices().map(|(name, _)| name.clone()).collect()
     }
 
     /// Starts an instrument, unless it runs already (its datum stands then), and counts its
@@ -345,6 +311,19 @@ impl Machine {
         let at = self.axis_index(axis)?;
         let now = self.now();
         self.axes[at].device.command(now, command.into());
+        self.await_outcome(at, step, limit)
+    }
+
+    /// Gives `command` to drive number `at`, whatever it moves, and waits until it is done.
+    pub(crate) fn control(
+        &mut self,
+        at: usize,
+        command: DriveCommand,
+        step: &'static str,
+        limit: Duration,
+    ) -> Result<(), Failure> {
+        let now = self.now();
+        self.drive_mut(at).control(now, command);
         self.await_outcome(at, step, limit)
     }
 
@@ -408,51 +387,6 @@ impl Machine {
             })
     }
 
-    /// The number of a named instrument among all devices.
-    pub(crate) fn instrument_index(&self, name: &str) -> usize {
-        self.instruments
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
-    }
-
-    /// The number of a named analog module.
-    pub(crate) fn analog_index(&self, name: &str) -> usize {
-        self.analogs
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
-    }
-
-    /// The number, among all devices, of instrument number `at`.
-    pub(crate) fn instrument_device(&self, at: usize) -> usize {
-        self.axes.len() + self.analogs.len() + at
-    }
-
-    pub(crate) fn device_count(&self) -> usize {
-        self.axes.len() + self.analogs.len() + self.instruments.len() + self.cameras.len()
-    }
-
-    pub(crate) fn device_name(&self, at: usize) -> String {
-        self.device_names().swap_remove(at)
-    }
-
-    /// Device number `at`, in the order of [`Machine::device_names`].
-    pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
-        let (axes, analogs) = (self.axes.len(), self.analogs.len());
-        let machines_own = axes + analogs;
-        let instruments = machines_own + self.instruments.len();
-        if at < axes {
-            self.axes[at].as_device()
-        } else if at < machines_own {
-            self.analogs[at - axes].as_device()
-        } else if at < instruments {
-            self.instruments[at - machines_own].as_device()
-        } else {
-            self.cameras[at - instruments].as_device()
-        }
-    }
-
     /// Where `axis` should be sent so that the point arrives at `target`.
     pub(crate) fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
         let config = self.axis_config(axis)?;
@@ -461,12 +395,6 @@ impl Machine {
             Metres::from_mm(config.soft_max_mm),
         ))
     }
-}
-
-/// Any device, with its port.
-pub(crate) struct UnitMut<'a> {
-    pub(crate) port: Port,
-    pub(crate) device: &'a mut dyn Device,
 }
 
 /// The longest a device may take to start: some boot for seconds.

@@ -13,8 +13,8 @@ impl Machine {
     pub fn shut_down(&mut self) -> Result<(), Failure> {
         let mut result = Ok(());
         self.supervision = Supervision::Stopping;
-        for axis in self.axis_names() {
-            result = result.and(self.command(&axis, DriveCommand::Disable, "disable", STOP_LIMIT));
+        for at in 0..self.drive_count() {
+            result = result.and(self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT));
         }
         self.supervision = Supervision::Off;
         result.and(self.set_sync(false))
@@ -47,16 +47,16 @@ impl Machine {
         // Nothing that waited may be sent after the stop.
         self.outbox.clear();
         let now = self.now();
-        for unit in &mut self.axes {
-            unit.device.control(now, DriveCommand::QuickStop);
+        for at in 0..self.drive_count() {
+            self.drive_mut(at).control(now, DriveCommand::QuickStop);
         }
-        for at in 0..self.axes.len() {
+        for at in 0..self.drive_count() {
             // A drive that is gone cannot confirm; the others must still be stopped.
             let stopped = self.await_outcome(at, "quick stop", STOP_LIMIT);
             self.tell_unconfirmed(at, stopped);
         }
-        for (at, axis) in self.axis_names().into_iter().enumerate() {
-            let disabled = self.command(&axis, DriveCommand::Disable, "disable", STOP_LIMIT);
+        for at in 0..self.drive_count() {
+            let disabled = self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT);
             self.tell_unconfirmed(at, disabled);
         }
         for memory in self.memory.values_mut() {

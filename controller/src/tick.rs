@@ -221,8 +221,7 @@ impl Machine {
 
     /// An instrument or a camera that nobody reads may have its beam blocked.
     fn alarm_counts(&self, at: usize) -> bool {
-        let machines_own = self.axes.len() + self.analogs.len();
-        at < machines_own || self.instrument_in_use == Some(self.device_name(at))
+        at < self.instrument_device(0) || self.instrument_in_use == Some(self.device_name(at))
     }
 
     /// A drive that was reset has lost its origin, whoever is listening.
@@ -233,11 +232,15 @@ impl Machine {
                 | Alarm::DuplicateNode { .. }
                 | Alarm::AmplifierRestarted { .. }
         );
-        if !lost || at >= self.axes.len() {
+        if !lost || at >= self.drive_count() {
             return;
         }
-        let name = self.axes[at].name.clone();
-        self.remember(&name).zeroed = false;
+        let name = self.device_name(at);
+        if at < self.axes.len() {
+            self.remember(&name).zeroed = false;
+        } else {
+            self.rotary_memory.remove(&name);
+        }
     }
 
     fn port_name(&self, port: Port) -> String {

@@ -344,6 +344,13 @@ impl MachineConfig {
             positive("field_mm", self.plant.camera.field_mm)?;
         }
         let plant = &self.plant;
+        if let Some(table) = &plant.table {
+            for (key, seen) in table.positive_numbers() {
+                positive(key, seen)?;
+            }
+            // A machine is one thing or the other.
+            positive("platform and table", f64::from(plant.platform.is_none()))?;
+        }
         self.nodes
             .iter()
             .try_for_each(|node| node.device.check(plant))
@@ -386,6 +393,20 @@ fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
 impl DeviceConfig {
     fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
         match self {
+            Self::Cia402Drive(Cia402DriveConfig {
+                rotary: Some(rotary),
+                ..
+            }) => {
+                let turn = plant.table.as_ref().map(|it| it.encoder.counts_per_turn);
+                if turn == Some(rotary.counts_per_turn) {
+                    return Ok(());
+                }
+                Err(ConfigError::Value {
+                    key: "counts_per_turn",
+                    seen: rotary.counts_per_turn.into(),
+                    expected: "the plant's table's counts_per_turn",
+                })
+            }
             Self::Cia402Drive(config) if config.encoder_resolution_nm != plant.resolution_nm() => {
                 Err(ConfigError::Value {
                     key: "encoder_resolution_nm",

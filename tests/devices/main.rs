@@ -4,4 +4,5 @@ mod analog;
 mod camera;
 mod drive;
 mod interferometer;
+mod rotary;
 mod screw;

@@ -2,7 +2,9 @@
 
 use core::time::Duration;
 
-use drivers::device::{Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError};
+use drivers::device::{
+    Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, LatchCommand, PositionLatch,
+};
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Payload, Port, Transport};
 use drivers::wire::canopen::NodeId;
@@ -170,6 +172,19 @@ impl<D: Device> Desk<D> {
         D: Axis<Q>,
     {
         self.begin(command);
+        self.outcome()
+    }
+
+    /// Tells the drive's latch something and waits for its end.
+    ///
+    /// # Errors
+    /// What the device says.
+    pub fn latch<Q: Coordinate>(&mut self, command: LatchCommand<Q>) -> Result<(), DeviceError>
+    where
+        D: PositionLatch<Q>,
+    {
+        let now = self.now();
+        self.device.latch(now, command);
         self.outcome()
     }
 

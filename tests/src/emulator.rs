@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{LINEAR, MACHINE, Rig, Shipped, UVW, shipped_config};
+use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, shipped_config};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -46,6 +46,11 @@ impl Setup {
             machine: Vec::new(),
             emulated: Vec::new(),
         }
+    }
+
+    /// The shipped rotary table with the noise and errors of `seed`.
+    pub const fn rotary(seed: u64) -> Self {
+        Self::of(ROTARY, seed)
     }
 
     /// On another SocketCAN interface than the usual one.

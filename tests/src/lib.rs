@@ -15,7 +15,8 @@ pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use interface::{Interface, run};
 pub use rig::{
-    Bench, EMULATED, LINEAR, MACHINE, Rig, Shipped, UVW, machine_config, rigs, shipped_config,
+    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, machine_config, rigs,
+    shipped_config,
 };
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};

@@ -34,6 +34,12 @@ pub const UVW: Shipped = Shipped {
     emulated: include_str!("../../configs/emulated/uvw.toml"),
 };
 
+/// The rotary table.
+pub const ROTARY: Shipped = Shipped {
+    machine: include_str!("../../configs/machines/rotary.toml"),
+    emulated: include_str!("../../configs/emulated/rotary.toml"),
+};
+
 /// Which bus a test runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {
@@ -126,6 +132,29 @@ impl Bench {
         emulated: impl Fn(String) -> String,
     ) -> Self {
         Self::wrapped(seed, machine, emulated, |transport| Box::new(transport))
+    }
+
+    /// The shipped rotary table with changes to its configuration and to its emulation.
+    ///
+    /// # Panics
+    /// When a changed text is none any more.
+    pub fn rotary(
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+    ) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let loaded = shipped_config(&ROTARY, folder.path(), machine);
+        let text = emulated(ROTARY.emulated.to_owned());
+        let emulated =
+            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
+        Self {
+            machine: Machine::new(&loaded, Box::new(emulated.transport())),
+            emulated,
+            store: Store::new(folder.path(), &loaded.config.machine.name),
+            loaded,
+            folder,
+        }
     }
 
     /// The same, with the transport wrapped (recorded, say).

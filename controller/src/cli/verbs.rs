@@ -24,7 +24,7 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
         path.display(),
         machine.name,
         machine.stage_serial,
-        loaded.config.axis.len(),
+        loaded.config.axis.len() + loaded.config.rotary.len(),
         loaded.config.analog.len(),
         loaded.config.instrument.len(),
         loaded.config.camera.len(),

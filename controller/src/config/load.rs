@@ -81,6 +81,18 @@ fn calibration_hash(config: &MachineConfig) -> String {
         })
         .collect();
     let mut text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    for (name, rotary) in &config.rotary {
+        let zero = rotary.zero.as_ref();
+        text.push_str(&format!(
+            "\nrotary {name} {:?} {} {} {} {:?} {:?}",
+            rotary.device,
+            rotary.node_id,
+            rotary.counts_per_turn,
+            rotary.reverse,
+            rotary.identity,
+            zero.map(|zero| (zero.index_direction, zero.index_deg)),
+        ));
+    }
     for it in config.platform.iter().flat_map(|it| &it.actuator) {
         // Points and directions turn what the camera sees into strokes; the index is their zero.
         let place = (it.point_mm, it.direction, it.lead_mm, it.index_mm);
@@ -176,6 +188,7 @@ mod tests {
     use super::*;
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
 
     #[track_caller]
     fn findings(text: &str) -> Vec<Diagnostic> {
@@ -283,6 +296,62 @@ mod tests {
             let found = findings(&text);
             assert!(found.iter().any(|it| it.key == key), "{to}: {found:?}");
         }
+    }
+
+    #[test]
+    fn the_shipped_rotary_table_is_sound_and_what_it_cannot_be_is_refused() {
+        parse(ROTARY, "rotary.toml").unwrap_or_else(|error| panic!("{error}"));
+        for (from, to, key) in [
+            (
+                "speed_deg_per_s = 30.0",
+                "speed_deg_per_s = 300.0",
+                "rotary.c.speed_deg_per_s",
+            ),
+            (
+                "counts_per_turn = 129600000",
+                "counts_per_turn = 4294967295",
+                "rotary.c.counts_per_turn",
+            ),
+            (
+                "quick_stop_deceleration_deg_per_s2 = 720.0",
+                "quick_stop_deceleration_deg_per_s2 = 7200.0",
+                "rotary.c.quick_stop_deceleration_deg_per_s2",
+            ),
+            (
+                "index_deg = 0.0",
+                "index_deg = nan",
+                "rotary.c.zero.index_deg",
+            ),
+            (
+                "move_timeout_s = 60.0",
+                "move_timeout_s = nan",
+                "rotary.c.move_timeout_s",
+            ),
+            ("node_id = 1\n", "node_id = 127\n", "rotary.c.node_id"),
+            ("bus = \"can0\"", "bus = \"can9\"", "rotary.c.bus"),
+        ] {
+            assert!(ROTARY.contains(from), "{from}");
+            let found = findings(&ROTARY.replace(from, to));
+            assert!(found.iter().any(|it| it.key == key), "{to}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn an_axis_and_a_rotary_axis_have_two_names() {
+        let rotary = ROTARY.find("[rotary.c]").unwrap();
+        let text = format!("{LINEAR}\n{}", &ROTARY[rotary..]).replace("rotary.c", "rotary.x");
+        let found = findings(&text);
+        assert!(found.iter().any(|it| it.key == "rotary.x"), "{found:?}");
+    }
+
+    #[test]
+    fn a_calibration_depends_on_how_a_table_is_counted_and_on_nothing_of_its_speed() {
+        let hash = |text: &str| parse(text, "rotary.toml").unwrap().hash;
+        let usual = hash(ROTARY);
+        let faster = ROTARY.replace("speed_deg_per_s = 30.0", "speed_deg_per_s = 40.0");
+        assert_eq!(usual, hash(&faster));
+        let mirrored = ROTARY.replace("node_id = 1\n", "node_id = 1\nreverse = true\n");
+        assert_ne!(usual, hash(&mirrored));
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod diagnostic;
 mod load;
 mod model;
 mod platform;
+mod rotary;
 mod validate;
 
 pub use camera::{CameraConfig, CameraDevice};
@@ -22,4 +23,7 @@ pub use model::{
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
     PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
+};
+pub use rotary::{
+    DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryZeroConfig,
 };

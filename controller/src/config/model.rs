@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::camera::CameraConfig;
 use super::platform::PlatformConfig;
+use super::rotary::RotaryConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -21,8 +22,12 @@ pub struct MachineConfig {
     /// Serial lines by name.
     #[serde(default)]
     pub serial: BTreeMap<String, SerialLine>,
-    /// Axes by name.
+    /// Linear axes by name.
+    #[serde(default)]
     pub axis: BTreeMap<String, AxisConfig>,
+    /// Rotary axes by name.
+    #[serde(default)]
+    pub rotary: BTreeMap<String, RotaryConfig>,
     /// Analog modules by name.
     #[serde(default)]
     pub analog: BTreeMap<String, AnalogConfig>,

@@ -8,13 +8,17 @@ mod datum;
 mod measure;
 pub mod platform;
 mod scan;
+mod sweep;
 mod travel;
+mod turn;
 mod verify;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
 pub use measure::{MeasureOptions, Measured, RunPlan};
 pub use scan::Found;
+pub use sweep::{Sweep, SweepOptions};
+pub use turn::Way;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;
 

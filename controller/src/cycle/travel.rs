@@ -23,38 +23,33 @@ pub(crate) enum Correction {
 }
 
 impl Machine {
-    /// Switches `axis` on.
+    /// Switches `axis`, linear or rotary, on.
     ///
     /// # Errors
     /// When the drive refuses or does not answer in time.
     pub fn enable(&mut self, axis: &str) -> Result<(), Failure> {
-        self.command(axis, DriveCommand::Enable, "enable", Duration::from_secs(5))
+        let at = self.drive_index(axis)?;
+        self.control(at, DriveCommand::Enable, "enable", Duration::from_secs(5))
     }
 
-    /// Switches `axis` off.
+    /// Switches `axis`, linear or rotary, off.
     ///
     /// # Errors
     /// When the drive refuses or does not answer in time.
     pub fn disable(&mut self, axis: &str) -> Result<(), Failure> {
-        self.command(
-            axis,
-            DriveCommand::Disable,
-            "disable",
-            Duration::from_secs(5),
-        )
+        let at = self.drive_index(axis)?;
+        let limit = Duration::from_secs(5);
+        self.control(at, DriveCommand::Disable, "disable", limit)
     }
 
-    /// Acknowledges a fault of `axis`, once.
+    /// Acknowledges a fault of `axis`, linear or rotary, once.
     ///
     /// # Errors
     /// When the fault does not go: its cause is still there.
     pub fn reset_fault(&mut self, axis: &str) -> Result<(), Failure> {
-        self.command(
-            axis,
-            DriveCommand::ResetFault,
-            "fault reset",
-            Duration::from_secs(5),
-        )
+        let at = self.drive_index(axis)?;
+        let limit = Duration::from_secs(5);
+        self.control(at, DriveCommand::ResetFault, "fault reset", limit)
     }
 
     /// Moves the point of `axis` to `target` (machine coordinates), compensated when a

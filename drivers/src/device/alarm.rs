@@ -73,6 +73,9 @@ pub enum Alarm {
         jump: LengthOrAngle,
         limit: LengthOrAngle,
     },
+    /// The drive latches no more, though it was not told so.
+    #[error("{node}: the touch probe was switched off; does somebody else write 0x60B8?")]
+    LatchDisarmed { node: NodeId },
     /// The interferometer's measurement beam is blocked.
     #[error("interferometer: beam lost; clear and align it, set a new datum")]
     BeamLost,

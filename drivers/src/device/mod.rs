@@ -13,14 +13,18 @@ mod error;
 #[cfg(test)]
 mod fake_node;
 pub mod in_sight;
+mod latch;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;
 
-use units::{Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts};
+use units::{
+    Approach, Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
+};
 
 pub use alarm::{Alarm, AmplifierTrouble};
 pub use error::{DeviceError, DeviceName, Seen};
+pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis};
 pub use shared_line::{LineUse, Urgency};
 
 use crate::transport::Input;
@@ -148,6 +152,16 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         position: Q,
         /// Search speed.
         speed: Q::Speed,
+    },
+    /// Home on the next index pulse of the encoder in a direction (methods 33 and 34); the
+    /// drive's coordinates become `position` there.
+    HomeNextIndex {
+        /// The coordinate of the index mark.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+        /// The direction of the search.
+        approach: Approach,
     },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {

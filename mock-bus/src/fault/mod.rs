@@ -144,6 +144,10 @@ pub enum Fault {
     TargetAbsent,
     /// The cameras' marks are partly covered.
     TargetCovered,
+    /// A line of the table's plate cannot be seen.
+    LineSmudged { line: u32 },
+    /// A scratch beside a line of the table's plate gives a second edge.
+    LineScratched { line: u32 },
     /// The machine shakes under its instruments (standard deviation).
     Vibration { amplitude_um: f64 },
     /// The instrument's temperature, pressure and humidity stand still.

@@ -262,7 +262,7 @@ mod tests {
         }
 
         fn go(&mut self, demand_m: f64) -> Vec<Sample> {
-            self.plant.set_servo(0, Servo::Follow { demand_m });
+            self.plant.set_servo(0, Servo::Follow { demand: demand_m });
             self.run(0.4)
         }
     }

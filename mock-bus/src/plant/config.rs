@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::camera::CameraConfig;
 use super::platform::config::PlatformConfig;
+use super::table::config::TableConfig;
 
 /// The physics of one machine.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -13,6 +14,8 @@ pub struct PlantConfig {
     pub stage: StageConfig,
     /// A platform on screws in place of the stage.
     pub platform: Option<PlatformConfig>,
+    /// A rotary table in place of the stage.
+    pub table: Option<TableConfig>,
     /// The cameras over the platform.
     pub camera: CameraConfig,
     /// The magnets and sensors of the absolute zero.

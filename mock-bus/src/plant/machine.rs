@@ -9,6 +9,7 @@ use super::Servo;
 use super::config::PlantConfig;
 use super::platform::Platform;
 use super::stage::Stage;
+use super::table::Table;
 
 /// One driven direction as its drive is wired to it.
 pub(super) trait Actuator {
@@ -17,12 +18,16 @@ pub(super) trait Actuator {
     /// The encoder's counts since its power came on.
     fn counts(&self, now: Time) -> i64;
     fn counts_per_s(&self, now: Time) -> f64;
-    /// Metres of encoder travel per count.
-    fn resolution_m(&self) -> f64;
+    /// Metres or radians of encoder travel per count.
+    fn resolution(&self) -> f64;
     fn encoder_power(&mut self, on: bool);
     /// The encoder's last index pulse since its power came on; `None` before, and where the
     /// encoder has no index.
     fn index_pulse(&self) -> Option<IndexPulse>;
+    /// The next edge at the drive's fast input by `now`; `None` also where nothing is wired to it.
+    fn probe_edge(&mut self, _now: Time) -> Option<ProbeEdge> {
+        None
+    }
     /// Negative and positive limit switch: true when pressed.
     fn limit_switches(&self) -> (bool, bool);
     /// Holds a limit switch in a state, or (with `None`) leaves it to the mechanics.
@@ -42,6 +47,17 @@ pub struct IndexPulse {
     pub number: u64,
 }
 
+/// An edge at a fast input, with what a drive latches at it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProbeEdge {
+    /// When.
+    pub at: Time,
+    /// From low to high.
+    pub rising: bool,
+    /// The encoder's count at that moment.
+    pub count: i64,
+}
+
 /// The mechanics of one machine.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
@@ -49,13 +65,16 @@ pub(super) enum Machine {
     Stage(Box<Stage>),
     /// A platform on screws.
     Platform(Box<Platform>),
+    /// A rotary table.
+    Table(Box<Table>),
 }
 
 impl Machine {
     pub(super) fn new(config: &PlantConfig, seed: u64) -> Self {
-        match &config.platform {
-            Some(platform) => Self::Platform(Box::new(Platform::new(platform, seed))),
-            None => Self::Stage(Box::new(Stage::new(config.stage.clone(), seed))),
+        match (&config.platform, &config.table) {
+            (Some(platform), _) => Self::Platform(Box::new(Platform::new(platform, seed))),
+            (None, Some(table)) => Self::Table(Box::new(Table::new(table, seed))),
+            (None, None) => Self::Stage(Box::new(Stage::new(config.stage.clone(), seed))),
         }
     }
 
@@ -63,6 +82,7 @@ impl Machine {
         match self {
             Self::Stage(stage) => stage.advance(now),
             Self::Platform(platform) => platform.advance(now),
+            Self::Table(table) => table.advance(now),
         }
     }
 
@@ -70,6 +90,7 @@ impl Machine {
         match self {
             Self::Stage(stage) => (number == 0).then_some(&**stage as &dyn Actuator),
             Self::Platform(platform) => platform.actuator(number),
+            Self::Table(table) => (number == 0).then_some(&**table as &dyn Actuator),
         }
     }
 
@@ -77,6 +98,7 @@ impl Machine {
         match self {
             Self::Stage(stage) => (number == 0).then_some(&mut **stage as &mut dyn Actuator),
             Self::Platform(platform) => platform.actuator_mut(number),
+            Self::Table(table) => (number == 0).then_some(&mut **table as &mut dyn Actuator),
         }
     }
 
@@ -94,6 +116,7 @@ impl Machine {
         match self {
             Self::Stage(stage) => stage.push_a_little(),
             Self::Platform(platform) => platform.power_cycle(),
+            Self::Table(table) => table.push_a_little(),
         }
     }
 
@@ -101,7 +124,7 @@ impl Machine {
     pub(super) const fn stage(&self) -> Option<&Stage> {
         match self {
             Self::Stage(stage) => Some(stage),
-            Self::Platform(_) => None,
+            Self::Platform(_) | Self::Table(_) => None,
         }
     }
 
@@ -109,7 +132,23 @@ impl Machine {
     pub(super) const fn platform(&self) -> Option<&Platform> {
         match self {
             Self::Platform(platform) => Some(platform),
-            Self::Stage(_) => None,
+            Self::Stage(_) | Self::Table(_) => None,
+        }
+    }
+
+    /// The rotary table, where the machine is one.
+    pub(super) const fn table(&self) -> Option<&Table> {
+        match self {
+            Self::Table(table) => Some(table),
+            Self::Stage(_) | Self::Platform(_) => None,
+        }
+    }
+
+    /// The same, to be turned and spoilt.
+    pub(super) const fn table_mut(&mut self) -> Option<&mut Table> {
+        match self {
+            Self::Table(table) => Some(table),
+            Self::Stage(_) | Self::Platform(_) => None,
         }
     }
 }

@@ -10,12 +10,14 @@ pub mod config;
 mod deviation;
 mod encoder;
 mod hall_field;
+mod index_mark;
 mod instrument;
 mod limit_switch;
 mod machine;
 pub mod platform;
 mod servo;
 mod stage;
+pub mod table;
 mod thermal;
 mod truth;
 
@@ -28,8 +30,9 @@ pub use analog::InputFault;
 pub use camera::{Mark, Target};
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes};
-pub use machine::IndexPulse;
+pub use machine::{IndexPulse, ProbeEdge};
 pub use platform::{PlatformTruth, Pose};
+pub use table::TableTruth;
 pub use thermal::Environment;
 pub use truth::Truth;
 
@@ -49,10 +52,11 @@ const ANALOG_INPUTS: usize = 8;
 pub enum Servo {
     /// No torque: the axis coasts to a stop by friction.
     Off,
-    /// The position controller follows this demand (metres of encoder travel since power-on).
+    /// The position controller follows this demand.
     Follow {
-        /// Demanded encoder position in metres since the encoder was powered.
-        demand_m: f64,
+        /// Demanded encoder travel since the encoder was powered, in metres or, of a rotary
+        /// axis, radians.
+        demand: f64,
     },
 }
 
@@ -120,16 +124,23 @@ impl Plant {
         self.read(axis, |actuator| actuator.counts_per_s(self.now))
     }
 
-    /// Metres of encoder travel per count of `axis`; of axis 0 for an axis that is not there.
-    pub fn encoder_resolution_m(&self, axis: usize) -> f64 {
+    /// Metres or radians of encoder travel per count of `axis`; of axis 0 for an axis that is
+    /// not there.
+    pub fn encoder_resolution(&self, axis: usize) -> f64 {
         let actuator = self.machine.actuator(axis);
         let actuator = actuator.or_else(|| self.machine.actuator(0));
-        actuator.map_or(0.0, |actuator| actuator.resolution_m())
+        actuator.map_or(0.0, |actuator| actuator.resolution())
     }
 
     /// The last index pulse of `axis`'s encoder since its power came on.
     pub fn index_pulse(&self, axis: usize) -> Option<IndexPulse> {
         self.read(axis, |actuator| actuator.index_pulse())
+    }
+
+    /// The next edge at the fast input of `axis`'s drive that has come by now.
+    pub fn probe_edge(&mut self, axis: usize) -> Option<ProbeEdge> {
+        let now = self.now;
+        self.machine.actuator_mut(axis)?.probe_edge(now)
     }
 
     /// Negative and positive limit switch of `axis`: true when pressed.
@@ -211,6 +222,27 @@ impl Plant {
     pub fn power_cycle(&mut self, drift: HallDrift) {
         self.hall.drift = drift;
         self.machine.power_cycle();
+    }
+
+    /// Somebody takes up the table's plate, turns it by so many lines and fixes it again.
+    pub fn turn_plate(&mut self, lines: i64) {
+        if let Some(table) = self.machine.table_mut() {
+            table.turn_plate(lines);
+        }
+    }
+
+    /// Covers a line of the table's plate with dirt, or wipes it.
+    pub fn set_line_smudged(&mut self, line: u32, smudged: bool) {
+        if let Some(table) = self.machine.table_mut() {
+            table.set_smudged(line, smudged);
+        }
+    }
+
+    /// Scratches the plate beside a line, which then gives a second edge, or mends it.
+    pub fn set_line_scratched(&mut self, line: u32, scratched: bool) {
+        if let Some(table) = self.machine.table_mut() {
+            table.set_scratched(line, scratched);
+        }
     }
 
     /// Holds `axis` fast, or lets it go.

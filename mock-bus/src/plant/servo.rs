@@ -4,6 +4,8 @@
 //! is constant, so position and speed are smooth and do not depend on how often anybody looks.
 //! A mass at rest costs nothing: the grid is skipped until the demand changes.
 //!
+//! Places are metres of a linear axis and radians of a rotary one; the loop knows no difference.
+//!
 //! Absent: cogging, cable force, amplifier current and its limits beyond one largest
 //! acceleration.
 
@@ -18,15 +20,49 @@ pub(super) const GRID_NS: u64 = 250_000;
 const GRID_S: f64 = GRID_NS as f64 * 1e-9;
 /// A demand older than this is not extrapolated: its sender has stopped.
 const DEMAND_STALE_NS: u64 = 20_000_000;
-/// Nearer and slower than this the loop is taken to have settled.
-const SETTLED_M: f64 = 1e-9;
-const SETTLED_M_PER_S: f64 = 2e-6;
+
+/// Mass, servo and mechanical ends, in metres or radians and seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Dynamics {
+    pub(super) servo_bandwidth_hz: f64,
+    pub(super) servo_damping: f64,
+    /// 1 follows a constant speed without error.
+    pub(super) feed_forward_fraction: f64,
+    pub(super) acceleration_max: f64,
+    pub(super) friction_deceleration: f64,
+    /// Standard deviation of where the settled servo stands.
+    pub(super) rest_error: f64,
+    /// Mechanical ends; `None` for what turns endlessly.
+    pub(super) hard_stops: Option<(f64, f64)>,
+    /// Nearer and slower than this the loop is taken to have settled.
+    pub(super) settled: f64,
+    pub(super) settled_speed: f64,
+}
+
+impl From<MotionConfig> for Dynamics {
+    fn from(config: MotionConfig) -> Self {
+        Self {
+            servo_bandwidth_hz: config.servo_bandwidth_hz,
+            servo_damping: config.servo_damping,
+            feed_forward_fraction: config.feed_forward_fraction,
+            acceleration_max: config.acceleration_max_m_per_s2,
+            friction_deceleration: config.friction_deceleration_m_per_s2,
+            rest_error: config.rest_error_nm * 1e-9,
+            hard_stops: Some((
+                config.hard_stop_min_mm * 1e-3,
+                config.hard_stop_max_mm * 1e-3,
+            )),
+            settled: 1e-9,
+            settled_speed: 2e-6,
+        }
+    }
+}
 
 /// What the drive asks for, and since when.
 #[derive(Clone, Copy, Debug)]
 struct Demand {
     servo: Servo,
-    speed_m_per_s: f64,
+    speed: f64,
     acceleration: f64,
     at: Time,
     period_s: f64,
@@ -35,23 +71,23 @@ struct Demand {
 impl Demand {
     /// Position, speed and acceleration `age_s` after the demand came. The speed of the last
     /// interval is that of its middle.
-    fn ahead(&self, demand_m: f64, age_s: f64) -> (f64, f64, f64) {
+    fn ahead(&self, demand: f64, age_s: f64) -> (f64, f64, f64) {
         let age_s = age_s.min(self.period_s);
-        let at_start = self.speed_m_per_s + self.acceleration * self.period_s / 2.0;
-        let target_m = demand_m + at_start * age_s + self.acceleration * age_s * age_s / 2.0;
+        let at_start = self.speed + self.acceleration * self.period_s / 2.0;
+        let target = demand + at_start * age_s + self.acceleration * age_s * age_s / 2.0;
         let speed = at_start + self.acceleration * age_s;
-        (target_m, speed, self.acceleration)
+        (target, speed, self.acceleration)
     }
 }
 
-/// Mass and servo. Positions are encoder travel, 0 where the Hall zero was when built.
+/// Mass and servo. Positions are encoder travel; their zero is that of the scale as built.
 #[derive(Clone, Debug)]
 pub(super) struct Mass {
-    config: MotionConfig,
+    dynamics: Dynamics,
     natural_rad_per_s: f64,
     demand: Demand,
-    position_m: f64,
-    speed_m_per_s: f64,
+    position: f64,
+    speed: f64,
     acceleration: f64,
     step: u64,
     resting: bool,
@@ -65,19 +101,20 @@ pub(super) type Stroke = (f64, f64);
 
 impl Mass {
     /// `rest_jitter` is where the settled servo's noise comes from.
-    pub(super) fn new(config: MotionConfig, position_m: f64, rest_jitter: Stream) -> Self {
+    pub(super) fn new(dynamics: impl Into<Dynamics>, position: f64, rest_jitter: Stream) -> Self {
+        let dynamics = dynamics.into();
         Self {
-            natural_rad_per_s: core::f64::consts::TAU * config.servo_bandwidth_hz,
-            config,
+            natural_rad_per_s: core::f64::consts::TAU * dynamics.servo_bandwidth_hz,
+            dynamics,
             demand: Demand {
                 servo: Servo::Off,
-                speed_m_per_s: 0.0,
+                speed: 0.0,
                 acceleration: 0.0,
                 at: Time::ZERO,
                 period_s: 0.0,
             },
-            position_m,
-            speed_m_per_s: 0.0,
+            position,
+            speed: 0.0,
             acceleration: 0.0,
             step: 0,
             resting: true,
@@ -92,9 +129,9 @@ impl Mass {
     }
 
     /// Puts the mass elsewhere, as a hand does while the power is off.
-    pub(super) fn push(&mut self, by_m: f64) {
-        self.position_m += by_m;
-        self.speed_m_per_s = 0.0;
+    pub(super) fn push(&mut self, by: f64) {
+        self.position += by;
+        self.speed = 0.0;
         self.wake();
     }
 
@@ -117,7 +154,7 @@ impl Mass {
     pub(super) fn set_servo(&mut self, now: Time, servo: Servo) {
         if servo == self.demand.servo && now > self.demand.at && self.resting {
             self.demand.at = now;
-            self.demand.speed_m_per_s = 0.0;
+            self.demand.speed = 0.0;
             return;
         }
         self.demand = self.next_demand(now, servo);
@@ -131,12 +168,12 @@ impl Mass {
         let age = now.nanos().saturating_sub(old.at.nanos());
         let standing = Demand {
             servo,
-            speed_m_per_s: 0.0,
+            speed: 0.0,
             acceleration: 0.0,
             at: now,
             period_s: 0.0,
         };
-        let (Servo::Follow { demand_m: before }, Servo::Follow { demand_m: after }) =
+        let (Servo::Follow { demand: before }, Servo::Follow { demand: after }) =
             (old.servo, servo)
         else {
             return standing;
@@ -148,10 +185,10 @@ impl Mass {
             return standing;
         }
         let period_s = age as f64 * 1e-9;
-        let speed_m_per_s = (after - before) / period_s;
+        let speed = (after - before) / period_s;
         Demand {
-            speed_m_per_s,
-            acceleration: (speed_m_per_s - old.speed_m_per_s) / period_s,
+            speed,
+            acceleration: (speed - old.speed) / period_s,
             period_s,
             ..standing
         }
@@ -167,35 +204,34 @@ impl Mass {
     }
 
     /// Runs the next grid step if it ends by `now`; returns where it led from and to.
-    /// `offset_m` is where the encoder's count 0 lies on its scale.
-    pub(super) fn step_until(&mut self, now: Time, offset_m: f64) -> Option<Stroke> {
+    /// `offset` is where the encoder's count 0 lies on its scale.
+    pub(super) fn step_until(&mut self, now: Time, offset: f64) -> Option<Stroke> {
         let end = (self.step + 1) * GRID_NS;
         if self.resting || end > now.nanos() {
             return None;
         }
-        let from = self.position_m;
-        self.position_m =
-            from + self.speed_m_per_s * GRID_S + self.acceleration * GRID_S * GRID_S / 2.0;
-        self.speed_m_per_s += self.acceleration * GRID_S;
+        let from = self.position;
+        self.position = from + self.speed * GRID_S + self.acceleration * GRID_S * GRID_S / 2.0;
+        self.speed += self.acceleration * GRID_S;
         self.step += 1;
         self.stop_at_the_ends();
-        self.control(Time(end), offset_m);
-        Some((from, self.position_m))
+        self.control(Time(end), offset);
+        Some((from, self.position))
     }
 
     fn stop_at_the_ends(&mut self) {
-        let inside = self.position_m.clamp(
-            self.config.hard_stop_min_mm * 1e-3,
-            self.config.hard_stop_max_mm * 1e-3,
-        );
-        if inside != self.position_m || self.blocked {
-            self.position_m = inside;
-            self.speed_m_per_s = 0.0;
+        let inside = match self.dynamics.hard_stops {
+            Some((low, high)) => self.position.clamp(low, high),
+            None => self.position,
+        };
+        if inside != self.position || self.blocked {
+            self.position = inside;
+            self.speed = 0.0;
         }
     }
 
     /// Chooses the acceleration of the step that begins `now`.
-    fn control(&mut self, now: Time, offset_m: f64) {
+    fn control(&mut self, now: Time, offset: f64) {
         let servo = if self.torque_off {
             Servo::Off
         } else {
@@ -203,7 +239,7 @@ impl Mass {
         };
         match servo {
             Servo::Off => self.coast(),
-            Servo::Follow { demand_m } => self.follow(now, demand_m + offset_m),
+            Servo::Follow { demand } => self.follow(now, demand + offset),
         }
         if self.blocked {
             self.acceleration = 0.0;
@@ -211,45 +247,45 @@ impl Mass {
     }
 
     fn coast(&mut self) {
-        let friction = self.config.friction_deceleration_m_per_s2;
+        let friction = self.dynamics.friction_deceleration;
         let lost = friction * GRID_S;
-        if self.speed_m_per_s.abs() <= lost {
-            self.speed_m_per_s = 0.0;
+        if self.speed.abs() <= lost {
+            self.speed = 0.0;
             self.acceleration = 0.0;
             self.resting = true;
         } else {
-            self.acceleration = -friction * self.speed_m_per_s.signum();
+            self.acceleration = -friction * self.speed.signum();
         }
     }
 
-    fn follow(&mut self, now: Time, demand_m: f64) {
+    fn follow(&mut self, now: Time, demand: f64) {
         let age_s = (now - self.demand.at).as_secs_f64();
         // Between two demands the servo interpolates on; a silent sender's demand stands still.
         let live = age_s <= 1.5 * self.demand.period_s;
-        let (target_m, speed, acceleration) = if live {
-            self.demand.ahead(demand_m, age_s)
+        let (target, speed, acceleration) = if live {
+            self.demand.ahead(demand, age_s)
         } else {
-            (demand_m, 0.0, 0.0)
+            (demand, 0.0, 0.0)
         };
-        let error_m = target_m - self.position_m;
-        let slow = self.speed_m_per_s.abs() < SETTLED_M_PER_S;
-        if speed == 0.0 && slow && error_m.abs() < SETTLED_M {
-            return self.settle(target_m);
+        let error = target - self.position;
+        let slow = self.speed.abs() < self.dynamics.settled_speed;
+        if speed == 0.0 && slow && error.abs() < self.dynamics.settled {
+            return self.settle(target);
         }
-        let fed = self.config.feed_forward_fraction;
+        let fed = self.dynamics.feed_forward_fraction;
         let w = self.natural_rad_per_s;
-        let wanted = w * w * error_m
-            + 2.0 * self.config.servo_damping * w * (fed * speed - self.speed_m_per_s)
+        let wanted = w * w * error
+            + 2.0 * self.dynamics.servo_damping * w * (fed * speed - self.speed)
             + fed * acceleration;
-        let limit = self.config.acceleration_max_m_per_s2;
+        let limit = self.dynamics.acceleration_max;
         self.acceleration = wanted.clamp(-limit, limit);
     }
 
     /// At rest the integrator leaves the mass somewhere within about a count.
-    fn settle(&mut self, target_m: f64) {
-        let jitter_m = self.config.rest_error_nm * 1e-9 * self.rest_jitter.gaussian();
-        self.position_m = target_m + jitter_m;
-        self.speed_m_per_s = 0.0;
+    fn settle(&mut self, target: f64) {
+        let jitter = self.dynamics.rest_error * self.rest_jitter.gaussian();
+        self.position = target + jitter;
+        self.speed = 0.0;
         self.acceleration = 0.0;
         self.resting = true;
     }
@@ -257,10 +293,10 @@ impl Mass {
     /// Where the mass is `now`, at most one grid step after the last one.
     pub(super) fn position_at(&self, now: Time) -> f64 {
         if self.resting {
-            return self.position_m;
+            return self.position;
         }
         let s = (now.nanos().saturating_sub(self.step * GRID_NS)) as f64 * 1e-9;
-        self.position_m + self.speed_m_per_s * s + self.acceleration * s * s / 2.0
+        self.position + self.speed * s + self.acceleration * s * s / 2.0
     }
 
     pub(super) fn speed_at(&self, now: Time) -> f64 {
@@ -268,6 +304,6 @@ impl Mass {
             return 0.0;
         }
         let s = (now.nanos().saturating_sub(self.step * GRID_NS)) as f64 * 1e-9;
-        self.speed_m_per_s + self.acceleration * s
+        self.speed + self.acceleration * s
     }
 }

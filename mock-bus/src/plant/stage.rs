@@ -38,7 +38,7 @@ impl Stage {
             field: Field::new(&config.deviation, seed),
             path: Path::new(&config.deviation, seed),
             switches: LimitSwitch::pair(&config.limits, seed, ""),
-            encoder: Encoder::new(config.encoder.resolution_nm, start_m),
+            encoder: Encoder::new(config.encoder.resolution_nm * 1e-9, start_m),
             shift,
             config,
         };
@@ -47,7 +47,7 @@ impl Stage {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero_m();
+        let offset_m = self.encoder.count_zero();
         while let Some((from, to)) = self.mass.step_until(now, offset_m) {
             if to != from {
                 self.path.travel(to - from);
@@ -82,7 +82,7 @@ impl Stage {
 
     /// Scale position of the encoder's present zero count.
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero_m()
+        self.encoder.count_zero()
     }
 
     pub(super) fn scale_position_m(&self, now: Time) -> f64 {
@@ -123,11 +123,11 @@ impl Actuator for Stage {
     }
 
     fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution_m()
+        self.mass.speed_at(now) / self.encoder.resolution()
     }
 
-    fn resolution_m(&self) -> f64 {
-        self.encoder.resolution_m()
+    fn resolution(&self) -> f64 {
+        self.encoder.resolution()
     }
 
     fn encoder_power(&mut self, on: bool) {

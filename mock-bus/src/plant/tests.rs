@@ -7,7 +7,7 @@ fn plant(seed: u64) -> Plant {
 
 fn demand_at(plant: &mut Plant, now: Time, demand_m: f64) {
     plant.advance(now);
-    plant.set_servo(0, Servo::Follow { demand_m });
+    plant.set_servo(0, Servo::Follow { demand: demand_m });
 }
 
 /// A trapezoid of 100 mm/s and 1 m/s², demanded every 1 ms, then 100 ms of rest.

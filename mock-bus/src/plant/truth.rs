@@ -3,7 +3,7 @@
 use units::{Approach, Celsius, Metres};
 
 use super::stage::Stage;
-use super::{Environment, Plant, PlatformTruth};
+use super::{Environment, Plant, PlatformTruth, TableTruth};
 
 /// A look at the truth behind all sensors.
 ///
@@ -58,6 +58,13 @@ impl<'a> Truth<'a> {
     pub fn platform(&self) -> Option<PlatformTruth<'a>> {
         let platform = self.plant.machine.platform()?;
         Some(PlatformTruth::new(platform, self.plant.now))
+    }
+
+    /// The rotary table, where the machine is one.
+    pub fn table(&self) -> Option<TableTruth<'a>> {
+        let plant: &'a Plant = self.plant;
+        let table = plant.machine.table()?;
+        Some(TableTruth::new(table, plant.now))
     }
 
     fn stage(&self) -> &Stage {

@@ -242,6 +242,14 @@ impl Running {
         self.with(move |machine| machine.power_cycle(drift))
     }
 
+    /// Turns the table's plate by so many lines; see [`Simulation::turn_plate`].
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn turn_plate(&self, lines: i64) -> Result<(), RunError> {
+        self.with(move |machine| machine.turn_plate(lines))
+    }
+
     /// Whether the machine has come to an end by itself; [`Running::stop`] says why.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)

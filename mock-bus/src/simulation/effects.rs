@@ -71,6 +71,8 @@ impl Simulation {
             Fault::TargetCovered => {
                 plant.set_target(if on { Target::Covered } else { Target::Good });
             }
+            Fault::LineSmudged { line } => plant.set_line_smudged(line, on),
+            Fault::LineScratched { line } => plant.set_line_scratched(line, on),
             Fault::Vibration { amplitude_um } => {
                 plant.set_vibration(Metres::from_um(if on { amplitude_um } else { 0.0 }));
             }

@@ -277,6 +277,12 @@ impl Simulation {
         self.mains_back = self.now + self.config.power_off();
     }
 
+    /// Somebody takes up the table's plate, turns it by so many lines against the table and
+    /// fixes it again, a little off as ever. Nothing happens on a machine without one.
+    pub fn turn_plate(&mut self, lines: i64) {
+        self.plant.turn_plate(lines);
+    }
+
     /// The device called `name`, when it is a `T`: for the faults that only it knows. It is
     /// advanced at the next step.
     pub fn node_mut<T: Node>(&mut self, name: &str) -> Option<&mut T> {

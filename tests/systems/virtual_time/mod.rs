@@ -5,4 +5,5 @@ mod linear;
 mod linear_zero;
 mod platform;
 mod repeatable;
+mod rotary_table;
 mod serial_zero;

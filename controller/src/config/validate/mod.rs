@@ -4,6 +4,7 @@ mod camera;
 mod cycle;
 mod judge;
 mod platform;
+mod rotary;
 
 use std::collections::BTreeMap;
 
@@ -11,6 +12,7 @@ use self::camera::check_cameras;
 use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
 use self::judge::Judge;
+use self::rotary::check_rotaries;
 use drivers::protocol::bus_load::BusLoadError;
 
 use super::model::{
@@ -45,7 +47,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
     }
     for (name, axis) in &config.axis {
-        check_axis_name(&mut findings, name);
+        check_axis_name(&mut findings, "axis", name);
         check_axis(
             &mut Judge::at(format!("axis.{name}"), &mut findings),
             config,
@@ -53,6 +55,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
         check_cycle(&mut findings, config, name, axis);
     }
+    check_rotaries(config, &mut findings);
     for (name, analog) in &config.analog {
         check_analog(
             &mut Judge::at(format!("analog.{name}"), &mut findings),
@@ -94,17 +97,21 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
             "give the serial number on the stage's plate",
         );
     }
-    if config.axis.is_empty() {
-        judge.say("", "the machine has no axis", "add an [axis.NAME] section");
+    if config.axis.is_empty() && config.rotary.is_empty() {
+        judge.say(
+            "",
+            "the machine has no axis",
+            "add an [axis.NAME] or a [rotary.NAME] section",
+        );
     }
 }
 
 /// Axes name files, and stand in words of the command line (`x=1mm`).
-fn check_axis_name(findings: &mut Vec<Finding>, name: &str) {
+fn check_axis_name(findings: &mut Vec<Finding>, section: &str, name: &str) {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     if name.is_empty() || !name.chars().all(plain) {
         findings.push(Finding {
-            key: format!("axis.{name}"),
+            key: format!("{section}.{name}"),
             cause: format!("`{name}` cannot name an axis"),
             help: "use letters, digits and _".into(),
         });
@@ -384,11 +391,15 @@ fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
         .axis
         .iter()
         .map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
+    let rotaries = config
+        .rotary
+        .iter()
+        .map(|(name, it)| (&*it.bus, it.node_id, format!("rotary.{name}")));
     let analogs = config
         .analog
         .iter()
         .filter_map(|(name, it)| Some((it.bus.as_deref()?, it.node_id?, format!("analog.{name}"))));
-    for (bus, node, owner) in axes.chain(analogs) {
+    for (bus, node, owner) in axes.chain(rotaries).chain(analogs) {
         let key = format!("{owner}.node_id");
         if let Some(other) = taken.insert((bus, node), key.clone()) {
             findings.push(Finding {

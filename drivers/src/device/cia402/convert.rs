@@ -46,6 +46,26 @@ pub(super) fn counts_i32<Q: Coordinate>(
     }
 }
 
+/// A position of an axis that may have turned any number of times.
+pub(super) fn position_counts<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
+    object: Object,
+    what: &'static str,
+    position: Q,
+) -> Result<i64, DeviceError> {
+    if settings.turn.is_none() {
+        return counts_i32(settings, object, what, position).map(i64::from);
+    }
+    // Beyond this a float no longer tells one count from the next.
+    const EXACT: f64 = (1_u64 << 52) as f64;
+    let limit = settings.scale.resolution().abs() * EXACT;
+    if position.is_finite() && position.abs() <= limit {
+        return Ok(settings.scale.to_counts(position).0);
+    }
+    let range = (position.value(), limit.value());
+    Err(out_of_range(settings, object, what, range, Q::UNIT))
+}
+
 /// A positive number of position units (per second, per second squared), at least 1.
 fn positive<Q: Coordinate>(
     settings: &Cia402Settings<Q>,

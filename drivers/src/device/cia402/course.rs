@@ -22,7 +22,11 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let target = match &self.activity {
             Activity::Move(moving) => Some(moving.target()),
             Activity::Homing(_) => None,
-            Activity::Idle | Activity::Starting | Activity::Power(_) | Activity::Halt(_) => {
+            Activity::Idle
+            | Activity::Starting
+            | Activity::Power(_)
+            | Activity::Halt(_)
+            | Activity::Latch(_) => {
                 self.course = None;
                 return;
             }

@@ -1,9 +1,11 @@
-//! Homing (CiA 402, 11): parameters, mode 6, start, status by mask, mode 1 again.
+//! Homing (CiA 402, 11; methods 17, 18, 33, 34 and 37): parameters, mode 6, start, status by
+//! mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Coordinate, Time};
+use units::{Approach, Coordinate, Time};
 
-use super::convert::counts_i32;
+use super::convert::{counts_i32, position_counts};
+use super::modulo::apart;
 use super::settings::HomeOffset;
 use super::start::{HOME_OFFSET, MODE, homing_steps};
 use super::{Activity, Cia402Drive};
@@ -35,7 +37,7 @@ enum Phase {
 pub(super) struct Homing {
     phase: Phase,
     /// The coordinate at home, in counts.
-    position: i32,
+    position: i64,
     /// Homed where it stands: the reading must become `position`.
     here: bool,
     since: Time,
@@ -57,25 +59,32 @@ pub(super) enum HomingPlace<S> {
     NegativeLimit(S),
     /// At the first index pulse off that switch.
     Index(S),
+    /// At the next index pulse in this direction.
+    NextIndex(S, Approach),
 }
 
 impl<S: Copy> HomingPlace<S> {
     /// 0x6098. The negative end of the axis is the drive's positive one when the drive counts
     /// against the axis.
     pub(super) const fn method(&self, reversed: bool) -> i8 {
+        use Approach::{Forward, Reverse};
         match (self, reversed) {
             (Self::Here, _) => 37,
             (Self::NegativeLimit(_), false) => 17,
             (Self::NegativeLimit(_), true) => 18,
             (Self::Index(_), false) => 1,
             (Self::Index(_), true) => 2,
+            (Self::NextIndex(_, Reverse), false) | (Self::NextIndex(_, Forward), true) => 33,
+            (Self::NextIndex(_, Forward), false) | (Self::NextIndex(_, Reverse), true) => 34,
         }
     }
 
     const fn speed(&self) -> Option<S> {
         match self {
             Self::Here => None,
-            Self::NegativeLimit(speed) | Self::Index(speed) => Some(*speed),
+            Self::NegativeLimit(speed) | Self::Index(speed) | Self::NextIndex(speed, _) => {
+                Some(*speed)
+            }
         }
     }
 }
@@ -88,17 +97,14 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return;
         }
         let method = place.method(self.settings.scale.resolution() < Q::ZERO);
-        let plan =
-            counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(|counts| {
-                let offset = match self.settings.home_offset {
-                    HomeOffset::IsPositionAtHome => counts,
-                    HomeOffset::IsZeroFromHome => -counts,
-                };
-                Ok((
-                    counts,
-                    homing_steps(&self.settings, method, offset, search)?,
-                ))
-            });
+        let plan = self.home_counts(position).and_then(|(counts, shown)| {
+            let offset = match self.settings.home_offset {
+                HomeOffset::IsPositionAtHome => shown,
+                HomeOffset::IsZeroFromHome => -shown,
+            };
+            let steps = homing_steps(&self.settings, method, offset, search)?;
+            Ok((counts, steps))
+        });
         match plan {
             Err(error) => self.finish(Err(error)),
             Ok((position, steps)) => {
@@ -122,6 +128,19 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.pump(now);
             }
         }
+    }
+
+    /// The coordinate at home in counts, and as the drive will show it.
+    fn home_counts(&self, position: Q) -> Result<(i64, i32), DeviceError> {
+        const WHAT: &str = "home position";
+        let settings = &self.settings;
+        let Some(turn) = settings.wraps_at() else {
+            let counts = counts_i32(settings, HOME_OFFSET, WHAT, position)?;
+            return Ok((i64::from(counts), counts));
+        };
+        let counts = position_counts(settings, HOME_OFFSET, WHAT, position)?;
+        let shown = i32::try_from(counts.rem_euclid(turn)).expect("a turn fits 32 bits");
+        Ok((counts, shown))
     }
 
     fn enter_homing(&mut self, now: Time, phase: Phase, patience: Option<Duration>) {
@@ -230,23 +249,28 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             Phase::AwaitingPosition => {
-                let wanted = i64::from(homing.position);
-                let away = (sample.position.0 - wanted).abs();
-                let mirrored = (sample.position.0 + wanted).abs();
-                let believed = if homing.here {
-                    away <= self.settings.tolerance_counts()
-                } else {
-                    // A search ends somewhere beside the switch, but not at minus its place:
-                    // there 0x607C has the other meaning, and the next move would go through
-                    // the switch.
-                    away < mirrored || wanted == 0
-                };
-                if believed {
-                    self.target = homing.position;
+                let (wanted, here) = (homing.position, homing.here);
+                if self.is_new_position(sample.position.0, wanted, here) {
+                    self.image.count_from(wanted);
+                    self.target = self.on_the_wire(wanted).unwrap_or(self.target);
                     self.homed = true;
                     self.finish(Ok(()));
                 }
             }
+        }
+    }
+
+    /// Whether the position after a homing to `wanted` is believed.
+    fn is_new_position(&self, position: i64, wanted: i64, here: bool) -> bool {
+        let modulo = self.settings.modulo();
+        let away = apart(modulo, position, wanted).abs();
+        let mirrored = apart(modulo, position, -wanted).abs();
+        if here {
+            away <= self.settings.tolerance_counts()
+        } else {
+            // A search ends somewhere beside the switch, but not at minus its place: there
+            // 0x607C has the other meaning, and the next move would go through the switch.
+            away < mirrored || apart(modulo, wanted, -wanted) == 0
         }
     }
 

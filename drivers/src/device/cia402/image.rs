@@ -3,6 +3,7 @@
 use core::time::Duration;
 use units::{Counts, Time};
 
+use super::modulo::Modulo;
 use super::start::{MODE_DISPLAY, POSITION_ACTUAL, STATUSWORD};
 use crate::wire::canopen::pdo::extract;
 use crate::wire::cia402::{OperationMode, PowerState, Statusword};
@@ -18,6 +19,9 @@ const STANDING_SAMPLES: u8 = 3;
 pub(super) struct Sample {
     pub(super) at: Time,
     pub(super) status: Statusword,
+    /// As the drive shows it; it may wrap.
+    pub(super) shown: i32,
+    /// The same, counting on.
     pub(super) position: Counts,
     pub(super) mode: OperationMode,
 }
@@ -28,12 +32,14 @@ impl Sample {
         let position_at = usize::from(status_bits);
         let mode_at = position_at + usize::from(POSITION_ACTUAL.bits);
         let status = extract(payload, 0, status_bits)? as u16;
-        let position = extract(payload, position_at, POSITION_ACTUAL.bits)? as u32;
+        let shown = extract(payload, position_at, POSITION_ACTUAL.bits)? as u32;
+        let shown = shown.cast_signed();
         let mode = extract(payload, mode_at, MODE_DISPLAY.bits)? as u8;
         Some(Self {
             at,
             status: Statusword::from_bits_retain(status),
-            position: Counts(i64::from(position.cast_signed())),
+            shown,
+            position: Counts(i64::from(shown)),
             mode: OperationMode::from_raw(mode.cast_signed()),
         })
     }
@@ -60,6 +66,7 @@ pub(super) enum Judgement {
 pub(super) struct Image {
     sample: Option<Sample>,
     following_error: Option<Counts>,
+    modulo: Option<Modulo>,
     speed_max: f64,
     margin: i64,
     tolerance: i64,
@@ -78,6 +85,7 @@ impl Image {
     /// `speed_max` in counts per second, `margin` and `tolerance` in counts; samples may lie
     /// `stall_max` further apart than their arrivals say.
     pub(super) const fn new(
+        modulo: Option<Modulo>,
         speed_max: f64,
         margin: i64,
         tolerance: i64,
@@ -87,6 +95,7 @@ impl Image {
         Self {
             sample: None,
             following_error: None,
+            modulo,
             speed_max,
             margin,
             tolerance,
@@ -146,7 +155,32 @@ impl Image {
         }
     }
 
-    pub(super) fn take(&mut self, sample: Sample) -> Judgement {
+    /// How far the position that counts on is from the one that the drive shows.
+    pub(super) fn wrapped_away(&self) -> i64 {
+        self.sample
+            .as_ref()
+            .map_or(0, |sample| sample.position.0 - i64::from(sample.shown))
+    }
+
+    /// What the drive shows as `shown`, near where the axis is.
+    pub(super) fn counting_on(&self, shown: i32) -> Counts {
+        let shown = i64::from(shown);
+        Counts(match (self.modulo, &self.sample) {
+            (Some(modulo), Some(near)) => modulo.nearest(shown, near.position.0),
+            (Some(_) | None, _) => shown,
+        })
+    }
+
+    /// From now on the axis is counted from near `position`, the turns that it shows or not.
+    pub(super) fn count_from(&mut self, position: i64) {
+        if let (Some(modulo), Some(sample)) = (self.modulo, &mut self.sample) {
+            sample.position = Counts(modulo.nearest(i64::from(sample.shown), position));
+            self.standing = 0;
+        }
+    }
+
+    pub(super) fn take(&mut self, mut sample: Sample) -> Judgement {
+        sample.position = self.counting_on(sample.shown);
         let judgement = self.judge(&sample);
         match judgement {
             Judgement::Doubted => {

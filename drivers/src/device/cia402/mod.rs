@@ -1,10 +1,12 @@
 //! A servo drive by CiA 402 (IEC 61800-7-201) on CANopen.
 //!
-//! Start, power, profile position, homing, halt, quick stop and supervision of one axis.
+//! Start, power, profile position, homing, halt, quick stop and supervision of one axis, linear
+//! or turning endlessly, and its touch probe.
 //!
 //! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
-//! error, both at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
-//! taken over at once (or, in a group that starts together, at the next SYNC): no adapter that re-orders frames can part a target from the edge that
+//! error, TPDO 3 (if wanted) the touch probe, all at every SYNC. RPDO 1 carries controlword **and**
+//! target position in one frame, taken over at once (or, in a group that starts together, at the
+//! next SYNC): no adapter that re-orders frames can part a target from the edge that
 //! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
 //! they are written by SDO, read back, before the move that needs them.
 //!
@@ -12,12 +14,15 @@
 //! and a controlword that seems to be without effect is sent again. All levels, no edge but the
 //! fault reset's: a repetition is harmless.
 //!
-//! Absent: cyclic synchronous modes, interpolated position, touch probe, torque.
+//! Absent: cyclic synchronous modes, interpolated position, the second touch probe, torque.
 
+mod commands;
 mod convert;
 mod course;
 mod homing;
 mod image;
+mod latch;
+mod modulo;
 mod motion;
 mod power;
 mod settings;
@@ -25,27 +30,30 @@ mod start;
 mod supervision;
 
 #[cfg(test)]
+mod rotary_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
 
 use units::{Coordinate, Metres, Quantity, Time};
 
-pub use settings::{Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes};
+pub use settings::{
+    Cia402Settings, Cia402Timeouts, Edge, HomeOffset, LatchSettings, OptionCodes, PositionRange,
+    Turn,
+};
 
 use super::canopen_node::{CanopenNode, NodeEvent};
-use super::{
-    Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DriveCommand, Identity, Seen,
-    ServoDrive,
-};
+use super::{Alarm, Device, DeviceError, Identity, Seen};
 use crate::protocol::script::Script;
 use crate::transport::Input;
 use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
-use homing::{Homing, HomingPlace};
+use homing::Homing;
 use image::{Image, Sample};
+use latch::{LatchChange, Probe};
 use motion::{Halt, Move};
 use power::Power;
 
@@ -61,6 +69,7 @@ enum Activity {
     Move(Move),
     Halt(Halt),
     Homing(Homing),
+    Latch(LatchChange),
 }
 
 impl Activity {
@@ -72,6 +81,7 @@ impl Activity {
             Self::Move(_) => "the move",
             Self::Halt(_) => "the halt",
             Self::Homing(_) => "homing",
+            Self::Latch(_) => "setting the touch probe",
         }
     }
 }
@@ -94,7 +104,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     /// Velocity and acceleration that the drive confirmed.
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
-    reached: Option<i32>,
+    reached: Option<i64>,
     /// A move that only has to be started.
     prepared: Option<Move>,
     started_at: Option<Time>,
@@ -105,6 +115,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     kept: Option<PowerState>,
     /// Where the motion under way began.
     course: Option<course::Course>,
+    probe: Probe,
     /// Alarms that were told and whose cause lasts.
     told_state: bool,
     told_following: bool,
@@ -120,6 +131,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     pub fn new(settings: Cia402Settings<Q>) -> Self {
         let counts = |si: f64| si / settings.scale.resolution().abs().value();
         let image = Image::new(
+            settings.modulo(),
             counts(settings.speed_max.value()),
             counts(settings.jump_margin.value()) as i64,
             settings.tolerance_counts(),
@@ -144,6 +156,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             first: None,
             kept: None,
             course: None,
+            probe: Probe::default(),
             told_state: false,
             told_following: false,
             told_short: false,
@@ -219,17 +232,6 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }));
     }
 
-    fn refuse_out_of_service(&mut self) {
-        self.refuse(
-            "a command",
-            "a started, operational node that sends process data; start it (again)",
-        );
-    }
-
-    fn is_enabled(&self) -> bool {
-        self.state() == Some(PowerState::OperationEnabled)
-    }
-
     fn alarm(&mut self, alarm: Alarm) {
         self.alarms.push_back(alarm);
         self.prepared = None;
@@ -239,7 +241,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             // has nothing left to stop.
             (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
             (Activity::Power(_) | Activity::Halt(_), _) => false,
-            (Activity::Move(_) | Activity::Homing(_), _) => true,
+            (Activity::Move(_) | Activity::Homing(_) | Activity::Latch(_), _) => true,
         };
         if ends_it {
             let step = self.activity.name();
@@ -272,8 +274,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn take_description(&mut self, now: Time, script: &Script) {
+        self.probe.counts_edges = latch::counts_edges(&self.settings, script);
         let steps = start::check_description(&self.settings, script)
-            .and_then(|()| start::configuration(&self.settings));
+            .and_then(|()| start::configuration(&self.settings, self.probe.counts_edges));
         match steps {
             Ok(steps) => self.node.configure(now, steps),
             Err(error) => {
@@ -288,6 +291,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Activity::Starting => self.end_start(now, script),
             Activity::Move(_) => self.move_prepared(now),
             Activity::Homing(_) => self.homing_prepared(now),
+            Activity::Latch(_) => self.latch_written(now),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -299,6 +303,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.profile = None;
                 self.finish(Err(error));
             }
+            Activity::Latch(_) => self.finish(Err(error)),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -341,6 +346,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Move(_) => self.move_timeout(now),
             Activity::Halt(_) => self.halt_timeout(now),
             Activity::Homing(_) => self.homing_timeout(now),
+            Activity::Latch(_) => self.latch_timeout(now),
         }
         self.repeat_control(now);
     }
@@ -352,6 +358,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Move(moving) => moving.deadline(),
             Activity::Halt(halt) => halt.deadline(),
             Activity::Homing(homing) => homing.deadline(),
+            Activity::Latch(change) => change.deadline(),
         };
         activity.min(self.repeat_at).min(self.node.poll_timeout())
     }
@@ -373,8 +380,9 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.reached = None;
         self.kept = None;
         self.first = None;
+        self.probe.disarm();
         self.activity = Activity::Starting;
-        self.node.start(now, start::description());
+        self.node.start(now, start::description(&self.settings));
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
@@ -390,92 +398,10 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         counters.push(("pdos too short", self.short_pdos));
         counters.push(("positions not believed", self.image.rejected()));
         counters.push(("commands repeated", self.repeated_commands));
+        if self.settings.latch.is_some() {
+            counters.push(("edges latched", self.probe.latched));
+            counters.push(("edges missed", self.probe.missed));
+        }
         counters
-    }
-}
-
-impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
-    fn control(&mut self, now: Time, command: DriveCommand) {
-        self.supersede(now);
-        match command {
-            DriveCommand::QuickStop => self.begin_quick_stop(now),
-            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
-            DriveCommand::Enable => self.begin_enable(now),
-            DriveCommand::Disable => self.begin_disable(now),
-            DriveCommand::ResetFault => self.begin_reset(now),
-            // A drive that is not enabled does not move: nothing is left to do.
-            DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
-            DriveCommand::Halt => self.begin_halt(now),
-        }
-    }
-
-    fn power_state(&self) -> Option<PowerState> {
-        self.state()
-    }
-
-    fn is_homed(&self) -> bool {
-        self.homed
-    }
-
-    fn started_at(&self) -> Option<Time> {
-        self.started_at
-    }
-}
-
-impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
-    fn command(&mut self, now: Time, command: AxisCommand<Q>) {
-        if let AxisCommand::Drive(command) = command {
-            self.control(now, command);
-            return;
-        }
-        let prepared = self.prepared.take();
-        self.supersede(now);
-        match command {
-            AxisCommand::Drive(_) => {}
-            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
-            _ if !self.is_enabled() => self.refuse("moving", "an enabled drive"),
-            AxisCommand::MoveTo {
-                target,
-                speed,
-                acceleration,
-            } => self.begin_move(now, (target, speed, acceleration), false),
-            AxisCommand::Prepare {
-                target,
-                speed,
-                acceleration,
-            } => self.begin_move(now, (target, speed, acceleration), true),
-            AxisCommand::Start => match prepared {
-                Some(prepared) => self.begin_prepared(now, prepared),
-                None => self.refuse("starting", "a move that was prepared right before"),
-            },
-            AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
-            }
-            AxisCommand::HomeIndex { position, speed } => {
-                self.begin_homing(now, position, HomingPlace::Index(speed));
-            }
-            AxisCommand::HomeHere { position } => {
-                self.begin_homing(now, position, HomingPlace::Here);
-            }
-        }
-    }
-
-    fn reading(&self) -> Option<AxisReading<Q>> {
-        let sample = self.image.sample()?;
-        let scale = self.settings.scale;
-        let pending = sample.mode == OperationMode::ProfilePosition
-            && sample.status.contains(Statusword::MODE_12);
-        Some(AxisReading {
-            at: sample.at,
-            counts: sample.position,
-            position: scale.to_coordinate(sample.position),
-            following_error: self
-                .image
-                .following_error()
-                .map(|counts| scale.to_coordinate(counts)),
-            standing: sample.status.contains(Statusword::TARGET_REACHED)
-                && !pending
-                && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
-        })
     }
 }

@@ -8,7 +8,7 @@
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
 
-use super::convert::{acceleration_counts, counts_i32, out_of_range, velocity_counts};
+use super::convert::{acceleration_counts, out_of_range, position_counts, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
@@ -33,7 +33,9 @@ enum MovePhase {
 /// A move under way, or one that only has to be started.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Move {
-    target: i32,
+    target: i64,
+    /// Where the drive is sent now: the target, or a point on a long way round to it.
+    set_point: i64,
     /// Ends where only the edge of the set-point bit is missing.
     only_prepared: bool,
     profile: (u32, u32),
@@ -49,7 +51,7 @@ impl Move {
     }
 
     pub(super) const fn target(&self) -> Counts {
-        Counts(self.target as i64)
+        Counts(self.target)
     }
 
     const fn awaited(&self) -> &'static str {
@@ -134,7 +136,13 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     ) -> Result<Move, DeviceError> {
         let settings = &self.settings;
         let object = TARGET_POSITION.object;
-        let counts = counts_i32(settings, object, "target", target)?;
+        let counts = position_counts(settings, object, "target", target)?;
+        if self.on_the_wire(counts).is_none() {
+            let limit = settings.scale.to_coordinate(self.register_end(counts));
+            let range = (target.value(), limit.value());
+            return Err(out_of_range(settings, object, "target", range, Q::UNIT));
+        }
+        self.check_latch_speed(speed)?;
         if let Some((low, high)) = settings.soft_limits {
             let limit = if target < low { low } else { high };
             if target < low || target > high {
@@ -148,6 +156,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         );
         Ok(Move {
             target: counts,
+            set_point: self.way_point(counts),
             only_prepared,
             profile,
             phase: MovePhase::Preparing,
@@ -158,14 +167,40 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         })
     }
 
+    /// Where the drive's position register ends on the way to `target`.
+    fn register_end(&self, target: i64) -> Counts {
+        let away = self.image.wrapped_away();
+        let end = if target > away { i32::MAX } else { i32::MIN };
+        Counts(away + i64::from(end))
+    }
+
+    /// Where to send the drive now for it to come to `target` in the end. One that wraps takes
+    /// the shortest way, so it must never have half a turn to go.
+    fn way_point(&self, target: i64) -> i64 {
+        let (Some(turn), Some(sample)) = (self.settings.wraps_at(), self.image.sample()) else {
+            return target;
+        };
+        let reach = turn * 2 / 5;
+        sample.position.0 + (target - sample.position.0).clamp(-reach, reach)
+    }
+
+    /// Whether the drive comes near to a point that is not the target: it must not begin to
+    /// slow down there.
+    fn nears_way_point(&self, target: i64, set_point: i64) -> bool {
+        let (Some(turn), Some(sample)) = (self.settings.wraps_at(), self.image.sample()) else {
+            return false;
+        };
+        set_point != target && (set_point - sample.position.0).abs() < turn / 5
+    }
+
     /// Some drives ignore a target they stand at: there is nothing to do then.
-    fn is_there(&self, target: i32) -> bool {
+    fn is_there(&self, target: i64) -> bool {
         self.reached == Some(target) && self.arrived_at(target)
     }
 
-    fn arrived_at(&self, target: i32) -> bool {
+    fn arrived_at(&self, target: i64) -> bool {
         self.image.sample().is_some_and(|sample| {
-            let away = (sample.position.0 - i64::from(target)).abs();
+            let away = (sample.position.0 - target).abs();
             sample.status.contains(Statusword::TARGET_REACHED)
                 && away <= self.settings.tolerance_counts()
         })
@@ -196,7 +231,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let Activity::Move(moving) = &self.activity else {
             return;
         };
-        let (phase, target) = (moving.phase, moving.target);
+        let (phase, set_point) = (moving.phase, moving.set_point);
+        let target = moving.target;
         let patience = self.settings.timeouts.set_point;
         let acknowledged = sample.status.contains(Statusword::MODE_12);
         let in_mode = sample.mode == OperationMode::ProfilePosition;
@@ -219,7 +255,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             MovePhase::Releasing => {
-                self.target = target;
+                self.target = self.on_the_wire(set_point).unwrap_or(self.target);
                 if moving.only_prepared {
                     let prepared = *moving;
                     // The target without its edge: nothing moves.
@@ -239,13 +275,26 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             }
             MovePhase::Lowering => {
                 if !acknowledged {
-                    let time = self.travel_time(target);
+                    let time = self.travel_time(set_point);
                     self.enter(now, MovePhase::Running, time);
                     self.repeat_at = Time::NEVER;
                 }
             }
+            MovePhase::Running if self.nears_way_point(target, set_point) => {
+                self.go_on(now, target);
+            }
             MovePhase::Running => self.watch_arrival(target, acknowledged),
         }
+    }
+
+    /// The next set-point on a long way, on the fly.
+    fn go_on(&mut self, now: Time, target: i64) {
+        let set_point = self.way_point(target);
+        if let Activity::Move(moving) = &mut self.activity {
+            moving.set_point = set_point;
+        }
+        self.enter(now, MovePhase::Releasing, self.settings.timeouts.set_point);
+        self.advance_move(now);
     }
 
     /// Begins what was prepared: only the edge is missing.
@@ -258,7 +307,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             sample.mode == OperationMode::ProfilePosition
                 && !sample.status.contains(Statusword::MODE_12)
         });
-        if !ready || self.target != prepared.target {
+        if !ready || self.on_the_wire(prepared.set_point) != Some(self.target) {
             self.refuse("starting", "a drive that is still as it was prepared");
             return;
         }
@@ -288,7 +337,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         now.since(self.lowered_at) >= self.settings.common.sync_period * 2
     }
 
-    fn watch_arrival(&mut self, target: i32, acknowledged: bool) {
+    fn watch_arrival(&mut self, target: i64, acknowledged: bool) {
         let there = !acknowledged && self.arrived_at(target);
         let Activity::Move(moving) = &mut self.activity else {
             return;
@@ -301,12 +350,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     /// Half as much again as a trapezoidal profile takes, and the settling.
-    fn travel_time(&self, target: i32) -> Duration {
+    fn travel_time(&self, set_point: i64) -> Duration {
         let Activity::Move(moving) = &self.activity else {
             return Duration::ZERO;
         };
         let from = self.image.sample().map_or(0, |sample| sample.position.0);
-        let way = (i64::from(target) - from).unsigned_abs() as f64;
+        let way = (set_point - from).unsigned_abs() as f64;
         let (velocity, acceleration) = moving.profile;
         let (velocity, acceleration) = (f64::from(velocity), f64::from(acceleration));
         // A superseded move may first have to come back from the other direction.

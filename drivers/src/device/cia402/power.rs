@@ -42,7 +42,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time) {
         if let Some(sample) = self.image.sample() {
             // The target in RPDO 1 counts only at an edge, but a true one is the better company.
-            self.target = i32::try_from(sample.position.0).unwrap_or(self.target);
+            self.target = sample.shown;
         }
         self.begin_power(now, Goal::OperationEnabled);
     }

@@ -2,7 +2,10 @@
 
 use core::time::Duration;
 
-use units::{Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+use units::{
+    Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Radians, RadiansPerSecond,
+    RadiansPerSecondSquared, Scale,
+};
 
 use crate::device::canopen_node::NodeSettings;
 
@@ -18,6 +21,10 @@ pub struct Cia402Settings<Q: Coordinate = Metres> {
     /// Metres (radians) per encoder increment, to check the factor objects (0x608F, 0x6091, 0x6092)
     /// against; `None`: not checked.
     pub increment: Option<Q>,
+    /// How an axis that turns endlessly is counted; `None` for one that has ends.
+    pub turn: Option<Turn>,
+    /// How positions are latched; `None`: not at all.
+    pub latch: Option<LatchSettings>,
     /// Lowest and highest position (0x607D), drive coordinates.
     pub soft_limits: Option<(Q, Q)>,
     /// How far the axis may lag behind the drive's demand (0x6065), and for how long (0x6066).
@@ -80,6 +87,50 @@ pub enum HomeOffset {
     IsZeroFromHome,
 }
 
+/// How an axis that turns endlessly is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Turn {
+    /// Position units of one turn: a whole number, or every turn would add to an error.
+    pub counts: u32,
+    /// Where the drive's position starts again.
+    pub range: PositionRange,
+}
+
+/// Where the drive's position starts again (0x607B, CiA 402: position range limit).
+///
+/// The standard says that a position that reaches or exceeds a limit wraps to the other one;
+/// drives differ in whether the upper limit is still a position of its own.
+///
+/// A drive that wraps must also take the shortest way (0x60F2, bits 6 and 7): only so is a
+/// target beyond the seam told apart from one on this side. Longer ways are made of several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PositionRange {
+    /// It does not until 32 bits are full; 0x607B is 0 or absent.
+    CountsOn,
+    /// At 0, after the last count of the turn, which is the upper limit.
+    ToLastCount,
+    /// At 0, which is also what the upper limit, the counts of the turn, stands for.
+    ToFirstCount,
+}
+
+/// How positions are latched: touch probe 1 (CiA 402, 0x60B8 to 0x60BB).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LatchSettings {
+    /// Which edge of the input.
+    pub edge: Edge,
+    /// 0x60D0:01, where the drive has a choice of inputs; `None`: its first one.
+    pub source: Option<i16>,
+}
+
+/// An edge of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Edge {
+    /// From low to high (0x60BA).
+    Positive,
+    /// From high to low (0x60BB).
+    Negative,
+}
+
 /// How long each thing is waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cia402Timeouts {
@@ -97,6 +148,8 @@ pub struct Cia402Timeouts {
     pub homing: Duration,
     /// The new position after homing.
     pub new_position: Duration,
+    /// The latch saying that it is armed.
+    pub latch: Duration,
     /// After how long a controlword without effect is sent again.
     pub repeat: Duration,
 }
@@ -111,6 +164,7 @@ impl Default for Cia402Timeouts {
             standing: Duration::from_secs(3),
             homing: Duration::from_secs(120),
             new_position: Duration::from_secs(1),
+            latch: Duration::from_secs(1),
             repeat: Duration::from_millis(50),
         }
     }
@@ -130,6 +184,30 @@ impl Cia402Settings {
     }
 }
 
+impl Cia402Settings<Radians> {
+    /// A rotary axis that turns endlessly and whose position unit is one encoder increment;
+    /// windows of 1 arcsec for 10 ms, position jumps above 60 arcsec are not believed, a lost
+    /// heartbeat is a quick stop.
+    ///
+    /// `None` when a turn has no counts, or more than the drive's 32 bits.
+    pub fn rotary(
+        common: NodeSettings,
+        turn: Turn,
+        speed_max: RadiansPerSecond,
+        acceleration_max: RadiansPerSecondSquared,
+    ) -> Option<Self> {
+        i32::try_from(turn.counts).ok()?;
+        let scale = Scale::new(Radians::TURN / f64::from(turn.counts))?;
+        let (window, jump) = (Radians::from_arcsec(1.0), Radians::from_arcsec(60.0));
+        let limits = (speed_max, acceleration_max);
+        let axis = Self::with_windows(common, scale, limits, window, jump);
+        Some(Self {
+            turn: Some(turn),
+            ..axis
+        })
+    }
+}
+
 impl<Q: Coordinate> Cia402Settings<Q> {
     fn with_windows(
         common: NodeSettings,
@@ -142,6 +220,8 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             common,
             scale,
             increment: Some(scale.resolution().abs()),
+            turn: None,
+            latch: None,
             soft_limits: None,
             following_error: None,
             position_window,

@@ -4,7 +4,8 @@ use core::time::Duration;
 use units::Coordinate;
 
 use super::convert::{acceleration_counts, counts_i32, distance_counts, velocity_counts};
-use super::settings::Cia402Settings;
+use super::latch;
+use super::settings::{Cia402Settings, PositionRange};
 use crate::device::DeviceError;
 use crate::device::canopen_node::millis;
 use crate::protocol::pdo_setup::{Pdo, PdoDirection, PdoTooLong};
@@ -39,7 +40,7 @@ const FEED: Object = Object::new(0x6092, 1);
 const FEED_REVOLUTIONS: Object = Object::new(0x6092, 2);
 
 /// What is asked besides the identity.
-pub(super) fn description() -> Vec<Step> {
+pub(super) fn description<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Vec<Step> {
     const FACTORS: &str = "reading its factors";
     let mut steps = vec![Step::read(SUPPORTED_MODES, "reading the modes it supports").optional()];
     let factors = [
@@ -51,6 +52,7 @@ pub(super) fn description() -> Vec<Step> {
         FEED_REVOLUTIONS,
     ];
     steps.extend(factors.map(|object| Step::read(object, FACTORS).optional()));
+    steps.extend(latch::description(settings));
     steps
 }
 
@@ -107,10 +109,15 @@ fn units_per_increment(script: &Script) -> f64 {
 }
 
 /// Limits, windows, options, PDOs, and profile position as the mode to begin with.
+/// `counts_edges`: the drive counts the edges of its touch probe.
 pub(super) fn configuration<Q: Coordinate>(
     settings: &Cia402Settings<Q>,
+    counts_edges: bool,
 ) -> Result<Vec<Step>, DeviceError> {
-    let mut steps = pdo_steps(settings).expect("the mappings below hold at most 7 bytes");
+    let mut steps =
+        pdo_steps(settings, counts_edges).expect("the mappings below hold at most 8 bytes");
+    steps.extend(range_steps(settings));
+    steps.extend(latch::configuration(settings));
     steps.extend(limit_steps(settings)?);
     steps.extend(option_steps(settings));
     steps.push(Step::write(
@@ -121,7 +128,10 @@ pub(super) fn configuration<Q: Coordinate>(
     Ok(steps)
 }
 
-fn pdo_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Result<Vec<Step>, PdoTooLong> {
+fn pdo_steps<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
+    counts_edges: bool,
+) -> Result<Vec<Step>, PdoTooLong> {
     const SYNC: Transmission = Transmission::Synchronous(1);
     let node = settings.common.node;
     let pdo = |direction, number| Pdo::new(direction, number).expect("1 to 4");
@@ -142,10 +152,46 @@ fn pdo_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Result<Vec<Step>, P
     } else {
         steps.extend(transmit(2).disable(node));
     }
-    for unused in [receive(2), receive(3), receive(4), transmit(3), transmit(4)] {
+    for unused in [receive(2), receive(3), receive(4)] {
         steps.extend(unused.disable(node));
     }
+    match latch::mapping(settings, counts_edges) {
+        Some(latched) => steps.extend(transmit(3).configure(node, &latched, SYNC)?),
+        None => steps.extend(transmit(3).disable(node)),
+    }
+    steps.extend(transmit(4).disable(node));
     Ok(steps)
+}
+
+/// Where the position of an endless axis wraps, and that targets are taken the shortest way.
+fn range_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Vec<Step> {
+    const TEXT: &str = "setting the position range of a turn";
+    /// 0x60F2: bits 6 and 7 both set, the shortest way.
+    const SHORTEST_WAY: u16 = 0x00C0;
+    let Some(turn) = settings.turn else {
+        return Vec::new();
+    };
+    let (minimum, maximum) = (Object::new(0x607B, 1), Object::new(0x607B, 2));
+    let upper = match turn.range {
+        // A drive without the object does what is wanted.
+        PositionRange::CountsOn => {
+            return vec![
+                Step::check(minimum, 0_i32, TEXT).optional(),
+                Step::check(maximum, 0_i32, TEXT).optional(),
+            ];
+        }
+        PositionRange::ToLastCount => turn.counts - 1,
+        PositionRange::ToFirstCount => turn.counts,
+    };
+    vec![
+        Step::check(minimum, 0_i32, TEXT),
+        Step::check(maximum, upper, TEXT),
+        Step::check(
+            Object::new(0x60F2, 0),
+            SHORTEST_WAY,
+            "choosing the shortest way",
+        ),
+    ]
 }
 
 fn limit_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Result<Vec<Step>, DeviceError> {
@@ -240,7 +286,12 @@ pub(super) fn homing_steps<Q: Coordinate>(
         let acceleration =
             acceleration_counts(settings, HOMING_ACCELERATION, settings.homing_acceleration)?;
         steps.push(Step::check(HOMING_SPEED_SEARCH, search, TEXT));
-        steps.push(Step::check(HOMING_SPEED_ZERO, (search / 5).max(1), TEXT));
+        // The search of a switch is followed by a slow one; that of an index pulse is the only one.
+        let zero = match method {
+            33 | 34 => search,
+            _ => (search / 5).max(1),
+        };
+        steps.push(Step::check(HOMING_SPEED_ZERO, zero, TEXT));
         steps.push(Step::check(HOMING_ACCELERATION, acceleration, TEXT));
     }
     steps.push(Step::write(

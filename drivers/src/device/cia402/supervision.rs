@@ -1,8 +1,9 @@
 //! What a drive says of itself, and what of it is an alarm.
 
-use units::{Coordinate, Counts, Time};
+use units::{Coordinate, Time};
 
 use super::image::{Judgement, SAMPLE_BYTES, Sample};
+use super::modulo::apart;
 use super::start::POSITION_ACTUAL;
 use super::{Activity, Cia402Drive};
 use crate::device::{Alarm, DeviceError};
@@ -21,6 +22,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             self.profile = None;
             self.commanded_mode = None;
             self.kept = None;
+            self.probe.disarm();
             self.image.clear();
         }
         self.alarm(alarm);
@@ -39,11 +41,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             2 if !self.settings.map_following_error => {}
             2 if payload.len() < 4 => self.take_short_pdo(4, payload.len()),
             2 => self.image.take_following_error(payload),
+            3 => self.take_latch(now, payload),
             _ => {}
         }
     }
 
-    fn take_short_pdo(&mut self, expected: usize, seen: usize) {
+    pub(super) fn take_short_pdo(&mut self, expected: usize, seen: usize) {
         self.short_pdos += 1;
         // Before the mapping is ours, anything may come.
         if self.node.is_up() && !core::mem::replace(&mut self.told_short, true) {
@@ -74,7 +77,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
         self.supervise(&sample);
         match &self.activity {
-            Activity::Idle | Activity::Starting => {}
+            Activity::Idle | Activity::Starting | Activity::Latch(_) => {}
             Activity::Power(_) => self.advance_power(now),
             Activity::Move(_) => self.advance_move(now),
             Activity::Halt(_) => self.advance_halt(now),
@@ -100,15 +103,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let (Some(sample), Some(raw)) = (self.first.take(), script.value(object)) else {
             return;
         };
-        let position = Counts(i64::from(raw.cast_signed()));
-        let apart = (sample.position - position).0.abs();
-        if apart > self.image.margin() {
+        let position = i64::from(raw.cast_signed());
+        let away = apart(self.settings.modulo(), sample.position.0, position);
+        if away.abs() > self.image.margin() {
             self.node.give_up(now);
             self.finish(Err(DeviceError::ReadBack {
                 node: self.node.id(),
                 object,
                 expected: u64::from(raw),
-                seen: u64::from(sample.position.0 as u32),
+                seen: u64::from(sample.shown.cast_unsigned()),
                 step: COMPARING,
             }));
             return;

@@ -3,9 +3,11 @@
 use core::time::Duration;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale, Time};
 
+use super::homing::HomingPlace;
 use super::*;
 use crate::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use crate::device::fake_node::FakeNode;
+use crate::device::{Axis, AxisCommand, DriveCommand, ServoDrive};
 use crate::wire::canopen::sdo::AbortCode;
 use crate::wire::canopen::{NodeId, Object};
 

@@ -420,7 +420,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
             AxisCommand::HomeNegativeLimit { position, speed } => {
                 self.begin_homing(now, position, Some(speed));
             }
-            AxisCommand::HomeIndex { .. } => {
+            AxisCommand::HomeIndex { .. } | AxisCommand::HomeNextIndex { .. } => {
                 self.refuse(
                     "homing on the index pulse",
                     "a drive that looks for it itself",

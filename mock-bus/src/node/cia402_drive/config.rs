@@ -67,10 +67,89 @@ pub struct Cia402DriveConfig {
     pub quick_stop_option: i16,
     /// 0x6007 at power-on: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
     pub abort_connection_option: i16,
+    /// It moves a rotary axis: this takes the place of all lengths above.
+    pub rotary: Option<RotaryDriveConfig>,
+    /// It has a touch probe.
+    pub touch_probe: Option<TouchProbeConfig>,
     /// How badly its communication behaves.
     pub manners: Manners,
     /// How badly the drive itself behaves.
     pub quirks: DriveQuirks,
+}
+
+/// What a drive of a rotary axis has at power-on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[expect(missing_docs, reason = "as the drive's own keys, in angles")]
+pub struct RotaryDriveConfig {
+    pub counts_per_turn: u32,
+    /// Whether the upper limit in 0x607B is still a position of its own.
+    pub upper_limit_is_a_position: bool,
+    pub following_error_window_arcsec: f64,
+    pub position_window_arcsec: f64,
+    pub max_profile_velocity_deg_per_s: f64,
+    pub profile_velocity_deg_per_s: f64,
+    pub profile_acceleration_deg_per_s2: f64,
+    pub quick_stop_deceleration_deg_per_s2: f64,
+    pub homing_switch_speed_deg_per_s: f64,
+    pub homing_zero_speed_deg_per_s: f64,
+    pub homing_acceleration_deg_per_s2: f64,
+    pub homing_search_limit_deg: f64,
+}
+
+impl Default for RotaryDriveConfig {
+    fn default() -> Self {
+        Self {
+            counts_per_turn: 129_600_000,
+            upper_limit_is_a_position: true,
+            following_error_window_arcsec: 600.0,
+            position_window_arcsec: 1.0,
+            max_profile_velocity_deg_per_s: 360.0,
+            profile_velocity_deg_per_s: 10.0,
+            profile_acceleration_deg_per_s2: 100.0,
+            quick_stop_deceleration_deg_per_s2: 1000.0,
+            homing_switch_speed_deg_per_s: 10.0,
+            homing_zero_speed_deg_per_s: 2.0,
+            homing_acceleration_deg_per_s2: 100.0,
+            homing_search_limit_deg: 400.0,
+        }
+    }
+}
+
+/// What a touch probe can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TouchProbeConfig {
+    /// The drive counts edges (0x60D5 and 0x60D6).
+    pub edge_counters: bool,
+    /// Bits 6 and 7 of 0x60B9 toggle with each position latched.
+    pub status_toggles: bool,
+}
+
+impl Default for TouchProbeConfig {
+    fn default() -> Self {
+        Self {
+            edge_counters: true,
+            status_toggles: false,
+        }
+    }
+}
+
+/// What objects have at power-on, in counts and seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PowerOn {
+    pub(super) following_error_window: i64,
+    pub(super) position_window: i64,
+    pub(super) max_velocity: i64,
+    pub(super) velocity: i64,
+    pub(super) acceleration: i64,
+    pub(super) quick_stop_deceleration: i64,
+    pub(super) homing_switch_speed: i64,
+    pub(super) homing_zero_speed: i64,
+    pub(super) homing_acceleration: i64,
+    pub(super) homing_search_limit: i64,
+    /// A search may begin so near to the opposite switch.
+    pub(super) homing_may_begin_within: i64,
 }
 
 /// What real drives do and a polite one would not; the default is nothing.
@@ -123,6 +202,8 @@ impl Default for Cia402DriveConfig {
             has_index: false,
             quick_stop_option: 6,
             abort_connection_option: 3,
+            rotary: None,
+            touch_probe: None,
             manners: Manners::default(),
             quirks: DriveQuirks::default(),
         }
@@ -130,14 +211,48 @@ impl Default for Cia402DriveConfig {
 }
 
 impl Cia402DriveConfig {
-    /// Micrometres to counts, at least one.
-    pub(super) fn counts_of_um(&self, um: f64) -> i64 {
-        ((um * 1e3 / self.encoder_resolution_nm).round() as i64).max(1)
+    pub(super) fn power_on(&self) -> PowerOn {
+        const MAY_BEGIN_WITHIN_MM: f64 = 10.0;
+        if let Some(rotary) = &self.rotary {
+            return rotary.power_on();
+        }
+        let um = |um: f64| ((um * 1e3 / self.encoder_resolution_nm).round() as i64).max(1);
+        let mm = |mm: f64| um(mm * 1e3);
+        PowerOn {
+            following_error_window: um(self.following_error_window_um),
+            position_window: um(self.position_window_um),
+            max_velocity: mm(self.max_profile_velocity_mm_per_s),
+            velocity: mm(self.profile_velocity_mm_per_s),
+            acceleration: mm(self.profile_acceleration_mm_per_s2),
+            quick_stop_deceleration: mm(self.quick_stop_deceleration_mm_per_s2),
+            homing_switch_speed: mm(self.homing_switch_speed_mm_per_s),
+            homing_zero_speed: mm(self.homing_zero_speed_mm_per_s),
+            homing_acceleration: mm(self.homing_acceleration_mm_per_s2),
+            homing_search_limit: mm(self.homing_search_limit_mm),
+            homing_may_begin_within: mm(MAY_BEGIN_WITHIN_MM),
+        }
     }
+}
 
-    /// Millimetres (per second, per second squared) to counts.
-    pub(super) fn counts_of_mm(&self, mm: f64) -> i64 {
-        self.counts_of_um(mm * 1e3)
+impl RotaryDriveConfig {
+    fn power_on(&self) -> PowerOn {
+        const MAY_BEGIN_WITHIN_DEG: f64 = 10.0;
+        let turn = f64::from(self.counts_per_turn);
+        let deg = |deg: f64| ((deg * turn / 360.0).round() as i64).max(1);
+        let arcsec = |arcsec: f64| deg(arcsec / 3600.0);
+        PowerOn {
+            following_error_window: arcsec(self.following_error_window_arcsec),
+            position_window: arcsec(self.position_window_arcsec),
+            max_velocity: deg(self.max_profile_velocity_deg_per_s),
+            velocity: deg(self.profile_velocity_deg_per_s),
+            acceleration: deg(self.profile_acceleration_deg_per_s2),
+            quick_stop_deceleration: deg(self.quick_stop_deceleration_deg_per_s2),
+            homing_switch_speed: deg(self.homing_switch_speed_deg_per_s),
+            homing_zero_speed: deg(self.homing_zero_speed_deg_per_s),
+            homing_acceleration: deg(self.homing_acceleration_deg_per_s2),
+            homing_search_limit: deg(self.homing_search_limit_deg),
+            homing_may_begin_within: deg(MAY_BEGIN_WITHIN_DEG),
+        }
     }
 }
 

@@ -133,8 +133,7 @@ impl Drive {
         let pressed = switch(run.direction, limits);
         let opposite = switch(-run.direction, limits);
         let travelled = (self.demand(now).position - run.started_at).abs();
-        let search_limit = self.config.counts_of_mm(self.config.homing_search_limit_mm);
-        let lost = travelled > search_limit as f64;
+        let lost = travelled > self.config.power_on().homing_search_limit as f64;
         match run.step {
             Step::Seek if pressed && opposite => self.fail_homing(now),
             Step::Seek if pressed => self.enter(now, run, Step::Stop),
@@ -169,8 +168,7 @@ impl Drive {
 
     /// The opposite switch, on which a run may begin but which it must leave soon.
     fn runs_into(&self, opposite: bool, travelled: f64) -> bool {
-        const MAY_BEGIN_WITHIN_MM: f64 = 10.0;
-        opposite && travelled > self.config.counts_of_mm(MAY_BEGIN_WITHIN_MM) as f64
+        opposite && travelled > self.config.power_on().homing_may_begin_within as f64
     }
 
     /// The zero moves so that `position` becomes 0x607C.

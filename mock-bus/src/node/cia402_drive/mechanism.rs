@@ -1,6 +1,6 @@
 //! What the drive's power stage and encoder are wired to.
 
-use crate::plant::{IndexPulse, Plant, Servo};
+use crate::plant::{IndexPulse, Plant, ProbeEdge, Servo};
 
 /// One axis, seen from its drive.
 pub(super) trait Mechanism {
@@ -8,12 +8,14 @@ pub(super) trait Mechanism {
     fn counts(&self) -> i64;
     /// Counts per second.
     fn speed(&self) -> f64;
-    /// Metres per count.
-    fn resolution_m(&self) -> f64;
+    /// Metres or radians per count.
+    fn resolution(&self) -> f64;
     /// The encoder's last index pulse since its power came on.
     fn index_pulse(&self) -> Option<IndexPulse>;
     /// Negative and positive limit switch.
     fn limit_switches(&self) -> (bool, bool);
+    /// The next edge at the fast input.
+    fn probe_edge(&mut self) -> Option<ProbeEdge>;
     fn set_servo(&mut self, servo: Servo);
     fn encoder_power(&mut self, on: bool);
 }
@@ -33,8 +35,8 @@ impl Mechanism for PlantAxis<'_> {
         self.plant.encoder_speed(self.axis)
     }
 
-    fn resolution_m(&self) -> f64 {
-        self.plant.encoder_resolution_m(self.axis)
+    fn resolution(&self) -> f64 {
+        self.plant.encoder_resolution(self.axis)
     }
 
     fn index_pulse(&self) -> Option<IndexPulse> {
@@ -43,6 +45,10 @@ impl Mechanism for PlantAxis<'_> {
 
     fn limit_switches(&self) -> (bool, bool) {
         self.plant.limit_switches(self.axis)
+    }
+
+    fn probe_edge(&mut self) -> Option<ProbeEdge> {
+        self.plant.probe_edge(self.axis)
     }
 
     fn set_servo(&mut self, servo: Servo) {

@@ -6,11 +6,11 @@
 //! demand at the servo rate while something moves, and none while nothing does.
 //!
 //! Source: CiA 402-2 and -3 (IEC 61800-7-201), CiA 301; the quirks are those of the drives in
-//! protocols.md, 3.4. Absent: velocity and torque modes, touch probes, jerk, index pulses.
+//! protocols.md, 3.4. Absent: velocity and torque modes, jerk.
 //!
 //! | symbol | name |
 //! |---|---|
-//! | 0x6064 | actual = sign · encoder counts + offset, as i32 (it wraps) |
+//! | 0x6064 | actual = sign · encoder counts + offset, wrapped to 0x607B, as i32 (it wraps) |
 //! | 0x6062 | demand, from the [profile](super::profile) |
 //! | 0x60F4 | following error = demand − actual |
 
@@ -19,12 +19,14 @@ mod homing;
 mod mechanism;
 mod motion;
 mod objects;
+mod position_range;
 mod positioning;
 mod power;
 mod status;
 mod supervision;
 #[cfg(test)]
 mod tests;
+mod touch_probe;
 mod transitions;
 
 use std::time::Duration;
@@ -38,7 +40,7 @@ use drivers::wire::cia402::{Controlword, HomingStatus, PowerState};
 use units::Time;
 
 pub(in crate::node) use config::checked_node_id;
-pub use config::{Cia402DriveConfig, DriveQuirks};
+pub use config::{Cia402DriveConfig, DriveQuirks, RotaryDriveConfig, TouchProbeConfig};
 
 use super::Node;
 use super::canopen_server::{CanopenServer, Deliveries, Manners, ServerEvent};
@@ -173,7 +175,7 @@ struct Drive {
     homing: HomingStatus,
     /// Whether the power stage controls the motor.
     servo_on: bool,
-    /// The last demand given to the plant, in metres.
+    /// The last demand given to the plant, in metres or radians.
     sent_demand: Option<f64>,
     /// Where the demand was when the power stage was switched on.
     enabled_at: f64,
@@ -350,6 +352,7 @@ impl Drive {
             ServerEvent::Written(object) => match object.index {
                 0x6040 => self.on_controlword(now, m),
                 0x6060 => self.change_mode(now),
+                0x60B8 => self.on_probe_function(),
                 _ => {}
             },
             ServerEvent::Synchronised => {

@@ -62,13 +62,6 @@ impl Drive {
         self.profile.at(now)
     }
 
-    /// A position from the bus, in the 2³² counts the axis is in.
-    pub(super) fn unwrapped(&self, raw: i64, m: &impl Mechanism) -> f64 {
-        let actual = self.actual(m);
-        let turn = actual - i64::from(actual as i32);
-        (turn + raw) as f64
-    }
-
     /// Whether a ramp is needed before the drive does something else.
     pub(super) const fn is_moving_itself(&self) -> bool {
         match self.activity {
@@ -132,10 +125,10 @@ impl Drive {
             position = 2.0 * self.enabled_at - position;
         }
         let counts = self.sign() as f64 * (position - self.offset as f64);
-        let demand_m = counts * m.resolution_m();
-        if self.sent_demand != Some(demand_m) {
-            self.sent_demand = Some(demand_m);
-            m.set_servo(Servo::Follow { demand_m });
+        let demand = counts * m.resolution();
+        if self.sent_demand != Some(demand) {
+            self.sent_demand = Some(demand);
+            m.set_servo(Servo::Follow { demand });
         }
     }
 
@@ -173,11 +166,11 @@ impl Drive {
     }
 
     /// The nearest position inside the soft limits 0x607D. They count from the machine's zero,
-    /// so they are in force only once it is known.
+    /// so they are in force only once it is known; an endless axis has none.
     pub(super) fn within_soft_limits(&self, target: f64) -> f64 {
         let low = self.server.get(0x607D, 1) as f64;
         let high = self.server.get(0x607D, 2) as f64;
-        if self.homed && low < high {
+        if self.homed && low < high && self.config.rotary.is_none() {
             target.clamp(low, high)
         } else {
             target

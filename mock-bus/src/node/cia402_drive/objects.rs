@@ -16,6 +16,8 @@ const HOMING_METHODS: &[i64] = &[0, 17, 18, 35, 37];
 const HOMING_METHODS_WITH_INDEX: &[i64] = &[0, 1, 2, 17, 18, 33, 34, 35, 37];
 /// "increments" as an SI unit (CiA 303-2).
 const UNIT_INCREMENTS: i64 = 0x00B5_0000;
+/// "per second" in an SI unit.
+const PER_SECOND: i64 = 0x0000_0300;
 /// Bytes of 0x2000, enough for a block upload of several blocks of ordinary clients.
 const LOG_BYTES: usize = 889;
 /// The most bytes 0x2001 takes.
@@ -29,6 +31,8 @@ pub(super) fn dictionary(config: &Cia402DriveConfig) -> Dictionary {
     insert_profile(&mut dictionary, config);
     insert_homing(&mut dictionary, config);
     insert_factors(&mut dictionary, config);
+    insert_range(&mut dictionary, config);
+    insert_probe(&mut dictionary, config);
     insert_motor(&mut dictionary);
     insert_manufacturer(&mut dictionary);
     dictionary
@@ -44,6 +48,10 @@ fn both(kind: Kind, value: i64) -> Entry {
 
 fn option(known: &'static [i64], value: i64) -> Entry {
     Entry::read_write(Kind::I16, value).bounded(Bounds::OneOf(known))
+}
+
+fn positive(counts: i64) -> Entry {
+    both(Kind::U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
 }
 
 fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
@@ -72,12 +80,11 @@ fn insert_positions(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     for index in [0x6062, 0x6063, 0x6064, 0x606B, 0x606C, 0x60F4, 0x60FC] {
         dictionary.insert(index, 0, transmit(I32));
     }
-    let window = config.counts_of_um(config.following_error_window_um);
-    dictionary.insert(0x6065, 0, both(U32, window));
+    let power_on = config.power_on();
+    dictionary.insert(0x6065, 0, both(U32, power_on.following_error_window));
     let timeout = i64::from(config.following_error_timeout_ms);
     dictionary.insert(0x6066, 0, both(U16, timeout));
-    let window = config.counts_of_um(config.position_window_um);
-    dictionary.insert(0x6067, 0, both(U32, window));
+    dictionary.insert(0x6067, 0, both(U32, power_on.position_window));
     let time = i64::from(config.position_window_time_ms);
     dictionary.insert(0x6068, 0, both(U16, time));
     dictionary.insert(0x6077, 0, transmit(I16));
@@ -90,18 +97,13 @@ fn insert_positions(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 }
 
 fn insert_profile(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
-    use Kind::{I8, I32, U8, U32};
-    let positive = |mm: f64| {
-        let counts = config.counts_of_mm(mm);
-        both(U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
-    };
-    let acceleration = config.profile_acceleration_mm_per_s2;
-    let quick_stop = config.quick_stop_deceleration_mm_per_s2;
-    dictionary.insert(0x607F, 0, positive(config.max_profile_velocity_mm_per_s));
-    dictionary.insert(0x6081, 0, positive(config.profile_velocity_mm_per_s));
-    dictionary.insert(0x6083, 0, positive(acceleration));
-    dictionary.insert(0x6084, 0, positive(acceleration));
-    dictionary.insert(0x6085, 0, positive(quick_stop));
+    use Kind::{I8, I32, U8};
+    let power_on = config.power_on();
+    dictionary.insert(0x607F, 0, positive(power_on.max_velocity));
+    dictionary.insert(0x6081, 0, positive(power_on.velocity));
+    dictionary.insert(0x6083, 0, positive(power_on.acceleration));
+    dictionary.insert(0x6084, 0, positive(power_on.acceleration));
+    dictionary.insert(0x6085, 0, positive(power_on.quick_stop_deceleration));
     dictionary.insert(0x6086, 0, option(&[0], 0));
     dictionary.insert(0x60FF, 0, both(I32, 0));
     let units = Entry::read_write(U8, 0);
@@ -113,7 +115,7 @@ fn insert_profile(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 }
 
 fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
-    use Kind::{I8, I32, U32};
+    use Kind::{I8, I32};
     dictionary.insert(0x607C, 0, both(I32, 0));
     let methods = if config.has_index {
         HOMING_METHODS_WITH_INDEX
@@ -122,14 +124,11 @@ fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     };
     let method = both(I8, 0).bounded(Bounds::OneOf(methods));
     dictionary.insert(0x6098, 0, method);
-    let positive = |mm: f64| {
-        let counts = config.counts_of_mm(mm);
-        both(U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
-    };
-    let switch = positive(config.homing_switch_speed_mm_per_s);
-    let zero = positive(config.homing_zero_speed_mm_per_s);
+    let power_on = config.power_on();
+    let switch = positive(power_on.homing_switch_speed);
+    let zero = positive(power_on.homing_zero_speed);
     dictionary.insert_array(0x6099, vec![switch, zero]);
-    dictionary.insert(0x609A, 0, positive(config.homing_acceleration_mm_per_s2));
+    dictionary.insert(0x609A, 0, positive(power_on.homing_acceleration));
     let known = methods[1..].iter();
     let known = known.map(|method| Entry::constant(I8, *method));
     dictionary.insert_array(0x60E3, known.collect());
@@ -144,7 +143,10 @@ fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     dictionary.insert_array(0x608F, ratio(PER_TURN, 1));
     dictionary.insert_array(0x6091, ratio(1, 1));
     dictionary.insert_array(0x6092, ratio(PER_TURN, 1));
-    let (position, velocity) = units(config.encoder_resolution_nm);
+    let (position, velocity) = match config.rotary {
+        Some(_) => (UNIT_INCREMENTS, UNIT_INCREMENTS | PER_SECOND),
+        None => units(config.encoder_resolution_nm),
+    };
     dictionary.insert(0x60A8, 0, Entry::read_write(U32, position));
     dictionary.insert(0x60A9, 0, Entry::read_write(U32, velocity));
 }
@@ -152,7 +154,6 @@ fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 /// 0x60A8 and 0x60A9 (CiA 303-2: prefix, numerator, denominator, 0): metre 0x01, second 0x03.
 fn units(resolution_nm: f64) -> (i64, i64) {
     const METRE: i64 = 0x0001_0000;
-    const PER_SECOND: i64 = 0x0000_0300;
     let exponent = (resolution_nm * 1e-9).log10();
     let rounded = exponent.round();
     if (exponent - rounded).abs() > 1e-9 {
@@ -160,6 +161,34 @@ fn units(resolution_nm: f64) -> (i64, i64) {
     }
     let prefix = i64::from((rounded as i8).cast_unsigned()) << 24;
     (prefix | METRE, prefix | METRE | PER_SECOND)
+}
+
+/// Where positions wrap; at power-on they count on.
+fn insert_range(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    if config.rotary.is_some() {
+        let limit = || Entry::read_write(Kind::I32, 0);
+        dictionary.insert_array(0x607B, vec![limit(), limit()]);
+    }
+}
+
+fn insert_probe(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
+    use Kind::{I16, I32, U16};
+    let Some(probe) = config.touch_probe else {
+        return;
+    };
+    let function = Entry::read_write(U16, 0).mapped(Mapping::Receive);
+    dictionary.insert(0x60B8, 0, function);
+    dictionary.insert(0x60B9, 0, transmit(U16));
+    for index in 0x60BA..=0x60BD {
+        dictionary.insert(index, 0, transmit(I32));
+    }
+    let source = |input| Entry::read_write(I16, input).bounded(Bounds::OneOf(&[1, 2]));
+    dictionary.insert_array(0x60D0, vec![source(1), source(2)]);
+    if probe.edge_counters {
+        for index in 0x60D5..=0x60D8 {
+            dictionary.insert(index, 0, transmit(U16));
+        }
+    }
 }
 
 fn insert_motor(dictionary: &mut Dictionary) {

@@ -12,7 +12,8 @@ use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION};
 
 impl Drive {
     /// Brings the process values in the dictionary up to date.
-    pub(super) fn publish(&mut self, now: Time, m: &impl Mechanism) {
+    pub(super) fn publish(&mut self, now: Time, m: &mut impl Mechanism) {
+        self.take_edges(m);
         let actual = self.actual(m);
         let demand = self.demand(now);
         let shown = if self.servo_on {
@@ -25,9 +26,9 @@ impl Drive {
         let inputs = i64::from(negative) | i64::from(positive) << 1;
         let interlock = i64::from(self.safe_torque_off) << 3;
         let values = [
-            (0x6062, shown),
+            (0x6062, self.shown(shown)),
             (0x6063, m.counts()),
-            (0x6064, actual),
+            (0x6064, self.shown(actual)),
             (0x606B, demand.velocity.round() as i64),
             (0x606C, sign * m.speed().round() as i64),
             (0x60F4, shown - actual),

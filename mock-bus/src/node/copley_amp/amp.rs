@@ -264,10 +264,10 @@ impl Amp {
             return;
         }
         let counts = self.demand(now).position - self.offset as f64;
-        let demand_m = counts * plant.encoder_resolution_m(self.config.axis);
+        let demand_m = counts * plant.encoder_resolution(self.config.axis);
         if self.sent_demand != Some(demand_m) {
             self.sent_demand = Some(demand_m);
-            plant.set_servo(self.config.axis, Servo::Follow { demand_m });
+            plant.set_servo(self.config.axis, Servo::Follow { demand: demand_m });
         }
     }
 }

@@ -12,6 +12,7 @@ use units::Time;
 use crate::plant::Servo;
 use crate::plant::deviation::StopError;
 use crate::plant::encoder::Encoder;
+use crate::plant::index_mark::IndexMark;
 use crate::plant::limit_switch::LimitSwitch;
 use crate::plant::machine::{Actuator, IndexPulse};
 use crate::plant::servo::Mass;
@@ -24,7 +25,8 @@ pub(super) struct Screw {
     config: ScrewConfig,
     mass: Mass,
     encoder: Encoder,
-    index: Index,
+    /// One of the marks is in the middle of the screw.
+    index: IndexMark,
     error: LeadError,
     play: Play,
     /// On top of where the flanks have pushed the table.
@@ -45,8 +47,12 @@ impl Screw {
         play.lie_anywhere(start_m + error.at(start_m), &mut shift);
         let mut screw = Self {
             mass: Mass::new(config.motion(), start_m, stream("servo rest")),
-            encoder: Encoder::new(config.resolution_nm, start_m),
-            index: Index::new(config, stream("index")),
+            encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
+            index: IndexMark::new(
+                config.lead_mm * 1e-3,
+                config.index_repeatability_nm * 1e-9,
+                stream("index"),
+            ),
             error,
             play,
             stop_error: StopError::new(config.repeatability_nm * 1e-9, stream("stop error")),
@@ -59,7 +65,7 @@ impl Screw {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero_m();
+        let offset_m = self.encoder.count_zero();
         while let Some((from, to)) = self.mass.step_until(now, offset_m) {
             if to != from {
                 self.travel(from, to);
@@ -128,7 +134,7 @@ impl Screw {
     }
 
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero_m()
+        self.encoder.count_zero()
     }
 }
 
@@ -146,21 +152,21 @@ impl Actuator for Screw {
     }
 
     fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution_m()
+        self.mass.speed_at(now) / self.encoder.resolution()
     }
 
-    fn resolution_m(&self) -> f64 {
-        self.encoder.resolution_m()
+    fn resolution(&self) -> f64 {
+        self.encoder.resolution()
     }
 
     fn encoder_power(&mut self, on: bool) {
         if self.encoder.power(on, self.mass.position_at(Time::ZERO)) {
-            self.index.last = None;
+            self.index.forget();
         }
     }
 
     fn index_pulse(&self) -> Option<IndexPulse> {
-        self.index.last
+        self.index.last()
     }
 
     fn limit_switches(&self) -> (bool, bool) {
@@ -213,38 +219,5 @@ impl Play {
     /// Nobody knows where between the flanks of a nut at `nut_m` it lies.
     fn lie_anywhere(&mut self, nut_m: f64, chance: &mut Stream) {
         self.table_m = nut_m + chance.between(-self.half_m, self.half_m);
-    }
-}
-
-/// The encoder's mark, met once a turn; one of the marks is in the middle of the screw.
-#[derive(Clone, Debug)]
-struct Index {
-    turn_m: f64,
-    repeatability_m: f64,
-    last: Option<IndexPulse>,
-    stream: Stream,
-}
-
-impl Index {
-    fn new(config: &ScrewConfig, stream: Stream) -> Self {
-        Self {
-            turn_m: config.lead_mm * 1e-3,
-            repeatability_m: config.index_repeatability_nm * 1e-9,
-            last: None,
-            stream,
-        }
-    }
-
-    fn watch(&mut self, from: f64, to: f64, encoder: &Encoder) {
-        let (before, after) = ((from / self.turn_m).floor(), (to / self.turn_m).floor());
-        if before == after {
-            return;
-        }
-        let mark_m = before.max(after) * self.turn_m;
-        let jitter_m = self.repeatability_m * self.stream.gaussian();
-        self.last = Some(IndexPulse {
-            count: encoder.counts(mark_m + jitter_m),
-            number: self.last.map_or(1, |last| last.number + 1),
-        });
     }
 }

@@ -42,7 +42,7 @@ fn go(plant: &mut Plant, start: Time, goals_m: [f64; AXES], step: Duration) -> T
         plant.advance(now);
         for axis in 0..AXES {
             let demand_m = from[axis] + share * (goals_m[axis] - from[axis]) - zero[axis];
-            plant.set_servo(axis, Servo::Follow { demand_m });
+            plant.set_servo(axis, Servo::Follow { demand: demand_m });
         }
         let next = now + Duration::from_millis(1);
         while now + step < next {
@@ -347,7 +347,7 @@ fn a_power_cycle_takes_the_origin_and_the_engagement_and_an_index_pulse_brings_o
         for axis in 0..AXES {
             let pulse = plant.index_pulse(axis).expect("the mark was passed");
             assert_eq!(pulse.number, 1);
-            let mark_m = pulse.count as f64 * plant.encoder_resolution_m(axis)
+            let mark_m = pulse.count as f64 * plant.encoder_resolution(axis)
                 + look(&plant).count_zero(axis).value();
             assert!(mark_m.abs() < 90e-9, "seed {seed}: {mark_m}");
         }

@@ -4,8 +4,10 @@ mod faults;
 mod homing;
 mod modes;
 mod positioning;
+mod rotary;
 mod states;
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use drivers::wire::can::CanFrame;
@@ -15,7 +17,7 @@ use units::Time;
 
 use super::mechanism::Mechanism;
 use super::{Cia402DriveConfig, Drive};
-use crate::plant::{IndexPulse, Servo};
+use crate::plant::{IndexPulse, ProbeEdge, Servo};
 
 const RESOLUTION_M: f64 = 10e-9;
 
@@ -29,6 +31,7 @@ pub(super) struct IdealAxis {
     pub(super) blocked: bool,
     pub(super) servo: Servo,
     pub(super) commands: u64,
+    pub(super) edges: VecDeque<ProbeEdge>,
 }
 
 impl Mechanism for IdealAxis {
@@ -40,7 +43,7 @@ impl Mechanism for IdealAxis {
         0.0
     }
 
-    fn resolution_m(&self) -> f64 {
+    fn resolution(&self) -> f64 {
         RESOLUTION_M
     }
 
@@ -55,14 +58,18 @@ impl Mechanism for IdealAxis {
         )
     }
 
+    fn probe_edge(&mut self) -> Option<ProbeEdge> {
+        self.edges.pop_front()
+    }
+
     fn set_servo(&mut self, servo: Servo) {
         self.servo = servo;
         self.commands += 1;
-        if let Servo::Follow { demand_m } = servo
+        if let Servo::Follow { demand } = servo
             && !self.blocked
         {
             let before = self.counts;
-            self.counts = (demand_m / RESOLUTION_M).round() as i64;
+            self.counts = (demand / RESOLUTION_M).round() as i64;
             self.pass_marks(before);
         }
     }
@@ -109,6 +116,7 @@ impl Bench {
             blocked: false,
             servo: Servo::Off,
             commands: 0,
+            edges: VecDeque::new(),
         };
         let drive = Drive::new(config);
         let mut bench = Self {

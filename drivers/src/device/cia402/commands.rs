@@ -1,0 +1,112 @@
+//! What a drive and its axis are told, and what they read.
+
+use units::{Coordinate, Time};
+
+use super::homing::HomingPlace;
+use super::{Activity, Cia402Drive};
+use crate::device::{Axis, AxisCommand, AxisReading, DriveCommand, ServoDrive};
+use crate::wire::cia402::{OperationMode, PowerState, Statusword};
+
+impl<Q: Coordinate> Cia402Drive<Q> {
+    pub(super) fn refuse_out_of_service(&mut self) {
+        self.refuse(
+            "a command",
+            "a started, operational node that sends process data; start it (again)",
+        );
+    }
+
+    fn is_enabled(&self) -> bool {
+        self.state() == Some(PowerState::OperationEnabled)
+    }
+}
+
+impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
+    fn control(&mut self, now: Time, command: DriveCommand) {
+        self.supersede(now);
+        match command {
+            DriveCommand::QuickStop => self.begin_quick_stop(now),
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            DriveCommand::Enable => self.begin_enable(now),
+            DriveCommand::Disable => self.begin_disable(now),
+            DriveCommand::ResetFault => self.begin_reset(now),
+            // A drive that is not enabled does not move: nothing is left to do.
+            DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
+            DriveCommand::Halt => self.begin_halt(now),
+        }
+    }
+
+    fn power_state(&self) -> Option<PowerState> {
+        self.state()
+    }
+
+    fn is_homed(&self) -> bool {
+        self.homed
+    }
+
+    fn started_at(&self) -> Option<Time> {
+        self.started_at
+    }
+}
+
+impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
+    fn command(&mut self, now: Time, command: AxisCommand<Q>) {
+        if let AxisCommand::Drive(command) = command {
+            self.control(now, command);
+            return;
+        }
+        let prepared = self.prepared.take();
+        self.supersede(now);
+        match command {
+            AxisCommand::Drive(_) => {}
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            _ if !self.is_enabled() => self.refuse("moving", "an enabled drive"),
+            AxisCommand::MoveTo {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, (target, speed, acceleration), false),
+            AxisCommand::Prepare {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, (target, speed, acceleration), true),
+            AxisCommand::Start => match prepared {
+                Some(prepared) => self.begin_prepared(now, prepared),
+                None => self.refuse("starting", "a move that was prepared right before"),
+            },
+            AxisCommand::HomeNegativeLimit { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
+            }
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeNextIndex {
+                position,
+                speed,
+                approach,
+            } => self.begin_homing(now, position, HomingPlace::NextIndex(speed, approach)),
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, position, HomingPlace::Here);
+            }
+        }
+    }
+
+    fn reading(&self) -> Option<AxisReading<Q>> {
+        let sample = self.image.sample()?;
+        let scale = self.settings.scale;
+        let pending = sample.mode == OperationMode::ProfilePosition
+            && sample.status.contains(Statusword::MODE_12);
+        Some(AxisReading {
+            at: sample.at,
+            counts: sample.position,
+            position: scale.to_coordinate(sample.position),
+            following_error: self
+                .image
+                .following_error()
+                .map(|counts| scale.to_coordinate(counts)),
+            standing: sample.status.contains(Statusword::TARGET_REACHED)
+                && !pending
+                && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
+        })
+    }
+}

@@ -1,0 +1,113 @@
+//! What sees the plate's lines pass, and the edges that it gives.
+
+use core::time::Duration;
+use std::collections::{BTreeSet, VecDeque};
+
+use units::{Radians, Time};
+
+use crate::plant::machine::ProbeEdge;
+use crate::random::Stream;
+
+use super::config::DetectorConfig;
+
+/// Edges that nobody takes are forgotten, the oldest first.
+const EDGES_MAX: usize = 1024;
+/// How far behind a line a scratch lies that gives a second edge.
+const SCRATCH_ARCSEC: f64 = 40.0;
+
+/// A line passes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passage {
+    pub(super) line: u32,
+    pub(super) at: Time,
+    /// The reading, not rounded, at that moment.
+    pub(super) reading: f64,
+    /// Radians per second.
+    pub(super) speed: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Detector {
+    noise: f64,
+    latency_s: f64,
+    pulse_s: f64,
+    scratched: BTreeSet<u32>,
+    edges: VecDeque<ProbeEdge>,
+    passages: u64,
+    stream: Stream,
+}
+
+impl Detector {
+    pub(super) fn new(config: &DetectorConfig, seed: u64) -> Self {
+        Self {
+            noise: Radians::from_arcsec(config.noise_arcsec).value(),
+            latency_s: config.latency_us * 1e-6,
+            pulse_s: config.pulse_us * 1e-6,
+            scratched: BTreeSet::new(),
+            edges: VecDeque::new(),
+            passages: 0,
+            stream: Stream::new(seed, "line detector"),
+        }
+    }
+
+    /// A scratch beside a line gives an edge of its own.
+    pub(super) fn scratch(&mut self, line: u32, scratched: bool) {
+        if scratched {
+            self.scratched.insert(line);
+        } else {
+            self.scratched.remove(&line);
+        }
+    }
+
+    /// How many lines it has seen.
+    pub(super) const fn passages(&self) -> u64 {
+        self.passages
+    }
+
+    /// A line passes; `counts` is what the encoder makes of a reading.
+    pub(super) fn see(&mut self, passage: Passage, counts: impl Fn(f64) -> i64) {
+        self.passages += 1;
+        let noise = self.noise * self.stream.gaussian();
+        self.pulse(passage, noise, &counts);
+        if self.scratched.contains(&passage.line) {
+            let behind = Radians::from_arcsec(SCRATCH_ARCSEC).value();
+            let later = Passage {
+                at: passage.at + span(behind / passage.speed.abs()),
+                reading: passage.reading + behind * passage.speed.signum(),
+                ..passage
+            };
+            let noise = self.noise * self.stream.gaussian();
+            self.pulse(later, noise, &counts);
+        }
+    }
+
+    fn pulse(&mut self, passage: Passage, noise: f64, counts: &impl Fn(f64) -> i64) {
+        for (after_s, rising) in [
+            (self.latency_s, true),
+            (self.latency_s + self.pulse_s, false),
+        ] {
+            if self.edges.len() >= EDGES_MAX {
+                self.edges.pop_front();
+            }
+            let reading = passage.reading + noise + passage.speed * after_s;
+            self.edges.push_back(ProbeEdge {
+                at: passage.at + span(after_s),
+                rising,
+                count: counts(reading),
+            });
+        }
+    }
+
+    /// The next edge that has come by `now`.
+    pub(super) fn take(&mut self, now: Time) -> Option<ProbeEdge> {
+        let first = self.edges.front()?;
+        if first.at > now {
+            return None;
+        }
+        self.edges.pop_front()
+    }
+}
+
+fn span(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+}

@@ -1,0 +1,211 @@
+//! A rotary table that turns endlessly, with a glass plate on it and a line detector over it.
+//!
+//! Source: the machine of CN 001 (system S2): an angle sensor of any kind with an error that
+//! repeats from turn to turn, and a plate whose lines are no better. Angles are radians and
+//! count on over the turns.
+//!
+//! | symbol | name |
+//! |---|---|
+//! | G | encoder error: reading minus true angle, of the reading |
+//! | A | error of a line on the plate: where it is minus where it should be |
+//! | s | placement: by how many lines the plate is turned against the table |
+//!
+//! Line n passes the detector when the true angle is (n + s) spacings, plus A of the line, plus
+//! what the placement is off by. Absent: wobble of the plate, run-out that moves the lines under
+//! the detector, heat.
+
+pub mod config;
+mod detector;
+mod encoder_error;
+mod plate;
+#[cfg(test)]
+mod tests;
+mod truth;
+
+use core::f64::consts::TAU;
+use core::time::Duration;
+
+use units::{Radians, Time};
+
+pub use truth::TableTruth;
+
+use crate::plant::Servo;
+use crate::plant::encoder::Encoder;
+use crate::plant::index_mark::IndexMark;
+use crate::plant::machine::{Actuator, IndexPulse, ProbeEdge};
+use crate::plant::servo::{GRID_NS, Mass};
+use crate::random::Stream;
+use config::TableConfig;
+use detector::{Detector, Passage};
+use encoder_error::EncoderError;
+use plate::Plate;
+
+#[derive(Clone, Debug)]
+pub(super) struct Table {
+    mass: Mass,
+    encoder: Encoder,
+    index: IndexMark,
+    error: EncoderError,
+    plate: Plate,
+    detector: Detector,
+    /// The grid step that ends next.
+    step: u64,
+    power_cycle_shift: f64,
+    shift: Stream,
+}
+
+impl Table {
+    pub(super) fn new(config: &TableConfig, seed: u64) -> Self {
+        let mut shift = Stream::new(seed, "table start");
+        let start = shift.between(0.0, TAU);
+        let encoder = &config.encoder;
+        let repeatability = Radians::from_arcsec(encoder.index_repeatability_arcsec).value();
+        Self {
+            mass: Mass::new(
+                config.motion.dynamics(),
+                start,
+                Stream::new(seed, "table servo rest"),
+            ),
+            encoder: Encoder::new(TAU / f64::from(encoder.counts_per_turn), start),
+            index: IndexMark::new(TAU, repeatability, Stream::new(seed, "table index")),
+            error: EncoderError::new(encoder, &config.bearing, seed),
+            plate: Plate::new(&config.plate, seed),
+            detector: Detector::new(&config.detector, seed),
+            step: 0,
+            power_cycle_shift: config.motion.power_cycle_shift_deg.to_radians(),
+            shift,
+        }
+    }
+
+    pub(super) fn advance(&mut self, now: Time) {
+        let offset = self.encoder.count_zero();
+        while let Some((from, to)) = self.mass.step_until(now, offset) {
+            self.step += 1;
+            if to != from {
+                self.index.watch(from, to, &self.encoder);
+                self.watch_lines(from, to);
+            }
+        }
+        if self.mass.resting() {
+            self.mass.skip_to(now);
+            self.step = now.nanos() / GRID_NS;
+        }
+    }
+
+    fn true_angle(&self, reading: f64) -> f64 {
+        reading - self.error.at(reading)
+    }
+
+    /// The lines that pass while the reading goes straight from one value to another in the grid
+    /// step that has just ended.
+    fn watch_lines(&mut self, from: f64, to: f64) {
+        let (before, after) = (self.true_angle(from), self.true_angle(to));
+        let (low, high) = (before.min(after), before.max(after));
+        let mut numbers: Vec<i64> = self
+            .plate
+            .candidates(low, high)
+            .filter(|number| {
+                let angle = self.plate.angle(*number);
+                // Each end belongs to one of two steps that follow each other.
+                angle > low && angle <= high
+            })
+            .collect();
+        if after < before {
+            numbers.reverse();
+        }
+        for number in numbers {
+            let share = (self.plate.angle(number) - before) / (after - before);
+            if let Some(line) = self.plate.visible(number) {
+                self.pass(line, number, share, (from, to));
+            }
+        }
+    }
+
+    fn pass(&mut self, line: u32, number: i64, share: f64, (from, to): (f64, f64)) {
+        let angle = self.plate.angle(number);
+        let mut reading = from + share * (to - from);
+        // The error changes slowly: each round is some thousand times nearer.
+        for _ in 0..2 {
+            reading += angle - self.true_angle(reading);
+        }
+        let start = Time((self.step - 1) * GRID_NS);
+        let passage = Passage {
+            line,
+            at: start + Duration::from_nanos((share * GRID_NS as f64) as u64),
+            reading,
+            speed: (to - from) / (GRID_NS as f64 * 1e-9),
+        };
+        let encoder = &self.encoder;
+        self.detector
+            .see(passage, |reading| encoder.counts(reading));
+    }
+
+    /// Without power the table can be turned.
+    pub(super) fn push_a_little(&mut self) {
+        let limit = self.power_cycle_shift;
+        self.mass.push(self.shift.between(-limit, limit));
+    }
+
+    pub(super) fn turn_plate(&mut self, lines: i64) {
+        self.plate.turn(lines);
+    }
+
+    pub(super) fn set_smudged(&mut self, line: u32, smudged: bool) {
+        self.plate.smudge(line, smudged);
+    }
+
+    pub(super) fn set_scratched(&mut self, line: u32, scratched: bool) {
+        self.detector.scratch(line, scratched);
+    }
+}
+
+impl Actuator for Table {
+    fn set_servo(&mut self, now: Time, servo: Servo) {
+        self.mass.set_servo(now, servo);
+    }
+
+    fn counts(&self, now: Time) -> i64 {
+        self.encoder.counts(self.mass.position_at(now))
+    }
+
+    fn counts_per_s(&self, now: Time) -> f64 {
+        self.mass.speed_at(now) / self.encoder.resolution()
+    }
+
+    fn resolution(&self) -> f64 {
+        self.encoder.resolution()
+    }
+
+    fn encoder_power(&mut self, on: bool) {
+        if self.encoder.power(on, self.mass.position_at(Time::ZERO)) {
+            self.index.forget();
+        }
+    }
+
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.index.last()
+    }
+
+    fn probe_edge(&mut self, now: Time) -> Option<ProbeEdge> {
+        self.detector.take(now)
+    }
+
+    /// What turns endlessly has no ends.
+    fn limit_switches(&self) -> (bool, bool) {
+        (false, false)
+    }
+
+    fn force_switch(&mut self, _positive: bool, _forced: Option<bool>) {}
+
+    fn set_blocked(&mut self, blocked: bool) {
+        self.mass.set_blocked(blocked);
+    }
+
+    fn set_torque_off(&mut self, off: bool) {
+        self.mass.set_torque_off(off);
+    }
+
+    fn torque_off(&self) -> bool {
+        self.mass.torque_off()
+    }
+}
