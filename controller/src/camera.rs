@@ -85,7 +85,9 @@ impl Machine {
         self.cameras[place].device.begin_pose(now, exposures);
         // The driver ends by itself; this is the last resort, in a number that a clock can bear.
         let config = &self.config.camera[camera];
-        let pictures = exposures.saturating_add(config.rejects_max).clamp(1, 10_000);
+        let pictures = exposures
+            .saturating_add(config.rejects_max)
+            .clamp(1, 10_000);
         let limit = 4 * inspection_timeout(config) + Duration::from_secs(10);
         let at = self.camera_device(place);
         let outcome = self.await_outcome(at, "pose", limit * pictures);
