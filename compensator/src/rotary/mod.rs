@@ -45,6 +45,7 @@
 
 mod closed_form;
 mod design;
+mod lanes;
 mod missing;
 mod outliers;
 mod periodic;
