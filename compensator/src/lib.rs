@@ -10,10 +10,12 @@
 //! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
 //! | [`rotary`] | what is the error of a rotary table, by a plate worse than it (system S2)? |
 //! | [`hall_zero`] | where is the drift-free origin (system S5)? |
+//! | [`screw`] | what does a ball screw do to a stroke, and which command undoes it (system S1)? |
 //! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
+//! | [`platform`] | which strokes bring an alignment platform into a pose, and back (system S1)? |
 //! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
 //! | [`apply`] | how does a correction get onto a moving axis without a bump? |
-//! | [`interpolation`], [`least_squares`], [`uncertainty`] | the numerics under them |
+//! | [`interpolation`], [`least_squares`], [`significance`], [`uncertainty`] | the numerics under them |
 //!
 //! Sign: deviation = actual − target (ISO 230-2), compensation = −deviation. The correction is
 //! the exact inverse: the command `c` with `c + deviation(c) = target`.
@@ -29,5 +31,8 @@ pub mod iso230;
 pub mod least_squares;
 pub mod length_correction;
 pub mod measurement;
+pub mod platform;
 pub mod rotary;
+pub mod screw;
+pub mod significance;
 pub mod uncertainty;

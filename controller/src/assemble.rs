@@ -13,7 +13,9 @@ use compensator::length_correction::{
 };
 use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings, NodeTimeouts};
 use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
-use drivers::device::cia402::{Cia402Drive, Cia402Settings, Cia402Timeouts};
+use drivers::device::cia402::{
+    Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
+};
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
@@ -28,8 +30,8 @@ use units::{
 
 use crate::config::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, CompensationConfig, EndPolicyName,
-    IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
-    ZeroConfig,
+    HomeOffsetName, IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName,
+    MachineConfig, OptionCodesConfig, ZeroConfig,
 };
 use crate::failure::Failure;
 use crate::machine::Unit;
@@ -233,6 +235,23 @@ fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
     }
 }
 
+fn option_codes(config: &OptionCodesConfig, usual: OptionCodes) -> OptionCodes {
+    OptionCodes {
+        quick_stop: config.quick_stop.or(usual.quick_stop),
+        shutdown: config.shutdown.or(usual.shutdown),
+        disable: config.disable.or(usual.disable),
+        halt: config.halt.or(usual.halt),
+        fault_reaction: config.fault_reaction.or(usual.fault_reaction),
+        ..usual
+    }
+}
+
+/// How long a drive may look for its limit switch, over twice the travel and some more.
+pub(crate) fn reference_limit(zero: &ZeroConfig, axis: &AxisConfig) -> Duration {
+    let travel_mm = axis.soft_max_mm - axis.soft_min_mm + 50.0;
+    Duration::from_secs_f64(10.0 + 2.0 * travel_mm / zero.reference_speed_mm_per_s)
+}
+
 /// The drive of an axis, as its driver is told.
 pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
     let heartbeats = (
@@ -241,6 +260,7 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
         axis.watch_master_ms,
     );
     let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats, patience);
+    let homing = axis.zero.as_ref().map(|zero| reference_limit(zero, axis));
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
     let acceleration = MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3);
@@ -259,7 +279,18 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
         stall_max: usual.common.sync_period * (patience - 1),
-        timeouts: patient_drive(usual.timeouts, patience),
+        home_offset: match axis.home_offset {
+            HomeOffsetName::PositionAtHome => HomeOffset::IsPositionAtHome,
+            HomeOffsetName::ZeroFromHome => HomeOffset::IsZeroFromHome,
+        },
+        options: option_codes(&axis.option_codes, usual.options),
+        timeouts: patient_drive(
+            Cia402Timeouts {
+                homing: homing.unwrap_or(usual.timeouts.homing),
+                ..usual.timeouts
+            },
+            patience,
+        ),
         ..usual
     }
 }

@@ -6,6 +6,8 @@ use compensator::iso230::{Directional, Figures};
 use serde_json::{Value, json};
 use units::Metres;
 
+pub mod screw;
+
 /// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
 pub fn um(length: Metres) -> f64 {
     let rounded = (length.um() * 1e4).round() / 1e4;
@@ -52,6 +54,16 @@ pub fn figures(figures: &Figures) -> Value {
         "conforms_to_iso_230_2": figures.conforms(),
         "targets": targets,
     })
+}
+
+/// What devices counted, as `{device: {what: count}}`; what never happened is left out.
+pub fn counters(counters: &[(String, &'static str, u64)]) -> Value {
+    let mut devices = serde_json::Map::new();
+    for (device, what, count) in counters.iter().filter(|(_, _, count)| *count > 0) {
+        let device = devices.entry(device.clone()).or_insert_with(|| json!({}));
+        device[*what] = json!(count);
+    }
+    Value::Object(devices)
 }
 
 /// An error table: deviations (actual − target) in micrometres.

@@ -12,18 +12,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
-use compensator::length_correction::LengthCorrection;
 use drivers::device::{
     AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
+use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
 use crate::assemble;
 use crate::bus_watch::BusWatch;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
-use crate::cycle::RunPlan;
+use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
@@ -64,7 +64,7 @@ pub(crate) struct AxisMemory {
     /// The calibration in use.
     pub(crate) compensation: Option<Compensation>,
     /// What was measured last, and how lengths were corrected since its datum.
-    pub(crate) datum: Option<(RunPlan, LengthCorrection)>,
+    pub(crate) datum: Option<(RunPlan, Datum)>,
     /// The direction of the last motion.
     pub(crate) approach: ApproachTracker,
 }
@@ -189,6 +189,16 @@ impl Machine {
             && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
     }
 
+    /// Coordinates mean something only after the zero.
+    pub(crate) fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        if self.is_zeroed(axis) {
+            return Ok(());
+        }
+        Err(Failure::NotZeroed {
+            axis: axis.to_owned(),
+        })
+    }
+
     /// The calibration `axis` uses now.
     pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
         self.memory.get(axis)?.compensation.as_ref()
@@ -214,6 +224,14 @@ impl Machine {
     /// When there is no such axis.
     pub fn reading(&self, axis: &str) -> Result<Option<AxisReading>, Failure> {
         Ok(self.axis(axis)?.device.reading())
+    }
+
+    /// The newest power state of `axis`, `None` before its drive has said one.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
+        Ok(self.axis(axis)?.device.power_state())
     }
 
     /// What every device said it is, by its name in the configuration.
@@ -311,13 +329,13 @@ impl Machine {
     pub(crate) fn command(
         &mut self,
         axis: &str,
-        command: AxisCommand,
+        command: impl Into<AxisCommand>,
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
         let now = self.now();
-        self.axes[at].device.command(now, command);
+        self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
     }
 

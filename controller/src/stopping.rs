@@ -1,6 +1,6 @@
 //! How a machine comes to rest: in order, or because something failed.
 
-use drivers::device::AxisCommand;
+use drivers::device::DriveCommand;
 
 use crate::failure::Failure;
 use crate::machine::{Machine, STOP_LIMIT, Supervision};
@@ -14,7 +14,7 @@ impl Machine {
         let mut result = Ok(());
         self.supervision = Supervision::Stopping;
         for axis in self.axis_names() {
-            result = result.and(self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT));
+            result = result.and(self.command(&axis, DriveCommand::Disable, "disable", STOP_LIMIT));
         }
         self.supervision = Supervision::Off;
         result.and(self.set_sync(false))
@@ -48,7 +48,7 @@ impl Machine {
         self.outbox.clear();
         let now = self.now();
         for unit in &mut self.axes {
-            unit.device.command(now, AxisCommand::QuickStop);
+            unit.device.control(now, DriveCommand::QuickStop);
         }
         for at in 0..self.axes.len() {
             // A drive that is gone cannot confirm; the others must still be stopped.
@@ -56,7 +56,7 @@ impl Machine {
             self.tell_unconfirmed(at, stopped);
         }
         for (at, axis) in self.axis_names().into_iter().enumerate() {
-            let disabled = self.command(&axis, AxisCommand::Disable, "disable", STOP_LIMIT);
+            let disabled = self.command(&axis, DriveCommand::Disable, "disable", STOP_LIMIT);
             self.tell_unconfirmed(at, disabled);
         }
         for memory in self.memory.values_mut() {

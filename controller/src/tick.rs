@@ -4,7 +4,7 @@
 //! fire, sends what the devices want to send, and judges their alarms. Nothing outside acts
 //! by itself: every event comes through here.
 
-use drivers::device::Alarm;
+use drivers::device::{Alarm, LineUse};
 use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
 use units::Time;
@@ -151,7 +151,7 @@ impl Machine {
             }
         }
         for at in 0..self.device_count() {
-            loop {
+            while self.may_speak(at) {
                 let unit = self.device_mut(at);
                 let port = unit.port;
                 let Some(payload) = unit.device.poll_transmit() else {
@@ -162,6 +162,23 @@ impl Machine {
             }
         }
         Ok(())
+    }
+
+    /// Whether device number `at` has its turn, where devices share a line.
+    fn may_speak(&mut self, at: usize) -> bool {
+        let unit = self.device_mut(at);
+        let (port, own) = (unit.port, unit.device.line_use());
+        if own == LineUse::Unshared {
+            return true;
+        }
+        let others: Vec<_> = (0..self.device_count())
+            .filter(|other| *other != at)
+            .filter_map(|other| {
+                let unit = self.device_mut(other);
+                (unit.port == port).then(|| (unit.device.line_use(), other < at))
+            })
+            .collect();
+        own.may_speak(others)
     }
 
     fn send(&mut self, port: Port, payload: Payload, device: &str) -> Result<(), Failure> {
@@ -215,7 +232,9 @@ impl Machine {
     fn forget_reference(&mut self, at: usize, alarm: &Alarm) {
         let lost = matches!(
             alarm,
-            Alarm::UnexpectedBootUp { .. } | Alarm::DuplicateNode { .. }
+            Alarm::UnexpectedBootUp { .. }
+                | Alarm::DuplicateNode { .. }
+                | Alarm::AmplifierRestarted { .. }
         );
         if !lost || at >= self.axes.len() {
             return;

@@ -9,9 +9,12 @@ use crate::fault::FaultConfig;
 use crate::node::Node;
 use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
 use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
+use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode, addresses_fit};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
+use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
+use crate::plant::platform::config::PlatformConfig;
 
 /// One emulated machine.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -124,6 +127,10 @@ pub enum DeviceConfig {
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
     DconModule(DconModuleConfig),
+    /// In-Sight vision system, on a serial line.
+    InSightController(InSightControllerConfig),
+    /// Copley Controls servo amplifiers, on one serial line.
+    CopleyAmps(CopleyAmpsConfig),
 }
 
 impl DeviceConfig {
@@ -134,13 +141,20 @@ impl DeviceConfig {
             Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
+            Self::InSightController(config) => {
+                Box::new(InSightControllerNode::new(config, seed, name))
+            }
+            Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
         }
     }
 
     const fn wants_can(&self) -> bool {
         match self {
             Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
-            Self::Umd2Interferometer(_) | Self::DconModule(_) => false,
+            Self::Umd2Interferometer(_)
+            | Self::DconModule(_)
+            | Self::InSightController(_)
+            | Self::CopleyAmps(_) => false,
         }
     }
 }
@@ -325,18 +339,53 @@ impl MachineConfig {
                 positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
             }
         }
-        let resolution_nm = stage.encoder.resolution_nm;
+        if let Some(platform) = &self.plant.platform {
+            check_platform(platform)?;
+        }
+        let plant = &self.plant;
         self.nodes
             .iter()
-            .try_for_each(|node| node.device.check(resolution_nm))
+            .try_for_each(|node| node.device.check(plant))
     }
 }
 
+fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
+    let screw = &platform.screw;
+    for (key, seen) in [
+        ("lead_mm", screw.lead_mm),
+        ("resolution_nm", screw.resolution_nm),
+        ("work_range_mm", screw.work_range_mm),
+        ("servo_bandwidth_hz", screw.servo_bandwidth_hz),
+        ("acceleration_max_m_per_s2", screw.acceleration_max_m_per_s2),
+        (
+            "friction_deceleration_m_per_s2",
+            screw.friction_deceleration_m_per_s2,
+        ),
+        (
+            "hard_stop_mm - work_range_mm",
+            screw.hard_stop_mm - screw.work_range_mm,
+        ),
+        (
+            "hard_stop_mm - start_mm",
+            screw.hard_stop_mm - screw.start_mm,
+        ),
+    ] {
+        positive(key, seen)?;
+    }
+    if platform.holds_the_platform() {
+        return Ok(());
+    }
+    Err(ConfigError::Value {
+        key: "actuators",
+        seen: platform.actuators.len() as f64,
+        expected: "three or four screws that hold x, y and angle",
+    })
+}
+
 impl DeviceConfig {
-    /// `resolution_nm` is the plant's encoder's.
-    fn check(&self, resolution_nm: f64) -> Result<(), ConfigError> {
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
         match self {
-            Self::Cia402Drive(config) if config.encoder_resolution_nm != resolution_nm => {
+            Self::Cia402Drive(config) if config.encoder_resolution_nm != plant.resolution_nm() => {
                 Err(ConfigError::Value {
                     key: "encoder_resolution_nm",
                     seen: config.encoder_resolution_nm,
@@ -349,8 +398,35 @@ impl DeviceConfig {
                 positive("batch_samples", f64::from(config.batch_samples))
             }
             Self::DconModule(config) => positive("channels", config.channels as f64),
+            Self::InSightController(config) => {
+                positive("length_unit_um", config.length_unit_um)?;
+                positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
+                positive("exposure_ms", config.exposure_ms)
+            }
+            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
         }
     }
+}
+
+fn check_amps(config: &CopleyAmpsConfig, resolution_nm: f64) -> Result<(), ConfigError> {
+    if !addresses_fit(config) {
+        return Err(ConfigError::Value {
+            key: "amps",
+            seen: config.amps.len() as f64,
+            expected: "amplifiers with different addresses up to 127, one of them 0",
+        });
+    }
+    let odd = config
+        .amps
+        .iter()
+        .find(|amp| amp.encoder_resolution_nm != resolution_nm);
+    odd.map_or(Ok(()), |amp| {
+        Err(ConfigError::Value {
+            key: "encoder_resolution_nm",
+            seen: amp.encoder_resolution_nm,
+            expected: "the plant's resolution_nm",
+        })
+    })
 }
 
 fn positive(key: &'static str, seen: f64) -> Result<(), ConfigError> {

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use drivers::device::cia402::Cia402Drive;
-use drivers::device::{Alarm, Axis, AxisCommand, Device, DeviceError};
+use drivers::device::{Alarm, Axis, AxisCommand, Device, DeviceError, DriveCommand, ServoDrive};
 use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Desk, Emulator, Rig, Setup, rigs};
@@ -76,7 +76,7 @@ fn on_the_way(drive: &mut Drive) -> Result<(), DeviceError> {
 }
 
 fn on_the_way_at(drive: &mut Drive, mm_per_s: f64) -> Result<(), DeviceError> {
-    drive.command(AxisCommand::Enable)?;
+    drive.command(DriveCommand::Enable)?;
     drive.command(HERE_IS_ZERO)?;
     drive.begin(to(40.0, mm_per_s));
     drive.live_until(|drive| {
@@ -103,7 +103,7 @@ fn a_started_drive_says_who_it_is_and_is_off() {
 #[test]
 fn an_enabled_drive_moves_to_its_target_and_is_disabled_again() {
     check(|drive| {
-        drive.command(AxisCommand::Enable)?;
+        drive.command(DriveCommand::Enable)?;
         assert_eq!(
             drive.device.power_state(),
             Some(PowerState::OperationEnabled)
@@ -117,7 +117,7 @@ fn an_enabled_drive_moves_to_its_target_and_is_disabled_again() {
             assert!((reading.position - target).abs() < Metres::from_um(1.0));
             assert!((scale(drive) - begin - target).abs() < Metres::from_um(1.0));
         }
-        drive.command(AxisCommand::Disable)?;
+        drive.command(DriveCommand::Disable)?;
         let state = drive.device.power_state();
         assert!(state.is_some_and(is_off), "{state:?}");
         assert_eq!(drive.alarms, []);
@@ -129,7 +129,7 @@ fn an_enabled_drive_moves_to_its_target_and_is_disabled_again() {
 fn a_halt_stops_short_of_the_target_and_the_drive_stays_enabled() {
     check(|drive| {
         on_the_way(drive)?;
-        drive.command(AxisCommand::Halt)?;
+        drive.command(DriveCommand::Halt)?;
         let stopped = drive.reading();
         assert!(stopped.position < Metres::from_mm(40.0));
         assert_eq!(
@@ -148,7 +148,7 @@ fn a_halt_stops_short_of_the_target_and_the_drive_stays_enabled() {
 fn a_quick_stop_ends_disabled_and_short_of_the_target() {
     check(|drive| {
         on_the_way(drive)?;
-        drive.command(AxisCommand::QuickStop)?;
+        drive.command(DriveCommand::QuickStop)?;
         assert!(rests(drive));
         assert!(drive.reading().position < Metres::from_mm(40.0));
         let state = drive.device.power_state();
@@ -160,7 +160,7 @@ fn a_quick_stop_ends_disabled_and_short_of_the_target() {
 #[test]
 fn homing_here_moves_the_coordinates_and_not_the_stage() {
     check(|drive| {
-        drive.command(AxisCommand::Enable)?;
+        drive.command(DriveCommand::Enable)?;
         let before = scale(drive);
         let position = Metres::from_mm(3.25);
         drive.command(AxisCommand::HomeHere { position })?;
@@ -175,9 +175,9 @@ fn homing_here_moves_the_coordinates_and_not_the_stage() {
 fn a_blocked_axis_faults_and_one_reset_clears_it_when_the_cause_is_gone() {
     check(|drive| {
         on_the_way(drive)?;
-        let blocked = drive
-            .emulator
-            .simulation(|simulation| simulation.inject(FaultConfig::permanent(Fault::BlockedAxis)));
+        let blocked = drive.emulator.simulation(|simulation| {
+            simulation.inject(FaultConfig::permanent(Fault::BlockedAxis { axis: 0 }))
+        });
         let blocked = blocked.expect("every stage can be blocked");
         assert!(drive.outcome().is_err());
         drive.live_until(|drive| drive.power_state() == Some(PowerState::Fault));
@@ -185,8 +185,8 @@ fn a_blocked_axis_faults_and_one_reset_clears_it_when_the_cause_is_gone() {
         drive
             .emulator
             .simulation(move |simulation| simulation.end_fault(blocked));
-        drive.command(AxisCommand::ResetFault)?;
-        drive.command(AxisCommand::Enable)?;
+        drive.command(DriveCommand::ResetFault)?;
+        drive.command(DriveCommand::Enable)?;
         drive.command(to(6.0, 50.0))?;
         assert!((drive.reading().position - Metres::from_mm(6.0)).abs() < Metres::from_um(1.0));
         Ok(())
@@ -235,7 +235,7 @@ fn a_drive_that_is_another_one_is_refused_before_anything_is_set() {
 #[test]
 fn a_drive_that_loses_its_power_raises_an_alarm_and_its_reference_is_gone() {
     check(|drive| {
-        drive.command(AxisCommand::Enable)?;
+        drive.command(DriveCommand::Enable)?;
         drive.command(HERE_IS_ZERO)?;
         drive
             .emulator

@@ -139,7 +139,7 @@ fn an_emergency_during_a_measurement_is_told_in_words() {
 fn a_blocked_axis_is_named_as_such() {
     let scene = Scene::during(Phase::Move)
         .after_ms(100)
-        .fault(Fault::BlockedAxis);
+        .fault(Fault::BlockedAxis { axis: 0 });
     let wanted = Wanted {
         cause: |failure| match failure {
             Failure::Alarm {

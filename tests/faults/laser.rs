@@ -185,6 +185,13 @@ fn a_fringe_count_that_slips_is_recognised_by_the_encoder() {
 }
 
 #[test]
+fn a_fringe_count_that_slips_is_recognised_whenever_it_does() {
+    for after_ms in (500..11_000).step_by(500) {
+        check_jump(-1, after_ms, 1);
+    }
+}
+
+#[test]
 fn a_fringe_count_that_slips_far_stops_the_run_at_once() {
     check_jump(2000, MIDST_MS, 1);
     check_jump(-700, MIDST_MS, 2);

@@ -214,6 +214,7 @@ fn torque_that_is_off_is_told_when_enabling_is_tried() {
 #[test]
 fn a_limit_switch_that_is_hit_ends_the_move() {
     let fault = Fault::LimitSwitch {
+        axis: 0,
         positive: true,
         pressed: true,
     };

@@ -7,7 +7,7 @@ use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Payload, Port, Transport};
 use drivers::wire::canopen::NodeId;
 use truestage::assemble;
-use units::Time;
+use units::{Coordinate, Time};
 
 use crate::emulator::Emulator;
 
@@ -148,18 +148,27 @@ impl<D: Device> Desk<D> {
     }
 }
 
-impl<D: Axis> Desk<D> {
+impl<D: Device> Desk<D> {
     /// Gives a command and does not wait.
-    pub fn begin(&mut self, command: AxisCommand) {
+    pub fn begin<Q: Coordinate>(&mut self, command: impl Into<AxisCommand<Q>>)
+    where
+        D: Axis<Q>,
+    {
         let now = self.now();
-        self.device.command(now, command);
+        self.device.command(now, command.into());
     }
 
     /// Gives a command and waits for its end.
     ///
     /// # Errors
     /// What the device says.
-    pub fn command(&mut self, command: AxisCommand) -> Result<(), DeviceError> {
+    pub fn command<Q: Coordinate>(
+        &mut self,
+        command: impl Into<AxisCommand<Q>>,
+    ) -> Result<(), DeviceError>
+    where
+        D: Axis<Q>,
+    {
         self.begin(command);
         self.outcome()
     }
@@ -168,7 +177,10 @@ impl<D: Axis> Desk<D> {
     ///
     /// # Panics
     /// Before the first.
-    pub fn reading(&self) -> AxisReading {
+    pub fn reading<Q: Coordinate>(&self) -> AxisReading<Q>
+    where
+        D: Axis<Q>,
+    {
         self.device.reading().expect("the drive was started")
     }
 }

@@ -1,9 +1,9 @@
-//! Encoder counts, and the scale that turns them into metres.
+//! Encoder counts, and the scale that turns them into metres or radians.
 
 use core::fmt;
 use core::ops::{Add, Neg, Sub};
 
-use crate::Metres;
+use crate::{Coordinate, Metres};
 
 /// A position or distance in encoder counts, exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -36,47 +36,54 @@ impl fmt::Display for Counts {
     }
 }
 
-/// How many metres one count is. Its sign is the direction in which counts grow.
+/// How much one count is: metres of a linear axis, radians of a rotary one. Its sign is the
+/// direction in which counts grow.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    metres_per_count: f64,
+pub struct Scale<Q = Metres> {
+    per_count: Q,
 }
 
-impl Scale {
-    /// A scale of `metres_per_count`; `None` when it is zero or not finite.
-    pub fn new(metres_per_count: Metres) -> Option<Self> {
-        let value = metres_per_count.value();
-        (value.is_finite() && value != 0.0).then_some(Self {
-            metres_per_count: value,
-        })
+impl<Q: Coordinate> Scale<Q> {
+    /// A scale of `per_count`; `None` when it is zero or not finite.
+    pub fn new(per_count: Q) -> Option<Self> {
+        (per_count.is_finite() && per_count != Q::ZERO).then_some(Self { per_count })
     }
 
-    /// The length of one count, signed.
-    pub const fn resolution(self) -> Metres {
-        Metres(self.metres_per_count)
+    /// What one count is, signed.
+    pub const fn resolution(self) -> Q {
+        self.per_count
     }
 
-    /// Exact counts to metres.
-    pub const fn to_metres(self, counts: Counts) -> Metres {
-        Metres(counts.0 as f64 * self.metres_per_count)
+    /// Exact counts to where they are.
+    pub fn to_coordinate(self, counts: Counts) -> Q {
+        Q::from_value(counts.0 as f64 * self.per_count.value())
     }
 
-    /// Metres to the nearest count.
-    pub fn to_counts(self, length: Metres) -> Counts {
-        Counts((length.value() / self.metres_per_count).round() as i64)
+    /// A coordinate to the nearest count.
+    pub fn to_counts(self, coordinate: Q) -> Counts {
+        Counts((coordinate.value() / self.per_count.value()).round() as i64)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Radians;
 
     #[test]
     fn a_length_rounds_to_the_nearest_count_and_back() {
         let scale = Scale::new(Metres(10e-9)).unwrap();
         assert_eq!(scale.to_counts(Metres(12.344e-9)), Counts(1));
         assert_eq!(scale.to_counts(Metres(-0.06)), Counts(-6_000_000));
-        assert!((scale.to_metres(Counts(6_000_000)).value() - 0.06).abs() < 1e-15);
+        assert!((scale.to_coordinate(Counts(6_000_000)).value() - 0.06).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_angle_has_a_scale_too() {
+        let scale = Scale::new(Radians::from_arcsec(-0.01)).unwrap();
+        assert_eq!(scale.to_counts(Radians::TURN), Counts(-129_600_000));
+        let quarter = scale.to_coordinate(Counts(-32_400_000));
+        assert!((quarter.degrees() - 90.0).abs() < 1e-12);
     }
 
     #[test]

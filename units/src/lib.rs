@@ -4,14 +4,16 @@
 //! arc-seconds exist only where a person writes or reads them (configuration, data files,
 //! screen). The package depends on nothing, so that everybody may import it.
 
+mod coordinate;
 mod counts;
 mod quantity;
 mod time;
 
+pub use coordinate::{Coordinate, LengthOrAngle};
 pub use counts::{Counts, Scale};
 pub use quantity::{
-    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
-    Volts,
+    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Quantity, Radians,
+    RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
 };
 pub use time::Time;
 
@@ -28,7 +30,7 @@ pub enum Approach {
 
 impl Approach {
     /// The approach of a move from `start` to `end`, or `None` when they are equal.
-    pub fn of_move(start: Metres, end: Metres) -> Option<Self> {
+    pub fn of_move<Q: Coordinate>(start: Q, end: Q) -> Option<Self> {
         if end > start {
             Some(Self::Forward)
         } else if end < start {

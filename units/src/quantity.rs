@@ -4,6 +4,48 @@ use core::fmt;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// What all quantities have in common, for code that is generic over them.
+pub trait Quantity:
+    Copy
+    + fmt::Debug
+    + Default
+    + PartialEq
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<f64, Output = Self>
+    + Div<Self, Output = f64>
+    + Send
+    + Sync
+    + 'static
+{
+    /// Zero of this quantity.
+    const ZERO: Self;
+
+    /// The quantity of `value` SI units.
+    fn from_value(value: f64) -> Self;
+
+    /// The bare number in the SI unit.
+    fn value(self) -> f64;
+
+    /// The magnitude.
+    fn abs(self) -> Self {
+        Self::from_value(self.value().abs())
+    }
+
+    /// Whether the value is neither infinite nor NaN.
+    fn is_finite(self) -> bool {
+        self.value().is_finite()
+    }
+
+    /// The larger of the two.
+    fn max(self, other: Self) -> Self {
+        Self::from_value(self.value().max(other.value()))
+    }
+}
+
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $symbol:literal) => {
         $(#[$doc])*
@@ -101,6 +143,18 @@ macro_rules! quantity {
             }
         }
 
+        impl Quantity for $name {
+            const ZERO: Self = Self(0.0);
+
+            fn from_value(value: f64) -> Self {
+                Self(value)
+            }
+
+            fn value(self) -> f64 {
+                self.0
+            }
+        }
+
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 fmt::Display::fmt(&self.0, f)?;
@@ -150,6 +204,16 @@ quantity!(
     MetresPerSecondSquared,
     "m/s²"
 );
+quantity!(
+    /// Angular speed in radians per second.
+    RadiansPerSecond,
+    "rad/s"
+);
+quantity!(
+    /// Angular acceleration in radians per second squared.
+    RadiansPerSecondSquared,
+    "rad/s²"
+);
 
 impl Metres {
     /// A length given in micrometres.
@@ -181,6 +245,9 @@ impl Metres {
 impl Radians {
     const PER_ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
 
+    /// One whole turn.
+    pub const TURN: Self = Self(core::f64::consts::TAU);
+
     /// An angle given in seconds of arc.
     pub const fn from_arcsec(arcsec: f64) -> Self {
         Self(arcsec * Self::PER_ARCSEC)
@@ -189,6 +256,16 @@ impl Radians {
     /// This angle in seconds of arc.
     pub const fn arcsec(self) -> f64 {
         self.0 / Self::PER_ARCSEC
+    }
+
+    /// An angle given in degrees.
+    pub const fn from_degrees(degrees: f64) -> Self {
+        Self(degrees.to_radians())
+    }
+
+    /// This angle in degrees.
+    pub const fn degrees(self) -> f64 {
+        self.0.to_degrees()
     }
 }
 

@@ -7,6 +7,7 @@ mod output;
 mod page;
 mod progress;
 mod scan;
+mod screw;
 mod session;
 mod verbs;
 
@@ -40,6 +41,8 @@ enum Command {
     },
     /// Who is on the buses, and what does not match the configuration; nothing is changed.
     Scan(MachineArgs),
+    /// Acknowledge the fault of a drive, once; nothing moves.
+    Reset(AxisArgs),
     /// Find the origin with the Hall sensors.
     Zero(AxisArgs),
     /// Zero, measure the deviations, store and activate the calibration.
@@ -146,6 +149,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args, output),
         Command::Check { config } => verbs::check(&config, output),
         Command::Scan(args) => scan::run(&args, output),
+        Command::Reset(args) => verbs::reset(&args, output),
         Command::Zero(args) => verbs::zero(&args, output),
         Command::Calibrate(args) => verbs::calibrate(&args, output),
         Command::Verify(args) => verbs::verify(&args, output),

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use drivers::wire::cia402::PowerState;
+use serde_json::{Value, json};
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
 use truestage::ports::Use;
 use truestage::store::{Store, read_journal};
@@ -40,6 +41,7 @@ struct Prepared {
 }
 
 /// Starts the machine, zeroes `axis`, loads its calibration, runs `procedure`, switches off.
+/// What the devices counted on the way comes with the result.
 fn with_zeroed_axis<R>(
     args: &AxisArgs,
     verb: &str,
@@ -47,7 +49,7 @@ fn with_zeroed_axis<R>(
     load_calibration: bool,
     resume: Option<&PathBuf>,
     procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
-) -> Result<R, Failure> {
+) -> Result<(R, Value), Failure> {
     let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
     let axis = choose_axis(&session.machine, args)?;
     let store = session.store.clone();
@@ -72,7 +74,7 @@ fn with_zeroed_axis<R>(
         };
         let result = procedure(machine, &axis, &store, prepared)?;
         machine.shut_down()?;
-        Ok(result)
+        Ok((result, to_json::counters(&machine.counters())))
     })
 }
 
@@ -80,11 +82,11 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "zero", Use::Motion, output)?;
     let axis = choose_axis(&session.machine, args)?;
     let store = session.store.clone();
-    let zeroed = session.machine.guarded(|machine| {
+    let (zeroed, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         let zeroed = machine.zero(&axis, &store)?;
         machine.shut_down()?;
-        Ok(zeroed)
+        Ok((zeroed, to_json::counters(&machine.counters())))
     })?;
     let estimate = &zeroed.estimate;
     let text = format!(
@@ -110,12 +112,36 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
         "zero": to_json::zero(estimate),
         "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
         "journal": zeroed.journal,
+        "counters": counters,
     });
     output.result(&(text + &since), &value)
 }
 
+/// Acknowledges a drive's fault; nothing moves.
+pub(super) fn reset(args: &AxisArgs, output: Output) -> Ended {
+    let mut session = Session::open(&args.machine, "reset", Use::Motion, output)?;
+    let axis = choose_axis(&session.machine, args)?;
+    let (before, after, counters) = session.machine.guarded(|machine| {
+        machine.start()?;
+        let before = machine.power_state(&axis)?;
+        machine.reset_fault(&axis)?;
+        let after = machine.power_state(&axis)?;
+        machine.shut_down()?;
+        Ok((before, after, to_json::counters(&machine.counters())))
+    })?;
+    let word = |state: Option<PowerState>| state.map_or("unknown".into(), |it| it.to_string());
+    let text = format!(
+        "axis {axis}: was in {}, is in {}; zero it before it moves",
+        word(before),
+        word(after)
+    );
+    let value = json!({"axis": axis, "before": word(before), "after": word(after),
+                       "counters": counters});
+    output.result(&text, &value)
+}
+
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    let calibrated = with_zeroed_axis(
+    let (calibrated, counters) = with_zeroed_axis(
         &args.axis,
         "calibrate",
         output,
@@ -155,6 +181,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         "journal": calibrated.journal,
         "closure_um": to_json::um(calibrated.measured.closure),
         "fit": to_json::fitted(fitted),
+        "counters": counters,
     });
     output.result(&text, &value)
 }
@@ -174,7 +201,7 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         )?;
         Ok((axis.to_owned(), verified))
     };
-    let (axis, verified) = with_zeroed_axis(
+    let ((axis, verified), counters) = with_zeroed_axis(
         &args.axis,
         "verify",
         output,
@@ -191,6 +218,7 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         name: to_json::figures(&verified.figures),
         "tolerance_um": to_json::um(verified.tolerance),
         "within_tolerance": within,
+        "counters": counters,
         "journal": verified.journal,
     });
     if compensated && !within {
@@ -300,6 +328,15 @@ fn journal_to_resume(
     axis: &str,
 ) -> Result<Option<PathBuf>, Failure> {
     let Some(path) = resume else { return Ok(None) };
+    if path.extension().is_some_and(|it| it == "toml") {
+        return Err(Failure::Usage {
+            what: format!("--resume {}: that is no journal", path.display()),
+            help: format!(
+                "write the configuration first: truestage {verb} {} --resume",
+                path.display()
+            ),
+        });
+    }
     if path.as_os_str() != NEWEST_RUN {
         return Ok(Some(path.clone()));
     }

@@ -313,6 +313,37 @@ mod tests {
     }
 
     #[test]
+    fn what_a_drive_does_on_its_own_is_written_only_where_the_file_says_so() {
+        use drivers::device::cia402::HomeOffset;
+        let settings = |text: &str| {
+            let config = parse(text, "m").unwrap().config;
+            let (axis, bus) = (&config.axis["x"], &config.can["can0"]);
+            crate::assemble::cia402_settings(axis, bus, 1)
+        };
+        let usual = settings(LINEAR);
+        assert_eq!(usual.options.quick_stop, None);
+        assert_eq!(usual.home_offset, HomeOffset::IsPositionAtHome);
+        let keys = "\nnode_id = 1\nhome_offset = \"zero_from_home\"\n\
+                    option_codes = { quick_stop = 2, fault_reaction = -1 }\n";
+        let told = settings(&LINEAR.replacen("\nnode_id = 1\n", keys, 1));
+        assert_eq!(told.options.quick_stop, Some(2));
+        assert_eq!(told.options.fault_reaction, Some(-1));
+        assert_eq!(
+            told.options.abort_connection,
+            usual.options.abort_connection
+        );
+        assert_eq!(told.home_offset, HomeOffset::IsZeroFromHome);
+    }
+
+    #[test]
+    fn a_key_of_another_kind_of_module_is_refused() {
+        let keys = "device = \"cia401\"\npoll_period_ms = 50.0";
+        let text = LINEAR.replacen("device = \"cia401\"", keys, 1);
+        let error = parse(&text, "m").unwrap_err().to_string();
+        assert!(error.contains("a cia401 module has no such key"), "{error}");
+    }
+
+    #[test]
     fn the_hash_follows_what_a_calibration_depends_on() {
         let hash = |text: &str| parse(text, "m").unwrap().hash;
         let same = LINEAR.replace("runs = 3", "runs = 4");

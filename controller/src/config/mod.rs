@@ -12,6 +12,7 @@ pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
-    CompensationConfig, EndPolicyName, IdentityConfig, InstrumentConfig, InstrumentDevice,
-    InterpolationName, MachineConfig, MachineSection, SerialLine, VerifyConfig, ZeroConfig,
+    CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
+    InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
+    SerialLine, VerifyConfig, ZeroConfig,
 };

@@ -93,6 +93,29 @@ pub struct IdentityConfig {
     pub serial_number: Option<u32>,
 }
 
+/// What a drive takes its home offset (0x607C) for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HomeOffsetName {
+    /// The position at home, as many drives do.
+    #[default]
+    PositionAtHome,
+    /// The way from home to zero, as CiA 402 has it.
+    ZeroFromHome,
+}
+
+/// The option codes 0x605A to 0x605E of CiA 402; what is absent stays as the drive has it.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct OptionCodesConfig {
+    pub quick_stop: Option<i16>,
+    pub shutdown: Option<i16>,
+    pub disable: Option<i16>,
+    pub halt: Option<i16>,
+    pub fault_reaction: Option<i16>,
+}
+
 /// One axis and what is done with it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -116,6 +139,10 @@ pub struct AxisConfig {
     pub heartbeat_producer_ms: u16,
     pub heartbeat_consumer_ms: u16,
     pub watch_master_ms: u16,
+    #[serde(default)]
+    pub home_offset: HomeOffsetName,
+    #[serde(default)]
+    pub option_codes: OptionCodesConfig,
     pub identity: IdentityConfig,
     pub zero: Option<ZeroConfig>,
     pub calibrate: Option<CalibrateConfig>,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
-use super::measure::{MeasureOptions, Measured, RunPlan};
+use super::measure::{EarlierRuns, MeasureOptions, Measured, RunPlan};
 use super::utc_now;
 use crate::assemble;
 use crate::config::CalibrateConfig;
@@ -15,7 +15,7 @@ use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
     CalibrationRecord, Content, Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord,
-    Journal, JournalHeader, LinearContent, PointEntry, RecordHead, SCHEMA_VERSION, Store,
+    Journal, JournalHeader, LinearContent, RecordHead, SCHEMA_VERSION, Store,
 };
 
 /// How a calibration is made.
@@ -59,12 +59,12 @@ impl Machine {
     ) -> Result<Calibrated, Failure> {
         let config = self.axis_config(axis)?.calibrate.clone();
         let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
-        let plan = run_plan(&config);
+        self.require_zeroed(axis)?;
+        let plan = RunPlan {
+            closure_limit: (!options.accept_drift)
+                .then(|| Metres::from_um(config.closure_limit_um)),
+            ..run_plan(&config)
+        };
         // Before the header, which says who measures.
         self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", axis, &plan, None);
@@ -73,18 +73,8 @@ impl Machine {
             stage: Stage::Calibrate,
             compensated: false,
         };
-        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, &earlier);
+        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let limit = Metres::from_um(config.closure_limit_um);
-        // Written so that NaN is refused too.
-        let closed = measured.closure.abs() <= limit;
-        if !closed && !options.accept_drift {
-            return Err(Failure::Closure {
-                axis: axis.to_owned(),
-                seen: measured.closure,
-                limit,
-            });
-        }
         let fitted = self.fit_table(axis, &plan, &measured)?;
         let compensation = self.prepare(axis, fitted.table.clone())?;
         let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
@@ -257,12 +247,19 @@ pub(super) fn open_journal(
     store: &Store,
     header: &JournalHeader,
     resume: Option<&PathBuf>,
-) -> Result<(Journal, Vec<PointEntry>), Failure> {
+) -> Result<(Journal, EarlierRuns), Failure> {
     match resume {
-        None => Ok((Journal::create(&store.runs(), header)?, Vec::new())),
+        None => Ok((
+            Journal::create(&store.runs(), header)?,
+            EarlierRuns::default(),
+        )),
         Some(path) => {
             let (journal, read) = Journal::resume(path, header)?;
-            Ok((journal, read.points))
+            let earlier = EarlierRuns {
+                points: read.points,
+                closures: read.closures,
+            };
+            Ok((journal, earlier))
         }
     }
 }
@@ -286,5 +283,6 @@ fn run_plan(config: &CalibrateConfig) -> RunPlan {
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
         scale_limit_ppm: config.scale_limit_ppm,
+        closure_limit: None,
     }
 }

@@ -10,7 +10,7 @@
 use units::Metres;
 
 use crate::failure::Failure;
-use crate::store::PointEntry;
+use crate::store::{ClosureEntry, PointEntry};
 
 /// Points on either side of a jump that make it believable.
 const SIDE: usize = 3;
@@ -26,6 +26,20 @@ pub(super) struct Plausible {
     pub(super) step: Metres,
     /// What the instrument's counter counts.
     pub(super) half_wavelength: Metres,
+}
+
+impl Plausible {
+    /// Whether samples that scatter so much say nothing of the place.
+    pub(super) fn is_shaken(&self, scatter: Metres) -> bool {
+        scatter > self.step / 2.0
+    }
+}
+
+/// A whole run, and its datum's place before and after it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run<'a> {
+    pub(super) points: &'a [PointEntry],
+    pub(super) closure: ClosureEntry,
 }
 
 /// The check of one measurement.
@@ -51,13 +65,17 @@ impl CrossCheck {
         }
     }
 
+    pub(super) const fn plausible(&self) -> &Plausible {
+        &self.plausible
+    }
+
     /// Judges a point against the one before it. A point whose own samples lie far apart says
     /// nothing of the count: vibration is for the fit to judge.
     ///
     /// # Errors
     /// When the instrument went another way than the encoder, beyond what a stage can do.
     pub(super) fn take(&mut self, point: &PointEntry) -> Result<(), Failure> {
-        if point.scatter_m > self.plausible.step.value() / 2.0 {
+        if self.plausible.is_shaken(Metres(point.scatter_m)) {
             return Ok(());
         }
         let Some(last) = self.last.replace(*point) else {
@@ -77,26 +95,36 @@ impl CrossCheck {
         Err(self.fringe_jump(jump, &last, point))
     }
 
-    /// Judges a whole run against the run before: the same targets in the same order.
+    /// Judges a whole run against the run before: the same targets in the same order, and the
+    /// datum's place before and after them, so that a slip on the way from run to run shows too.
     ///
     /// # Errors
     /// When the count slipped in one of them.
-    pub(super) fn compare(&self, before: &[PointEntry], run: &[PointEntry]) -> Result<(), Failure> {
+    pub(super) fn compare(&self, before: &Run<'_>, run: &Run<'_>) -> Result<(), Failure> {
         let half_wavelength_m = self.plausible.half_wavelength.value();
         let quiet = |point: &PointEntry| point.scatter_m < half_wavelength_m;
         let (places, changes): (Vec<usize>, Vec<f64>) = before
+            .points
             .iter()
-            .zip(run)
+            .zip(run.points)
             .enumerate()
             .filter(|(_, (a, b))| quiet(a) && quiet(b))
             .map(|(place, (a, b))| (place, deviation(b) - deviation(a)))
             .unzip();
+        let Some(last) = places.len().checked_sub(1) else {
+            return Ok(());
+        };
+        // The datum is one place, but it bounds the run: it counts as much as a side needs.
+        let start = [run.closure.start_m - before.closure.start_m; SIDE];
+        let end = [run.closure.closure_m - before.closure.closure_m; SIDE];
+        let changes = [&start, changes.as_slice(), &end].concat();
         let Some(slip) = find_slip(&changes, half_wavelength_m) else {
             return Ok(());
         };
         // Up to there both runs agree or differ alike: the slip is in the later run when the
         // change comes, in the earlier one when it goes; the place is the same.
-        let (from, to) = (&run[places[slip.at - 1]], &run[places[slip.at]]);
+        let point = |at: usize| &run.points[places[at.saturating_sub(SIDE).min(last)]];
+        let (from, to) = (point(slip.at - 1), point(slip.at));
         Err(self.fringe_jump(slip.jump_m * slip.sign(), from, to))
     }
 

@@ -2,18 +2,19 @@
 
 use core::time::Duration;
 
-use compensator::length_correction::{EnvironmentWatch, LengthCorrection};
+use compensator::length_correction::EnvironmentWatch;
 use compensator::measurement::{LinearSeries, Measurement};
-use drivers::device::{DisplacementReading, Environment};
+use drivers::device::Environment;
 use units::{Approach, Metres};
 
-use super::cross_check::{CrossCheck, Plausible, judge_scale};
+use super::cross_check::{CrossCheck, Plausible, Run, judge_scale};
+use super::datum::Datum;
 use super::travel::Correction;
 use crate::assemble;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::{Entry, EnvironmentRecord, Journal, PointEntry};
+use crate::store::{ClosureEntry, Entry, EnvironmentRecord, Journal, PointEntry};
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +33,8 @@ pub struct RunPlan {
     pub average_samples: u32,
     /// Largest relative difference of instrument and encoder believed, where it is judged.
     pub scale_limit_ppm: f64,
+    /// How far the datum may have drifted at the end of each run; `None` for any distance.
+    pub closure_limit: Option<Metres>,
 }
 
 /// How a series is measured.
@@ -43,12 +46,28 @@ pub struct MeasureOptions {
     pub compensated: bool,
 }
 
+/// The whole runs of a measurement that was interrupted; none for a new one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct EarlierRuns {
+    pub(crate) points: Vec<PointEntry>,
+    pub(crate) closures: Vec<ClosureEntry>,
+}
+
+impl EarlierRuns {
+    fn last(&self) -> Option<Run<'_>> {
+        let closure = *self.closures.last()?;
+        let begin = self.points.partition_point(|it| it.run < closure.run);
+        let points = &self.points[begin..];
+        Some(Run { points, closure })
+    }
+}
+
 /// A measured series.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// Every point.
     pub points: Vec<PointEntry>,
-    /// The same place, measured last minus first.
+    /// The same place, measured after a run minus before the first: the largest of all runs.
     pub closure: Metres,
     /// Mean environment of the points.
     pub environment: EnvironmentRecord,
@@ -100,7 +119,7 @@ struct Session<'a> {
     axis: &'a str,
     plan: &'a RunPlan,
     correction: Correction,
-    correction_of_length: LengthCorrection,
+    datum: Datum,
     journal: &'a mut Journal,
     counter: Counter,
     check: CrossCheck,
@@ -115,34 +134,34 @@ const STEP_MAX: Metres = Metres(5e-6);
 
 impl Machine {
     /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
-    /// `earlier` are the points of an interrupted run: its complete runs are kept.
+    /// The runs of an interrupted measurement are kept (`earlier`).
     ///
     /// The datum is the axis's zero, approached forward; the same place is measured again at
-    /// the end.
+    /// the end of each run.
     ///
     /// # Errors
-    /// Whatever stops the machine, and an instrument that disagrees with the encoder beyond
-    /// reason.
-    pub fn measure_runs(
+    /// Whatever stops the machine, a datum that drifted, and an instrument that disagrees
+    /// with the encoder beyond reason.
+    pub(crate) fn measure_runs(
         &mut self,
         axis: &str,
         plan: &RunPlan,
         options: MeasureOptions,
         journal: &mut Journal,
-        earlier: &[PointEntry],
+        mut runs: EarlierRuns,
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
-        let mut points = whole_runs(earlier, per_run);
         // A run that was whole but wrong ended the measurement that is continued here.
-        for run in points.chunk_by(|a, b| a.run == b.run) {
+        for run in runs.points.chunk_by(|a, b| a.run == b.run) {
             judge_scale(axis, plan.scale_limit_ppm, run)?;
         }
         self.use_instrument(&plan.instrument)?;
-        let correction_of_length = self.set_datum(axis, plan)?;
-        self.remember(axis).datum = Some((plan.clone(), correction_of_length));
+        let plausible = self.plausible(axis, plan)?;
+        let datum = self.set_datum(axis, plan, &plausible)?;
+        self.remember(axis).datum = Some((plan.clone(), datum));
         let counter = Counter {
             stage: options.stage,
-            done: points.len() as u64,
+            done: runs.points.len() as u64,
             total: per_run as u64 * u64::from(plan.runs),
         };
         let correction = if options.compensated {
@@ -154,27 +173,28 @@ impl Machine {
             axis,
             plan,
             correction,
-            correction_of_length,
+            datum,
             journal,
             counter,
-            check: CrossCheck::new(axis, self.plausible(axis, plan)?),
+            check: CrossCheck::new(axis, plausible),
             watch: self.environment_watch(plan),
         };
-        let first = points.last().map_or(1, |point| point.run + 1);
+        let first = runs.points.last().map_or(1, |point| point.run + 1);
+        let mut start = Metres::ZERO;
         for run in first..=plan.runs {
-            let measured = self.measure_run(&mut session, run)?;
-            let before = points.len().saturating_sub(per_run);
-            session.check.compare(&points[before..], &measured)?;
-            points.extend(measured);
+            let points = self.measure_run(&mut session, run)?;
+            let closure = self.close_run(&mut session, run, start, &runs, &points)?;
+            start = Metres(closure.closure_m);
+            runs.points.extend(points);
+            runs.closures.push(closure);
         }
-        let closure = self.measure_closure(&mut session)?;
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
         self.instrument_in_use = None;
-        let environment = mean_environment(&points);
+        let environment = mean_environment(&runs.points);
         Ok(Measured {
-            points,
-            closure,
+            closure: largest(&runs.closures),
+            points: runs.points,
             environment,
         })
     }
@@ -210,12 +230,7 @@ impl Machine {
         let set_point = self.travel(axis, target, session.correction)?;
         let reading = self.read_displacement(session.axis, session.plan)?;
         let environment = self.watched_environment(session)?;
-        let measured = self.correct(
-            session.plan,
-            &reading,
-            &environment,
-            &session.correction_of_length,
-        )?;
+        let measured = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let encoder = self
             .reading(axis)?
             .expect("an axis that moved has been read")
@@ -239,62 +254,38 @@ impl Machine {
         Ok(point)
     }
 
-    /// What the instrument of the last measurement reads at the axis's zero, approached
-    /// forward, against its datum: by how much the zero has moved since.
-    ///
-    /// # Errors
-    /// Whatever stops the machine; [`Failure::Usage`] when nothing was measured before.
-    pub fn displacement_at_zero(&mut self, axis: &str) -> Result<Metres, Failure> {
-        let (plan, length) = self
-            .remember(axis)
-            .datum
-            .clone()
-            .ok_or_else(|| Failure::Usage {
-                what: format!("axis {axis} has no datum"),
-                help: "calibrate or verify first".into(),
-            })?;
-        self.use_instrument(&plan.instrument)?;
-        self.go_to_datum(axis, &plan)?;
-        let reading = self.read_displacement(axis, &plan)?;
-        let environment = self.instrument_environment(&plan.instrument);
-        self.instrument_in_use = None;
-        self.correct(&plan, &reading, &environment, &length)
-    }
-
-    /// Goes to the axis's zero, forward, and makes the instrument read zero there.
-    fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
-        self.go_to_datum(axis, plan)?;
-        self.stand_still(axis, plan.settle)?;
-        let now = self.now();
-        let at = self.instrument_index(&plan.instrument);
-        self.instruments[at].device.set_datum(now);
-        let environment = self.instrument_environment(&plan.instrument);
-        let config = &self.config.instrument[&plan.instrument];
-        let environment = assemble::correction_environment(&environment);
-        LengthCorrection::new(assemble::correction_settings(config), &environment).map_err(
-            |source| Failure::Correction {
-                instrument: plan.instrument.clone(),
-                source,
-            },
-        )
-    }
-
-    fn go_to_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<(), Failure> {
-        self.travel(axis, Metres::ZERO - plan.overrun, Correction::Off)?;
-        self.travel(axis, Metres::ZERO, Correction::Off)?;
-        Ok(())
-    }
-
-    fn measure_closure(&mut self, session: &mut Session<'_>) -> Result<Metres, Failure> {
+    /// Measures the datum's place again; a run after which it has moved is worth nothing.
+    fn close_run(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+        start: Metres,
+        earlier: &EarlierRuns,
+        points: &[PointEntry],
+    ) -> Result<ClosureEntry, Failure> {
         self.go_to_datum(session.axis, session.plan)?;
-        let reading = self.read_displacement(session.axis, session.plan)?;
+        let reading = self.read_calm(session.axis, session.plan, session.check.plausible())?;
         let environment = self.watched_environment(session)?;
-        self.correct(
-            session.plan,
-            &reading,
-            &environment,
-            &session.correction_of_length,
-        )
+        let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
+        let closure = ClosureEntry {
+            run,
+            start_m: start.value(),
+            closure_m: seen.value(),
+        };
+        if let Some(before) = earlier.last() {
+            session.check.compare(&before, &Run { points, closure })?;
+        }
+        // A comparison with NaN is false, so that it is refused too.
+        let is_closed = |limit| seen.abs() <= limit;
+        if let Some(limit) = session.plan.closure_limit.filter(|it| !is_closed(*it)) {
+            return Err(Failure::Closure {
+                axis: session.axis.to_owned(),
+                seen,
+                limit,
+            });
+        }
+        session.journal.write(&Entry::Closed(closure))?;
+        Ok(closure)
     }
 
     /// What a stage like this can do from one point to the next.
@@ -326,62 +317,14 @@ impl Machine {
             }),
         }
     }
-
-    /// Lets the stage stand, then averages.
-    pub(crate) fn read_displacement(
-        &mut self,
-        axis: &str,
-        plan: &RunPlan,
-    ) -> Result<DisplacementReading, Failure> {
-        self.stand_still(axis, plan.settle)?;
-        let at = self.instrument_index(&plan.instrument);
-        let now = self.now();
-        self.instruments[at]
-            .device
-            .begin_average(now, plan.average_samples);
-        let rate = self.config.instrument[&plan.instrument].sample_rate_hz;
-        // Four times the nominal time: the stream comes in batches over USB.
-        let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(plan.average_samples) / rate);
-        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        Ok(self.instruments[at]
-            .device
-            .average()
-            .expect("an average that ended well is there"))
-    }
-
-    pub(crate) fn instrument_environment(&self, instrument: &str) -> Environment {
-        self.instruments[self.instrument_index(instrument)]
-            .device
-            .environment()
-    }
-
-    fn correct(
-        &self,
-        plan: &RunPlan,
-        reading: &DisplacementReading,
-        environment: &Environment,
-        length: &LengthCorrection,
-    ) -> Result<Metres, Failure> {
-        let failed = |source| Failure::Correction {
-            instrument: plan.instrument.clone(),
-            source,
-        };
-        let environment = assemble::correction_environment(environment);
-        length
-            .correct(reading.vacuum, &environment)
-            .map(|corrected| corrected.displacement)
-            .map_err(failed)
-    }
 }
 
-/// The points of the runs that are whole.
-fn whole_runs(points: &[PointEntry], per_run: usize) -> Vec<PointEntry> {
-    let count = |run: u32| points.iter().filter(|point| point.run == run).count();
-    points
+fn largest(closures: &[ClosureEntry]) -> Metres {
+    closures
         .iter()
-        .filter(|point| count(point.run) == per_run)
-        .copied()
-        .collect()
+        .map(|closure| Metres(closure.closure_m))
+        .max_by(|a, b| a.abs().value().total_cmp(&b.abs().value()))
+        .unwrap_or(Metres::ZERO)
 }
 
 fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {

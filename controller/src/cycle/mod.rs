@@ -4,6 +4,7 @@
 
 mod calibrate;
 mod cross_check;
+mod datum;
 mod measure;
 mod scan;
 mod travel;
@@ -16,6 +17,7 @@ pub use scan::Found;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;
 
+pub(crate) use datum::Datum;
 pub use measure::series_of;
 
 /// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::{Compensation, OutOfRange};
-use drivers::device::AxisCommand;
+use drivers::device::{AxisCommand, DriveCommand};
 use units::{Approach, Metres, MetresPerSecond, MetresPerSecondSquared};
 
 use crate::failure::Failure;
@@ -28,7 +28,7 @@ impl Machine {
     /// # Errors
     /// When the drive refuses or does not answer in time.
     pub fn enable(&mut self, axis: &str) -> Result<(), Failure> {
-        self.command(axis, AxisCommand::Enable, "enable", Duration::from_secs(5))
+        self.command(axis, DriveCommand::Enable, "enable", Duration::from_secs(5))
     }
 
     /// Switches `axis` off.
@@ -38,7 +38,7 @@ impl Machine {
     pub fn disable(&mut self, axis: &str) -> Result<(), Failure> {
         self.command(
             axis,
-            AxisCommand::Disable,
+            DriveCommand::Disable,
             "disable",
             Duration::from_secs(5),
         )
@@ -51,7 +51,7 @@ impl Machine {
     pub fn reset_fault(&mut self, axis: &str) -> Result<(), Failure> {
         self.command(
             axis,
-            AxisCommand::ResetFault,
+            DriveCommand::ResetFault,
             "fault reset",
             Duration::from_secs(5),
         )
@@ -64,11 +64,7 @@ impl Machine {
     /// Before anything moves: not zeroed, outside the soft limits, outside the calibrated
     /// range. While moving: whatever stops the machine.
     pub fn move_to(&mut self, axis: &str, target: Metres) -> Result<Metres, Failure> {
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_zeroed(axis)?;
         self.travel(axis, target, Correction::On)
     }
 

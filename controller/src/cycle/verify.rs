@@ -64,11 +64,7 @@ impl Machine {
     ) -> Result<Verified, Failure> {
         let config = self.axis_config(axis)?.verify.clone();
         let config = config.ok_or_else(|| missing(axis, "verify"))?;
-        if !self.is_zeroed(axis) {
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_zeroed(axis)?;
         if options.compensated && self.compensation(axis).is_none() {
             return Err(Failure::Usage {
                 what: format!("axis {axis} uses no calibration"),
@@ -85,7 +81,7 @@ impl Machine {
             compensated: options.compensated,
         };
         let measured = self
-            .measure_runs(axis, &plan, measuring, &mut journal, &earlier)
+            .measure_runs(axis, &plan, measuring, &mut journal, earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         let verified = Verified {
             figures: iso230::evaluate(&measured.series()?)?,
@@ -175,5 +171,6 @@ fn run_plan(config: &VerifyConfig) -> RunPlan {
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
         scale_limit_ppm: SCALE_LIMIT_PPM,
+        closure_limit: None,
     }
 }

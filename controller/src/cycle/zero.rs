@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use compensator::hall_zero::{
     Outcome, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
 };
-use drivers::device::AxisCommand;
+use drivers::device::{AxisCommand, DriveCommand};
 use units::{Metres, MetresPerSecond, Time, Volts};
 
 use super::calibrate::missing;
@@ -115,10 +115,7 @@ impl Machine {
     /// Coarse reference on the negative limit switch.
     fn reference(&mut self, axis: &str, config: &ZeroConfig) -> Result<(), Failure> {
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
-        let axis_config = self.axis_config(axis)?;
-        let travel_mm = axis_config.soft_max_mm - axis_config.soft_min_mm + 50.0;
-        let limit =
-            Duration::from_secs_f64(10.0 + 2.0 * travel_mm / config.reference_speed_mm_per_s);
+        let limit = assemble::reference_limit(config, self.axis_config(axis)?);
         let position = Metres::from_mm(config.negative_limit_mm);
         self.command(
             axis,
@@ -158,7 +155,7 @@ impl Machine {
                 None => {}
                 Some(Progress::Found(outcome)) => return Ok(*outcome),
                 Some(Progress::Failed(source)) => {
-                    self.command(axis, AxisCommand::Halt, "halt", STOP_LIMIT)?;
+                    self.command(axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
                     return Err(Failure::Search {
                         axis: axis.to_owned(),
                         source,
@@ -185,7 +182,7 @@ impl Machine {
                     acceleration,
                 }
             }
-            _ => AxisCommand::Halt,
+            _ => DriveCommand::Halt.into(),
         };
         if *motion != Some(command) {
             let at = self.axis_index(axis)?;

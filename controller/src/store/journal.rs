@@ -84,6 +84,18 @@ pub struct ZeroEntry {
     pub at_s: f64,
 }
 
+/// The datum's place, measured again after a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosureEntry {
+    /// Which run, from 1.
+    pub run: u32,
+    /// What the instrument read there before the run, metres; 0 right after the datum.
+    pub start_m: f64,
+    /// What the instrument read there, metres; 0 when nothing drifted.
+    pub closure_m: f64,
+}
+
 /// A line of a journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
@@ -94,6 +106,8 @@ pub enum Entry {
     Point(PointEntry),
     /// A zero.
     Zero(ZeroEntry),
+    /// A run is whole, and the place of its datum still reads what it should.
+    Closed(ClosureEntry),
     /// The run was continued here after an interruption.
     Resumed {
         /// When, UTC, RFC 3339.
@@ -207,6 +221,8 @@ pub struct ReadJournal {
     pub points: Vec<PointEntry>,
     /// Its zeros.
     pub zeros: Vec<ZeroEntry>,
+    /// How far each whole run had drifted at its end.
+    pub closures: Vec<ClosureEntry>,
     /// Whether the run was finished.
     pub complete: bool,
     /// How many bytes are whole lines.
@@ -216,12 +232,19 @@ pub struct ReadJournal {
 }
 
 impl ReadJournal {
-    /// What a continued run goes on from: the run that was cut short is measured anew.
+    /// What a continued measurement goes on from. Its datum is a new one, so that only runs
+    /// whose end was seen to agree with their own datum are kept.
     fn keep_whole_runs(&mut self) {
         let whole = self.header.targets_m.len() * 2;
-        let count = |run: u32| self.points.iter().filter(|point| point.run == run).count();
-        let kept = self.points.iter().filter(|point| count(point.run) == whole);
-        self.points = kept.copied().collect();
+        let points = core::mem::take(&mut self.points);
+        let count = |run: u32| points.iter().filter(|point| point.run == run).count();
+        self.closures.retain(|closure| count(closure.run) == whole);
+        let is_kept = |run: u32| self.closures.iter().any(|closure| closure.run == run);
+        self.points = points
+            .iter()
+            .filter(|it| is_kept(it.run))
+            .copied()
+            .collect();
     }
 }
 
@@ -345,6 +368,7 @@ fn take(
                 header,
                 points: Vec::new(),
                 zeros: Vec::new(),
+                closures: Vec::new(),
                 complete: false,
                 valid_bytes: 0,
                 torn: false,
@@ -353,6 +377,7 @@ fn take(
         (Entry::Header(_), Some(_)) | (_, None) => return Err(misplaced()),
         (Entry::Point(point), Some(read)) => read.points.push(point),
         (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
+        (Entry::Closed(closure), Some(read)) => read.closures.push(closure),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;
             read.keep_whole_runs();
@@ -430,11 +455,34 @@ mod tests {
         Journal::resume(journal.path(), &header).unwrap();
     }
 
-    /// One whole run of the header's two targets.
-    fn write_run(journal: &mut Journal, run: u32) {
+    fn write_points(journal: &mut Journal, run: u32) {
         for _ in 0..4 {
             journal.write(&point(run)).unwrap();
         }
+    }
+
+    /// One whole run of the header's two targets.
+    fn write_run(journal: &mut Journal, run: u32) {
+        write_points(journal, run);
+        let closure_m = 1e-8;
+        journal
+            .write(&Entry::Closed(ClosureEntry {
+                run,
+                start_m: 0.0,
+                closure_m,
+            }))
+            .unwrap();
+    }
+
+    #[test]
+    fn a_run_whose_datum_was_not_measured_again_is_not_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        write_run(&mut journal, 1);
+        write_points(&mut journal, 2);
+        let (_, read) = Journal::resume(journal.path(), &header()).unwrap();
+        assert!(read.points.iter().all(|point| point.run == 1));
+        assert_eq!((read.points.len(), read.closures.len()), (4, 1));
     }
 
     #[test]

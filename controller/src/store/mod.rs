@@ -20,12 +20,13 @@ use std::path::{Path, PathBuf};
 
 pub use calibration::{ActivePointer, Store, short};
 pub use journal::{
-    Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
+    ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
 pub use record::{
-    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
-    NodeRecord, ReadingName, RecordHead, RotaryContent,
+    CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,
+    InstrumentRecord, LinearContent, NodeRecord, ReadingName, RecordHead, RotaryContent,
+    ScrewContent, ScrewMethodName,
 };
 
 pub(crate) use atomic::write_new_or_replace;

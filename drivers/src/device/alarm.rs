@@ -1,12 +1,15 @@
 //! What a device says unasked when something is wrong.
 
+use core::fmt;
 use core::time::Duration;
-use units::Metres;
+use units::LengthOrAngle;
 
+use super::DeviceName;
 use crate::wire::canopen::NodeId;
 use crate::wire::canopen::emcy::Emergency;
 use crate::wire::canopen::nmt::NmtState;
 use crate::wire::cia402::PowerState;
+use crate::wire::copley::Faults;
 
 /// Something that must stop the machine, or at least be told.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -55,22 +58,20 @@ pub enum Alarm {
     FollowingError { node: NodeId },
     /// The axis goes the other way than its drive wants it to.
     #[error(
-        "{node}: the axis runs in the wrong direction: wanted {:+.3} mm, went {:+.3} mm; motor \
-         phases, encoder or polarity exchanged?", wanted.mm(), moved.mm()
+        "{node}: the axis runs in the wrong direction: wanted {wanted:+.3}, went {moved:+.3}; motor \
+         phases, encoder or polarity exchanged?"
     )]
     WrongDirection {
         node: NodeId,
-        wanted: Metres,
-        moved: Metres,
+        wanted: LengthOrAngle,
+        moved: LengthOrAngle,
     },
     /// An implausible jump of a position.
-    #[error(
-        "{node}: position jumped by {:.3} mm, possible are {:.3} mm", jump.mm(), limit.mm()
-    )]
+    #[error("{node}: position jumped by {jump:.3}, possible are {limit:.3}")]
     PositionJump {
         node: NodeId,
-        jump: Metres,
-        limit: Metres,
+        jump: LengthOrAngle,
+        limit: LengthOrAngle,
     },
     /// The interferometer's measurement beam is blocked.
     #[error("interferometer: beam lost; clear and align it, set a new datum")]
@@ -102,4 +103,74 @@ pub enum Alarm {
     /// An analog channel's sample is too old.
     #[error("analog input: no sample for {waited:?}")]
     StaleSample { waited: Duration },
+    /// An amplifier on a serial line says that something is wrong.
+    #[error("{device}: {trouble}")]
+    Amplifier {
+        device: DeviceName,
+        trouble: AmplifierTrouble,
+    },
+    /// An amplifier has restarted.
+    #[error("{device}: has restarted; it lost power or was reset, zero again")]
+    AmplifierRestarted { device: DeviceName },
+    /// An amplifier does not answer.
+    #[error("{device}: no answer for {waited:?}; power or cable lost? the axis may still move")]
+    AmplifierSilent {
+        device: DeviceName,
+        waited: Duration,
+    },
+    /// An implausible jump of a position that was asked for.
+    #[error("{device}: position jumped by {jump:.3}, possible are {limit:.3}")]
+    AmplifierJumped {
+        device: DeviceName,
+        jump: LengthOrAngle,
+        limit: LengthOrAngle,
+    },
+}
+
+/// What an amplifier on a serial line can say of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum AmplifierTrouble {
+    ShortCircuit,
+    AmplifierHot,
+    MotorHot,
+    OverVoltage,
+    UnderVoltage,
+    EncoderError,
+    PhasingError,
+    CommandFault,
+    TrackingError,
+    PositiveLimitSwitch,
+    NegativeLimitSwitch,
+    PositiveSoftLimit,
+    NegativeSoftLimit,
+    /// Its enable input, or its safe torque off, took the power away.
+    EnableInputOff,
+    /// It was enabled and is not any more.
+    Disabled,
+    /// Faults that have latched.
+    Faults(Faults),
+}
+
+impl fmt::Display for AmplifierTrouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ShortCircuit => "short circuit; motor or its cable",
+            Self::AmplifierHot => "amplifier too hot",
+            Self::MotorHot => "motor too hot",
+            Self::OverVoltage => "supply voltage too high",
+            Self::UnderVoltage => "supply voltage too low",
+            Self::EncoderError => "encoder error; encoder or its cable",
+            Self::PhasingError => "motor phasing error",
+            Self::CommandFault => "command signal missing",
+            Self::TrackingError => "following error outside its limit; blocked or overloaded?",
+            Self::PositiveLimitSwitch => "on its positive limit switch",
+            Self::NegativeLimitSwitch => "on its negative limit switch",
+            Self::PositiveSoftLimit => "beyond its positive software limit",
+            Self::NegativeSoftLimit => "beyond its negative software limit",
+            Self::EnableInputOff => "its enable input is not active (safe torque off?)",
+            Self::Disabled => "is disabled, should be enabled",
+            Self::Faults(faults) => return write!(f, "fault: {faults}"),
+        })
+    }
 }

@@ -400,7 +400,7 @@ impl Device for Dcon {
             }
             Input::Link(state) => self.link(now, *state),
             Input::Lost(_) => self.lines.skip_message(),
-            Input::Payload(Payload::Frame(_)) | Input::BusError(_) => {}
+            Input::Payload(Payload::Frame(_) | Payload::Control(_)) | Input::BusError(_) => {}
         }
     }
 

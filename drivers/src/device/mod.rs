@@ -7,20 +7,24 @@ mod alarm;
 pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
+pub mod copley;
 pub mod dcon;
 #[cfg(test)]
 mod fake_node;
+pub mod in_sight;
 pub mod serial_line;
+mod shared_line;
 pub mod umd2;
 
 use core::fmt;
 use core::time::Duration;
 use units::{
-    Celsius, Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, RelativeHumidity,
-    Time, Volts,
+    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, Radians, RelativeHumidity, Time,
+    Volts,
 };
 
-pub use alarm::Alarm;
+pub use alarm::{Alarm, AmplifierTrouble};
+pub use shared_line::{LineUse, Urgency};
 
 use crate::transport::Input;
 use crate::wire::Payload;
@@ -28,6 +32,7 @@ use crate::wire::canopen::nmt::NmtState;
 use crate::wire::canopen::sdo::AbortCode;
 use crate::wire::canopen::{NodeId, Object};
 use crate::wire::cia402::PowerState;
+use crate::wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
 
 /// The sans-io face that every device shows to the loop that drives it.
 pub trait Device {
@@ -40,8 +45,14 @@ pub trait Device {
     /// When [`Device::handle_timeout`] wants to be called next; [`Time::NEVER`] for never.
     fn poll_timeout(&self) -> Time;
 
-    /// The next payload to send, in order.
+    /// The next payload to send, in order. A device that shares its line is asked only when
+    /// [`LineUse::may_speak`].
     fn poll_transmit(&mut self) -> Option<Payload>;
+
+    /// What the device wants of its line; [`LineUse::Unshared`] unless it takes turns.
+    fn line_use(&self) -> LineUse {
+        LineUse::Unshared
+    }
 
     /// The next alarm.
     fn poll_alarm(&mut self) -> Option<Alarm>;
@@ -59,25 +70,27 @@ pub trait Device {
     fn counters(&self) -> Vec<(&'static str, u64)>;
 }
 
-/// A controlled direction: one servo drive.
-pub trait Axis: Device {
+/// A servo drive, whatever it moves.
+pub trait ServoDrive: Device {
     /// Begins a command; a command that still runs is superseded.
     /// [`Device::poll_outcome`] says when it is done, and how.
-    fn command(&mut self, now: Time, command: AxisCommand);
-
-    /// The newest sample of the axis, `None` before the first one.
-    fn reading(&self) -> Option<AxisReading>;
+    fn control(&mut self, now: Time, command: DriveCommand);
 
     /// The newest state, in the drive's own terms.
     fn power_state(&self) -> Option<PowerState>;
 
     /// Whether the drive has a reference since it was last powered.
     fn is_homed(&self) -> bool;
+
+    /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
+    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`. `None`
+    /// before the first motion and from a new command until its motion begins.
+    fn started_at(&self) -> Option<Time>;
 }
 
-/// What an axis can be told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisCommand {
+/// What every drive can be told, whatever it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveCommand {
     /// Switch on, up to operation enabled.
     Enable,
     /// Switch off, in a controlled way.
@@ -86,43 +99,87 @@ pub enum AxisCommand {
     QuickStop,
     /// Acknowledge a fault, once.
     ResetFault,
+    /// Slow down and stand, staying enabled; done when standing.
+    Halt,
+}
+
+/// A controlled direction, linear or rotary: one servo drive that positions in `Q`.
+pub trait Axis<Q: Coordinate = Metres>: ServoDrive {
+    /// Begins a command; a command that still runs is superseded.
+    /// [`Device::poll_outcome`] says when it is done, and how.
+    fn command(&mut self, now: Time, command: AxisCommand<Q>);
+
+    /// The newest sample of the axis, `None` before the first one.
+    fn reading(&self) -> Option<AxisReading<Q>>;
+}
+
+/// What an axis can be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisCommand<Q: Coordinate = Metres> {
+    /// What every drive can be told.
+    Drive(DriveCommand),
     /// Profile position move to `target` (drive coordinates); done when target reached.
     MoveTo {
         /// Where to, in drive coordinates.
-        target: Metres,
+        target: Q,
         /// Profile velocity.
-        speed: MetresPerSecond,
+        speed: Q::Speed,
         /// Profile acceleration and deceleration.
-        acceleration: MetresPerSecondSquared,
+        acceleration: Q::Acceleration,
     },
-    /// Slow down and stand, staying enabled; done when standing.
-    Halt,
+    /// Everything of a move loaded into the drive and confirmed, but nothing moves; done when
+    /// [`AxisCommand::Start`] is all that is missing. Any other command gives it up.
+    Prepare {
+        /// Where to, in drive coordinates.
+        target: Q,
+        /// Profile velocity.
+        speed: Q::Speed,
+        /// Profile acceleration and deceleration.
+        acceleration: Q::Acceleration,
+    },
+    /// Begins the move that was prepared last; done when target reached. Refused when nothing
+    /// is prepared.
+    Start,
     /// Home on the negative limit switch (method 17); the drive's coordinates become
     /// `position` there.
     HomeNegativeLimit {
         /// The coordinate of the switch.
-        position: Metres,
+        position: Q,
         /// Search speed.
-        speed: MetresPerSecond,
+        speed: Q::Speed,
+    },
+    /// Home on the first index pulse off the negative limit switch (method 1); the drive's
+    /// coordinates become `position` there.
+    HomeIndex {
+        /// The coordinate of the index pulse.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
     },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {
         /// The coordinate of where the axis stands now.
-        position: Metres,
+        position: Q,
     },
+}
+
+impl<Q: Coordinate> From<DriveCommand> for AxisCommand<Q> {
+    fn from(command: DriveCommand) -> Self {
+        Self::Drive(command)
+    }
 }
 
 /// One sample of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisReading {
+pub struct AxisReading<Q: Coordinate = Metres> {
     /// When it arrived.
     pub at: Time,
     /// The encoder, as the drive counts.
     pub counts: Counts,
-    /// The same in metres, drive coordinates.
-    pub position: Metres,
+    /// The same in metres or radians, drive coordinates.
+    pub position: Q,
     /// The drive's own following error, where it is mapped.
-    pub following_error: Option<Metres>,
+    pub following_error: Option<Q>,
     /// Whether the drive reports its target reached and no motion pending.
     pub standing: bool,
 }
@@ -178,6 +235,39 @@ pub struct DisplacementReading {
     pub standard_deviation: Metres,
     /// How many samples were averaged.
     pub samples: u32,
+}
+
+/// An instrument that sees where a body is in a plane.
+pub trait PoseInstrument: Device {
+    /// Begins to take pictures until `exposures` of them are good, and averages their poses.
+    /// Only pictures taken after this call count. [`Device::poll_outcome`] says when it is
+    /// done; then [`PoseInstrument::pose`].
+    fn begin_pose(&mut self, now: Time, exposures: u32);
+
+    /// The last pose, `None` before the first and after a measurement that failed: a picture
+    /// that was judged bad never becomes a number.
+    fn pose(&self) -> Option<PoseReading>;
+}
+
+/// Where a body was seen, in the machine's frame, from where the instrument was taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseReading {
+    /// When the answer about the last picture arrived.
+    pub at: Time,
+    /// Displacement of the body's origin along x.
+    pub x: Metres,
+    /// Displacement of the body's origin along y.
+    pub y: Metres,
+    /// Turn, counter-clockwise.
+    pub angle: Radians,
+    /// Standard deviations of the single pictures in x, y and angle, zero for a single one.
+    pub standard_deviation: (Metres, Metres, Radians),
+    /// How like the taught target the worst picture was, 0 to 1.
+    pub score: f64,
+    /// How many pictures were averaged.
+    pub samples: u32,
+    /// How many more were taken and judged bad.
+    pub rejected: u32,
 }
 
 /// What an instrument's weather sensors say; `None` where it has none or they fell silent.
@@ -293,13 +383,36 @@ pub enum DeviceError {
         needs: &'static str,
     },
     /// A value cannot be represented in the drive's units.
-    #[error("{node}: {what} {value} does not fit {object} (limit {limit})")]
+    #[error("{node}: {what} {value} {unit} does not fit {object} (limit {limit} {unit})")]
     OutOfRange {
         node: NodeId,
         object: Object,
         what: &'static str,
         value: f64,
         limit: f64,
+        unit: &'static str,
+    },
+    /// A device answered a command with something else than success.
+    #[error("{device}: {step} refused with {status}")]
+    Refused {
+        device: DeviceName,
+        step: &'static str,
+        status: crate::wire::in_sight::Status,
+    },
+    /// Too few good pictures.
+    #[error(
+        "{device}: {good} good pictures of {wanted}; of {} bad ones {without_target} showed no \
+         target and {judged_bad} were judged bad (best score {:.0} %); is the target in the \
+         field, clean, lit and at rest?",
+        without_target + judged_bad, best_score * 100.0
+    )]
+    NoGoodPicture {
+        device: DeviceName,
+        good: u32,
+        wanted: u32,
+        without_target: u32,
+        judged_bad: u32,
+        best_score: f64,
     },
     /// An alarm ended the command.
     #[error("{device}: {step} ended by an alarm: {alarm}")]
@@ -308,6 +421,74 @@ pub enum DeviceError {
         step: &'static str,
         alarm: Alarm,
     },
+    /// An amplifier on a serial line did not answer.
+    #[error(
+        "{device}: no answer ({attempts} attempts) while {step}; its power, address, cable or \
+         the line's baud rate?"
+    )]
+    Unanswered {
+        device: DeviceName,
+        step: &'static str,
+        attempts: u32,
+    },
+    /// An amplifier on a serial line refused a command.
+    #[error("{device}{}: {code} while {step}", of_parameter(*parameter))]
+    RefusedByAmplifier {
+        device: DeviceName,
+        parameter: Option<Parameter>,
+        code: ErrorCode,
+        step: &'static str,
+    },
+    /// A parameter read back differs from what was written, or is no number.
+    #[error("{device}, parameter {parameter}: read back {seen}, wrote {expected} ({step})")]
+    ParameterReadBack {
+        device: DeviceName,
+        parameter: Parameter,
+        expected: i64,
+        seen: String,
+        step: &'static str,
+    },
+    /// The amplifier is not the one the configuration names.
+    #[error(
+        "{device}: {what} is {seen}, the configuration says {expected}; fit the right device or \
+         correct the configuration"
+    )]
+    WrongAmplifier {
+        device: DeviceName,
+        what: &'static str,
+        expected: String,
+        seen: String,
+    },
+    /// A value cannot be represented in the amplifier's units.
+    #[error(
+        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
+    )]
+    ParameterOutOfRange {
+        device: DeviceName,
+        parameter: Parameter,
+        what: &'static str,
+        value: f64,
+        limit: f64,
+        unit: &'static str,
+    },
+    /// Latched faults are in the way.
+    #[error("{device}: {step} is not possible with latched faults: {faults}")]
+    Faulted {
+        device: DeviceName,
+        step: &'static str,
+        faults: Faults,
+    },
+    /// The amplifier broke a move off.
+    #[error("{device}: {step} was aborted by the amplifier, last saw {seen}")]
+    Aborted {
+        device: DeviceName,
+        step: &'static str,
+        seen: Seen,
+    },
+}
+
+fn of_parameter(parameter: Option<Parameter>) -> String {
+    parameter.map_or_else(String::new, |parameter| format!(", parameter {parameter}"))
 }
 
 /// Which device speaks: a node on the bus or a serial device by its kind.
@@ -317,6 +498,8 @@ pub enum DeviceName {
     Node(NodeId),
     /// On a serial line.
     Serial(&'static str),
+    /// One of several amplifiers behind a serial line.
+    Amplifier(Address),
 }
 
 impl fmt::Display for DeviceName {
@@ -324,6 +507,7 @@ impl fmt::Display for DeviceName {
         match self {
             Self::Node(node) => node.fmt(f),
             Self::Serial(kind) => f.write_str(kind),
+            Self::Amplifier(address) => write!(f, "amplifier {address}"),
         }
     }
 }
@@ -337,8 +521,9 @@ pub enum Seen {
     Power(PowerState),
     Statusword(u16),
     Mode(i8),
-    Position(Metres),
+    Position(LengthOrAngle),
     Samples(u32),
+    Events(EventStatus),
 }
 
 impl fmt::Display for Seen {
@@ -349,8 +534,9 @@ impl fmt::Display for Seen {
             Self::Power(state) => state.fmt(f),
             Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
             Self::Mode(raw) => write!(f, "mode {raw}"),
-            Self::Position(at) => write!(f, "position {:.6} mm", at.mm()),
+            Self::Position(at) => write!(f, "position {at:.6}"),
             Self::Samples(count) => write!(f, "{count} samples"),
+            Self::Events(events) => write!(f, "event status {:#010X}", events.bits()),
         }
     }
 }

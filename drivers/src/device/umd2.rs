@@ -344,7 +344,7 @@ impl Device for Umd2 {
                 self.counts.transport_losses += 1;
                 self.lines.skip_message();
             }
-            Input::Payload(Payload::Frame(_)) | Input::BusError(_) => {}
+            Input::Payload(Payload::Frame(_) | Payload::Control(_)) | Input::BusError(_) => {}
         }
     }
 

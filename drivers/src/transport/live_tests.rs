@@ -2,7 +2,7 @@
 //! nothing sleeps, every wait has a deadline that only a failure reaches.
 
 use nix::pty::{OpenptyResult, openpty};
-use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::sys::termios::{BaudRate, SetArg, cfgetospeed, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -11,6 +11,7 @@ use std::thread::JoinHandle;
 
 use super::*;
 use crate::transport::LinkState;
+use crate::wire::LineControl;
 use crate::wire::can::{BusError, BusErrorClass, CanFrame, ControllerProblem};
 use crate::wire::slcan::{BusState, Command, LineBuffer, Reply, StatusFlags};
 
@@ -39,6 +40,10 @@ impl Pty {
             path,
         }
     }
+}
+
+fn control(control: LineControl) -> Payload {
+    Payload::Control(control)
 }
 
 fn receive(live: &mut Live) -> Input {
@@ -104,6 +109,31 @@ fn a_line_that_takes_nothing_keeps_what_fits_and_then_refuses_whole_messages() {
     });
     assert_eq!(bytes(receive(&mut live)), b"!");
     drop(reader.join().unwrap());
+}
+
+#[test]
+fn an_open_line_changes_its_rate_and_a_break_is_harmless_on_a_pty() {
+    let pty = Pty::new();
+    let mut live = serial(&pty);
+    let rate = || cfgetospeed(&tcgetattr(pty.slave.as_ref().unwrap()).unwrap());
+    for done in [
+        LineControl::Break(true),
+        LineControl::Break(false),
+        LineControl::Baud(115_200),
+    ] {
+        live.send(PORT, &control(done)).unwrap();
+    }
+    assert_eq!(rate(), BaudRate::B115200);
+    live.send(PORT, &control(LineControl::Baud(9_600))).unwrap();
+    assert_eq!(rate(), BaudRate::B9600);
+    live.send(PORT, &Payload::Bytes(b"g r0x90\r".to_vec()))
+        .unwrap();
+    let mut heard = [0; 8];
+    (&pty.master).read_exact(&mut heard).unwrap();
+    assert_eq!(&heard, b"g r0x90\r");
+    let odd = live.send(PORT, &control(LineControl::Baud(12_345)));
+    assert!(matches!(odd, Err(SendError::System { .. })), "{odd:?}");
+    assert_eq!(rate(), BaudRate::B9600);
 }
 
 #[test]

@@ -1,13 +1,13 @@
-//! The two system calls that no safe library offers.
+//! The three system calls that no safe library offers.
 
 #![expect(
     unsafe_code,
-    reason = "serialport gives its descriptor away only as a number, and nix has no \
-              sched_setscheduler"
+    reason = "serialport gives its descriptor away only as a number, and nix has neither \
+              sched_setscheduler nor TIOCSBRK"
 )]
 
 use nix::errno::Errno;
-use std::os::fd::{FromRawFd, IntoRawFd, OwnedFd};
+use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd};
 
 /// Takes over the descriptor of an open port.
 pub(super) fn take_descriptor(port: impl IntoRawFd) -> OwnedFd {
@@ -25,5 +25,16 @@ pub(super) fn schedule_fifo(priority: i32) -> Result<(), Errno> {
     };
     // SAFETY: the call reads one `sched_param`; 0 is the calling thread.
     let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) };
+    Errno::result(result).map(drop)
+}
+
+/// Holds a serial line low, or lets go of it. `tcsendbreak` would wait until the end.
+///
+/// # Errors
+/// ENOTTY where there is no line.
+pub(super) fn set_break(descriptor: &OwnedFd, on: bool) -> Result<(), Errno> {
+    let request = if on { libc::TIOCSBRK } else { libc::TIOCCBRK };
+    // SAFETY: the descriptor is open as long as it is borrowed; both requests take no argument.
+    let result = unsafe { libc::ioctl(descriptor.as_raw_fd(), request) };
     Errno::result(result).map(drop)
 }

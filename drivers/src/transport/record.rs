@@ -8,6 +8,8 @@
 //! # port 0 can0
 //! (0000000000.001000) can0 601#4000100000000000 T
 //! # (0000000000.002000) laser R 323435360A
+//! # (0000000000.002500) amps baud 115200
+//! # (0000000000.002600) amps break on
 //! # (0000000000.003000) can0 lost 3
 //! # (0000000000.004000) can0 link down
 //! # (0000000000.005000) can0 sync 2000000
@@ -23,6 +25,7 @@ use std::io;
 use units::Time;
 
 use super::{Arrival, Input, LinkState, Payload, Port, SendError, Transport};
+use crate::wire::LineControl;
 use crate::wire::candump::{Content, Direction, Record};
 
 /// The first line of a recording.
@@ -139,6 +142,7 @@ impl<T: Transport, W: io::Write> Recorder<T, W> {
                 };
                 self.comment(at, port, &format!("{letter} {}", hex(bytes)));
             }
+            Payload::Control(control) => self.comment(at, port, &control_words(*control)),
         }
     }
 
@@ -205,6 +209,15 @@ pub(super) const fn link_word(state: LinkState) -> &'static str {
     }
 }
 
+/// Only the host does such things: they need no direction letter.
+pub(super) fn control_words(control: LineControl) -> String {
+    match control {
+        LineControl::Baud(baud) => format!("baud {baud}"),
+        LineControl::Break(true) => "break on".to_owned(),
+        LineControl::Break(false) => "break off".to_owned(),
+    }
+}
+
 fn hex(bytes: &[u8]) -> String {
     use core::fmt::Write as _;
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -227,6 +240,9 @@ mod tests {
 (0000000000.001500) can0 581#4300100092010200 R
 # (0000000000.002000) laser R 313233
 # (0000000000.002000) laser T 2330310D
+# (0000000000.002000) laser baud 115200
+# (0000000000.002000) laser break on
+# (0000000000.002000) laser break off
 (0000000000.002500) can0 20000040#0000000000000000 R
 # (0000000000.003000) can0 lost 3
 # (0000000000.004000) can0 link down
@@ -244,9 +260,16 @@ mod tests {
         assert!(recorder.receive(Time::NEVER).is_some());
         let poll = Payload::Bytes(b"#01\r".to_vec());
         recorder.send(Port(3), &poll).unwrap();
+        for control in [
+            LineControl::Baud(115_200),
+            LineControl::Break(true),
+            LineControl::Break(false),
+        ] {
+            recorder.send(Port(3), &Payload::Control(control)).unwrap();
+        }
         while recorder.receive(Time(5_000_000)).is_some() {}
         let (replay, _) = recorder.finish()?;
-        assert_eq!(replay.report().matched, 2);
+        assert_eq!(replay.report().matched, 5);
         Ok(())
     }
 

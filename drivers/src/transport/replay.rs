@@ -11,6 +11,7 @@ use units::Time;
 
 use super::record::rounded;
 use super::{Arrival, Input, LinkState, Payload, Port, SendError, Transport};
+use crate::wire::LineControl;
 use crate::wire::candump::{Content, Direction, Record};
 
 /// How many recorded sendings a single one may leave out and still be recognised.
@@ -273,6 +274,10 @@ impl Reader {
                 let state = parse_link(rest).ok_or(syntax)?;
                 self.arrived(stamp, port, Input::Link(state))
             }
+            "baud" | "break" => {
+                let control = parse_control(word, rest).ok_or(syntax)?;
+                self.sent(stamp, port, Payload::Control(control))
+            }
             "sync" | "refused" => Ok(()),
             _ => Err(syntax),
         }
@@ -313,6 +318,15 @@ fn parse_link(word: &str) -> Option<LinkState> {
     [LinkState::Up, LinkState::Down, LinkState::Gone]
         .into_iter()
         .find(|state| super::record::link_word(*state) == word)
+}
+
+fn parse_control(word: &str, rest: &str) -> Option<LineControl> {
+    match (word, rest) {
+        ("baud", rate) => rate.parse().ok().map(LineControl::Baud),
+        ("break", "on") => Some(LineControl::Break(true)),
+        ("break", "off") => Some(LineControl::Break(false)),
+        _ => None,
+    }
 }
 
 fn unhex(text: &str) -> Option<Vec<u8>> {

@@ -4,6 +4,7 @@
 use core::time::Duration;
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::sys::termios::{BaudRate, SetArg, cfsetspeed, tcgetattr, tcsetattr};
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use super::clock::Clock;
 use super::live::{LivePort, system};
 use super::os;
 use super::{Input, LinkState, Payload, Port, SendError};
+use crate::wire::LineControl;
 
 const READ_MAX: usize = 4_096;
 /// What may wait for a slow line before a send is refused.
@@ -136,6 +138,23 @@ fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
 
 fn is_denied(error: &std::io::Error) -> bool {
     error.kind() == std::io::ErrorKind::PermissionDenied
+}
+
+/// Another rate for a line that is open.
+fn set_baud(descriptor: &OwnedFd, baud: u32) -> Result<(), Errno> {
+    let rate = match baud {
+        4_800 => BaudRate::B4800,
+        9_600 => BaudRate::B9600,
+        19_200 => BaudRate::B19200,
+        38_400 => BaudRate::B38400,
+        57_600 => BaudRate::B57600,
+        115_200 => BaudRate::B115200,
+        230_400 => BaudRate::B230400,
+        _ => return Err(Errno::EINVAL),
+    };
+    let mut settings = tcgetattr(descriptor)?;
+    cfsetspeed(&mut settings, rate)?;
+    tcsetattr(descriptor, SetArg::TCSANOW, &settings)
 }
 
 /// Bytes on their way out; what a slow line does not take at once is kept, in order.
@@ -320,6 +339,34 @@ impl SerialLine {
         }
     }
 
+    /// Does not wait: whoever changes the rate has waited until what was sent has left. What
+    /// still waits here is a queue that is full.
+    fn control(&mut self, control: LineControl) -> Result<(), SendError> {
+        let port = self.port;
+        let Some(descriptor) = &self.descriptor else {
+            let state = LinkState::Gone;
+            return Err(SendError::Unusable { port, state });
+        };
+        if self.outbox.is_pending() {
+            return Err(SendError::QueueFull { port });
+        }
+        let done = match control {
+            LineControl::Baud(baud) => set_baud(descriptor, baud),
+            LineControl::Break(on) => os::set_break(descriptor, on),
+        };
+        if let (Ok(()), LineControl::Baud(baud)) = (done, control) {
+            // A line that is opened again goes on as it was.
+            self.settings.baud = baud;
+        }
+        match done {
+            // A pty has no line to hold low, some adapters cannot.
+            Err(Errno::ENOTTY | Errno::EOPNOTSUPP) if matches!(control, LineControl::Break(_)) => {
+                Ok(())
+            }
+            done => done.map_err(|errno| system(port, errno)),
+        }
+    }
+
     fn read(&mut self, now: Time) {
         let Some(descriptor) = &self.descriptor else {
             return;
@@ -368,8 +415,10 @@ impl LivePort for SerialLine {
 
     fn send(&mut self, payload: &Payload) -> Result<(), SendError> {
         let port = self.port;
-        let Payload::Bytes(bytes) = payload else {
-            return Err(SendError::WrongKind { port });
+        let bytes = match payload {
+            Payload::Bytes(bytes) => bytes,
+            Payload::Control(control) => return self.control(*control),
+            Payload::Frame(_) => return Err(SendError::WrongKind { port }),
         };
         let state = LinkState::Gone;
         let gone = SendError::Unusable { port, state };

@@ -8,7 +8,9 @@ pub mod can;
 pub mod candump;
 pub mod canopen;
 pub mod cia402;
+pub mod copley;
 pub mod dcon;
+pub mod in_sight;
 pub mod slcan;
 pub mod umd2;
 
@@ -19,6 +21,19 @@ pub enum Payload {
     Frame(can::CanFrame),
     /// On a serial line; where it is cut into runs means nothing.
     Bytes(Vec<u8>),
+    /// Not sent over a serial line, but done to it, in order with what is sent.
+    Control(LineControl),
+}
+
+/// What a host does at its end of a serial line besides sending. Devices never do any of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineControl {
+    /// Sends and receives with so many bits per second from now on. What was sent before must
+    /// have had the time to leave.
+    Baud(u32),
+    /// `true`: holds the line low from now on, which is a BREAK once it is longer than a byte;
+    /// `false`: lets go of it. Pseudo-terminals do not carry it.
+    Break(bool),
 }
 
 /// One of a machine's buses or serial lines, by its place in the configuration.

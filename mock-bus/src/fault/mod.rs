@@ -120,19 +120,31 @@ pub enum Fault {
     LinkDown { port: String },
     /// The host's adapter is pulled out, and put back when the fault ends.
     LinkGone { port: String },
-    /// The stage is held fast.
-    BlockedAxis,
-    /// The safe torque off circuit opens.
+    /// An axis is held fast.
+    BlockedAxis {
+        #[serde(default)]
+        axis: usize,
+    },
+    /// The safe torque off circuit, which all axes are on, opens.
     SafeTorqueOff,
-    /// A limit switch is stuck in a state.
-    LimitSwitch { positive: bool, pressed: bool },
+    /// A limit switch of an axis is stuck in a state.
+    LimitSwitch {
+        #[serde(default)]
+        axis: usize,
+        positive: bool,
+        pressed: bool,
+    },
     /// Nothing of the beam comes back.
     BeamBlocked,
     /// Too little of the beam comes back.
     BeamWeak,
     /// The fringe counter slips.
     FringeJump { half_wavelengths: i64 },
-    /// The interferometer's reflector shakes (standard deviation).
+    /// The cameras' marks are not there.
+    TargetAbsent,
+    /// The cameras' marks are partly covered.
+    TargetCovered,
+    /// The machine shakes under its instruments (standard deviation).
     Vibration { amplitude_um: f64 },
     /// The instrument's temperature, pressure and humidity stand still.
     FrozenEnvironment,

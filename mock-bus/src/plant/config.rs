@@ -2,18 +2,35 @@
 
 use serde::Deserialize;
 
+use super::camera::CameraConfig;
+use super::platform::config::PlatformConfig;
+
 /// The physics of one machine.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlantConfig {
-    /// Guide, motor, encoder and their errors.
+    /// Guide, motor, encoder and their errors; there unless the machine is another one.
     pub stage: StageConfig,
+    /// A platform on screws in place of the stage.
+    pub platform: Option<PlatformConfig>,
+    /// The cameras over the platform.
+    pub camera: CameraConfig,
     /// The magnets and sensors of the absolute zero.
     pub hall: HallConfig,
     /// Air and machine temperature.
     pub climate: ClimateConfig,
     /// The laser interferometer's optics.
     pub interferometer: InterferometerConfig,
+}
+
+impl PlantConfig {
+    /// Travel of one encoder count of the machine's axes.
+    pub fn resolution_nm(&self) -> f64 {
+        match &self.platform {
+            Some(platform) => platform.screw.resolution_nm,
+            None => self.stage.encoder.resolution_nm,
+        }
+    }
 }
 
 /// A linear-motor stage.

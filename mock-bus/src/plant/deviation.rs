@@ -120,13 +120,8 @@ impl Field {
 pub(super) struct Path {
     half_lost_m: f64,
     take_up_m: f64,
-    /// The stop error is carried along over this travel.
-    stop_travel_m: f64,
-    repeatability_m: f64,
     engagement_m: f64,
-    stop_error_m: f64,
-    next_stop_error_m: f64,
-    stream: Stream,
+    stop_error: StopError,
 }
 
 impl Path {
@@ -134,18 +129,17 @@ impl Path {
         Self {
             half_lost_m: config.lost_motion_um * 0.5e-6,
             take_up_m: config.lost_motion_take_up_um * 1e-6,
-            stop_travel_m: 5e-6,
-            repeatability_m: config.repeatability_nm * 1e-9,
             engagement_m: 0.0,
-            stop_error_m: 0.0,
-            next_stop_error_m: 0.0,
-            stream: Stream::new(seed, "stop error"),
+            stop_error: StopError::new(
+                config.repeatability_nm * 1e-9,
+                Stream::new(seed, "stop error"),
+            ),
         }
     }
 
     /// A stage that leaves its place will stop with another error.
     pub(super) fn leave(&mut self) {
-        self.next_stop_error_m = self.repeatability_m * self.stream.gaussian();
+        self.stop_error.leave();
     }
 
     /// Moving forward the stage lags behind its encoder by half the lost motion, and moving
@@ -154,17 +148,52 @@ impl Path {
     pub(super) fn travel(&mut self, by_m: f64) {
         let goal_m = -self.half_lost_m * by_m.signum();
         self.engagement_m = approach(self.engagement_m, goal_m, by_m.abs() / self.take_up_m);
-        let share = by_m.abs() / self.stop_travel_m;
-        self.stop_error_m = approach(self.stop_error_m, self.next_stop_error_m, share);
+        self.stop_error.travel(by_m);
     }
 
     pub(super) fn deviation_m(&self) -> f64 {
-        self.engagement_m + self.stop_error_m
+        self.engagement_m + self.stop_error.error_m()
     }
 
     /// Fully engaged in the direction of `sign`, without the stop's error.
     pub(super) fn engaged_m(&self, sign: f64) -> f64 {
         -self.half_lost_m * sign
+    }
+}
+
+/// The error of each single stop, which nothing can predict.
+#[derive(Clone, Debug)]
+pub(super) struct StopError {
+    standard_deviation_m: f64,
+    present_m: f64,
+    next_m: f64,
+    stream: Stream,
+}
+
+impl StopError {
+    /// It is carried along over this travel.
+    const TRAVEL_M: f64 = 5e-6;
+
+    pub(super) fn new(standard_deviation_m: f64, stream: Stream) -> Self {
+        Self {
+            standard_deviation_m,
+            present_m: 0.0,
+            next_m: 0.0,
+            stream,
+        }
+    }
+
+    /// What leaves its place will stop with another error.
+    pub(super) fn leave(&mut self) {
+        self.next_m = self.standard_deviation_m * self.stream.gaussian();
+    }
+
+    pub(super) fn travel(&mut self, by_m: f64) {
+        self.present_m = approach(self.present_m, self.next_m, by_m.abs() / Self::TRAVEL_M);
+    }
+
+    pub(super) const fn error_m(&self) -> f64 {
+        self.present_m
     }
 }
 

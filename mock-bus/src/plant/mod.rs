@@ -5,10 +5,15 @@
 //! however often [`Plant::advance`] is called in between.
 
 mod analog;
+pub mod camera;
 pub mod config;
 mod deviation;
+mod encoder;
 mod hall_field;
 mod instrument;
+mod limit_switch;
+mod machine;
+pub mod platform;
 mod servo;
 mod stage;
 mod thermal;
@@ -20,16 +25,20 @@ mod tests;
 use units::{Metres, Time};
 
 pub use analog::InputFault;
+pub use camera::{Mark, Target};
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes};
+pub use machine::IndexPulse;
+pub use platform::{PlatformTruth, Pose};
 pub use thermal::Environment;
 pub use truth::Truth;
 
 use analog::Input;
+use camera::Camera;
 use config::PlantConfig;
 use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
-use stage::Stage;
+use machine::{Actuator, Machine};
 use thermal::Climate;
 
 /// Inputs 0 and 1 are the Hall sensors; the others are spare.
@@ -47,18 +56,19 @@ pub enum Servo {
     },
 }
 
-/// Everything physical of one machine. It has one axis, number 0; axes that are not there
+/// Everything physical of one machine. Its axes are numbered from 0; axes that are not there
 /// stand still and read 0.
 #[derive(Clone, Debug)]
 pub struct Plant {
     now: Time,
     rail_v: f64,
-    stage: Stage,
+    machine: Machine,
     hall: HallField,
     inputs: Vec<Input>,
     inputs_swapped: bool,
     climate: Climate,
     interferometer: Interferometer,
+    camera: Camera,
 }
 
 impl Default for Plant {
@@ -74,7 +84,7 @@ impl Plant {
         Self {
             now: Time::ZERO,
             rail_v: config.hall.rail_v,
-            stage: Stage::new(config.stage.clone(), seed),
+            machine: Machine::new(config, seed),
             hall: HallField::new(config.hall.clone()),
             inputs: (0..ANALOG_INPUTS)
                 .map(|channel| Input::new(noise_v, seed, channel))
@@ -82,52 +92,53 @@ impl Plant {
             inputs_swapped: false,
             climate: Climate::new(config.climate.clone(), seed),
             interferometer: Interferometer::new(config.interferometer.clone(), seed),
+            camera: Camera::new(config.camera.clone(), seed),
         }
     }
 
     /// Lets the physics run up to `now`; a moment that has passed changes nothing.
     pub fn advance(&mut self, now: Time) {
         self.now = self.now.max(now);
-        self.stage.advance(self.now);
+        self.machine.advance(self.now);
     }
 
     /// What the drive does to axis `axis` from now on.
     pub fn set_servo(&mut self, axis: usize, servo: Servo) {
-        if axis == 0 {
-            self.stage.set_servo(self.now, servo);
+        let now = self.now;
+        if let Some(actuator) = self.machine.actuator_mut(axis) {
+            actuator.set_servo(now, servo);
         }
     }
 
     /// The encoder of `axis`: counts since its power came on.
     pub fn encoder_counts(&self, axis: usize) -> i64 {
-        if axis == 0 {
-            self.stage.counts(self.now)
-        } else {
-            0
-        }
+        self.read(axis, |actuator| actuator.counts(self.now))
     }
 
     /// Encoder speed of `axis` in counts per second.
     pub fn encoder_speed(&self, axis: usize) -> f64 {
-        if axis == 0 {
-            self.stage.counts_per_s(self.now)
-        } else {
-            0.0
-        }
+        self.read(axis, |actuator| actuator.counts_per_s(self.now))
     }
 
-    /// Metres of encoder travel per count of `axis`.
-    pub fn encoder_resolution_m(&self, _axis: usize) -> f64 {
-        self.stage.resolution_m()
+    /// Metres of encoder travel per count of `axis`; of axis 0 for an axis that is not there.
+    pub fn encoder_resolution_m(&self, axis: usize) -> f64 {
+        let actuator = self.machine.actuator(axis);
+        let actuator = actuator.or_else(|| self.machine.actuator(0));
+        actuator.map_or(0.0, |actuator| actuator.resolution_m())
+    }
+
+    /// The last index pulse of `axis`'s encoder since its power came on.
+    pub fn index_pulse(&self, axis: usize) -> Option<IndexPulse> {
+        self.read(axis, |actuator| actuator.index_pulse())
     }
 
     /// Negative and positive limit switch of `axis`: true when pressed.
     pub fn limit_switches(&self, axis: usize) -> (bool, bool) {
-        if axis == 0 {
-            self.stage.limit_switches()
-        } else {
-            (false, false)
-        }
+        self.read(axis, |actuator| actuator.limit_switches())
+    }
+
+    fn read<T: Default>(&self, axis: usize, what: impl FnOnce(&dyn Actuator) -> T) -> T {
+        self.machine.actuator(axis).map_or_else(T::default, what)
     }
 
     /// The voltage at analog input `channel` now, noise included.
@@ -145,22 +156,23 @@ impl Plant {
 
     /// The encoder of `axis` loses or gets power: its count starts again from 0.
     pub fn encoder_power(&mut self, axis: usize, on: bool) {
-        if axis == 0 {
-            self.stage.encoder_power(on);
+        if let Some(actuator) = self.machine.actuator_mut(axis) {
+            actuator.encoder_power(on);
         }
     }
 
     /// Whether the safe torque off input of `axis` has taken the torque away.
-    pub const fn safe_torque_off(&self, axis: usize) -> bool {
-        axis == 0 && self.stage.torque_off()
+    pub fn safe_torque_off(&self, axis: usize) -> bool {
+        self.read(axis, |actuator| actuator.torque_off())
     }
 
     /// The interferometer's signal now, noise included.
     pub fn fringes(&mut self) -> Fringes {
         let air = self.climate.at(self.now);
         let position_m = self.true_position().value();
-        self.interferometer
-            .fringes(position_m, self.stage.speed(self.now), &air)
+        let stage = self.machine.stage();
+        let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
+        self.interferometer.fringes(position_m, speed, &air)
     }
 
     /// What the interferometer's own sensors say about air and stage now.
@@ -168,31 +180,56 @@ impl Plant {
         self.interferometer.sensed(self.climate.at(self.now))
     }
 
+    /// The cameras over the platform begin to take their pictures.
+    pub fn open_shutter(&mut self) {
+        self.camera.open_shutter(self.pose());
+    }
+
+    /// The pictures are taken: each mark, `None` where it is not in its picture.
+    pub fn close_shutter(&mut self) -> Vec<Option<Mark>> {
+        self.camera.close_shutter(self.pose())
+    }
+
+    /// What carries the marks; on a machine without a platform they stand.
+    fn pose(&self) -> Pose {
+        let platform = self.machine.platform();
+        platform.map_or_else(Pose::default, |platform| platform.pose(self.now))
+    }
+
+    /// Of the linear stage: what carries the magnets and the reflector. Without one these
+    /// stand at their zero.
     fn true_position(&self) -> Metres {
+        let Some(stage) = self.machine.stage() else {
+            return Metres::ZERO;
+        };
         let stage_c = self.climate.at(self.now).stage_temperature.value();
-        Metres(self.stage.true_position_m(self.now, stage_c))
+        Metres(stage.true_position_m(self.now, stage_c))
     }
 
     /// The mains is off for a while: the Hall sensors come back as `drift` says, and nobody
-    /// has held the stage. The devices themselves tell when their encoders lose power.
+    /// has held the machine. The devices themselves tell when their encoders lose power.
     pub fn power_cycle(&mut self, drift: HallDrift) {
         self.hall.drift = drift;
-        self.stage.push_a_little();
+        self.machine.power_cycle();
     }
 
-    /// Holds axis 0 fast, or lets it go.
-    pub fn set_blocked(&mut self, blocked: bool) {
-        self.stage.set_blocked(blocked);
+    /// Holds `axis` fast, or lets it go.
+    pub fn set_blocked(&mut self, axis: usize, blocked: bool) {
+        if let Some(actuator) = self.machine.actuator_mut(axis) {
+            actuator.set_blocked(blocked);
+        }
     }
 
-    /// Opens or closes the safe torque off circuit.
+    /// Opens or closes the safe torque off circuit, which all axes are on.
     pub fn set_safe_torque_off(&mut self, off: bool) {
-        self.stage.set_torque_off(off);
+        self.machine.set_torque_off(off);
     }
 
-    /// Holds a limit switch in a state, or (with `None`) leaves it to the stage.
-    pub fn force_limit_switch(&mut self, positive: bool, forced: Option<bool>) {
-        self.stage.force_switch(positive, forced);
+    /// Holds a limit switch of `axis` in a state, or (with `None`) leaves it to the mechanics.
+    pub fn force_limit_switch(&mut self, axis: usize, positive: bool, forced: Option<bool>) {
+        if let Some(actuator) = self.machine.actuator_mut(axis) {
+            actuator.force_switch(positive, forced);
+        }
     }
 
     /// Breaks or mends an analog input.
@@ -217,9 +254,15 @@ impl Plant {
         self.interferometer.slipped += half_wavelengths;
     }
 
-    /// The interferometer's reflector shakes with this standard deviation.
+    /// The instruments shake against the machine with this standard deviation.
     pub fn set_vibration(&mut self, amplitude: Metres) {
         self.interferometer.vibration_m = amplitude.value();
+        self.camera.vibration_m = amplitude.value();
+    }
+
+    /// What becomes of the cameras' marks.
+    pub fn set_target(&mut self, target: Target) {
+        self.camera.target = target;
     }
 
     /// The interferometer's sensors show this for ever (or, with `None`, the truth again).

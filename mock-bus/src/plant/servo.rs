@@ -64,7 +64,8 @@ pub(super) struct Mass {
 pub(super) type Stroke = (f64, f64);
 
 impl Mass {
-    pub(super) fn new(config: MotionConfig, position_m: f64, seed: u64) -> Self {
+    /// `rest_jitter` is where the settled servo's noise comes from.
+    pub(super) fn new(config: MotionConfig, position_m: f64, rest_jitter: Stream) -> Self {
         Self {
             natural_rad_per_s: core::f64::consts::TAU * config.servo_bandwidth_hz,
             config,
@@ -82,7 +83,7 @@ impl Mass {
             resting: true,
             blocked: false,
             torque_off: false,
-            rest_jitter: Stream::new(seed, "servo rest"),
+            rest_jitter,
         }
     }
 

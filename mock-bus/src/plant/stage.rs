@@ -4,8 +4,11 @@ use crate::random::Stream;
 use units::Time;
 
 use super::Servo;
-use super::config::{LimitConfig, StageConfig};
+use super::config::StageConfig;
 use super::deviation::{Field, Path};
+use super::encoder::Encoder;
+use super::limit_switch::LimitSwitch;
+use super::machine::{Actuator, IndexPulse};
 use super::servo::Mass;
 
 /// Scales are true at this temperature (ISO 1).
@@ -17,11 +20,8 @@ pub(super) struct Stage {
     mass: Mass,
     field: Field,
     path: Path,
-    switches: [Switch; 2],
-    resolution_m: f64,
-    /// The encoder's count where its power came on.
-    power_on_count: i64,
-    encoder_powered: bool,
+    switches: [LimitSwitch; 2],
+    encoder: Encoder,
     shift: Stream,
 }
 
@@ -29,15 +29,16 @@ impl Stage {
     pub(super) fn new(config: StageConfig, seed: u64) -> Self {
         let mut shift = Stream::new(seed, "start position");
         let start_m = 1e-3 * shift.between(config.motion.start_min_mm, config.motion.start_max_mm);
-        let resolution_m = config.encoder.resolution_nm * 1e-9;
         let mut stage = Self {
-            mass: Mass::new(config.motion.clone(), start_m, seed),
+            mass: Mass::new(
+                config.motion.clone(),
+                start_m,
+                Stream::new(seed, "servo rest"),
+            ),
             field: Field::new(&config.deviation, seed),
             path: Path::new(&config.deviation, seed),
-            switches: Switch::pair(&config.limits, seed),
-            resolution_m,
-            power_on_count: (start_m / resolution_m).round() as i64,
-            encoder_powered: true,
+            switches: LimitSwitch::pair(&config.limits, seed, ""),
+            encoder: Encoder::new(config.encoder.resolution_nm, start_m),
             shift,
             config,
         };
@@ -46,7 +47,7 @@ impl Stage {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.power_on_count as f64 * self.resolution_m;
+        let offset_m = self.encoder.count_zero_m();
         while let Some((from, to)) = self.mass.step_until(now, offset_m) {
             if to != from {
                 self.path.travel(to - from);
@@ -70,43 +71,6 @@ impl Stage {
         }
     }
 
-    pub(super) fn set_servo(&mut self, now: Time, servo: Servo) {
-        let resting = self.mass.resting();
-        self.mass.set_servo(now, servo);
-        if resting && !self.mass.resting() {
-            self.path.leave();
-        }
-    }
-
-    pub(super) fn set_blocked(&mut self, blocked: bool) {
-        self.mass.set_blocked(blocked);
-    }
-
-    pub(super) fn set_torque_off(&mut self, off: bool) {
-        self.mass.set_torque_off(off);
-    }
-
-    pub(super) const fn torque_off(&self) -> bool {
-        self.mass.torque_off()
-    }
-
-    pub(super) fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
-        self.switches[usize::from(positive)].forced = forced;
-    }
-
-    pub(super) fn limit_switches(&self) -> (bool, bool) {
-        let [negative, positive] = &self.switches;
-        (negative.is_pressed(), positive.is_pressed())
-    }
-
-    pub(super) fn encoder_power(&mut self, on: bool) {
-        if on && !self.encoder_powered {
-            self.power_on_count =
-                (self.mass.position_at(Time::ZERO) / self.resolution_m).round() as i64;
-        }
-        self.encoder_powered = on;
-    }
-
     /// Without power the stage can be moved; `now` is when the power is off.
     pub(super) fn push_a_little(&mut self) {
         let limit_m = self.config.motion.power_cycle_shift_um * 1e-6;
@@ -116,24 +80,9 @@ impl Stage {
         self.path.travel(by_m);
     }
 
-    pub(super) fn counts(&self, now: Time) -> i64 {
-        if !self.encoder_powered {
-            return 0;
-        }
-        (self.mass.position_at(now) / self.resolution_m).round() as i64 - self.power_on_count
-    }
-
-    pub(super) fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.resolution_m
-    }
-
-    pub(super) const fn resolution_m(&self) -> f64 {
-        self.resolution_m
-    }
-
     /// Scale position of the encoder's present zero count.
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.power_on_count as f64 * self.resolution_m
+        self.encoder.count_zero_m()
     }
 
     pub(super) fn scale_position_m(&self, now: Time) -> f64 {
@@ -160,55 +109,54 @@ impl Stage {
     }
 }
 
-/// A limit switch: it acts a little elsewhere each time.
-#[derive(Clone, Debug)]
-struct Switch {
-    /// +1 for the positive end, -1 for the negative one.
-    side: f64,
-    /// Distance from zero, along its side.
-    at_m: f64,
-    config: LimitConfig,
-    jitter_m: f64,
-    pressed: bool,
-    forced: Option<bool>,
-    stream: Stream,
-}
-
-impl Switch {
-    fn pair(config: &LimitConfig, seed: u64) -> [Self; 2] {
-        let switch = |side: f64, at_mm: f64, name| Self {
-            side,
-            at_m: side * at_mm * 1e-3,
-            config: config.clone(),
-            jitter_m: 0.0,
-            pressed: false,
-            forced: None,
-            stream: Stream::new(seed, name),
-        };
-        [
-            switch(-1.0, config.negative_mm, "negative limit"),
-            switch(1.0, config.positive_mm, "positive limit"),
-        ]
-    }
-
-    /// Whether it may change its state here, by a generous margin; saves looking closer.
-    fn is_near(&self, encoder_m: f64) -> bool {
-        const MARGIN_M: f64 = 1e-3;
-        self.pressed || self.side * encoder_m - self.at_m > -MARGIN_M
-    }
-
-    fn watch(&mut self, true_m: f64) {
-        let beyond_m = self.side * true_m - self.at_m - self.jitter_m;
-        if !self.pressed && beyond_m >= 0.0 {
-            self.pressed = true;
-        } else if self.pressed && beyond_m < -self.config.hysteresis_um * 1e-6 {
-            self.pressed = false;
-            let limit_m = self.config.repeatability_um * 1e-6;
-            self.jitter_m = self.stream.between(-limit_m, limit_m);
+impl Actuator for Stage {
+    fn set_servo(&mut self, now: Time, servo: Servo) {
+        let resting = self.mass.resting();
+        self.mass.set_servo(now, servo);
+        if resting && !self.mass.resting() {
+            self.path.leave();
         }
     }
 
-    fn is_pressed(&self) -> bool {
-        self.forced.unwrap_or(self.pressed)
+    fn counts(&self, now: Time) -> i64 {
+        self.encoder.counts(self.mass.position_at(now))
+    }
+
+    fn counts_per_s(&self, now: Time) -> f64 {
+        self.mass.speed_at(now) / self.encoder.resolution_m()
+    }
+
+    fn resolution_m(&self) -> f64 {
+        self.encoder.resolution_m()
+    }
+
+    fn encoder_power(&mut self, on: bool) {
+        self.encoder.power(on, self.mass.position_at(Time::ZERO));
+    }
+
+    /// The scale has no index mark.
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        None
+    }
+
+    fn limit_switches(&self) -> (bool, bool) {
+        let [negative, positive] = &self.switches;
+        (negative.is_pressed(), positive.is_pressed())
+    }
+
+    fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
+        self.switches[usize::from(positive)].forced = forced;
+    }
+
+    fn set_blocked(&mut self, blocked: bool) {
+        self.mass.set_blocked(blocked);
+    }
+
+    fn set_torque_off(&mut self, off: bool) {
+        self.mass.set_torque_off(off);
+    }
+
+    fn torque_off(&self) -> bool {
+        self.mass.torque_off()
     }
 }

@@ -222,7 +222,7 @@ fn hard_stops_hold_the_stage() {
 #[test]
 fn a_blocked_stage_does_not_follow_and_an_open_sto_takes_the_torque() {
     let mut plant = plant(7);
-    plant.set_blocked(true);
+    plant.set_blocked(0, true);
     ramp(
         &mut plant,
         Time(1_000_000),

@@ -2,9 +2,14 @@
 
 use units::{Approach, Celsius, Metres};
 
-use super::{Environment, Plant};
+use super::stage::Stage;
+use super::{Environment, Plant, PlatformTruth};
 
 /// A look at the truth behind all sensors.
+///
+/// # Panics
+/// What is asked of the linear stage panics on a machine that is none: a judge that takes the
+/// place of something that is not there for 0 would judge nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth<'a> {
     plant: &'a Plant,
@@ -18,17 +23,18 @@ impl<'a> Truth<'a> {
     /// The stage's true position; 0 is the true origin, where the undrifted Hall curves have
     /// their centre of symmetry.
     pub fn position(&self) -> Metres {
+        self.stage();
         self.plant.true_position()
     }
 
     /// Where the scale is read, from its own zero, without quantisation.
     pub fn scale_position(&self) -> Metres {
-        Metres(self.plant.stage.scale_position_m(self.plant.now))
+        Metres(self.stage().scale_position_m(self.plant.now))
     }
 
     /// The scale position of the encoder's present count 0 (where it was last powered on).
     pub fn count_zero(&self) -> Metres {
-        Metres(self.plant.stage.count_zero_m())
+        Metres(self.stage().count_zero_m())
     }
 
     /// True minus scale position at a scale position, reached in a direction: the systematic
@@ -45,11 +51,18 @@ impl<'a> Truth<'a> {
     fn systematic(&self, scale_position: Metres, sign: f64) -> Metres {
         let Celsius(stage_c) = self.environment().stage_temperature;
         let scale_m = scale_position.value();
-        Metres(
-            self.plant
-                .stage
-                .systematic_deviation_m(scale_m, sign, stage_c),
-        )
+        Metres(self.stage().systematic_deviation_m(scale_m, sign, stage_c))
+    }
+
+    /// The platform, where the machine is one.
+    pub fn platform(&self) -> Option<PlatformTruth<'a>> {
+        let platform = self.plant.machine.platform()?;
+        Some(PlatformTruth::new(platform, self.plant.now))
+    }
+
+    fn stage(&self) -> &Stage {
+        let stage = self.plant.machine.stage();
+        stage.expect("the judged machine has a linear stage")
     }
 
     /// Air and machine as they are.

@@ -5,7 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::path::{Path, PathBuf};
 
 use drivers::wire::can::CanFrame;
-use drivers::wire::{Payload, Port};
+use drivers::wire::{LineControl, Payload, Port};
 use units::Time;
 
 use super::pty::Pty;
@@ -24,8 +24,8 @@ pub(super) struct Endpoint {
 }
 
 enum Kind {
-    /// A serial device.
-    Serial(Option<Pty>),
+    /// A serial device, and the rate at which the client sends.
+    Serial(Option<Pty>, u32),
     /// A CAN bus behind an adapter on a serial line.
     Slcan(Option<Pty>, SlcanAdapter),
     /// A CAN interface of the kernel.
@@ -46,7 +46,7 @@ impl Endpoint {
                 let adapter = SlcanAdapter::new(can.bitrate_kbit_per_s * 1000);
                 Kind::Slcan(Some(Pty::open(link)?), adapter)
             }
-            (PortConfig::Serial(_), _) => Kind::Serial(Some(Pty::open(link)?)),
+            (PortConfig::Serial(_), _) => Kind::Serial(Some(Pty::open(link)?), 0),
         };
         Ok(Self {
             port: Port(place as u8),
@@ -58,7 +58,7 @@ impl Endpoint {
     /// Where a client finds it: a terminal's path; nothing for an interface.
     pub(super) fn path(&self) -> Option<&Path> {
         match &self.kind {
-            Kind::Serial(pty) | Kind::Slcan(pty, _) => pty.as_ref().map(Pty::path),
+            Kind::Serial(pty, _) | Kind::Slcan(pty, _) => pty.as_ref().map(Pty::path),
             Kind::Vcan(_) => None,
         }
     }
@@ -66,7 +66,7 @@ impl Endpoint {
     /// What to wait for, and whether there is something to send.
     pub(super) fn fd(&self) -> Option<(BorrowedFd<'_>, bool)> {
         match &self.kind {
-            Kind::Serial(pty) | Kind::Slcan(pty, _) => {
+            Kind::Serial(pty, _) | Kind::Slcan(pty, _) => {
                 pty.as_ref().map(|pty| (pty.fd(), pty.has_unsent()))
             }
             Kind::Vcan(vcan) => vcan.fd().map(|fd| (fd, false)),
@@ -77,10 +77,15 @@ impl Endpoint {
     pub(super) fn receive(&mut self, now: Time, machine: &mut Simulation) -> io::Result<()> {
         let port = self.port;
         match &mut self.kind {
-            Kind::Serial(Some(pty)) => {
+            Kind::Serial(Some(pty), rate) => {
                 pty.flush()?;
                 let bytes = pty.receive()?;
                 if !bytes.is_empty() {
+                    if let Some(seen) = pty.client_rate().filter(|seen| seen != rate) {
+                        *rate = seen;
+                        let control = Payload::Control(LineControl::Baud(seen));
+                        let _ = machine.deliver(now, port, &control);
+                    }
                     // A line that is down swallows what is said into it.
                     let _ = machine.deliver(now, port, &Payload::Bytes(bytes));
                 }
@@ -99,7 +104,7 @@ impl Endpoint {
                     let _ = machine.deliver(now, port, &Payload::Frame(frame));
                 }
             }
-            Kind::Serial(None) | Kind::Slcan(None, _) => {}
+            Kind::Serial(None, _) | Kind::Slcan(None, _) => {}
         }
         Ok(())
     }
@@ -109,9 +114,9 @@ impl Endpoint {
         match event {
             Event::Link(Link::Gone) => self.unplug(),
             Event::Link(Link::Up) => self.plug_in()?,
-            Event::Link(Link::Down) => {}
+            Event::Link(Link::Down) | Event::Payload(Payload::Control(_)) => {}
             Event::Payload(Payload::Bytes(bytes)) => {
-                if let Kind::Serial(Some(pty)) = &mut self.kind {
+                if let Kind::Serial(Some(pty), _) = &mut self.kind {
                     pty.send(&bytes)?;
                 }
             }
@@ -119,7 +124,7 @@ impl Endpoint {
             Event::BusError(error) => match &mut self.kind {
                 Kind::Slcan(Some(pty), adapter) => pty.send(&adapter.bus_error(error))?,
                 Kind::Vcan(vcan) => vcan.send_error(error)?,
-                Kind::Serial(_) | Kind::Slcan(None, _) => {}
+                Kind::Serial(..) | Kind::Slcan(None, _) => {}
             },
         }
         Ok(())
@@ -132,14 +137,14 @@ impl Endpoint {
                 line => pty.send(&line),
             },
             Kind::Vcan(vcan) => vcan.send(&frame),
-            Kind::Serial(_) | Kind::Slcan(None, _) => Ok(()),
+            Kind::Serial(..) | Kind::Slcan(None, _) => Ok(()),
         }
     }
 
     /// The client's end hangs up.
     fn unplug(&mut self) {
         match &mut self.kind {
-            Kind::Serial(pty) | Kind::Slcan(pty, _) => *pty = None,
+            Kind::Serial(pty, _) | Kind::Slcan(pty, _) => *pty = None,
             Kind::Vcan(_) => {}
         }
     }
@@ -147,10 +152,10 @@ impl Endpoint {
     /// It comes back as another terminal; the link, where there is one, shows which.
     fn plug_in(&mut self) -> io::Result<()> {
         match &mut self.kind {
-            Kind::Serial(pty @ None) | Kind::Slcan(pty @ None, _) => {
+            Kind::Serial(pty @ None, _) | Kind::Slcan(pty @ None, _) => {
                 *pty = Some(Pty::open(self.link.as_deref())?);
             }
-            Kind::Serial(_) | Kind::Slcan(..) | Kind::Vcan(_) => {}
+            Kind::Serial(..) | Kind::Slcan(..) | Kind::Vcan(_) => {}
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::libc;
 use nix::pty::openpty;
 use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};
@@ -78,6 +79,22 @@ impl Pty {
             Err(Errno::EAGAIN | Errno::EINTR) => Ok(Vec::new()),
             Err(errno) => Err(errno.into()),
         }
+    }
+
+    /// The rate that the client has set, where it has set one of the usual by its code; one that
+    /// is set as a number cannot be read here.
+    pub(super) fn client_rate(&self) -> Option<u32> {
+        let settings = libc::termios::from(tcgetattr(&self.slave).ok()?);
+        Some(match settings.c_cflag & libc::CBAUD {
+            libc::B4800 => 4_800,
+            libc::B9600 => 9_600,
+            libc::B19200 => 19_200,
+            libc::B38400 => 38_400,
+            libc::B57600 => 57_600,
+            libc::B115200 => 115_200,
+            libc::B230400 => 230_400,
+            _ => return None,
+        })
     }
 
     /// Sends now what fits, and the rest at the next [`Pty::flush`].

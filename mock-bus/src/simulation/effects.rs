@@ -6,7 +6,7 @@ use units::{Celsius, Metres, Pascals, RelativeHumidity};
 use super::{Event, Link, Simulation};
 use crate::bus::Sender;
 use crate::fault::Fault;
-use crate::plant::{Beam, Environment, InputFault};
+use crate::plant::{Beam, Environment, InputFault, Target};
 
 /// Sensors that have lost their calibration memory show such things.
 const IMPOSSIBLE: Environment = Environment {
@@ -58,13 +58,19 @@ impl Simulation {
     fn set_plant_fault(&mut self, fault: &Fault, on: bool) {
         let plant = &mut self.plant;
         match *fault {
-            Fault::BlockedAxis => plant.set_blocked(on),
+            Fault::BlockedAxis { axis } => plant.set_blocked(axis, on),
             Fault::SafeTorqueOff => plant.set_safe_torque_off(on),
-            Fault::LimitSwitch { positive, pressed } => {
-                plant.force_limit_switch(positive, on.then_some(pressed));
-            }
+            Fault::LimitSwitch {
+                axis,
+                positive,
+                pressed,
+            } => plant.force_limit_switch(axis, positive, on.then_some(pressed)),
             Fault::BeamBlocked => plant.set_beam(if on { Beam::Blocked } else { Beam::Good }),
             Fault::BeamWeak => plant.set_beam(if on { Beam::Weak } else { Beam::Good }),
+            Fault::TargetAbsent => plant.set_target(if on { Target::Absent } else { Target::Good }),
+            Fault::TargetCovered => {
+                plant.set_target(if on { Target::Covered } else { Target::Good });
+            }
             Fault::Vibration { amplitude_um } => {
                 plant.set_vibration(Metres::from_um(if on { amplitude_um } else { 0.0 }));
             }

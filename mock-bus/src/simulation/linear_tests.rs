@@ -143,7 +143,7 @@ fn a_blocked_stage_is_a_following_error() {
     client.enable();
     client
         .machine
-        .inject(FaultConfig::permanent(Fault::BlockedAxis))
+        .inject(FaultConfig::permanent(Fault::BlockedAxis { axis: 0 }))
         .unwrap();
     client.go(1_000_000, 500);
     let status = client.read(0x6041);

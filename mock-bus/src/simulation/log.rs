@@ -60,10 +60,12 @@ impl Log {
                 self.hash = fnv1a_bytes(self.hash, frame.data());
             }
             Payload::Bytes(bytes) => self.add(at, port, way, bytes),
+            Payload::Control(control) => self.add(at, port, way, format!("{control:?}").as_bytes()),
         }
         self.write(at, port, way, || match payload {
             Payload::Frame(frame) => frame.to_string(),
             Payload::Bytes(bytes) => String::from_utf8_lossy(bytes).escape_debug().to_string(),
+            Payload::Control(control) => format!("{control:?}"),
         });
     }
 

@@ -371,7 +371,9 @@ impl Simulation {
                 any = true;
                 match payload {
                     Payload::Frame(frame) => self.frame_complete(place, sender, frame),
-                    Payload::Bytes(_) => self.tell_nodes(place, sender, &payload),
+                    Payload::Bytes(_) | Payload::Control(_) => {
+                        self.tell_nodes(place, sender, &payload)
+                    }
                 }
             }
         }

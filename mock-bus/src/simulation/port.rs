@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use drivers::wire::can::CanFrame;
-use drivers::wire::{Payload, Port};
+use drivers::wire::{LineControl, Payload, Port};
 use units::Time;
 
 use super::{DeliverError, Link};
@@ -37,7 +37,7 @@ pub(super) struct SerialPort {
     byte_ns: u64,
     device_free: Time,
     host_free: Time,
-    to_device: VecDeque<(Time, Vec<u8>)>,
+    to_device: VecDeque<(Time, Payload)>,
     kept: Vec<u8>,
 }
 
@@ -72,9 +72,8 @@ impl PortState {
         let link = self.link;
         let usable = link == Link::Up;
         match (&mut self.medium, payload) {
-            (Medium::Can(_), Payload::Bytes(_)) | (Medium::Serial(_), Payload::Frame(_)) => {
-                Err(DeliverError::WrongKind { port })
-            }
+            (Medium::Can(_), Payload::Bytes(_) | Payload::Control(_))
+            | (Medium::Serial(_), Payload::Frame(_)) => Err(DeliverError::WrongKind { port }),
             _ if !usable => Err(DeliverError::Unusable { port, link }),
             (Medium::Can(can), Payload::Frame(frame)) => {
                 if can.bus.host_waiting() >= can.queue_max {
@@ -86,7 +85,13 @@ impl PortState {
             (Medium::Serial(line), Payload::Bytes(bytes)) => {
                 let start = now.max(line.host_free);
                 line.host_free = start + line.span(bytes.len());
-                line.to_device.push_back((line.host_free, bytes.clone()));
+                line.to_device.push_back((line.host_free, payload.clone()));
+                Ok(())
+            }
+            (Medium::Serial(line), Payload::Control(control)) => {
+                let at = now.max(line.host_free);
+                line.to_device.push_back((at, payload.clone()));
+                line.control(*control);
                 Ok(())
             }
         }
@@ -111,8 +116,8 @@ impl PortState {
                 if line.to_device.front()?.0 > now {
                     return None;
                 }
-                let (_, bytes) = line.to_device.pop_front()?;
-                Some((Sender::Host, Payload::Bytes(bytes)))
+                let (_, payload) = line.to_device.pop_front()?;
+                Some((Sender::Host, payload))
             }
         }
     }
@@ -181,16 +186,26 @@ impl PortState {
 
 impl SerialPort {
     fn new(config: &crate::config::SerialConfig) -> Self {
-        let byte_ns = config.baud_bit_per_s.map_or(0, |baud| {
-            BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1))
-        });
         Self {
-            byte_ns,
+            byte_ns: config.baud_bit_per_s.map_or(0, byte_ns),
             ..Self::default()
+        }
+    }
+
+    /// The host's rate is the line's, except where the line is USB.
+    fn control(&mut self, control: LineControl) {
+        if let LineControl::Baud(baud) = control
+            && self.byte_ns > 0
+        {
+            self.byte_ns = byte_ns(baud);
         }
     }
 
     const fn span(&self, bytes: usize) -> Duration {
         Duration::from_nanos(self.byte_ns * bytes as u64)
     }
+}
+
+fn byte_ns(baud: u32) -> u64 {
+    BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1))
 }

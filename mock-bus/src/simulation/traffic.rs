@@ -63,6 +63,8 @@ impl Simulation {
             match payload {
                 Payload::Frame(frame) => self.ports[port].send_frame(Sender::Node(place), frame),
                 Payload::Bytes(bytes) => self.node_bytes(place, port, bytes),
+                // The host's end of the line is the host's.
+                Payload::Control(_) => {}
             }
         }
     }

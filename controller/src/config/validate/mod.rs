@@ -238,6 +238,38 @@ fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogCo
         AnalogDevice::Cia401 => check_cia401(judge, config, analog),
         AnalogDevice::Dcon => check_dcon(judge, config, analog),
     }
+    check_strangers(judge, analog);
+}
+
+/// A key of another kind of module would be believed to do something.
+fn check_strangers(judge: &mut Judge<'_>, analog: &AnalogConfig) {
+    let can = [
+        ("bus", analog.bus.is_some()),
+        ("node_id", analog.node_id.is_some()),
+        (
+            "heartbeat_producer_ms",
+            analog.heartbeat_producer_ms.is_some(),
+        ),
+        (
+            "heartbeat_consumer_ms",
+            analog.heartbeat_consumer_ms.is_some(),
+        ),
+        ("watch_master_ms", analog.watch_master_ms.is_some()),
+        ("identity", analog.identity.is_some()),
+    ];
+    let line = [
+        ("line", analog.line.is_some()),
+        ("address", analog.address.is_some()),
+        ("checksum", analog.checksum),
+        ("poll_period_ms", analog.poll_period_ms.is_some()),
+    ];
+    let (name, strangers) = match analog.device {
+        AnalogDevice::Cia401 => ("cia401", line.as_slice()),
+        AnalogDevice::Dcon => ("dcon", can.as_slice()),
+    };
+    for (key, _) in strangers.iter().filter(|(_, is_there)| *is_there) {
+        judge.say(key, format!("a {name} module has no such key"), "remove it");
+    }
 }
 
 fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {

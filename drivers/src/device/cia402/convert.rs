@@ -1,33 +1,35 @@
 //! SI quantities to the drive's integers; what does not fit is an error, never clamped.
 
-use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
+use units::{Coordinate, Quantity};
 
 use super::settings::Cia402Settings;
 use crate::device::DeviceError;
 use crate::wire::canopen::Object;
 
-fn out_of_range(
-    settings: &Cia402Settings,
+/// `value` and `limit` in SI units, `unit` what a person reads them in.
+pub(super) fn out_of_range<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
     what: &'static str,
-    value: f64,
-    limit: f64,
+    (value, limit): (f64, f64),
+    unit: &'static str,
 ) -> DeviceError {
     DeviceError::OutOfRange {
         node: settings.common.node,
         object,
         what,
-        value,
-        limit,
+        value: Q::in_unit(value),
+        limit: Q::in_unit(limit),
+        unit,
     }
 }
 
 /// A position in drive coordinates.
-pub(super) fn counts_i32(
-    settings: &Cia402Settings,
+pub(super) fn counts_i32<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
     what: &'static str,
-    position: Metres,
+    position: Q,
 ) -> Result<i32, DeviceError> {
     let limit = settings.scale.resolution().abs() * f64::from(i32::MAX);
     let fits = position.is_finite() && position.abs() <= limit;
@@ -38,54 +40,60 @@ pub(super) fn counts_i32(
             settings,
             object,
             what,
-            position.value(),
-            limit.value(),
+            (position.value(), limit.value()),
+            Q::UNIT,
         )),
     }
 }
 
 /// A positive number of position units (per second, per second squared), at least 1.
-fn positive(
-    settings: &Cia402Settings,
+fn positive<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
     what: &'static str,
-    value: f64,
-    limit: f64,
+    (value, limit): (f64, f64),
+    unit: &'static str,
 ) -> Result<u32, DeviceError> {
-    let unit = settings.scale.resolution().abs().value();
-    let counts = (value / unit).round();
+    let count = settings.scale.resolution().abs().value();
+    let counts = (value / count).round();
     // Drives hold these in 32 bits, some of them signed.
     if value > 0.0 && value <= limit && counts <= f64::from(i32::MAX) {
         Ok((counts as u32).max(1))
     } else {
-        Err(out_of_range(settings, object, what, value, limit))
+        Err(out_of_range(settings, object, what, (value, limit), unit))
     }
 }
 
-pub(super) fn length_counts(
-    settings: &Cia402Settings,
+pub(super) fn distance_counts<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
     what: &'static str,
-    length: Metres,
+    distance: Q,
 ) -> Result<u32, DeviceError> {
-    positive(settings, object, what, length.value(), f64::MAX)
+    let range = (distance.value(), f64::MAX);
+    positive(settings, object, what, range, Q::UNIT)
 }
 
-pub(super) fn velocity_counts(
-    settings: &Cia402Settings,
+pub(super) fn velocity_counts<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
-    speed: MetresPerSecond,
+    speed: Q::Speed,
 ) -> Result<u32, DeviceError> {
-    let limit = settings.speed_max.value();
-    positive(settings, object, "speed", speed.value(), limit)
+    let range = (speed.value(), settings.speed_max.value());
+    positive(settings, object, "speed", range, Q::SPEED_UNIT)
 }
 
-pub(super) fn acceleration_counts(
-    settings: &Cia402Settings,
+pub(super) fn acceleration_counts<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     object: Object,
-    acceleration: MetresPerSecondSquared,
+    acceleration: Q::Acceleration,
 ) -> Result<u32, DeviceError> {
-    let limit = settings.acceleration_max.value();
-    let value = acceleration.value();
-    positive(settings, object, "acceleration", value, limit)
+    let range = (acceleration.value(), settings.acceleration_max.value());
+    positive(
+        settings,
+        object,
+        "acceleration",
+        range,
+        Q::ACCELERATION_UNIT,
+    )
 }

@@ -4,7 +4,7 @@
 //! left the place where the motion began, in opposite directions, then phases, encoder or
 //! polarity are exchanged: the further the axis goes the harder the drive pushes it on.
 
-use units::Counts;
+use units::{Coordinate, Counts};
 
 use super::{Activity, Cia402Drive};
 use crate::device::Alarm;
@@ -16,7 +16,7 @@ pub(super) struct Course {
     actual: Counts,
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     /// After each sample that was believed; `lagging`: the drive says that it cannot follow.
     pub(super) fn watch_course(&mut self, lagging: bool) {
         let target = match &self.activity {
@@ -44,8 +44,8 @@ impl Cia402Drive {
         let apart = wanted.0.signum() == -moved.0.signum();
         if apart && wanted.0.abs() > margin && moved.0.abs() > margin {
             self.course = None;
-            let metres = |counts| self.settings.scale.to_metres(counts);
-            let (wanted, moved) = (metres(wanted), metres(moved));
+            let shown = |counts| self.settings.scale.to_coordinate(counts).into();
+            let (wanted, moved) = (shown(wanted), shown(moved));
             let node = self.node.id();
             self.alarm(Alarm::WrongDirection {
                 node,

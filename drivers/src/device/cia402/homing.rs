@@ -1,7 +1,7 @@
 //! Homing (CiA 402, 11): parameters, mode 6, start, status by mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Metres, MetresPerSecond, Time};
+use units::{Coordinate, Time};
 
 use super::convert::counts_i32;
 use super::settings::HomeOffset;
@@ -48,25 +48,46 @@ impl Homing {
     }
 }
 
-impl Cia402Drive {
-    /// With a search speed: on the negative limit switch; without: here.
-    pub(super) fn begin_homing(
-        &mut self,
-        now: Time,
-        position: Metres,
-        search: Option<MetresPerSecond>,
-    ) {
+/// Where the home is, and how fast it is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum HomingPlace<S> {
+    /// Where the axis stands.
+    Here,
+    /// Where it leaves its negative limit switch.
+    NegativeLimit(S),
+    /// At the first index pulse off that switch.
+    Index(S),
+}
+
+impl<S: Copy> HomingPlace<S> {
+    /// 0x6098. The negative end of the axis is the drive's positive one when the drive counts
+    /// against the axis.
+    pub(super) const fn method(&self, reversed: bool) -> i8 {
+        match (self, reversed) {
+            (Self::Here, _) => 37,
+            (Self::NegativeLimit(_), false) => 17,
+            (Self::NegativeLimit(_), true) => 18,
+            (Self::Index(_), false) => 1,
+            (Self::Index(_), true) => 2,
+        }
+    }
+
+    const fn speed(&self) -> Option<S> {
+        match self {
+            Self::Here => None,
+            Self::NegativeLimit(speed) | Self::Index(speed) => Some(*speed),
+        }
+    }
+}
+
+impl<Q: Coordinate> Cia402Drive<Q> {
+    pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
+        let search = place.speed();
         if search.is_none() && !self.image.stands() {
             self.refuse("homing here", "an axis that stands");
             return;
         }
-        let reversed = self.settings.scale.resolution() < Metres::ZERO;
-        let method = match search {
-            None => 37,
-            // The negative end of the axis is the drive's positive one when it counts against it.
-            Some(_) if reversed => 18,
-            Some(_) => 17,
-        };
+        let method = place.method(self.settings.scale.resolution() < Q::ZERO);
         let plan =
             counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(|counts| {
                 let offset = match self.settings.home_offset {
@@ -267,7 +288,7 @@ impl Cia402Drive {
             }
             Phase::AwaitingPosition => {
                 let seen = self.image.sample().map_or(Seen::Nothing, |sample| {
-                    Seen::Position(self.settings.scale.to_metres(sample.position))
+                    Seen::Position(self.settings.scale.to_coordinate(sample.position).into())
                 });
                 self.time_out(now, since, "the new position after homing", seen);
             }

@@ -4,7 +4,7 @@
 //!
 //! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
 //! error, both at every SYNC. RPDO 1 carries controlword **and** target position in one frame,
-//! taken over at once: no adapter that re-orders frames can part a target from the edge that
+//! taken over at once (or, in a group that starts together, at the next SYNC): no adapter that re-orders frames can part a target from the edge that
 //! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
 //! they are written by SDO, read back, before the move that needs them.
 //!
@@ -29,19 +29,22 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use units::Time;
+use units::{Coordinate, Metres, Quantity, Time};
 
 pub use settings::{Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes};
 
 use super::canopen_node::{CanopenNode, NodeEvent};
-use super::{Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, Identity, Seen};
+use super::{
+    Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DriveCommand, Identity, Seen,
+    ServoDrive,
+};
 use crate::protocol::script::Script;
 use crate::transport::Input;
 use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
-use homing::Homing;
+use homing::{Homing, HomingPlace};
 use image::{Image, Sample};
 use motion::{Halt, Move};
 use power::Power;
@@ -73,10 +76,10 @@ impl Activity {
     }
 }
 
-/// One CiA 402 drive, one axis.
+/// One CiA 402 drive, one axis: linear ([`Metres`]) or rotary.
 #[derive(Debug)]
-pub struct Cia402Drive {
-    settings: Cia402Settings,
+pub struct Cia402Drive<Q: Coordinate = Metres> {
+    settings: Cia402Settings<Q>,
     node: CanopenNode,
     image: Image,
     activity: Activity,
@@ -92,6 +95,9 @@ pub struct Cia402Drive {
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i32>,
+    /// A move that only has to be started.
+    prepared: Option<Move>,
+    started_at: Option<Time>,
     homed: bool,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
@@ -109,10 +115,10 @@ pub struct Cia402Drive {
     repeated_commands: u64,
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     /// A drive that is not started.
-    pub fn new(settings: Cia402Settings) -> Self {
-        let counts = |metres: f64| metres / settings.scale.resolution().abs().value();
+    pub fn new(settings: Cia402Settings<Q>) -> Self {
+        let counts = |si: f64| si / settings.scale.resolution().abs().value();
         let image = Image::new(
             counts(settings.speed_max.value()),
             counts(settings.jump_margin.value()) as i64,
@@ -132,6 +138,8 @@ impl Cia402Drive {
             commanded_mode: None,
             profile: None,
             reached: None,
+            prepared: None,
+            started_at: None,
             homed: false,
             first: None,
             kept: None,
@@ -147,7 +155,7 @@ impl Cia402Drive {
     }
 
     /// What was set.
-    pub const fn settings(&self) -> &Cia402Settings {
+    pub const fn settings(&self) -> &Cia402Settings<Q> {
         &self.settings
     }
 
@@ -211,8 +219,20 @@ impl Cia402Drive {
         }));
     }
 
+    fn refuse_out_of_service(&mut self) {
+        self.refuse(
+            "a command",
+            "a started, operational node that sends process data; start it (again)",
+        );
+    }
+
+    fn is_enabled(&self) -> bool {
+        self.state() == Some(PowerState::OperationEnabled)
+    }
+
     fn alarm(&mut self, alarm: Alarm) {
         self.alarms.push_back(alarm);
+        self.prepared = None;
         let ends_it = match (&self.activity, alarm) {
             (Activity::Idle | Activity::Starting, _) => false,
             // Stopping and resetting go on: they are the answer to alarms. A drive that booted
@@ -286,6 +306,7 @@ impl Cia402Drive {
     /// Ends whatever runs, without an outcome.
     fn supersede(&mut self, now: Time) {
         self.outcome = None;
+        self.prepared = None;
         self.repeat_at = Time::NEVER;
         self.image.allow_jumps(false);
         self.course = None;
@@ -305,7 +326,7 @@ impl Cia402Drive {
     }
 }
 
-impl Device for Cia402Drive {
+impl<Q: Coordinate> Device for Cia402Drive<Q> {
     fn handle(&mut self, now: Time, input: &Input) {
         self.node.handle(now, input);
         self.pump(now);
@@ -373,54 +394,19 @@ impl Device for Cia402Drive {
     }
 }
 
-impl Axis for Cia402Drive {
-    fn command(&mut self, now: Time, command: AxisCommand) {
+impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
+    fn control(&mut self, now: Time, command: DriveCommand) {
         self.supersede(now);
-        let enabled = self.state() == Some(PowerState::OperationEnabled);
         match command {
-            AxisCommand::QuickStop => self.begin_quick_stop(now),
-            _ if !self.node.is_in_service() => {
-                self.refuse(
-                    "a command",
-                    "a started, operational node that sends process data; start it (again)",
-                );
-            }
-            AxisCommand::Enable => self.begin_enable(now),
-            AxisCommand::Disable => self.begin_disable(now),
-            AxisCommand::ResetFault => self.begin_reset(now),
+            DriveCommand::QuickStop => self.begin_quick_stop(now),
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            DriveCommand::Enable => self.begin_enable(now),
+            DriveCommand::Disable => self.begin_disable(now),
+            DriveCommand::ResetFault => self.begin_reset(now),
             // A drive that is not enabled does not move: nothing is left to do.
-            AxisCommand::Halt if !enabled => self.finish(Ok(())),
-            AxisCommand::Halt => self.begin_halt(now),
-            _ if !enabled => self.refuse("moving", "an enabled drive"),
-            AxisCommand::MoveTo {
-                target,
-                speed,
-                acceleration,
-            } => self.begin_move(now, target, speed, acceleration),
-            AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, Some(speed));
-            }
-            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+            DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
+            DriveCommand::Halt => self.begin_halt(now),
         }
-    }
-
-    fn reading(&self) -> Option<AxisReading> {
-        let sample = self.image.sample()?;
-        let scale = self.settings.scale;
-        let pending = sample.mode == OperationMode::ProfilePosition
-            && sample.status.contains(Statusword::MODE_12);
-        Some(AxisReading {
-            at: sample.at,
-            counts: sample.position,
-            position: scale.to_metres(sample.position),
-            following_error: self
-                .image
-                .following_error()
-                .map(|counts| scale.to_metres(counts)),
-            standing: sample.status.contains(Statusword::TARGET_REACHED)
-                && !pending
-                && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
-        })
     }
 
     fn power_state(&self) -> Option<PowerState> {
@@ -429,5 +415,67 @@ impl Axis for Cia402Drive {
 
     fn is_homed(&self) -> bool {
         self.homed
+    }
+
+    fn started_at(&self) -> Option<Time> {
+        self.started_at
+    }
+}
+
+impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
+    fn command(&mut self, now: Time, command: AxisCommand<Q>) {
+        if let AxisCommand::Drive(command) = command {
+            self.control(now, command);
+            return;
+        }
+        let prepared = self.prepared.take();
+        self.supersede(now);
+        match command {
+            AxisCommand::Drive(_) => {}
+            _ if !self.node.is_in_service() => self.refuse_out_of_service(),
+            _ if !self.is_enabled() => self.refuse("moving", "an enabled drive"),
+            AxisCommand::MoveTo {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, (target, speed, acceleration), false),
+            AxisCommand::Prepare {
+                target,
+                speed,
+                acceleration,
+            } => self.begin_move(now, (target, speed, acceleration), true),
+            AxisCommand::Start => match prepared {
+                Some(prepared) => self.begin_prepared(now, prepared),
+                None => self.refuse("starting", "a move that was prepared right before"),
+            },
+            AxisCommand::HomeNegativeLimit { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
+            }
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, position, HomingPlace::Here);
+            }
+        }
+    }
+
+    fn reading(&self) -> Option<AxisReading<Q>> {
+        let sample = self.image.sample()?;
+        let scale = self.settings.scale;
+        let pending = sample.mode == OperationMode::ProfilePosition
+            && sample.status.contains(Statusword::MODE_12);
+        Some(AxisReading {
+            at: sample.at,
+            counts: sample.position,
+            position: scale.to_coordinate(sample.position),
+            following_error: self
+                .image
+                .following_error()
+                .map(|counts| scale.to_coordinate(counts)),
+            standing: sample.status.contains(Statusword::TARGET_REACHED)
+                && !pending
+                && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
+        })
     }
 }

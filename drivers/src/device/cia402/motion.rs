@@ -6,9 +6,9 @@
 //! window: the bit may still be set from the move before.
 
 use core::time::Duration;
-use units::{Counts, Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+use units::{Coordinate, Counts, Time};
 
-use super::convert::{acceleration_counts, counts_i32, velocity_counts};
+use super::convert::{acceleration_counts, counts_i32, out_of_range, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
@@ -30,10 +30,12 @@ enum MovePhase {
     Running,
 }
 
-/// A move under way.
-#[derive(Debug)]
+/// A move under way, or one that only has to be started.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Move {
     target: i32,
+    /// Ends where only the edge of the set-point bit is missing.
+    only_prepared: bool,
     profile: (u32, u32),
     phase: MovePhase,
     since: Time,
@@ -75,17 +77,21 @@ impl Halt {
     }
 }
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
+    /// Up to its end, or `only_prepared`.
     pub(super) fn begin_move(
         &mut self,
         now: Time,
-        target: Metres,
-        speed: MetresPerSecond,
-        acceleration: MetresPerSecondSquared,
+        wanted: (Q, Q::Speed, Q::Acceleration),
+        only_prepared: bool,
     ) {
-        match self.plan_move(now, target, speed, acceleration) {
+        self.started_at = None;
+        match self.plan_move(now, wanted, only_prepared) {
             Err(error) => self.finish(Err(error)),
-            Ok(planned) if self.is_there(planned.target) => self.finish(Ok(())),
+            Ok(planned) if self.is_there(planned.target) => {
+                self.finish(Ok(()));
+                self.prepared = only_prepared.then_some(planned);
+            }
             Ok(planned) => {
                 let mut steps = Vec::new();
                 if self.profile != Some(planned.profile) {
@@ -123,9 +129,8 @@ impl Cia402Drive {
     fn plan_move(
         &self,
         now: Time,
-        target: Metres,
-        speed: MetresPerSecond,
-        acceleration: MetresPerSecondSquared,
+        (target, speed, acceleration): (Q, Q::Speed, Q::Acceleration),
+        only_prepared: bool,
     ) -> Result<Move, DeviceError> {
         let settings = &self.settings;
         let object = TARGET_POSITION.object;
@@ -133,13 +138,8 @@ impl Cia402Drive {
         if let Some((low, high)) = settings.soft_limits {
             let limit = if target < low { low } else { high };
             if target < low || target > high {
-                return Err(DeviceError::OutOfRange {
-                    node: self.node.id(),
-                    object,
-                    what: "target",
-                    value: target.value(),
-                    limit: limit.value(),
-                });
+                let range = (target.value(), limit.value());
+                return Err(out_of_range(settings, object, "target", range, Q::UNIT));
             }
         }
         let profile = (
@@ -148,6 +148,7 @@ impl Cia402Drive {
         );
         Ok(Move {
             target: counts,
+            only_prepared,
             profile,
             phase: MovePhase::Preparing,
             since: now,
@@ -219,12 +220,19 @@ impl Cia402Drive {
             }
             MovePhase::Releasing => {
                 self.target = target;
-                self.enter(now, MovePhase::Raising, patience);
-                let new = Controlword::MODE_4 | Controlword::MODE_5;
-                self.send_control(now, Controlword::ENABLE_COMMAND | new);
+                if moving.only_prepared {
+                    let prepared = *moving;
+                    // The target without its edge: nothing moves.
+                    self.release_set_point(now);
+                    self.finish(Ok(()));
+                    self.prepared = Some(prepared);
+                } else {
+                    self.raise_set_point(now);
+                }
             }
             MovePhase::Raising => {
                 if acknowledged {
+                    self.started_at = Some(now);
                     self.enter(now, MovePhase::Lowering, patience);
                     self.send_control(now, Controlword::ENABLE_COMMAND);
                 }
@@ -238,6 +246,35 @@ impl Cia402Drive {
             }
             MovePhase::Running => self.watch_arrival(target, acknowledged),
         }
+    }
+
+    /// Begins what was prepared: only the edge is missing.
+    pub(super) fn begin_prepared(&mut self, now: Time, prepared: Move) {
+        if self.is_there(prepared.target) {
+            self.finish(Ok(()));
+            return;
+        }
+        let ready = self.image.sample().is_some_and(|sample| {
+            sample.mode == OperationMode::ProfilePosition
+                && !sample.status.contains(Statusword::MODE_12)
+        });
+        if !ready || self.target != prepared.target {
+            self.refuse("starting", "a drive that is still as it was prepared");
+            return;
+        }
+        self.reached = None;
+        self.activity = Activity::Move(Move {
+            only_prepared: false,
+            ..prepared
+        });
+        self.raise_set_point(now);
+    }
+
+    fn raise_set_point(&mut self, now: Time) {
+        let patience = self.settings.timeouts.set_point;
+        self.enter(now, MovePhase::Raising, patience);
+        let new = Controlword::MODE_4 | Controlword::MODE_5;
+        self.send_control(now, Controlword::ENABLE_COMMAND | new);
     }
 
     /// Takes the set-point bit back. Halt stays: an older target must not be resumed.
@@ -297,7 +334,7 @@ impl Cia402Drive {
         }
         let seen = match (phase, self.image.sample()) {
             (MovePhase::Running, Some(sample)) => {
-                Seen::Position(self.settings.scale.to_metres(sample.position))
+                Seen::Position(self.settings.scale.to_coordinate(sample.position).into())
             }
             (MovePhase::AwaitingMode, Some(sample)) => Seen::Mode(sample.mode.raw()),
             (

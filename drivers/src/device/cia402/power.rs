@@ -1,6 +1,6 @@
 //! Enable, disable, quick stop and fault reset of a drive.
 
-use units::Time;
+use units::{Coordinate, Time};
 
 use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
@@ -31,7 +31,14 @@ const fn step_name(goal: Goal) -> &'static str {
     }
 }
 
-impl Cia402Drive {
+const fn stops(goal: Goal) -> bool {
+    match goal {
+        Goal::SwitchOnDisabled | Goal::QuickStop => true,
+        Goal::OperationEnabled | Goal::FaultReset => false,
+    }
+}
+
+impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time) {
         if let Some(sample) = self.image.sample() {
             // The target in RPDO 1 counts only at an edge, but a true one is the better company.
@@ -83,6 +90,8 @@ impl Cia402Drive {
         };
         let goal = power.sequence.goal();
         let since = power.since;
+        // Stopped is what the drive says after it has had the command, not what it said before.
+        let fresh = sample.at.since(since) >= self.settings.common.sync_period * 2;
         match power.sequence.next(now, sample.status, standing) {
             PowerStep::Command(control) if control == self.control => {
                 if self.repeat_at == Time::NEVER {
@@ -90,6 +99,12 @@ impl Cia402Drive {
                 }
             }
             PowerStep::Command(control) => self.send_control(now, control),
+            PowerStep::Done(_) if !fresh && stops(goal) => {
+                if now >= power.poll_timeout() {
+                    let seen = Seen::Power(sample.status.state());
+                    self.time_out(now, since, "a statusword after the command", seen);
+                }
+            }
             PowerStep::Done(control) => {
                 if control != self.control {
                     self.send_control(now, control);

@@ -2,48 +2,53 @@
 
 use core::time::Duration;
 
-use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+use units::{Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 
 use crate::device::canopen_node::NodeSettings;
 
 /// Everything the driver must know about one drive. [`Cia402Settings::new`] leaves to the
 /// drive what is `None`: it is then neither written nor checked.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cia402Settings {
+pub struct Cia402Settings<Q: Coordinate = Metres> {
     /// Node, master, identity, heartbeats, SYNC period, start time-outs.
     pub common: NodeSettings,
-    /// Metres per position unit of 0x6064; negative when the drive counts against the axis.
-    pub scale: Scale,
-    /// Metres per encoder increment, to check the factor objects (0x608F, 0x6091, 0x6092)
+    /// Metres (radians) per position unit of 0x6064; negative when the drive counts against the
+    /// axis.
+    pub scale: Scale<Q>,
+    /// Metres (radians) per encoder increment, to check the factor objects (0x608F, 0x6091, 0x6092)
     /// against; `None`: not checked.
-    pub increment: Option<Metres>,
+    pub increment: Option<Q>,
     /// Lowest and highest position (0x607D), drive coordinates.
-    pub soft_limits: Option<(Metres, Metres)>,
+    pub soft_limits: Option<(Q, Q)>,
     /// How far the axis may lag behind the drive's demand (0x6065), and for how long (0x6066).
-    pub following_error: Option<(Metres, Duration)>,
+    pub following_error: Option<(Q, Duration)>,
     /// How near to its target the axis must be (0x6067) ...
-    pub position_window: Metres,
+    pub position_window: Q,
     /// ... and for how long (0x6068), for the drive to call it reached.
     pub position_window_time: Duration,
     /// Deceleration of a quick stop (0x6085).
-    pub quick_stop_deceleration: Option<MetresPerSecondSquared>,
+    pub quick_stop_deceleration: Option<Q::Acceleration>,
     /// What the drive does of itself.
     pub options: OptionCodes,
     /// What the axis can do at most: faster moves are refused, faster positions not believed.
-    pub speed_max: MetresPerSecond,
+    pub speed_max: Q::Speed,
     /// Likewise.
-    pub acceleration_max: MetresPerSecondSquared,
+    pub acceleration_max: Q::Acceleration,
     /// How far a position may be from where `speed_max` could have taken it.
-    pub jump_margin: Metres,
+    pub jump_margin: Q,
     /// How much later than it came a sample may be stamped on a host that is held up. None on
     /// a real machine: its transports stamp what queued up with the time of its arrival.
     pub stall_max: Duration,
     /// Acceleration while homing (0x609A).
-    pub homing_acceleration: MetresPerSecondSquared,
+    pub homing_acceleration: Q::Acceleration,
     /// What 0x607C means to this drive.
     pub home_offset: HomeOffset,
     /// Whether TPDO 2 carries the following error (0x60F4).
     pub map_following_error: bool,
+    /// Whether RPDO 1 takes effect at the next SYNC (transmission type 1) instead of at once, so
+    /// that axes which are started together start at the same one. Every controlword then takes
+    /// up to one SYNC period longer, a quick stop too; and none without SYNC.
+    pub synchronous_start: bool,
     /// How long each thing is waited for.
     pub timeouts: Cia402Timeouts,
 }
@@ -112,13 +117,26 @@ impl Default for Cia402Timeouts {
 }
 
 impl Cia402Settings {
-    /// A drive whose position unit is one encoder increment; windows of 100 nm for 10 ms,
-    /// position jumps above 100 µm are not believed, a lost heartbeat is a quick stop.
+    /// A linear axis whose position unit is one encoder increment; windows of 100 nm for
+    /// 10 ms, position jumps above 100 µm are not believed, a lost heartbeat is a quick stop.
     pub fn new(
         common: NodeSettings,
         scale: Scale,
         speed_max: MetresPerSecond,
         acceleration_max: MetresPerSecondSquared,
+    ) -> Self {
+        let (window, jump) = (Metres::from_um(0.1), Metres::from_um(100.0));
+        Self::with_windows(common, scale, (speed_max, acceleration_max), window, jump)
+    }
+}
+
+impl<Q: Coordinate> Cia402Settings<Q> {
+    fn with_windows(
+        common: NodeSettings,
+        scale: Scale<Q>,
+        (speed_max, acceleration_max): (Q::Speed, Q::Acceleration),
+        position_window: Q,
+        jump_margin: Q,
     ) -> Self {
         Self {
             common,
@@ -126,7 +144,7 @@ impl Cia402Settings {
             increment: Some(scale.resolution().abs()),
             soft_limits: None,
             following_error: None,
-            position_window: Metres::from_um(0.1),
+            position_window,
             position_window_time: Duration::from_millis(10),
             quick_stop_deceleration: None,
             options: OptionCodes {
@@ -135,11 +153,12 @@ impl Cia402Settings {
             },
             speed_max,
             acceleration_max,
-            jump_margin: Metres::from_um(100.0),
+            jump_margin,
             stall_max: Duration::ZERO,
             homing_acceleration: acceleration_max * 0.1,
             home_offset: HomeOffset::IsPositionAtHome,
             map_following_error: true,
+            synchronous_start: false,
             timeouts: Cia402Timeouts::default(),
         }
     }

@@ -1,9 +1,9 @@
 //! What is read from and written to a drive at the start, as SDO steps.
 
 use core::time::Duration;
-use units::Metres;
+use units::Coordinate;
 
-use super::convert::{acceleration_counts, counts_i32, length_counts, velocity_counts};
+use super::convert::{acceleration_counts, counts_i32, distance_counts, velocity_counts};
 use super::settings::Cia402Settings;
 use crate::device::DeviceError;
 use crate::device::canopen_node::millis;
@@ -55,8 +55,8 @@ pub(super) fn description() -> Vec<Step> {
 }
 
 /// Whether the drive can do what is asked of it, in the units of the configuration.
-pub(super) fn check_description(
-    settings: &Cia402Settings,
+pub(super) fn check_description<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     script: &Script,
 ) -> Result<(), DeviceError> {
     let node = settings.common.node;
@@ -107,7 +107,9 @@ fn units_per_increment(script: &Script) -> f64 {
 }
 
 /// Limits, windows, options, PDOs, and profile position as the mode to begin with.
-pub(super) fn configuration(settings: &Cia402Settings) -> Result<Vec<Step>, DeviceError> {
+pub(super) fn configuration<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
+) -> Result<Vec<Step>, DeviceError> {
     let mut steps = pdo_steps(settings).expect("the mappings below hold at most 7 bytes");
     steps.extend(limit_steps(settings)?);
     steps.extend(option_steps(settings));
@@ -119,7 +121,7 @@ pub(super) fn configuration(settings: &Cia402Settings) -> Result<Vec<Step>, Devi
     Ok(steps)
 }
 
-fn pdo_steps(settings: &Cia402Settings) -> Result<Vec<Step>, PdoTooLong> {
+fn pdo_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Result<Vec<Step>, PdoTooLong> {
     const SYNC: Transmission = Transmission::Synchronous(1);
     let node = settings.common.node;
     let pdo = |direction, number| Pdo::new(direction, number).expect("1 to 4");
@@ -129,7 +131,12 @@ fn pdo_steps(settings: &Cia402Settings) -> Result<Vec<Step>, PdoTooLong> {
     let mut steps = transmit(1).configure(node, &sample, SYNC)?;
     // Controlword and target in one frame: no bus can part the new target from its edge.
     let command = [CONTROLWORD, TARGET_POSITION];
-    steps.extend(receive(1).configure(node, &command, Transmission::Event)?);
+    let taken_over = if settings.synchronous_start {
+        SYNC
+    } else {
+        Transmission::Event
+    };
+    steps.extend(receive(1).configure(node, &command, taken_over)?);
     if settings.map_following_error {
         steps.extend(transmit(2).configure(node, &[FOLLOWING_ERROR_ACTUAL], SYNC)?);
     } else {
@@ -141,7 +148,7 @@ fn pdo_steps(settings: &Cia402Settings) -> Result<Vec<Step>, PdoTooLong> {
     Ok(steps)
 }
 
-fn limit_steps(settings: &Cia402Settings) -> Result<Vec<Step>, DeviceError> {
+fn limit_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Result<Vec<Step>, DeviceError> {
     let mut steps = Vec::new();
     if let Some((low, high)) = settings.soft_limits {
         const TEXT: &str = "setting the soft limits";
@@ -152,11 +159,11 @@ fn limit_steps(settings: &Cia402Settings) -> Result<Vec<Step>, DeviceError> {
         steps.push(Step::check(minimum, first.min(second), TEXT));
         steps.push(Step::check(maximum, first.max(second), TEXT));
     }
-    let window = |object, what, length: Metres| length_counts(settings, object, what, length);
-    if let Some((length, time)) = settings.following_error {
+    let window = |object, what, distance| distance_counts(settings, object, what, distance);
+    if let Some((distance, time)) = settings.following_error {
         const TEXT: &str = "setting the following error window";
         let object = Object::new(0x6065, 0);
-        let counts = window(object, "following error window", length)?;
+        let counts = window(object, "following error window", distance)?;
         steps.push(Step::check(object, counts, TEXT));
         steps.push(time_step(0x6066, time, TEXT));
     }
@@ -184,7 +191,7 @@ fn time_step(index: u16, time: Duration, text: &'static str) -> Step {
     Step::check(Object::new(index, 0), millis(time), text)
 }
 
-fn option_steps(settings: &Cia402Settings) -> Vec<Step> {
+fn option_steps<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Vec<Step> {
     let options = &settings.options;
     let codes = [
         (0x605A, options.quick_stop, "setting the quick stop option"),
@@ -217,11 +224,11 @@ pub(super) fn profile_steps(velocity: u32, acceleration: u32) -> Vec<Step> {
 }
 
 /// Homing parameters, then the mode.
-pub(super) fn homing_steps(
-    settings: &Cia402Settings,
+pub(super) fn homing_steps<Q: Coordinate>(
+    settings: &Cia402Settings<Q>,
     method: i8,
     offset: i32,
-    speed: Option<units::MetresPerSecond>,
+    speed: Option<Q::Speed>,
 ) -> Result<Vec<Step>, DeviceError> {
     const TEXT: &str = "setting the homing parameters";
     let mut steps = vec![

@@ -1,6 +1,6 @@
 //! What a drive says of itself, and what of it is an alarm.
 
-use units::{Counts, Time};
+use units::{Coordinate, Counts, Time};
 
 use super::image::{Judgement, SAMPLE_BYTES, Sample};
 use super::start::POSITION_ACTUAL;
@@ -12,7 +12,7 @@ use crate::wire::cia402::{OperationMode, PowerState, Statusword};
 
 const COMPARING: &str = "comparing process data with the object it carries";
 
-impl Cia402Drive {
+impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn take_alarm(&mut self, alarm: Alarm) {
         if let Alarm::UnexpectedBootUp { .. } | Alarm::DuplicateNode { .. } = alarm {
             // Everything volatile is gone: reference, profile, state.
@@ -67,10 +67,8 @@ impl Cia402Drive {
                 self.homed = false;
                 self.reached = None;
                 let node = self.node.id();
-                let (jump, limit) = (
-                    self.settings.scale.to_metres(by).abs(),
-                    self.settings.scale.to_metres(limit).abs(),
-                );
+                let shown = |counts| self.settings.scale.to_coordinate(counts).abs().into();
+                let (jump, limit) = (shown(by), shown(limit));
                 self.alarm(Alarm::PositionJump { node, jump, limit });
             }
         }

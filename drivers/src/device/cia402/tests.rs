@@ -327,8 +327,8 @@ impl Rig {
         self.outcome()
     }
 
-    fn does(&mut self, command: AxisCommand) -> Result<(), DeviceError> {
-        self.drive.command(self.now, command);
+    fn does(&mut self, command: impl Into<AxisCommand>) -> Result<(), DeviceError> {
+        self.drive.command(self.now, command.into());
         self.outcome()
     }
 
@@ -336,7 +336,7 @@ impl Rig {
     fn enabled() -> Self {
         let mut rig = Self::new();
         rig.start().unwrap();
-        rig.does(AxisCommand::Enable).unwrap();
+        rig.does(DriveCommand::Enable).unwrap();
         rig
     }
 
@@ -563,7 +563,7 @@ fn enabling_and_disabling_walk_the_power_states() {
     let mut rig = Rig::enabled();
     assert_eq!(rig.controlwords(), ["0600", "0700", "0F00"]);
     assert_eq!(rig.drive.power_state(), Some(PowerState::OperationEnabled));
-    assert_eq!(rig.does(AxisCommand::Disable), Ok(()));
+    assert_eq!(rig.does(DriveCommand::Disable), Ok(()));
     assert_eq!(rig.fake.state, 0x40);
     rig.passes_ms(100);
     assert!(rig.alarms.is_empty(), "{:?}", rig.alarms);
@@ -574,7 +574,7 @@ fn a_drive_that_stays_where_it_is_times_out_naming_the_states() {
     let mut rig = Rig::new();
     rig.start().unwrap();
     rig.fake.stuck = true;
-    let error = rig.does(AxisCommand::Enable).unwrap_err();
+    let error = rig.does(DriveCommand::Enable).unwrap_err();
     assert_eq!(
         error.to_string(),
         "node 5: waited 2.002s for the state ready to switch on, last saw switch on disabled"
@@ -647,7 +647,7 @@ fn a_target_beyond_the_soft_limits_never_reaches_the_bus() {
     rig.start().unwrap();
     assert_eq!(rig.fake.node.get(0x607D, 1), -3_000_000);
     assert_eq!(rig.fake.node.get(0x607D, 2), 3_000_000);
-    rig.does(AxisCommand::Enable).unwrap();
+    rig.does(DriveCommand::Enable).unwrap();
     rig.sent.clear();
     let error = rig.does(move_to(30_001.0)).unwrap_err();
     assert!(matches!(error, DeviceError::OutOfRange { .. }), "{error}");
@@ -688,7 +688,7 @@ fn a_halt_stops_on_the_way_and_the_next_move_goes_on() {
     let mut rig = Rig::enabled();
     rig.drive.command(rig.now, move_to(20_000.0));
     rig.passes_ms(60);
-    assert_eq!(rig.does(AxisCommand::Halt), Ok(()));
+    assert_eq!(rig.does(DriveCommand::Halt), Ok(()));
     let halted = rig.fake.position();
     assert!(halted > 0 && halted < 2_000_000, "{halted}");
     rig.passes_ms(100);
@@ -702,7 +702,7 @@ fn homing_after_a_halt_does_not_resume_the_interrupted_move() {
     let mut rig = Rig::enabled();
     rig.drive.command(rig.now, move_to(20_000.0));
     rig.passes_ms(60);
-    rig.does(AxisCommand::Halt).unwrap();
+    rig.does(DriveCommand::Halt).unwrap();
     rig.drive.command(rig.now, home_here(0.0));
     let halted = rig.fake.position();
     while rig.fake.node.get(0x6061, 0) != 6 {
@@ -756,7 +756,7 @@ fn a_quick_stop_goes_out_at_once_while_an_sdo_is_pending() {
     rig.drive.command(rig.now, home_here(0.0));
     rig.exchange();
     rig.sent.clear();
-    rig.drive.command(rig.now, AxisCommand::QuickStop);
+    rig.drive.control(rig.now, DriveCommand::QuickStop);
     let Some(Payload::Frame(frame)) = rig.drive.poll_transmit() else {
         panic!("nothing sent")
     };
@@ -768,12 +768,25 @@ fn a_quick_stop_goes_out_at_once_while_an_sdo_is_pending() {
 }
 
 #[test]
+fn a_stop_is_not_confirmed_by_what_the_drive_said_before_it() {
+    let mut rig = Rig::new();
+    rig.start().unwrap();
+    rig.drive.control(rig.now, DriveCommand::QuickStop);
+    // Sampled before it heard the command: "switch on disabled", and it was so.
+    rig.fake.sync();
+    rig.exchange();
+    assert_eq!(rig.drive.poll_outcome(), None);
+    rig.passes_ms(3 * SYNC_MS);
+    assert_eq!(rig.drive.poll_outcome(), Some(Ok(())));
+}
+
+#[test]
 fn a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() {
     let mut rig = Rig::enabled();
     rig.fake.stays_in_quick_stop = true;
     rig.drive.command(rig.now, move_to(20_000.0));
     rig.passes_ms(60);
-    assert_eq!(rig.does(AxisCommand::QuickStop), Ok(()));
+    assert_eq!(rig.does(DriveCommand::QuickStop), Ok(()));
     assert_eq!(rig.fake.state, 0x40);
     assert!(
         rig.controlwords()
@@ -784,7 +797,7 @@ fn a_drive_that_stays_in_quick_stop_is_disabled_when_it_stands() {
 #[test]
 fn a_quick_stop_is_sent_even_before_the_start() {
     let mut rig = Rig::new();
-    rig.drive.command(rig.now, AxisCommand::QuickStop);
+    rig.drive.control(rig.now, DriveCommand::QuickStop);
     rig.exchange();
     // And, as nobody knows whether it listens to PDOs, by SDO too.
     assert_eq!(rig.sent, ["205#020000000000", "605#2B40600002000000"]);
@@ -829,6 +842,21 @@ fn homing_on_the_limit_switch_sets_method_and_speeds() {
 }
 
 #[test]
+fn homing_on_an_index_pulse_sets_its_method_and_counts_the_other_way_with_the_drive() {
+    let command = AxisCommand::HomeIndex {
+        position: Metres::from_mm(-4.0),
+        speed: MetresPerSecond(0.005),
+    };
+    let mut rig = Rig::enabled();
+    assert_eq!(rig.does(command), Ok(()));
+    assert_eq!(rig.fake.node.get(0x6098, 0), 1);
+    assert_eq!(rig.fake.node.get(0x6099, 1), 500_000);
+    assert_eq!(rig.fake.node.get(0x607C, 0), -400_000);
+    let place: HomingPlace<MetresPerSecond> = HomingPlace::Index(MetresPerSecond(0.005));
+    assert_eq!(place.method(true), 2);
+}
+
+#[test]
 fn mirrored_coordinates_after_a_search_are_noticed_before_anything_moves_by_them() {
     let mut rig = Rig::enabled();
     rig.fake.offset_leads_to_zero = true;
@@ -862,15 +890,15 @@ fn a_fault_is_reset_by_a_single_edge() {
     rig.fake.state = 0x08;
     rig.passes_ms(10);
     assert!(matches!(
-        rig.does(AxisCommand::Enable),
+        rig.does(DriveCommand::Enable),
         Err(DeviceError::DriveRefused {
             state: PowerState::Fault,
             ..
         })
     ));
-    assert_eq!(rig.does(AxisCommand::ResetFault), Ok(()));
+    assert_eq!(rig.does(DriveCommand::ResetFault), Ok(()));
     assert_eq!(rig.fake.fault_edges, 1);
-    assert_eq!(rig.does(AxisCommand::Enable), Ok(()));
+    assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
 }
 
 #[test]
@@ -880,7 +908,7 @@ fn a_fault_whose_cause_remains_is_not_reset_in_a_loop() {
     rig.fake.state = 0x08;
     rig.fake.fault_remains = true;
     rig.passes_ms(10);
-    let error = rig.does(AxisCommand::ResetFault).unwrap_err();
+    let error = rig.does(DriveCommand::ResetFault).unwrap_err();
     assert!(error.to_string().contains("last saw fault"), "{error}");
     assert_eq!(rig.fake.fault_edges, 1);
 }
@@ -933,7 +961,7 @@ fn a_boot_up_in_service_is_an_alarm_and_takes_the_reference() {
     assert!(matches!(rig.alarms[0], Alarm::UnexpectedBootUp { .. }));
     // It can be started again.
     assert_eq!(rig.start(), Ok(()));
-    assert_eq!(rig.does(AxisCommand::Enable), Ok(()));
+    assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
 }
 
 #[test]
@@ -959,11 +987,11 @@ fn a_node_that_left_operational_is_not_believed_to_be_enabled() {
     rig.fake.node.nmt = Some(0x7F);
     rig.passes_ms(60);
     assert!(matches!(
-        rig.does(AxisCommand::Enable),
+        rig.does(DriveCommand::Enable),
         Err(DeviceError::NotPossible { .. })
     ));
     // It can still be stopped: it hears SDO.
-    rig.drive.command(rig.now, AxisCommand::QuickStop);
+    rig.drive.control(rig.now, DriveCommand::QuickStop);
     rig.exchange();
     assert_eq!(rig.fake.node.get(0x6040, 0), 0x0002);
 }
@@ -1079,7 +1107,7 @@ fn a_negative_scale_turns_directions_and_limits() {
     rig.start().unwrap();
     assert_eq!(rig.fake.node.get(0x607D, 1), -3_000_000);
     assert_eq!(rig.fake.node.get(0x607D, 2), 1_000_000);
-    rig.does(AxisCommand::Enable).unwrap();
+    rig.does(DriveCommand::Enable).unwrap();
     assert_eq!(rig.does(move_to(200.0)), Ok(()));
     assert_eq!(rig.fake.position(), -20_000);
 }

@@ -1,0 +1,58 @@
+//! A limit switch: it acts a little elsewhere each time.
+
+use crate::random::Stream;
+
+use super::config::LimitConfig;
+
+#[derive(Clone, Debug)]
+pub(super) struct LimitSwitch {
+    /// +1 for the positive end, -1 for the negative one.
+    side: f64,
+    /// Distance from zero, along its side.
+    at_m: f64,
+    config: LimitConfig,
+    jitter_m: f64,
+    pressed: bool,
+    pub(super) forced: Option<bool>,
+    stream: Stream,
+}
+
+impl LimitSwitch {
+    /// The negative and the positive one; `whose` begins the names of their random streams.
+    pub(super) fn pair(config: &LimitConfig, seed: u64, whose: &str) -> [Self; 2] {
+        let switch = |side: f64, at_mm: f64, name| Self {
+            side,
+            at_m: side * at_mm * 1e-3,
+            config: config.clone(),
+            jitter_m: 0.0,
+            pressed: false,
+            forced: None,
+            stream: Stream::new(seed, &format!("{whose}{name}")),
+        };
+        [
+            switch(-1.0, config.negative_mm, "negative limit"),
+            switch(1.0, config.positive_mm, "positive limit"),
+        ]
+    }
+
+    /// Whether it may change its state here, by a generous margin; saves looking closer.
+    pub(super) fn is_near(&self, encoder_m: f64) -> bool {
+        const MARGIN_M: f64 = 1e-3;
+        self.pressed || self.side * encoder_m - self.at_m > -MARGIN_M
+    }
+
+    pub(super) fn watch(&mut self, true_m: f64) {
+        let beyond_m = self.side * true_m - self.at_m - self.jitter_m;
+        if !self.pressed && beyond_m >= 0.0 {
+            self.pressed = true;
+        } else if self.pressed && beyond_m < -self.config.hysteresis_um * 1e-6 {
+            self.pressed = false;
+            let limit_m = self.config.repeatability_um * 1e-6;
+            self.jitter_m = self.stream.between(-limit_m, limit_m);
+        }
+    }
+
+    pub(super) fn is_pressed(&self) -> bool {
+        self.forced.unwrap_or(self.pressed)
+    }
+}

@@ -1,0 +1,115 @@
+//! Which machine stands here, and what its drives, faults and mains can do to it.
+//!
+//! A machine is a list of actuators, each with its own servo, encoder and switches, and
+//! whatever they move together. Drives know actuators by number, from 0.
+
+use units::Time;
+
+use super::Servo;
+use super::config::PlantConfig;
+use super::platform::Platform;
+use super::stage::Stage;
+
+/// One driven direction as its drive is wired to it.
+pub(super) trait Actuator {
+    /// What the drive does to it from `now` on.
+    fn set_servo(&mut self, now: Time, servo: Servo);
+    /// The encoder's counts since its power came on.
+    fn counts(&self, now: Time) -> i64;
+    fn counts_per_s(&self, now: Time) -> f64;
+    /// Metres of encoder travel per count.
+    fn resolution_m(&self) -> f64;
+    fn encoder_power(&mut self, on: bool);
+    /// The encoder's last index pulse since its power came on; `None` before, and where the
+    /// encoder has no index.
+    fn index_pulse(&self) -> Option<IndexPulse>;
+    /// Negative and positive limit switch: true when pressed.
+    fn limit_switches(&self) -> (bool, bool);
+    /// Holds a limit switch in a state, or (with `None`) leaves it to the mechanics.
+    fn force_switch(&mut self, positive: bool, forced: Option<bool>);
+    /// Holds it fast, or lets it go.
+    fn set_blocked(&mut self, blocked: bool);
+    fn set_torque_off(&mut self, off: bool);
+    fn torque_off(&self) -> bool;
+}
+
+/// A pulse that the encoder gave at its index mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IndexPulse {
+    /// The count at the mark, in the encoder's present counting.
+    pub count: i64,
+    /// How many pulses there have been since the encoder was powered: a new one has a new number.
+    pub number: u64,
+}
+
+/// The mechanics of one machine.
+#[derive(Clone, Debug)]
+pub(super) enum Machine {
+    /// One linear-motor stage.
+    Stage(Box<Stage>),
+    /// A platform on screws.
+    Platform(Box<Platform>),
+}
+
+impl Machine {
+    pub(super) fn new(config: &PlantConfig, seed: u64) -> Self {
+        match &config.platform {
+            Some(platform) => Self::Platform(Box::new(Platform::new(platform, seed))),
+            None => Self::Stage(Box::new(Stage::new(config.stage.clone(), seed))),
+        }
+    }
+
+    pub(super) fn advance(&mut self, now: Time) {
+        match self {
+            Self::Stage(stage) => stage.advance(now),
+            Self::Platform(platform) => platform.advance(now),
+        }
+    }
+
+    pub(super) fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
+        match self {
+            Self::Stage(stage) => (number == 0).then_some(&**stage as &dyn Actuator),
+            Self::Platform(platform) => platform.actuator(number),
+        }
+    }
+
+    pub(super) fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
+        match self {
+            Self::Stage(stage) => (number == 0).then_some(&mut **stage as &mut dyn Actuator),
+            Self::Platform(platform) => platform.actuator_mut(number),
+        }
+    }
+
+    /// One circuit takes the torque away from every actuator.
+    pub(super) fn set_torque_off(&mut self, off: bool) {
+        let mut number = 0;
+        while let Some(actuator) = self.actuator_mut(number) {
+            actuator.set_torque_off(off);
+            number += 1;
+        }
+    }
+
+    /// The mains is off: nobody holds the machine.
+    pub(super) fn power_cycle(&mut self) {
+        match self {
+            Self::Stage(stage) => stage.push_a_little(),
+            Self::Platform(platform) => platform.power_cycle(),
+        }
+    }
+
+    /// The linear stage, where the machine is one.
+    pub(super) const fn stage(&self) -> Option<&Stage> {
+        match self {
+            Self::Stage(stage) => Some(stage),
+            Self::Platform(_) => None,
+        }
+    }
+
+    /// The platform, where the machine is one.
+    pub(super) const fn platform(&self) -> Option<&Platform> {
+        match self {
+            Self::Platform(platform) => Some(platform),
+            Self::Stage(_) => None,
+        }
+    }
+}
