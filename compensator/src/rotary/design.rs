@@ -83,9 +83,8 @@ impl Design {
         amplification_max: f64,
     ) -> Result<Self, DesignError> {
         check_offsets(lines, offsets)?;
-        let step = offsets
-            .iter()
-            .fold(lines, |step, offset| gcd(step, offset.abs_diff(offsets[0])));
+        let apart = offsets.iter().map(|offset| offset.abs_diff(offsets[0]));
+        let step = apart.fold(lines, gcd);
         if step > 1 {
             return Err(DesignError::Unobservable {
                 offsets: offsets.to_vec(),
@@ -191,7 +190,7 @@ fn check_offsets(lines: usize, offsets: &[usize]) -> Result<(), DesignError> {
     Ok(())
 }
 
-pub(super) fn gcd(a: usize, b: usize) -> usize {
+pub(crate) fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 

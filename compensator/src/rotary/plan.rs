@@ -18,7 +18,7 @@ const WORK_MAX: u64 = 80_000_000;
 const SWEEPS_MAX: usize = 8;
 
 /// Starts tried where the work allows it; more have never found better ones for small plates.
-const STARTS_MAX: usize = 500;
+const STARTS_MAX: usize = 150;
 
 /// Information below it is rounding: the harmonic is unobservable.
 const INFORMATION_MIN: f64 = 1e-9;

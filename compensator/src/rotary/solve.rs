@@ -171,6 +171,17 @@ impl Solution {
         self.table_error.iter().map(|error| -*error).collect()
     }
 
+    /// What line by line is expected of a further placement at `offset`, but for its constant:
+    /// G\[n + s\] + A\[n\]; `None` for lines never read.
+    pub fn expected(&self, offset: usize) -> Vec<Option<Radians>> {
+        let lines = self.table_error.len();
+        let table = |line: usize| self.table_error[(line + offset) % lines];
+        let plate = self.plate_error.iter().enumerate();
+        plate
+            .map(|(line, it)| it.map(|error| table(line) + error))
+            .collect()
+    }
+
     fn spread(&self, noise: Radians) -> Vec<Radians> {
         self.amplification.iter().map(|it| noise * *it).collect()
     }
