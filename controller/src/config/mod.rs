@@ -3,11 +3,14 @@
 //! Micrometres and millimetres live here and on the screen only; every key carries its unit
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
+mod camera;
 mod diagnostic;
 mod load;
 mod model;
+mod platform;
 mod validate;
 
+pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
@@ -15,4 +18,8 @@ pub use model::{
     CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
     InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
     SerialLine, VerifyConfig, ZeroConfig,
+};
+pub use platform::{
+    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
+    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };

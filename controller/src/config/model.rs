@@ -4,6 +4,9 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::camera::CameraConfig;
+use super::platform::PlatformConfig;
+
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -26,6 +29,11 @@ pub struct MachineConfig {
     /// Measuring instruments by name.
     #[serde(default)]
     pub instrument: BTreeMap<String, InstrumentConfig>,
+    /// Image controllers by name.
+    #[serde(default)]
+    pub camera: BTreeMap<String, CameraConfig>,
+    /// The alignment platform that the axes move, if they move one.
+    pub platform: Option<PlatformConfig>,
 }
 
 /// Who the machine is, and where its records live.

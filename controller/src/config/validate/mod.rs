@@ -1,10 +1,13 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
+mod camera;
 mod cycle;
 mod judge;
+mod platform;
 
 use std::collections::BTreeMap;
 
+use self::camera::check_cameras;
 use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
 use self::judge::Judge;
@@ -64,6 +67,8 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
             instrument,
         );
     }
+    check_cameras(config, &mut findings);
+    platform::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
     if findings.is_empty() {
