@@ -93,11 +93,7 @@ impl Design {
                 harmonic: lines / step,
             });
         }
-        let design = Self {
-            lines,
-            offsets: offsets.to_vec(),
-            information: information(lines, offsets),
-        };
+        let design = Self::of_any(lines, offsets)?;
         let (harmonic, seen) = design.worst();
         // Written so that a NaN limit refuses.
         if seen <= amplification_max {
@@ -110,6 +106,16 @@ impl Design {
                 limit: amplification_max,
             })
         }
+    }
+
+    /// The same for offsets that may leave harmonics unobservable, whose information is zero.
+    pub(super) fn of_any(lines: usize, offsets: &[usize]) -> Result<Self, DesignError> {
+        check_offsets(lines, offsets)?;
+        Ok(Self {
+            lines,
+            offsets: offsets.to_vec(),
+            information: information(lines, offsets),
+        })
     }
 
     /// The lines of the plate.

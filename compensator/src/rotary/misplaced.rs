@@ -9,12 +9,13 @@
 //! - the lines are wrong and their positions right, as when lines are told apart by where the table
 //!   finds them: reading − G\[p\] is A\[p − s\] for another s.
 //!
-//! Of three placements each is judged by two; two cannot judge each other.
+//! Of three placements each is judged by two; two cannot judge each other. Harmonics that the others
+//! cannot part are left with the plate, which spoils the prediction by no more than the table's share.
 
 use realfft::RealFftPlanner;
 use units::Radians;
 
-use super::solve::{Solution, SolveOptions, solve};
+use super::solve::{Solution, SolveOptions, solve_what_is_seen};
 use crate::measurement::{Placement, RotarySeries};
 use crate::uncertainty::rms;
 
@@ -63,7 +64,7 @@ pub fn misplaced(series: &RotarySeries, options: &SolveOptions) -> Option<Mispla
 
 fn judged(series: &RotarySeries, at: usize, options: &SolveOptions) -> Option<Misplaced> {
     let (others, own) = without(series, at)?;
-    let rest = solve(&others, options).ok()?;
+    let rest = solve_what_is_seen(&others, options).ok()?;
     let lines = series.lines();
     let table: Vec<f64> = rest.table_error.iter().map(|it| it.value()).collect();
     let plate = |line: usize| rest.plate_error[line].map(Radians::value);
@@ -201,7 +202,7 @@ mod tests {
                     "by place: {by_place}"
                 );
                 assert!(found.residual_likely.arcsec() < 0.15, "{found}");
-                assert!(found.residual.arcsec() > 1.0, "{found}");
+                assert!(found.residual.arcsec() > 0.5, "{found}");
             }
         }
     }

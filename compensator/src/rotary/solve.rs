@@ -194,11 +194,28 @@ impl Solution {
 /// amplified beyond the limit, or too many readings disagree.
 pub fn solve(series: &RotarySeries, options: &SolveOptions) -> Result<Solution, SolveError> {
     let design = Design::new(series.lines(), &series.offsets(), options.amplification_max)?;
-    let form = ClosedForm::new(&design);
+    evaluate(&design, series, options)
+}
+
+/// The same for offsets that may leave harmonics of the table unobservable: those are zero.
+pub(super) fn solve_what_is_seen(
+    series: &RotarySeries,
+    options: &SolveOptions,
+) -> Result<Solution, SolveError> {
+    let design = Design::of_any(series.lines(), &series.offsets())?;
+    evaluate(&design, series, options)
+}
+
+fn evaluate(
+    design: &Design,
+    series: &RotarySeries,
+    options: &SolveOptions,
+) -> Result<Solution, SolveError> {
+    let form = ClosedForm::new(design);
     let (readings, missing) = readings_of(series);
     let solver = Solver {
         covariance: form.covariance(),
-        design: &design,
+        design,
         form: &form,
         options,
         missing,
