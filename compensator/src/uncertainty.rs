@@ -32,14 +32,18 @@ pub fn standard_deviation(values: &[f64]) -> Option<f64> {
 
 /// The median; `None` for an empty slice. NaN sorts last.
 pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(sorted[middle]),
-        _ => Some((sorted[middle - 1] + sorted[middle]) / 2.0),
+    if values.is_empty() {
+        return None;
     }
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    let (below, upper, above) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let upper = *upper;
+    if below.len() > above.len() {
+        let lower = below.iter().copied().max_by(f64::total_cmp)?;
+        return Some((lower + upper) / 2.0);
+    }
+    Some(upper)
 }
 
 /// The standard deviation estimated from the median absolute value of residuals that are

@@ -326,6 +326,33 @@ pub enum Failure {
         /// Why.
         source: compensator::screw::ScrewError,
     },
+    /// A rotary table's error cannot be computed.
+    #[error("{place}: {source}")]
+    Rotary {
+        /// The data file, or the run.
+        place: String,
+        /// Why.
+        source: compensator::rotary::SolveError,
+    },
+    /// A plate was turned otherwise than was entered.
+    #[error("{place}: {source}")]
+    Misplaced {
+        /// The data file, or the run.
+        place: String,
+        /// Which placement, and what it fits.
+        source: compensator::rotary::Misplaced,
+    },
+    /// A rotary table's error cannot be applied.
+    #[error("axis {axis}: {source}")]
+    RotaryCompensation {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: compensator::rotary::PeriodicError,
+    },
+    /// No offsets of a plate can be planned, or those given are of no use.
+    #[error(transparent)]
+    Plan(#[from] compensator::rotary::PlanError),
     /// ISO 230-2 figures cannot be computed.
     #[error(transparent)]
     Figures(#[from] compensator::iso230::EvaluationError),
@@ -410,6 +437,9 @@ impl Failure {
             | Self::Data(_)
             | Self::Series(_)
             | Self::Screw { .. }
+            | Self::Rotary { .. }
+            | Self::Misplaced { .. }
+            | Self::Plan(_)
             | Self::SearchSettings { .. }
             | Self::File { .. }
             | Self::Usage { .. }
@@ -426,6 +456,7 @@ impl Failure {
             | Self::Store(_)
             | Self::Compensation { .. }
             | Self::ScrewCompensation { .. }
+            | Self::RotaryCompensation { .. }
             | Self::OutOfCalibration { .. }
             | Self::Jump { .. }
             | Self::ScaleMismatch { .. } => 3,

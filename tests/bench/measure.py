@@ -1,9 +1,10 @@
 """Runs the benchmark programs in turn and prints what they measured as one JSON object.
 
     measure.py bus PROGRAMS    SDO round trips and SYNC jitter on vcan0
-    measure.py host PROGRAMS   table correction, and SYNC jitter without CAN
+    measure.py host PROGRAMS   corrections, rotary self-calibration, and SYNC jitter without CAN
 
-PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "sync": path}.
+PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "rotary": path,
+"sync": path}.
 The caller pins this process to one core; what it starts inherits that.
 """
 
@@ -184,6 +185,7 @@ def main(place, programs):
     else:
         measured = {
             "table": run([programs["table"], "times"]),
+            "rotary": run([programs["rotary"], "times"]),
             "table_instructions": instructions(programs["table"]),
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
         }

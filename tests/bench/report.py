@@ -64,6 +64,22 @@ def show_table(table, counts, growth):
         line((f"longest / shortest table, {name}: {ratio:.1f}", 0))
 
 
+def show_rotary(rotary):
+    print("\nRotary self-calibration: us for a whole evaluation, ms to plan the offsets")
+    heads = ("solve", "least", "plan worst", "plan rms")
+    line(("lines", 8), ("placements", 12), *((name, 12) for name in heads))
+    for case in rotary["evaluations"]:
+        line(
+            (case["lines"], 8),
+            (case["placements"], 12),
+            *((f"{case[key]:.0f}", 12) for key in ("solve_us", "solve_us_min")),
+            *((f"{case[key]:.0f}", 12) for key in ("plan_worst_ms", "plan_rms_ms")),
+        )
+    for case in rotary["set_points"]:
+        time = f"{case['ns']:.1f} ({case['ns_min']:.1f}) ns"
+        line((f"set-point of 3600 lines, {case['interpolation']}: {time}", 0))
+
+
 def growth_of(table):
     """How much longer a call takes in the longest table than in the shortest, in a row."""
     least = {}
@@ -75,7 +91,11 @@ def growth_of(table):
 def goals_of(measured):
     ours = [case for case in measured["host"]["table"]["cases"] if case["interpolation"] != OTHER]
     slowest = max(case["in_a_row_ns"] for case in ours)
-    goals = {"set_point_ns": {"measured": slowest, "at_most": 40.0}}
+    largest = measured["host"]["rotary"]["evaluations"][-1]
+    goals = {
+        "set_point_ns": {"measured": slowest, "at_most": 40.0},
+        "rotary_solve_us": {"measured": largest["solve_us"], "at_most": 1000.0},
+    }
     if "bus" in measured:
         ratio = measured["bus"]["sdo"]["ours_to_python"]["median"]
         goals["ours_to_python"] = {"measured": ratio, "at_least": 5.0}
@@ -95,6 +115,7 @@ def main(vcan_host, host_file, bus_file=None):
     show_table(
         measured["host"]["table"], measured["host"]["table_instructions"], measured["growth"]
     )
+    show_rotary(measured["host"]["rotary"])
     show_sync("on the host, without CAN", measured["host"]["sync"])
     if bus_file:
         with open(bus_file, encoding="utf-8") as file:

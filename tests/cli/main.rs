@@ -2,5 +2,6 @@
 
 mod interrupted;
 mod programs;
+mod rotary;
 mod screw;
 mod verbs;

@@ -10,6 +10,7 @@ use units::Radians;
 
 use super::table::{Format, Table};
 use super::{DataError, Fault};
+use crate::rotary::gcd;
 
 /// More lines than any plate has; a number above it is a misprint.
 const LINES_MAX: usize = 100_000;
@@ -141,6 +142,22 @@ pub enum RotaryFault {
         /// The only offset.
         offset: usize,
     },
+    /// All offsets differ by multiples of a number that divides the number of lines.
+    #[error(
+        "offset {offset} and those before it differ by multiples of {step} only, which divides the \
+         {lines} lines: harmonic {harmonic} and its multiples look the same in every placement \
+         and cannot be told from the plate; add a placement at another offset"
+    )]
+    CommonStep {
+        /// The last offset.
+        offset: usize,
+        /// What all differ by.
+        step: usize,
+        /// The lines of the plate.
+        lines: usize,
+        /// The lowest harmonic lost.
+        harmonic: usize,
+    },
     /// A placement of which most is missing.
     #[error(
         "the placement at offset {offset} ends with {seen} of {lines} lines; at most a quarter may \
@@ -235,6 +252,7 @@ impl RotarySeries {
         for block in &blocks {
             placements.push(block.placement(&table, lines)?);
         }
+        check_step(&table, &blocks, lines)?;
         Ok(Self::new(lines, placements).expect("every rule was checked with its place"))
     }
 
@@ -362,6 +380,23 @@ fn count_lines(table: &Table, blocks: &[Block], given: Option<usize>) -> Result<
         }
     }
     Ok(largest + 1)
+}
+
+/// The rule of [`Design`](crate::rotary::Design), with the place of the last offset.
+fn check_step(table: &Table, blocks: &[Block], lines: usize) -> Result<(), DataError> {
+    let (first, last) = (&blocks[0], &blocks[blocks.len() - 1]);
+    let apart = blocks.iter().map(|it| it.offset.abs_diff(first.offset));
+    let step = apart.fold(lines, gcd);
+    if step == 1 {
+        return Ok(());
+    }
+    let fault = RotaryFault::CommonStep {
+        offset: last.offset,
+        step,
+        lines,
+        harmonic: lines / step,
+    };
+    Err(table.fail(last.first_row, OFFSET, fault.into()))
 }
 
 impl Block {

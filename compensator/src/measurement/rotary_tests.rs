@@ -123,6 +123,13 @@ fn wrong_counts_are_refused() {
 }
 
 #[test]
+fn offsets_that_cannot_part_table_and_plate_are_refused_at_the_last_of_them() {
+    let whole = format!("{HEADER}{}\n", good(4).join("\n"));
+    let opposite = whole.replace("\n1,", "\n2,");
+    check_text(&opposite, None, 6, 1, "harmonic 2 and its multiples");
+}
+
+#[test]
 fn a_line_missing_everywhere_is_accepted_where_it_cannot_be_the_last() {
     let rows = good(5).into_iter().filter(|row| !row.contains(",2,"));
     let text = format!("{HEADER}{}\n", rows.collect::<Vec<_>>().join("\n"));

@@ -83,9 +83,8 @@ impl Design {
         amplification_max: f64,
     ) -> Result<Self, DesignError> {
         check_offsets(lines, offsets)?;
-        let step = offsets
-            .iter()
-            .fold(lines, |step, offset| gcd(step, offset.abs_diff(offsets[0])));
+        let apart = offsets.iter().map(|offset| offset.abs_diff(offsets[0]));
+        let step = apart.fold(lines, gcd);
         if step > 1 {
             return Err(DesignError::Unobservable {
                 offsets: offsets.to_vec(),
@@ -94,11 +93,7 @@ impl Design {
                 harmonic: lines / step,
             });
         }
-        let design = Self {
-            lines,
-            offsets: offsets.to_vec(),
-            information: information(lines, offsets),
-        };
+        let design = Self::of_any(lines, offsets)?;
         let (harmonic, seen) = design.worst();
         // Written so that a NaN limit refuses.
         if seen <= amplification_max {
@@ -111,6 +106,16 @@ impl Design {
                 limit: amplification_max,
             })
         }
+    }
+
+    /// The same for offsets that may leave harmonics unobservable, whose information is zero.
+    pub(super) fn of_any(lines: usize, offsets: &[usize]) -> Result<Self, DesignError> {
+        check_offsets(lines, offsets)?;
+        Ok(Self {
+            lines,
+            offsets: offsets.to_vec(),
+            information: information(lines, offsets),
+        })
     }
 
     /// The lines of the plate.
@@ -191,40 +196,63 @@ fn check_offsets(lines: usize, offsets: &[usize]) -> Result<(), DesignError> {
     Ok(())
 }
 
-pub(super) fn gcd(a: usize, b: usize) -> usize {
+pub(crate) fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Σ_j |w_j − w̄|² = (4/P) Σ_{i<j} sin²(πk(s_i − s_j)/N): without cancellation, so that it keeps
-/// all its digits for slow harmonics and near offsets, where it is smallest.
+/// Σ_j |w_j − w̄|² for k = 0 … N/2.
 fn information(lines: usize, offsets: &[usize]) -> Vec<f64> {
-    let mut pairs = vec![0_u32; lines / 2 + 1];
-    for (at, a) in offsets.iter().enumerate() {
-        for b in &offsets[..at] {
-            let apart = a.abs_diff(*b);
-            pairs[apart.min(lines - apart)] += 1;
-        }
-    }
-    let squared_sine: Vec<f64> = (0..lines)
-        .map(|m| {
-            // sin(π − x) = sin(x), and the smaller argument is the more exact one.
-            let sine = (PI * m.min(lines - m) as f64 / lines as f64).sin();
-            sine * sine
-        })
-        .collect();
-    let mut information = vec![0.0; lines / 2 + 1];
-    for (apart, count) in pairs.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let weight = 4.0 * f64::from(*count) / offsets.len() as f64;
+    let count = offsets.len() as f64;
+    let turn = turn(lines);
+    let mut sums = vec![(0.0, 0.0); lines / 2 + 1];
+    for &offset in offsets {
         let mut at = 0;
-        for sum in &mut information[1..] {
-            at += apart;
+        for sum in &mut sums[1..] {
+            at += offset;
             if at >= lines {
                 at -= lines;
             }
-            *sum += weight * squared_sine[at];
+            sum.0 += turn[at].0;
+            sum.1 += turn[at].1;
         }
     }
+    let of = |(harmonic, (re, im)): (usize, &(f64, f64))| {
+        let information = count - (re * re + im * im) / count;
+        if information > 0.1 * count {
+            information
+        } else {
+            by_pairs(lines, offsets, harmonic)
+        }
+    };
+    let mut information: Vec<f64> = sums.iter().enumerate().map(of).collect();
+    information[0] = 0.0;
     information
+}
+
+/// cos and sin of 2πm/N; the second half of the circle mirrors the first.
+fn turn(lines: usize) -> Vec<(f64, f64)> {
+    let mut turn = vec![(1.0, 0.0); lines];
+    for m in 1..=lines / 2 {
+        let (sin, cos) = (2.0 * PI * m as f64 / lines as f64).sin_cos();
+        turn[m] = (cos, sin);
+        turn[lines - m] = (cos, -sin);
+    }
+    turn
+}
+
+/// The same as (4/P) Σ_{i<j} sin²(πk(s_i − s_j)/N): without cancellation, so that it keeps all
+/// its digits for slow harmonics and near offsets, where it is smallest.
+fn by_pairs(lines: usize, offsets: &[usize], harmonic: usize) -> f64 {
+    let mut sum = 0.0;
+    for (at, a) in offsets.iter().enumerate() {
+        for b in &offsets[..at] {
+            let apart = a.abs_diff(*b) * harmonic % lines;
+            // sin(π − x) = sin(x), and the smaller argument is the more exact one.
+            let sine = (PI * apart.min(lines - apart) as f64 / lines as f64).sin();
+            sum += sine * sine;
+        }
+    }
+    4.0 * sum / offsets.len() as f64
 }
 
 #[cfg(test)]

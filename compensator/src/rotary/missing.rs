@@ -12,6 +12,7 @@
 
 use super::closed_form::ClosedForm;
 use super::design::Design;
+use super::lanes::dot;
 
 /// More gaps than this make a matrix that takes minutes to factor.
 pub(super) const UNKNOWNS_MAX: usize = 3000;
@@ -228,18 +229,4 @@ impl Lower {
             }
         }
     }
-}
-
-/// Four sums side by side, which the processor adds at once.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a_fours, b_fours) = (a.chunks_exact(4), b.chunks_exact(4));
-    let ends = a_fours.remainder().iter().zip(b_fours.remainder());
-    let rest: f64 = ends.map(|(a, b)| a * b).sum();
-    let mut sums = [0.0; 4];
-    for (a, b) in a_fours.zip(b_fours) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    rest + (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

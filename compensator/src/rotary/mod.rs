@@ -34,6 +34,7 @@
 //! | `closed_form` | the least squares of complete readings, with two Fourier transforms |
 //! | `missing` | the same with readings missing |
 //! | `outliers` | readings that belong to no model |
+//! | `misplaced` | a plate turned otherwise than was entered |
 //! | `solve` | all of it, with uncertainties |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
 //!
@@ -45,6 +46,8 @@
 
 mod closed_form;
 mod design;
+mod lanes;
+mod misplaced;
 mod missing;
 mod outliers;
 mod periodic;
@@ -53,7 +56,9 @@ mod plan;
 mod rig;
 mod solve;
 
+pub(crate) use design::gcd;
 pub use design::{Design, DesignError, rms_amplification_of_a_pair, rms_amplification_of_all};
+pub use misplaced::{Misplaced, misplaced};
 pub use periodic::{
     NotAnAngle, PeriodicCompensation, PeriodicError, PeriodicInterpolation, PeriodicLimits,
     PeriodicTable,

@@ -14,8 +14,8 @@ use crate::uncertainty::robust_sigma;
 /// Below so many degrees of freedom the scatter is too uncertain to judge anything by.
 const JUDGED_MIN: usize = 8;
 
-/// As many residuals as give the scatter to one part in a hundred.
-const SAMPLE: usize = 8192;
+/// As many residuals as give the scatter to two parts in a hundred.
+const SAMPLE: usize = 4096;
 
 /// In one round only readings with at least this share of the largest residual are taken out.
 const ROUND_SHARE: f64 = 0.5;
@@ -62,7 +62,7 @@ impl<'a> Judge<'a> {
         robust_sigma(&sample).unwrap_or(0.0).max(SIGMA_MIN)
     }
 
-    /// The readings to take out in this round. Those of `gaps` have residual 0 and are none.
+    /// The readings to take out in this round, by index. Those that are out have residual 0.
     pub(super) fn suspects(&self, residuals: &[f64]) -> Vec<usize> {
         let lines = self.design.lines();
         let limit = self.limit * self.scatter(residuals);

@@ -6,18 +6,19 @@
 //! together, mirrored, or multiplied by a number prime to N, and amplify noise the same, at other
 //! harmonics in the last case; which of those comes out is chance.
 
+use core::cell::Cell;
 use core::f64::consts::TAU;
 
 use super::design::{Design, DesignError};
 
-/// Simple steps a search may take; about a second.
-const WORK_MAX: usize = 600_000_000;
+/// Harmonics of candidates a search may look at; well under a second.
+const WORK_MAX: u64 = 80_000_000;
 
 /// Sweeps over all offsets from one start; a descent seldom needs more than five.
 const SWEEPS_MAX: usize = 8;
 
-/// Starts tried where the work allows it.
-const STARTS_MAX: usize = 48;
+/// Starts tried where the work allows it; more have never found better ones for small plates.
+const STARTS_MAX: usize = 150;
 
 /// Information below it is rounding: the harmonic is unobservable.
 const INFORMATION_MIN: f64 = 1e-9;
@@ -97,9 +98,9 @@ struct Search {
     harmonics: usize,
     /// cos and sin of 2πm/N.
     turn: Vec<(f64, f64)>,
-    starts: usize,
     /// Offsets tried for each place in a sweep.
     candidates: usize,
+    work: Cell<u64>,
 }
 
 /// All offsets but one: what that one adds to.
@@ -113,9 +114,14 @@ struct Rest {
 impl Search {
     fn new(lines: usize, placements: usize, criterion: Criterion) -> Self {
         let harmonics = lines / 2;
-        let sweep = placements * harmonics * SWEEPS_MAX / 2;
-        let candidates = (WORK_MAX / sweep.max(1)).clamp(16.min(lines), lines);
-        let starts = (WORK_MAX / (sweep * candidates).max(1)).clamp(2, STARTS_MAX);
+        // So that one descent of a few sweeps is possible whatever the plate.
+        let descent = placements * harmonics * SWEEPS_MAX / 2;
+        let share = match criterion {
+            // Most candidates are passed over after a few harmonics.
+            Criterion::Worst => 16,
+            Criterion::Rms => 1,
+        };
+        let candidates = (share * WORK_MAX as usize / descent).clamp(16.min(lines), lines);
         let turn = (0..lines)
             .map(|m| (TAU * m as f64 / lines as f64).sin_cos())
             .map(|(sin, cos)| (cos, sin))
@@ -126,14 +132,17 @@ impl Search {
             criterion,
             harmonics,
             turn,
-            starts,
             candidates,
+            work: Cell::new(0),
         }
     }
 
     fn best(&self) -> Vec<usize> {
         let mut best = (WORTHLESS, Vec::new());
-        for start in 0..self.starts {
+        for start in 0..STARTS_MAX {
+            if self.work.get() > WORK_MAX && start > 1 {
+                break;
+            }
             let found = self.descend(self.start(start));
             if found.0 < best.0 || best.1.is_empty() {
                 best = found;
@@ -258,14 +267,16 @@ impl Search {
     fn worst(&self, rest: &Rest, offset: usize, bound: f64) -> f64 {
         let least = (1.0 / bound) * (1.0 - 1e-6);
         let mut lowest = f64::INFINITY;
-        for &harmonic in &rest.hardest {
+        for (seen, &harmonic) in rest.hardest.iter().enumerate() {
             let at = harmonic as usize * offset % self.lines;
             let sum = rest.sums[harmonic as usize - 1];
             lowest = lowest.min(self.information(sum, self.turn[at]));
             if lowest < least.max(INFORMATION_MIN) {
+                self.work.set(self.work.get() + 4 * seen as u64 + 4);
                 return f64::INFINITY;
             }
         }
+        self.work.set(self.work.get() + 4 * self.harmonics as u64);
         // Equals must not differ by rounding, or the rms would never decide.
         (1e9 / lowest).round() / 1e9
     }
@@ -281,6 +292,7 @@ impl Search {
         }
         let mut at = 0;
         for sums in rest.sums.chunks(256) {
+            self.work.set(self.work.get() + sums.len() as u64);
             for sum in sums {
                 at = self.next(at, offset);
                 let information = self.information(*sum, self.turn[at]);

@@ -1,9 +1,12 @@
 //! From readings to the table error with its uncertainty.
 
+use std::borrow::Cow;
+
 use units::Radians;
 
 use super::closed_form::{ClosedForm, Estimate};
 use super::design::{Design, DesignError};
+use super::lanes::{dot, sum};
 use super::missing::{Gaps, UNKNOWNS_MAX, Unbridged};
 use super::outliers::Judge;
 use crate::measurement::RotarySeries;
@@ -168,6 +171,17 @@ impl Solution {
         self.table_error.iter().map(|error| -*error).collect()
     }
 
+    /// What line by line is expected of a further placement at `offset`, but for its constant:
+    /// G\[n + s\] + A\[n\]; `None` for lines never read.
+    pub fn expected(&self, offset: usize) -> Vec<Option<Radians>> {
+        let lines = self.table_error.len();
+        let table = |line: usize| self.table_error[(line + offset) % lines];
+        let plate = self.plate_error.iter().enumerate();
+        plate
+            .map(|(line, it)| it.map(|error| table(line) + error))
+            .collect()
+    }
+
     fn spread(&self, noise: Radians) -> Vec<Radians> {
         self.amplification.iter().map(|it| noise * *it).collect()
     }
@@ -180,16 +194,33 @@ impl Solution {
 /// amplified beyond the limit, or too many readings disagree.
 pub fn solve(series: &RotarySeries, options: &SolveOptions) -> Result<Solution, SolveError> {
     let design = Design::new(series.lines(), &series.offsets(), options.amplification_max)?;
-    let form = ClosedForm::new(&design);
+    evaluate(&design, series, options)
+}
+
+/// The same for offsets that may leave harmonics of the table unobservable: those are zero.
+pub(super) fn solve_what_is_seen(
+    series: &RotarySeries,
+    options: &SolveOptions,
+) -> Result<Solution, SolveError> {
+    let design = Design::of_any(series.lines(), &series.offsets())?;
+    evaluate(&design, series, options)
+}
+
+fn evaluate(
+    design: &Design,
+    series: &RotarySeries,
+    options: &SolveOptions,
+) -> Result<Solution, SolveError> {
+    let form = ClosedForm::new(design);
     let (readings, missing) = readings_of(series);
     let solver = Solver {
         covariance: form.covariance(),
-        design: &design,
+        design,
         form: &form,
         options,
         missing,
     };
-    solver.run(readings)
+    solver.run(&readings)
 }
 
 /// All readings, placement by placement, and the indices of those missing, which hold the mean
@@ -199,19 +230,16 @@ fn readings_of(series: &RotarySeries) -> (Vec<f64>, Vec<usize>) {
     let mut missing = Vec::new();
     for placement in series.placements() {
         let start = readings.len();
-        readings.extend(
-            placement
-                .readings
-                .iter()
-                .map(|it| it.map_or(f64::NAN, Radians::value)),
-        );
+        let value = |it: &Option<Radians>| it.map_or(f64::NAN, Radians::value);
+        readings.extend(placement.readings.iter().map(value));
         let own = &mut readings[start..];
-        let gaps: Vec<usize> = (0..own.len()).filter(|at| own[*at].is_nan()).collect();
-        if gaps.is_empty() {
+        // One NaN makes the whole sum one.
+        if !sum(own).is_nan() {
             continue;
         }
-        let sum: f64 = own.iter().filter(|it| !it.is_nan()).sum();
-        let mean = sum / (own.len() - gaps.len()).max(1) as f64;
+        let gaps: Vec<usize> = (0..own.len()).filter(|at| own[*at].is_nan()).collect();
+        let read: f64 = own.iter().filter(|it| !it.is_nan()).sum();
+        let mean = read / (own.len() - gaps.len()).max(1) as f64;
         gaps.iter().for_each(|&at| own[at] = mean);
         missing.extend(gaps.iter().map(|at| start + at));
     }
@@ -227,18 +255,18 @@ struct Solver<'a> {
 }
 
 /// One evaluation: what was left out, and what the rest says.
-struct Fit<'a> {
+struct Fit<'a, 'r> {
     gaps: Option<Gaps<'a>>,
     /// With the predictions in the gaps.
-    readings: Vec<f64>,
+    readings: Cow<'r, [f64]>,
     estimate: Estimate,
     residuals: Vec<f64>,
     left_out: Vec<usize>,
 }
 
 impl<'a> Solver<'a> {
-    fn run(&self, readings: Vec<f64>) -> Result<Solution, SolveError> {
-        let mut fit = self.fit(readings.clone(), &[])?;
+    fn run(&self, readings: &[f64]) -> Result<Solution, SolveError> {
+        let mut fit = self.fit(readings, &[])?;
         let judge = Judge::new(
             self.design,
             &self.covariance,
@@ -246,12 +274,13 @@ impl<'a> Solver<'a> {
             self.options.outlier_threshold,
         );
         if let Some(judge) = judge {
-            fit = self.search(&judge, &readings, fit)?;
+            fit = self.search(&judge, readings, fit)?;
         }
-        self.solution(&readings, fit)
+        self.solution(readings, fit)
     }
 
-    fn fit(&self, mut readings: Vec<f64>, outliers: &[usize]) -> Result<Fit<'a>, SolveError> {
+    fn fit<'r>(&self, readings: &'r [f64], outliers: &[usize]) -> Result<Fit<'a, 'r>, SolveError> {
+        let mut readings = Cow::Borrowed(readings);
         let mut left_out = [&self.missing[..], outliers].concat();
         left_out.sort_unstable();
         let gaps = if left_out.is_empty() {
@@ -259,7 +288,7 @@ impl<'a> Solver<'a> {
         } else {
             let gaps = Gaps::new(self.design, &self.covariance, &left_out);
             let gaps = gaps.map_err(|why| self.unbridged(why))?;
-            gaps.fill(self.form, &mut readings);
+            gaps.fill(self.form, readings.to_mut());
             Some(gaps)
         };
         let estimate = self.form.estimate(&readings);
@@ -274,12 +303,12 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn search(
+    fn search<'r>(
         &self,
         judge: &Judge<'_>,
-        readings: &[f64],
-        mut fit: Fit<'a>,
-    ) -> Result<Fit<'a>, SolveError> {
+        readings: &'r [f64],
+        mut fit: Fit<'a, 'r>,
+    ) -> Result<Fit<'a, 'r>, SolveError> {
         let total = readings.len() - self.missing.len();
         let limit = (total as f64 * self.options.outlier_share_max) as usize;
         let mut outliers: Vec<usize> = Vec::new();
@@ -298,43 +327,42 @@ impl<'a> Solver<'a> {
                     first: self.name(first),
                 });
             }
-            fit = self.fit(readings.to_vec(), &outliers)?;
+            fit = self.fit(readings, &outliers)?;
         }
-        let belongs = |at: &usize| self.belongs(judge, &fit, readings, *at);
+        if outliers.is_empty() {
+            return Ok(fit);
+        }
+        let scatter = judge.scatter(&fit.residuals);
+        // Whether a reading fits what the others predict for it after all.
+        let belongs = |at: &usize| {
+            let variance = fit.gaps.as_ref().and_then(|it| it.prediction_variance(*at));
+            let apart = readings[*at] - fit.readings[*at];
+            variance.is_some_and(|variance| judge.fits(apart, variance, scatter))
+        };
         let left = outliers.len();
         let kept: Vec<usize> = outliers.into_iter().filter(|at| !belongs(at)).collect();
         if kept.len() == left {
             Ok(fit)
         } else {
-            self.fit(readings.to_vec(), &kept)
+            self.fit(readings, &kept)
         }
-    }
-
-    /// Whether a reading that was taken out fits what the others predict for it after all.
-    fn belongs(&self, judge: &Judge<'_>, fit: &Fit<'_>, readings: &[f64], at: usize) -> bool {
-        let variance = fit
-            .gaps
-            .as_ref()
-            .and_then(|gaps| gaps.prediction_variance(at));
-        let apart = readings[at] - fit.readings[at];
-        variance.is_some_and(|it| judge.fits(apart, it, judge.scatter(&fit.residuals)))
     }
 
     /// Readings less unknowns: N − 1 table errors, N − 1 plate errors and P constants of complete
     /// readings, and one for each gap but the one that a line never read has for itself.
-    fn degrees_of_freedom(&self, fit: &Fit<'_>) -> usize {
+    fn degrees_of_freedom(&self, fit: &Fit<'_, '_>) -> usize {
         let (lines, placements) = (self.design.lines(), self.design.offsets().len());
         let unknowns = fit.gaps.as_ref().map_or(0, Gaps::unknowns);
         (placements - 2) * (lines - 1) - unknowns
     }
 
-    fn solution(&self, readings: &[f64], fit: Fit<'_>) -> Result<Solution, SolveError> {
+    fn solution(&self, readings: &[f64], fit: Fit<'_, '_>) -> Result<Solution, SolveError> {
         let extra = fit.gaps.as_ref().map(Gaps::variances);
         let extra = extra.unwrap_or_else(|| vec![0.0; self.design.lines()]);
         let own = self.covariance[0];
         let amplification: Vec<f64> = extra.iter().map(|it| (own + it).sqrt()).collect();
         self.check_amplification(&amplification)?;
-        let squares: f64 = fit.residuals.iter().map(|it| it * it).sum();
+        let squares = dot(&fit.residuals, &fit.residuals);
         let freedom = self.degrees_of_freedom(&fit);
         let used = readings.len() - fit.left_out.len();
         let outlier = |at: &usize| Outlier {
@@ -360,7 +388,7 @@ impl<'a> Solver<'a> {
     }
 
     /// A with the zero that makes the sum over the lines read vanish.
-    fn plate_error(&self, fit: &Fit<'_>) -> Vec<Option<Radians>> {
+    fn plate_error(&self, fit: &Fit<'_, '_>) -> Vec<Option<Radians>> {
         let lines = self.design.lines();
         let mut left = vec![self.design.offsets().len(); lines];
         fit.left_out.iter().for_each(|at| left[at % lines] -= 1);

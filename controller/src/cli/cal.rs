@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use serde_json::{Value, json};
 use truestage::store::{
-    CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, RotaryContent, Store, short,
+    CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, Store, short,
 };
 use truestage::{Failure, config};
-use units::{Metres, Radians};
+use units::Metres;
 
 use super::output::{Ended, Output};
-use super::screw;
+use super::{rotary, screw};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalCommand {
@@ -117,7 +117,7 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
     );
     text += &match &record.content {
         Content::LinearErrorTable(content) => linear_lines(content),
-        Content::RotaryErrorTable(content) => rotary_lines(content),
+        Content::RotaryErrorTable(content) => rotary::shown(content),
         Content::ScrewModel(content) => screw::shown(content),
     };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
@@ -134,27 +134,6 @@ fn linear_lines(content: &LinearContent) -> String {
         .nodes
         .iter()
         .fold(head, |text, node| text + &node_line(node))
-}
-
-fn rotary_lines(content: &RotaryContent) -> String {
-    let arcsec = |value: f64| format!("{:.4}", Radians(value).arcsec());
-    let mut text = format!(
-        "{} lines, plate offsets {:?}, residual rms {} ″\n  line   table error (″)   u (″)   plate (″)",
-        content.lines,
-        content.offsets,
-        arcsec(content.residual_rms_rad),
-    );
-    let errors = content.table_error_rad.iter();
-    for (line, error) in errors.enumerate() {
-        let cell = |value: Option<f64>| value.map_or("–".to_owned(), arcsec);
-        text += &format!(
-            "\n  {line:>4}   {:>15}   {:>5}   {:>9}",
-            arcsec(*error),
-            cell(content.standard_uncertainty_rad.get(line).copied()),
-            cell(content.plate_error_rad.get(line).copied().flatten()),
-        );
-    }
-    text
 }
 
 fn micrometres(metres: Option<f64>) -> String {
@@ -176,7 +155,7 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
     let (before, after) = (store.load(&before_id)?, store.load(&after_id)?);
     let (lines, values) = match &after.content {
         Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
-        Content::RotaryErrorTable(new) => rotary_changes(before.rotary(&before_id)?, new),
+        Content::RotaryErrorTable(new) => rotary::changes(before.rotary(&before_id)?, new),
         Content::ScrewModel(new) => screw::changes(before.screw(&before_id)?, new),
     };
     output.result(&lines.join("\n"), &json!({"changes": values}))
@@ -211,22 +190,6 @@ fn linear_changes(before: &LinearContent, after: &LinearContent) -> (Vec<String>
     }
     if values.is_empty() {
         lines.push("  no position stands in both".into());
-    }
-    (lines, values)
-}
-
-fn rotary_changes(before: &RotaryContent, after: &RotaryContent) -> (Vec<String>, Vec<Value>) {
-    if before.lines != after.lines {
-        let text = format!("  {} lines before, {} after", before.lines, after.lines);
-        return (vec![text], Vec::new());
-    }
-    let mut lines = vec!["  line   Δ table error (″)".to_owned()];
-    let mut values = Vec::new();
-    let pairs = before.table_error_rad.iter().zip(&after.table_error_rad);
-    for (line, (old, new)) in pairs.enumerate() {
-        let change = Radians(new - old).arcsec();
-        lines.push(format!("  {line:>4}   {change:>17.4}"));
-        values.push(json!({"line": line, "table_error_arcsec": change}));
     }
     (lines, values)
 }

@@ -16,7 +16,7 @@ use truestage::store::{
 use truestage::{Failure, assemble, config, json as to_json, text};
 
 use super::output::{Ended, Output};
-use super::screw;
+use super::{rotary, screw};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FitCommand {
@@ -38,6 +38,8 @@ pub(super) enum FitCommand {
     },
     /// Ball screws, from columns axis,approach,stroke_um,deviation_um.
     Screw(screw::ScrewArgs),
+    /// A rotary table's error, from columns offset,line,deviation_arcsec.
+    Rotary(rotary::RotaryArgs),
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Failure> {
@@ -64,6 +66,7 @@ pub(super) fn fit(command: &FitCommand, output: Output) -> Ended {
         }
         FitCommand::Hall { data } => hall(data, output),
         FitCommand::Screw(args) => screw::run(args, output),
+        FitCommand::Rotary(args) => rotary::fit(args, output),
     }
 }
 

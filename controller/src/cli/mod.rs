@@ -7,6 +7,7 @@ mod output;
 mod page;
 mod platform;
 mod progress;
+mod rotary;
 mod scan;
 mod screw;
 mod session;
@@ -58,6 +59,9 @@ enum Command {
     /// The same mathematics on data measured elsewhere.
     #[command(subcommand)]
     Fit(data::FitCommand),
+    /// What to measure, before anything is measured.
+    #[command(subcommand)]
+    Plan(rotary::PlanCommand),
     /// ISO 230-2 figures of measured data (columns run,approach,target_mm,measured_mm).
     Iso230 {
         /// The data file.
@@ -192,6 +196,7 @@ pub(crate) fn main() -> ExitCode {
         }
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
+        Command::Plan(command) => rotary::plan(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
         Command::Report(args) => page::run(&args, output),
     };

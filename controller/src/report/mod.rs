@@ -199,12 +199,13 @@ fn rotary_table(content: &RotaryContent) -> String {
     let mut html = String::from(
         "<table><tr><th>line</th><th>table error (″)</th><th>u (″)</th><th>plate (″)</th></tr>",
     );
+    let u = content.standard_uncertainty_rad.as_ref();
     for (line, error) in content.table_error_rad.iter().enumerate() {
         let _ = write!(
             html,
             "<tr><td>{line}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             cell(Some(*error)),
-            cell(content.standard_uncertainty_rad.get(line).copied()),
+            cell(u.and_then(|it| it.get(line).copied())),
             cell(content.plate_error_rad.get(line).copied().flatten()),
         );
     }

@@ -142,6 +142,14 @@ pub enum StoreError {
         /// Why.
         source: compensator::error_table::TableError,
     },
+    /// The values of the record make no table of a rotary axis.
+    #[error("calibration {id}: {source}")]
+    Periodic {
+        /// The calibration.
+        id: String,
+        /// Why.
+        source: compensator::rotary::PeriodicError,
+    },
     /// Nothing is left of the run to be done.
     #[error("{}: this run is complete; start a new one without --resume", path.display())]
     AlreadyComplete {

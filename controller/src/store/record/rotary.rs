@@ -1,8 +1,10 @@
 //! The errors of a rotary table at the lines of a plate (`rotary_error_table`).
 
+use compensator::rotary::{PeriodicTable, Reading, Solution};
 use serde::{Deserialize, Serialize};
+use units::Radians;
 
-use super::super::StoreError;
+use super::super::{StoreError, short};
 use super::{CalibrationRecord, Content};
 
 /// One reading of the run: a line of the plate in one placement.
@@ -25,8 +27,9 @@ pub struct RotaryContent {
     pub offsets: Vec<u32>,
     /// Error of the table's reading at each line, radians; its sum is zero.
     pub table_error_rad: Vec<f64>,
-    /// Its standard uncertainty, radians.
-    pub standard_uncertainty_rad: Vec<f64>,
+    /// Its standard uncertainty, radians; `None` where neither residuals nor a stated noise
+    /// gave one.
+    pub standard_uncertainty_rad: Option<Vec<f64>>,
     /// Error of the plate's lines, radians; `None` for a line that was never read.
     pub plate_error_rad: Vec<Option<f64>>,
     /// Standard uncertainty of one reading as it was stated beforehand, radians.
@@ -46,6 +49,63 @@ pub struct RotaryContent {
 impl RotaryContent {
     /// The name of this kind.
     pub const KIND: &'static str = "rotary_error_table";
+
+    /// What `solution` says.
+    pub fn new(solution: &Solution) -> Self {
+        let radians = |values: &[Radians]| values.iter().map(|it| it.value()).collect();
+        let uncertainty = solution.standard_uncertainty();
+        let plate = solution.plate_error.iter();
+        let outliers = solution.outliers.iter().map(|it| &it.reading);
+        Self {
+            lines: small(solution.design.lines()),
+            offsets: solution
+                .design
+                .offsets()
+                .iter()
+                .copied()
+                .map(small)
+                .collect(),
+            table_error_rad: radians(&solution.table_error),
+            standard_uncertainty_rad: uncertainty.as_deref().map(radians),
+            plate_error_rad: plate.map(|it| it.map(Radians::value)).collect(),
+            reading_noise_rad: solution.reading_noise_given.map(Radians::value),
+            residual_rms_rad: solution.residual_rms.value(),
+            degrees_of_freedom: small(solution.degrees_of_freedom),
+            noise_amplification: solution.noise_amplification(),
+            missing: solution.missing.iter().map(ReadingName::of).collect(),
+            outliers: outliers.map(ReadingName::of).collect(),
+        }
+    }
+
+    /// The deviations that calibration `id` holds, ready to be interpolated.
+    ///
+    /// # Errors
+    /// When its values make no table.
+    pub fn table(&self, id: &str) -> Result<PeriodicTable, StoreError> {
+        // A reading too large is an axis short of its target.
+        let deviations = self.table_error_rad.iter().map(|error| Radians(-error));
+        let uncertainty = self.standard_uncertainty_rad.as_ref();
+        let uncertainty = uncertainty.map(|it| it.iter().copied().map(Radians).collect());
+        PeriodicTable::new(deviations.collect(), uncertainty).map_err(|source| {
+            StoreError::Periodic {
+                id: short(id),
+                source,
+            }
+        })
+    }
+}
+
+impl ReadingName {
+    fn of(reading: &Reading) -> Self {
+        Self {
+            offset: small(reading.offset),
+            line: small(reading.line),
+        }
+    }
+}
+
+fn small(number: usize) -> u32 {
+    u32::try_from(number).expect("no plate has four thousand million lines")
 }
 
 impl CalibrationRecord {

@@ -1,0 +1,291 @@
+//! `plan rotary` and `fit rotary`: offsets of a plate, and files of readings made elsewhere.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tests::MACHINE;
+
+use crate::programs::{Ended, truestage};
+
+const HEADER: &str = "offset,line,deviation_arcsec\n";
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder can be made")
+}
+
+fn fit(folder: &Path, rows: &str, words: &[&str]) -> Ended {
+    fs::write(folder.join("data.csv"), format!("{HEADER}{rows}")).expect("a file can be written");
+    truestage(folder, &[&["fit", "rotary", "data.csv"], words].concat())
+}
+
+fn numbers(list: &Value) -> Vec<f64> {
+    let list = list.as_array().unwrap_or_else(|| panic!("{list}"));
+    list.iter()
+        .map(|it| it.as_f64().expect("a number"))
+        .collect()
+}
+
+#[track_caller]
+fn check_near(seen: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (seen - expected).abs() <= tolerance,
+        "{seen}, not {expected}"
+    );
+}
+
+const LINES: usize = 36;
+
+/// Eccentricity, a second and a ninth harmonic; ±9″.
+fn table(position: usize) -> f64 {
+    let angle = core::f64::consts::TAU * (position % LINES) as f64 / LINES as f64;
+    6.0 * angle.cos() + 2.0 * (2.0 * angle).sin() + (9.0 * angle + 0.3).cos()
+}
+
+/// Readings of a plate with errors of ±30″ and noise of ±0.05″, the same on every machine.
+fn readings(offsets: &[usize], noise: f64) -> Vec<(usize, usize, f64)> {
+    let mut state = 4711_u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+    };
+    let plate: Vec<f64> = (0..LINES).map(|_| 60.0 * random()).collect();
+    let mut rows = Vec::new();
+    for (placement, &offset) in offsets.iter().enumerate() {
+        for (line, error) in plate.iter().enumerate() {
+            let constant = 20.0 * placement as f64 - 30.0;
+            let reading = table(line + offset) + error + constant + 2.0 * noise * random();
+            rows.push((offset, line, reading));
+        }
+    }
+    rows
+}
+
+fn csv(rows: &[(usize, usize, f64)]) -> String {
+    rows.iter()
+        .map(|(offset, line, reading)| format!("{offset},{line},{reading:.9}\n"))
+        .collect()
+}
+
+#[test]
+fn the_table_error_comes_out_whatever_the_plate_with_what_was_left_out() {
+    let folder = folder();
+    let mut rows = readings(&[0, 1, 7, 11], 0.05);
+    // Line 20 is smudged; one reading is bad.
+    rows.retain(|(_, line, _)| *line != 20);
+    let bad = rows.iter_mut().find(|it| (it.0, it.1) == (7, 3));
+    bad.expect("it was read").2 += 4.0;
+    let result = fit(
+        folder.path(),
+        &csv(&rows),
+        &["--reading-noise-arcsec", "0.029"],
+    )
+    .with_code(0);
+    assert_eq!(result["lines"], 36);
+    assert_eq!(result["offsets"], serde_json::json!([0, 1, 7, 11]));
+    let errors = numbers(&result["table_error_arcsec"]);
+    let u = numbers(&result["standard_uncertainty_arcsec"]);
+    let stated = numbers(&result["propagated_uncertainty_arcsec"]);
+    assert_eq!((errors.len(), u.len(), stated.len()), (36, 36, 36));
+    let sum: f64 = errors.iter().sum();
+    check_near(sum, 0.0, 1e-6);
+    for (position, (error, u)) in errors.iter().zip(&u).enumerate() {
+        assert!(*u > 0.0 && *u < 0.05, "{u}");
+        check_near(*error, table(position), 4.5 * u);
+    }
+    // Uniform noise of ±0.05″ has a standard deviation of 0.0289″.
+    check_near(
+        result["reading_noise_arcsec"].as_f64().unwrap(),
+        0.0289,
+        0.006,
+    );
+    check_near(u[0] / stated[0], 1.0, 0.2);
+    let amplification = result["noise_amplification"].as_f64().unwrap();
+    assert!((0.5..1.0).contains(&amplification), "{amplification}");
+    assert_eq!(result["plate_error_arcsec"][20], Value::Null);
+    assert_eq!(result["plate_error_arcsec"].as_array().unwrap().len(), 36);
+    assert_eq!(result["missing"].as_array().unwrap().len(), 4);
+    let outliers = result["outliers"].as_array().unwrap();
+    assert_eq!(outliers.len(), 1, "{outliers:?}");
+    assert_eq!(
+        (&outliers[0]["offset"], &outliers[0]["line"]),
+        (&7.into(), &3.into())
+    );
+    check_near(outliers[0]["residual_arcsec"].as_f64().unwrap(), 4.0, 0.3);
+}
+
+#[test]
+fn the_patents_two_placements_give_its_recursion_and_no_uncertainty_of_their_own() {
+    let folder = folder();
+    let rows = readings(&[0, 1], 0.05);
+    let result = fit(folder.path(), &csv(&rows), &[]).with_code(0);
+    let (first, second) = rows.split_at(LINES);
+    let mean = |rows: &[(usize, usize, f64)]| rows.iter().map(|it| it.2).sum::<f64>() / 36.0;
+    let mut sums = vec![0.0];
+    for (a, b) in first.iter().zip(&second[..LINES - 1]) {
+        let last = sums[sums.len() - 1];
+        sums.push(last + (b.2 - mean(second)) - (a.2 - mean(first)));
+    }
+    let zero = sums.iter().sum::<f64>() / 36.0;
+    for (seen, sum) in numbers(&result["table_error_arcsec"]).iter().zip(&sums) {
+        check_near(*seen, sum - zero, 1e-7);
+    }
+    check_near(
+        result["noise_amplification"].as_f64().unwrap(),
+        (1295.0_f64 / 216.0).sqrt(),
+        1e-9,
+    );
+    let u = result["standard_uncertainty_arcsec"].as_array().unwrap();
+    assert!(u.len() == 36 && u.iter().all(Value::is_null));
+    let words = ["--reading-noise-arcsec", "0.1"];
+    let result = fit(folder.path(), &csv(&rows), &words).with_code(0);
+    let u = numbers(&result["standard_uncertainty_arcsec"]);
+    check_near(u[5], 0.1 * (1295.0_f64 / 216.0).sqrt(), 1e-9);
+}
+
+#[track_caller]
+fn check_refused(rows: &str, words: &[&str], says: &[&str]) {
+    let folder = folder();
+    fs::write(folder.path().join("machine.toml"), MACHINE).expect("a file can be written");
+    let words = [words, &["--save", "machine.toml"]].concat();
+    let error = fit(folder.path(), rows, &words).with_code(2)["error"].to_string();
+    for word in says {
+        assert!(error.contains(word), "`{word}` is not in {error}");
+    }
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(left.len(), 2, "something was stored: {left:?}");
+}
+
+#[test]
+fn what_cannot_be_used_is_told_with_file_line_and_cause_and_nothing_is_stored() {
+    let rows = readings(&[0, 1, 7], 0.05);
+    let good = csv(&rows);
+    let with = |row: &str| format!("{good}{row}\n");
+    check_refused(
+        &with("7,5,nan"),
+        &[],
+        &["data.csv:110:5", "not a finite number"],
+    );
+    check_refused(&with("7,5"), &[], &["data.csv:110:4", "2 cells"]);
+    check_refused(
+        &with("7,5,1.0"),
+        &[],
+        &["data.csv:110:3", "line 5 of the placement at offset 7"],
+    );
+    check_refused(
+        &with("1,5,1.0"),
+        &[],
+        &["data.csv:110:1", "offset 1 comes again"],
+    );
+    check_refused(
+        &with("36,5,1.0"),
+        &[],
+        &["data.csv:110:1", "`offset` is 36"],
+    );
+    check_refused(
+        &with("7,36,1.0"),
+        &[],
+        &["data.csv:110:3", "line 36 is read in 1 of 3"],
+    );
+    check_refused(
+        &with("7,36,1.0"),
+        &["--lines", "36"],
+        &["data.csv:110:3", "has 36 lines"],
+    );
+    check_refused(
+        &csv(&rows[..LINES]),
+        &[],
+        &["data.csv:37:1", "one placement cannot part"],
+    );
+    check_refused(
+        &csv(&rows[..90]),
+        &["--lines", "36"],
+        &["data.csv:91:1", "18 of 36 lines"],
+    );
+}
+
+#[test]
+fn placements_and_options_of_no_use_are_told_and_nothing_is_stored() {
+    let good = csv(&readings(&[0, 1, 7], 0.05));
+    let opposite = csv(&readings(&[0, 18], 0.05));
+    check_refused(&opposite, &[], &["data.csv:38:1", "harmonic 2"]);
+    let gap = csv(&readings(&[0, 1], 0.05)).replacen("0,9,", "#0,9,", 1);
+    check_refused(
+        &gap,
+        &[],
+        &["data.csv: ", "line 9 at plate offset 0 is needed"],
+    );
+    let turned = csv(&readings(&[0, 1, 9, 11], 0.05)).replace("\n9,", "\n7,");
+    check_refused(&turned, &[], &["plate offset 7 fits offset 9 far better"]);
+    check_refused(&good, &["--reading-noise-arcsec=-1"], &["above zero"]);
+    check_refused(
+        &good,
+        &["--amplification-limit", "1"],
+        &["is amplified", "the limit is 1.0"],
+    );
+    check_refused(&good, &[], &["its axes (x) are linear"]);
+    let urad = folder();
+    fs::write(
+        urad.path().join("u.csv"),
+        "offset,line,deviation_urad\n0,0,1\n",
+    )
+    .unwrap();
+    let error = truestage(urad.path(), &["fit", "rotary", "u.csv"]).with_code(2);
+    let error = error["error"].to_string();
+    assert!(
+        error.contains("u.csv:1:13") && error.contains("deviation_arcsec"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_plan_says_what_it_makes_of_noise_and_what_others_would() {
+    let folder = folder();
+    let plan = |words: &[&str]| truestage(folder.path(), &[&["plan", "rotary"], words].concat());
+    for (criterion, worst) in [("worst", 1.36), ("rms", 2.0)] {
+        let words = [
+            "--lines",
+            "360",
+            "--placements",
+            "4",
+            "--criterion",
+            criterion,
+        ];
+        let planned = plan(&words).with_code(0);
+        assert_eq!(planned["criterion"], criterion);
+        let amplification = numbers(&planned["amplification"]);
+        assert_eq!(
+            (numbers(&planned["offsets"]).len(), amplification.len()),
+            (4, 180)
+        );
+        let largest = amplification.iter().copied().fold(0.0, f64::max);
+        check_near(
+            planned["worst_amplification"].as_f64().unwrap(),
+            largest,
+            1e-12,
+        );
+        assert!(largest < worst, "{largest}");
+        assert!(planned["rms_amplification"].as_f64().unwrap() < 0.631);
+        let pair = &planned["patent_pair"];
+        let theory = planned["theory"]["pair_one_line_apart_rms"]
+            .as_f64()
+            .unwrap();
+        check_near(pair["rms_amplification"].as_f64().unwrap(), theory, 1e-9);
+        check_near(theory, 7.7459, 1e-4);
+        let all = planned["theory"]["placement_at_every_line_rms"]
+            .as_f64()
+            .unwrap();
+        check_near(all, 359.0_f64.sqrt() / 360.0, 1e-12);
+    }
+    let judged = plan(&["--lines", "360", "--offsets", "0,1"]).with_code(0);
+    assert_eq!(judged["worst_harmonic"], 1);
+    let words = ["--lines", "360", "--offsets", "0,120,240"];
+    let refused = plan(&words).with_code(2)["error"].to_string();
+    assert!(
+        refused.contains("harmonic 3 and its multiples"),
+        "{refused}"
+    );
+    plan(&["--lines", "360", "--placements", "1"]).with_code(2);
+    plan(&["--lines", "3", "--placements", "4"]).with_code(2);
+    plan(&["--lines", "360"]).with_code(2);
+}
