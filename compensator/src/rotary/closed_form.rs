@@ -122,28 +122,38 @@ impl ClosedForm {
         self.backward(&mut spectrum)
     }
 
-    /// reading − model for every line of every placement.
+    /// reading − model for every line of one placement, in the place of what `row` held.
+    pub(super) fn residuals_of(
+        &self,
+        placement: usize,
+        readings: &[f64],
+        estimate: &Estimate,
+        row: &mut Vec<f64>,
+    ) {
+        let (table, plate) = (&estimate.table, &estimate.plate);
+        let (offset, constant) = (self.offsets[placement], estimate.constants[placement]);
+        let readings = &readings[placement * self.lines..(placement + 1) * self.lines];
+        let (before, after) = readings.split_at(self.lines - offset);
+        let left =
+            |(reading, (table, plate)): (&f64, (&f64, &f64))| reading - constant - table - plate;
+        row.clear();
+        row.extend(
+            before
+                .iter()
+                .zip(table[offset..].iter().zip(plate))
+                .map(left),
+        );
+        let plate = &plate[before.len()..];
+        row.extend(after.iter().zip(table.iter().zip(plate)).map(left));
+    }
+
+    /// The same for all placements, one after the other.
     pub(super) fn residuals(&self, readings: &[f64], estimate: &Estimate) -> Vec<f64> {
-        let Estimate {
-            table,
-            plate,
-            constants,
-        } = estimate;
         let mut residuals = Vec::with_capacity(readings.len());
-        let placements = readings.chunks_exact(self.lines).zip(constants);
-        for ((placement, constant), &offset) in placements.zip(&self.offsets) {
-            let (before, after) = placement.split_at(self.lines - offset);
-            let left = |(reading, (table, plate)): (&f64, (&f64, &f64))| {
-                reading - constant - table - plate
-            };
-            residuals.extend(
-                before
-                    .iter()
-                    .zip(table[offset..].iter().zip(plate))
-                    .map(left),
-            );
-            let plate = &plate[before.len()..];
-            residuals.extend(after.iter().zip(table.iter().zip(plate)).map(left));
+        let mut row = Vec::with_capacity(self.lines);
+        for placement in 0..self.offsets.len() {
+            self.residuals_of(placement, readings, estimate, &mut row);
+            residuals.extend_from_slice(&row);
         }
         residuals
     }

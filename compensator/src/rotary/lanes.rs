@@ -26,3 +26,24 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     rest + (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
+
+/// max |a|; 0 for nothing.
+pub(super) fn largest(a: &[f64]) -> f64 {
+    let mut largest = [0.0_f64; 4];
+    let fours = a.chunks_exact(4);
+    let rest = fours
+        .remainder()
+        .iter()
+        .fold(0.0, |largest, a| a.abs().max(largest));
+    for a in fours {
+        for lane in 0..4 {
+            let size = a[lane].abs();
+            largest[lane] = if size > largest[lane] {
+                size
+            } else {
+                largest[lane]
+            };
+        }
+    }
+    largest.iter().copied().fold(rest, f64::max)
+}

@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 
 use super::design::Design;
+use super::lanes::{dot, largest};
 use crate::uncertainty::robust_sigma;
 
 /// Below so many degrees of freedom the scatter is too uncertain to judge anything by.
@@ -22,6 +23,30 @@ const ROUND_SHARE: f64 = 0.5;
 
 /// A scatter below it is rounding of the data: 0.2 µas.
 const SIGMA_MIN: f64 = 1e-12;
+
+/// What is needed of residuals to see whether there are outliers.
+#[derive(Default)]
+pub(super) struct Scan {
+    /// Σ r².
+    pub(super) squares: f64,
+    /// max |r| of each placement.
+    largest: Vec<f64>,
+    /// Some residuals, with their placements.
+    sample: Vec<(usize, f64)>,
+}
+
+impl Scan {
+    /// Adds the residuals of the next placement of `placements`.
+    pub(super) fn add(&mut self, residuals: &[f64], placements: usize) {
+        let placement = self.largest.len();
+        let stride = (residuals.len() * placements).div_ceil(SAMPLE);
+        let sample = residuals.iter().step_by(stride);
+        self.sample
+            .extend(sample.map(|residual| (placement, *residual)));
+        self.largest.push(largest(residuals));
+        self.squares += dot(residuals, residuals);
+    }
+}
 
 /// The judge of one design.
 pub(super) struct Judge<'a> {
@@ -52,20 +77,25 @@ impl<'a> Judge<'a> {
     }
 
     /// The scatter of a reading, robust against bad ones.
-    pub(super) fn scatter(&self, residuals: &[f64]) -> f64 {
-        let lines = self.design.lines();
-        let stride = residuals.len().div_ceil(SAMPLE);
-        let sample: Vec<f64> = (0..residuals.len())
-            .step_by(stride)
-            .map(|at| residuals[at] / self.scales[at / lines])
-            .collect();
+    pub(super) fn scatter(&self, scan: &Scan) -> f64 {
+        let scaled = |(placement, residual): &(usize, f64)| residual / self.scales[*placement];
+        let sample: Vec<f64> = scan.sample.iter().map(scaled).collect();
         robust_sigma(&sample).unwrap_or(0.0).max(SIGMA_MIN)
     }
 
-    /// The readings to take out in this round, by index. Those that are out have residual 0.
-    pub(super) fn suspects(&self, residuals: &[f64]) -> Vec<usize> {
+    /// The readings to take out in this round, by index; `residuals` are asked for only when
+    /// there are any. Those that are out already have residual 0.
+    pub(super) fn suspects(&self, scan: &Scan, residuals: impl FnOnce() -> Vec<f64>) -> Vec<usize> {
+        let limit = self.limit * self.scatter(scan);
+        let mut largest = scan.largest.iter().zip(&self.scales);
+        if largest.all(|(largest, scale)| *largest <= limit * scale) {
+            return Vec::new();
+        }
+        self.beyond(limit, &residuals())
+    }
+
+    fn beyond(&self, limit: f64, residuals: &[f64]) -> Vec<usize> {
         let lines = self.design.lines();
-        let limit = self.limit * self.scatter(residuals);
         let mut found = Vec::new();
         for (placement, residuals) in residuals.chunks_exact(lines).enumerate() {
             let limit = limit * self.scales[placement];

@@ -6,9 +6,9 @@ use units::Radians;
 
 use super::closed_form::{ClosedForm, Estimate};
 use super::design::{Design, DesignError};
-use super::lanes::{dot, sum};
+use super::lanes::sum;
 use super::missing::{Gaps, UNKNOWNS_MAX, Unbridged};
-use super::outliers::Judge;
+use super::outliers::{Judge, Scan};
 use crate::measurement::RotarySeries;
 use crate::uncertainty::rms;
 
@@ -260,7 +260,7 @@ struct Fit<'a, 'r> {
     /// With the predictions in the gaps.
     readings: Cow<'r, [f64]>,
     estimate: Estimate,
-    residuals: Vec<f64>,
+    scan: Scan,
     left_out: Vec<usize>,
 }
 
@@ -292,15 +292,35 @@ impl<'a> Solver<'a> {
             Some(gaps)
         };
         let estimate = self.form.estimate(&readings);
-        let mut residuals = self.form.residuals(&readings, &estimate);
-        left_out.iter().for_each(|&at| residuals[at] = 0.0);
+        let scan = self.scan(&readings, &estimate, &left_out);
         Ok(Fit {
             gaps,
             readings,
             estimate,
-            residuals,
+            scan,
             left_out,
         })
+    }
+
+    /// One placement at a time, which stays in the processor's cache.
+    fn scan(&self, readings: &[f64], estimate: &Estimate, left_out: &[usize]) -> Scan {
+        let lines = self.design.lines();
+        let placements = self.design.offsets().len();
+        let (mut scan, mut row) = (Scan::default(), Vec::with_capacity(lines));
+        for placement in 0..placements {
+            self.form
+                .residuals_of(placement, readings, estimate, &mut row);
+            let own = left_out.iter().filter(|at| **at / lines == placement);
+            own.for_each(|at| row[at % lines] = 0.0);
+            scan.add(&row, placements);
+        }
+        scan
+    }
+
+    fn residuals(&self, fit: &Fit<'_, '_>) -> Vec<f64> {
+        let mut residuals = self.form.residuals(&fit.readings, &fit.estimate);
+        fit.left_out.iter().for_each(|&at| residuals[at] = 0.0);
+        residuals
     }
 
     fn search<'r>(
@@ -313,7 +333,7 @@ impl<'a> Solver<'a> {
         let limit = (total as f64 * self.options.outlier_share_max) as usize;
         let mut outliers: Vec<usize> = Vec::new();
         for round in 0.. {
-            let suspects = judge.suspects(&fit.residuals);
+            let suspects = judge.suspects(&fit.scan, || self.residuals(&fit));
             let Some(&first) = suspects.first() else {
                 break;
             };
@@ -332,7 +352,7 @@ impl<'a> Solver<'a> {
         if outliers.is_empty() {
             return Ok(fit);
         }
-        let scatter = judge.scatter(&fit.residuals);
+        let scatter = judge.scatter(&fit.scan);
         // Whether a reading fits what the others predict for it after all.
         let belongs = |at: &usize| {
             let variance = fit.gaps.as_ref().and_then(|it| it.prediction_variance(*at));
@@ -362,7 +382,7 @@ impl<'a> Solver<'a> {
         let own = self.covariance[0];
         let amplification: Vec<f64> = extra.iter().map(|it| (own + it).sqrt()).collect();
         self.check_amplification(&amplification)?;
-        let squares = dot(&fit.residuals, &fit.residuals);
+        let squares = fit.scan.squares;
         let freedom = self.degrees_of_freedom(&fit);
         let used = readings.len() - fit.left_out.len();
         let outlier = |at: &usize| Outlier {

@@ -197,3 +197,42 @@ fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_do
     elsewhere.drive.vendor = 2;
     assert!(elsewhere.belongs_to("id", &machine).is_err());
 }
+
+/// Three lines with table errors 2, −1, −1″ and plate errors 1, 0, −1″, placed at 0 and 1.
+fn solution() -> compensator::rotary::Solution {
+    use compensator::measurement::{Placement, RotarySeries};
+    use units::Radians;
+
+    let placement = |offset, readings: [f64; 3]| Placement {
+        offset,
+        readings: readings.map(|it| Some(Radians::from_arcsec(it))).to_vec(),
+    };
+    let placements = vec![
+        placement(0, [3.0, -1.0, -2.0]),
+        placement(1, [0.0, -1.0, 1.0]),
+    ];
+    let series = RotarySeries::new(3, placements).unwrap();
+    compensator::rotary::solve(&series, &Default::default()).unwrap()
+}
+
+#[test]
+fn a_rotary_table_is_compensated_by_what_was_stored_with_the_sign_of_a_deviation() {
+    let content = RotaryContent::new(&solution());
+    assert_eq!((content.lines, &content.offsets[..]), (3, &[0, 1][..]));
+    assert_eq!(content.standard_uncertainty_rad, None);
+    let table = content.table("id").unwrap();
+    // Where the table reads 2″ too much it has stopped 2″ short: actual − target = −2″.
+    let deviations: Vec<f64> = table.deviations().iter().map(|it| it.arcsec()).collect();
+    for (seen, expected) in deviations.iter().zip([-2.0, 1.0, 1.0]) {
+        assert!((seen - expected).abs() < 1e-9, "{deviations:?}");
+    }
+    let bad = RotaryContent {
+        table_error_rad: vec![0.0, f64::NAN],
+        ..RotaryContent::default()
+    };
+    let error = bad.table("0123456789abcdef").unwrap_err().to_string();
+    assert!(
+        error.starts_with("calibration 0123456789ab: rotary"),
+        "{error}"
+    );
+}
