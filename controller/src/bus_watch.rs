@@ -15,7 +15,7 @@ use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
 use drivers::wire::canopen::{Function, NodeId};
 use units::Time;
 
-use crate::config::MachineConfig;
+use crate::config::{AxisConfig, MachineConfig};
 use crate::failure::Failure;
 
 /// The identifier of SYNC.
@@ -162,7 +162,8 @@ fn masters_own(config: &MachineConfig, bus: &str, master: u8) -> BTreeMap<u16, &
             "a heartbeat with this controller's own node number",
         );
     }
-    for axis in config.axis.values().filter(|axis| axis.bus == bus) {
+    let axes = config.axis.values().filter_map(AxisConfig::can);
+    for axis in axes.filter(|axis| axis.bus == bus) {
         if let Some(node) = NodeId::new(axis.node_id) {
             own.insert(
                 node.cob_id(Function::Rpdo1),

@@ -389,7 +389,7 @@ impl DeviceConfig {
                 positive("batch_samples", f64::from(config.batch_samples))
             }
             Self::DconModule(config) => positive("channels", config.channels as f64),
-            Self::CopleyAmps(config) => check_amps(config, resolution_nm),
+            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
         }
     }
 }

@@ -11,8 +11,8 @@ mod validate;
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
-    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
-    CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
-    InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
-    SerialLine, VerifyConfig, ZeroConfig,
+    AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
+    CanBus, CanTransport, CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig,
+    InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig, MachineSection,
+    OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
 };

@@ -1,17 +1,19 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
+mod axis;
 mod cycle;
 mod judge;
 
 use std::collections::BTreeMap;
 
+use self::axis::{check_axis, check_axis_name, check_lines};
 use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
 use self::judge::Judge;
 use drivers::protocol::bus_load::BusLoadError;
 
 use super::model::{
-    AnalogConfig, AnalogDevice, AxisConfig, CanBus, CanTransport, InstrumentConfig, MachineConfig,
+    AnalogConfig, AnalogDevice, CanBus, CanTransport, InstrumentConfig, MachineConfig,
 };
 use crate::assemble;
 use crate::bus_plan;
@@ -65,6 +67,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
     }
     check_node_ids(config, &mut findings);
+    check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
     if findings.is_empty() {
         check_bus_load(config, &mut findings);
@@ -91,18 +94,6 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
     }
     if config.axis.is_empty() {
         judge.say("", "the machine has no axis", "add an [axis.NAME] section");
-    }
-}
-
-/// Axes name files, and stand in words of the command line (`x=1mm`).
-fn check_axis_name(findings: &mut Vec<Finding>, name: &str) {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.is_empty() || !name.chars().all(plain) {
-        findings.push(Finding {
-            key: format!("axis.{name}"),
-            cause: format!("`{name}` cannot name an axis"),
-            help: "use letters, digits and _".into(),
-        });
     }
 }
 
@@ -164,54 +155,6 @@ fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_m
             format!(
                 "give at least {least}; without it a killed controller would not stop the stage"
             ),
-        );
-    }
-}
-
-fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    judge.known("bus", &axis.bus, &config.can, "CAN bus");
-    judge.within("node_id", axis.node_id.into(), 1.0, 127.0);
-    judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);
-    judge.below(
-        ("soft_min_mm", axis.soft_min_mm),
-        ("soft_max_mm", axis.soft_max_mm),
-    );
-    judge.within("speed_max_mm_per_s", axis.speed_max_mm_per_s, 1e-3, 1e5);
-    judge.within(
-        "speed_mm_per_s",
-        axis.speed_mm_per_s,
-        1e-3,
-        axis.speed_max_mm_per_s,
-    );
-    judge.within(
-        "acceleration_mm_per_s2",
-        axis.acceleration_mm_per_s2,
-        1e-2,
-        1e6,
-    );
-    let quick_stop = axis.quick_stop_deceleration_mm_per_s2;
-    judge.within("quick_stop_deceleration_mm_per_s2", quick_stop, 1e-2, 1e7);
-    judge.within(
-        "following_error_limit_um",
-        axis.following_error_limit_um,
-        1e-3,
-        1e5,
-    );
-    judge.within("position_window_um", axis.position_window_um, 1e-4, 1e4);
-    judge.within("move_timeout_s", axis.move_timeout_s, 0.01, 1e5);
-    check_heartbeat(
-        judge,
-        axis.heartbeat_producer_ms,
-        axis.heartbeat_consumer_ms,
-    );
-    check_watch(judge, config, &axis.bus, axis.watch_master_ms);
-    let counts =
-        axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
-    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
-        judge.say(
-            "resolution_nm",
-            format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
-            "use a coarser resolution or a shorter range",
         );
     }
 }
@@ -378,7 +321,7 @@ fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let axes = config
         .axis
         .iter()
-        .map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
+        .filter_map(|(name, it)| Some((it.bus.as_deref()?, it.node_id?, format!("axis.{name}"))));
     let analogs = config
         .analog
         .iter()
