@@ -91,6 +91,19 @@ impl Segment {
         self.linear + t * (2.0 * self.quadratic + t * 3.0 * self.cubic)
     }
 
+    /// The largest magnitude of the value over the whole piece, in closed form: at an end or
+    /// where the slope vanishes.
+    pub fn largest(&self) -> f64 {
+        let ends = self.constant.abs().max(self.value(self.width).abs());
+        let root = (self.quadratic * self.quadratic - 3.0 * self.cubic * self.linear).sqrt();
+        // This form of the roots keeps its digits, and holds for a parabola too.
+        let sum = -(self.quadratic + root.copysign(self.quadratic));
+        [self.linear / sum, sum / (3.0 * self.cubic)]
+            .into_iter()
+            .filter(|t| *t > 0.0 && *t < self.width)
+            .fold(ends, |largest, t| largest.max(self.value(t).abs()))
+    }
+
     /// The largest magnitude of the slope over the whole piece, in closed form: the slope is a
     /// parabola, so its extremes are at the ends and at the vertex.
     pub fn steepest(&self) -> f64 {
@@ -192,6 +205,18 @@ mod tests {
         );
         assert_eq!((pieces[0].value(0.1), pieces[1].value(2.9)), (1.0, 2.0));
         assert_eq!(pieces[0].steepest(), 0.0);
+    }
+
+    #[test]
+    fn the_largest_value_may_lie_inside_a_piece() {
+        // From 0 to 0 over 1 with slopes 4 and -4: 4t(1 - t), which is 1 in the middle.
+        let hump = Segment::hermite(0.0, 0.0, 4.0, 1.0, 0.0, -4.0);
+        assert!((hump.largest() - 1.0).abs() < 1e-15);
+        // t(t - 1)(t - 2) over 2 has its extremes 2/(3√3) at 1 ± 1/√3.
+        let wave = Segment::hermite(0.0, 0.0, 2.0, 2.0, 0.0, 2.0);
+        assert!((wave.largest() - 2.0 / 27.0_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(Segment::line(0.0, -3.0, 1.0, 2.0).largest(), 3.0);
+        assert_eq!(Segment::flat(0.0, 1.0, 2.0).largest(), 2.0);
     }
 
     #[test]

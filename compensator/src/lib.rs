@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`measurement`] | are these measured data complete and in order? |
 //! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
+//! | [`rotary`] | what is the error of a rotary table, by a plate worse than it (system S2)? |
 //! | [`hall_zero`] | where is the drift-free origin (system S5)? |
 //! | [`screw`] | what does a ball screw do to a stroke, and which command undoes it (system S1)? |
 //! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
@@ -31,6 +32,7 @@ pub mod least_squares;
 pub mod length_correction;
 pub mod measurement;
 pub mod platform;
+pub mod rotary;
 pub mod screw;
 pub mod significance;
 pub mod uncertainty;

@@ -285,6 +285,24 @@ pub enum Failure {
         /// Why.
         source: CompensationError,
     },
+    /// A screw's model cannot be computed.
+    #[error("{place}: axis {axis}: {source}")]
+    Screw {
+        /// The data file and the line where the axis begins, or the run.
+        place: String,
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: compensator::screw::FitError,
+    },
+    /// A screw's model cannot be applied.
+    #[error("axis {axis}: {source}")]
+    ScrewCompensation {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: compensator::screw::ScrewError,
+    },
     /// ISO 230-2 figures cannot be computed.
     #[error(transparent)]
     Figures(#[from] compensator::iso230::EvaluationError),
@@ -366,6 +384,7 @@ impl Failure {
             | Self::Figures(_)
             | Self::Data(_)
             | Self::Series(_)
+            | Self::Screw { .. }
             | Self::SearchSettings { .. }
             | Self::File { .. }
             | Self::Usage { .. }
@@ -381,6 +400,7 @@ impl Failure {
             | Self::NotZeroed { .. }
             | Self::Store(_)
             | Self::Compensation { .. }
+            | Self::ScrewCompensation { .. }
             | Self::OutOfCalibration { .. }
             | Self::Jump { .. }
             | Self::ScaleMismatch { .. } => 3,

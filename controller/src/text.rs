@@ -1,6 +1,7 @@
 //! What a person reads on a terminal.
 
 use compensator::iso230::{Directional, Figures};
+use compensator::screw::ScrewModel;
 use units::Metres;
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
@@ -67,4 +68,41 @@ pub fn accuracy_line(accuracy: &Directional) -> String {
         accuracy.forward.um(),
         accuracy.reverse.um()
     )
+}
+
+/// One term of a screw's model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScrewTerm {
+    /// What it is.
+    pub name: String,
+    /// How large, in its unit.
+    pub value: f64,
+    /// Its standard uncertainty, where anything was repeated.
+    pub standard_uncertainty: Option<f64>,
+    /// The unit of both.
+    pub unit: &'static str,
+}
+
+/// The terms of a screw's model, in the units people read.
+pub fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
+    let term = |name: &str, value, standard_uncertainty, unit| ScrewTerm {
+        name: name.to_owned(),
+        value,
+        standard_uncertainty,
+        unit,
+    };
+    let um = |length: Option<Metres>| length.map(Metres::um);
+    let (offset, lost_motion) = (model.offset.um(), model.lost_motion.um());
+    let u_slope = model.u_slope().map(|u| u * 1e3);
+    let mut terms = vec![
+        term("slope", model.slope * 1e3, u_slope, "µm/mm"),
+        term("lost motion", lost_motion, um(model.u_lost_motion()), "µm"),
+        term("offset", offset, um(model.u_offset()), "µm"),
+    ];
+    for (index, harmonic) in model.harmonics.iter().enumerate() {
+        let name = format!("amplitude, {} per turn", harmonic.number);
+        let u = model.u_harmonic(index).map(|[.., u]| u);
+        terms.push(term(&name, harmonic.amplitude().um(), um(u), "µm"));
+    }
+    terms
 }

@@ -11,6 +11,7 @@ use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
 use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
 use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode, addresses_fit};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
+use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
 use crate::plant::platform::config::PlatformConfig;
@@ -128,6 +129,8 @@ pub enum DeviceConfig {
     DconModule(DconModuleConfig),
     /// Copley Controls servo amplifiers, on one serial line.
     CopleyAmps(CopleyAmpsConfig),
+    /// In-Sight vision system, on a serial line.
+    InSightController(InSightControllerConfig),
 }
 
 impl DeviceConfig {
@@ -139,13 +142,19 @@ impl DeviceConfig {
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
             Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
+            Self::InSightController(config) => {
+                Box::new(InSightControllerNode::new(config, seed, name))
+            }
         }
     }
 
     const fn wants_can(&self) -> bool {
         match self {
             Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
-            Self::Umd2Interferometer(_) | Self::DconModule(_) | Self::CopleyAmps(_) => false,
+            Self::Umd2Interferometer(_)
+            | Self::DconModule(_)
+            | Self::CopleyAmps(_)
+            | Self::InSightController(_) => false,
         }
     }
 }
@@ -390,6 +399,11 @@ impl DeviceConfig {
             }
             Self::DconModule(config) => positive("channels", config.channels as f64),
             Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
+            Self::InSightController(config) => {
+                positive("length_unit_um", config.length_unit_um)?;
+                positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
+                positive("exposure_ms", config.exposure_ms)
+            }
         }
     }
 }

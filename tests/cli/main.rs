@@ -2,4 +2,5 @@
 
 mod interrupted;
 mod programs;
+mod screw;
 mod verbs;

@@ -123,6 +123,12 @@ impl Ended {
     }
 }
 
+/// Runs `truestage` with these words in `folder`, without any machine.
+pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Ended {
+    let mut command = Command::new(program("truestage"));
+    Process::start(command.current_dir(folder).arg("--json").args(words)).end()
+}
+
 /// An emulated machine in a process of its own, and a folder with its configuration.
 pub(crate) struct Bench {
     rig: Rig,

@@ -92,7 +92,7 @@ struct Piece {
 
 /// Continuous pieces with a constant continuation on both sides.
 #[derive(Clone, Debug)]
-pub(super) struct Curve {
+pub(crate) struct Curve {
     by_command: Grid,
     by_actual: Grid,
     pieces: Vec<Piece>,
@@ -108,7 +108,7 @@ impl Curve {
     /// `segments` join each other; `before` and `after` are the deviations outside them. For
     /// `stepped` ones the caller has checked only that they keep the order of the intervals;
     /// for the others that every slope is above −1.
-    pub(super) fn new(segments: &[Segment], before: f64, after: f64, stepped: bool) -> Self {
+    pub(crate) fn new(segments: &[Segment], before: f64, after: f64, stepped: bool) -> Self {
         let mut commands: Vec<f64> = segments.iter().map(|s| s.start).collect();
         let last = segments[segments.len() - 1].end();
         commands.push(last);
@@ -145,7 +145,7 @@ impl Curve {
     }
 
     #[inline]
-    pub(super) fn deviation(&self, command: f64) -> f64 {
+    pub(crate) fn deviation(&self, command: f64) -> f64 {
         if command <= self.first {
             return self.before;
         }
@@ -158,7 +158,7 @@ impl Curve {
 
     /// The command whose actual is `target`; for steps, target − deviation(target).
     #[inline]
-    pub(super) fn command(&self, target: f64) -> f64 {
+    pub(crate) fn command(&self, target: f64) -> f64 {
         if self.stepped {
             return target - self.deviation(target);
         }

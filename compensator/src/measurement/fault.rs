@@ -177,4 +177,7 @@ pub enum Fault {
         /// The longest stroke.
         stroke_um: f64,
     },
+    /// Something that only data of a rotary table can have.
+    #[error(transparent)]
+    Rotary(#[from] super::RotaryFault),
 }

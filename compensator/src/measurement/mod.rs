@@ -2,8 +2,10 @@
 //!
 //! A [`LinearSeries`] is what an external instrument measured at targets of a linear axis; a
 //! [`HallSeries`] is a sweep of the two Hall sensors of system S5; a [`StrokeSeries`] is what the
-//! screws of a platform (system S1) really did when told to make strokes. Whoever holds one knows
-//! that every number is finite and every point in its place; nothing is guessed or repaired.
+//! screws of a platform (system S1) really did when told to make strokes; a [`RotarySeries`] is
+//! what a rotary table read of a plate's lines in several placements of the plate (system S2).
+//! Whoever holds one knows that every number is finite and every point in its place; nothing is
+//! guessed or repaired.
 //!
 //! Source: the data file formats of the project's design; ISO 230-2:2014 4.3 for the order of a
 //! series (every run passes the targets in the sense of its approach).
@@ -18,6 +20,7 @@
 //! Absent: files (text comes in, text goes out), unit conversion of foreign formats.
 
 mod fault;
+mod rotary;
 mod stroke;
 mod table;
 
@@ -26,6 +29,7 @@ use std::collections::BTreeSet;
 use units::{Approach, Metres, Volts};
 
 pub use fault::{DataError, Fault};
+pub use rotary::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
 pub use stroke::{AxisStrokes, Stroke, StrokeError, StrokeSeries};
 use table::{Format, Table};
 

@@ -11,8 +11,8 @@ use super::fault::{DataError, Fault};
 
 /// The columns of one file format.
 pub(super) struct Format {
-    columns: &'static [&'static str],
-    header: &'static str,
+    pub(super) columns: &'static [&'static str],
+    pub(super) header: &'static str,
 }
 
 impl Format {
@@ -163,6 +163,11 @@ impl Table {
     /// The line of a row in the file, counted from 1.
     pub(super) fn line(&self, row: usize) -> usize {
         self.rows[row].0
+    }
+
+    /// A cell as it was written.
+    pub(super) fn text(&self, row: usize, column: usize) -> &str {
+        &self.rows[row].1[column].text
     }
 
     /// The name of an axis: letters, digits, `_` and `-`.

@@ -107,6 +107,9 @@ pub enum FitError {
         /// The value.
         seen: Metres,
     },
+    /// All strokes are the same.
+    #[error("screw: no two different strokes, so the slope is not observable")]
+    OneStroke,
     /// One side only: the lost motion cannot be seen.
     #[error(
         "screw: only approach `{}` was measured, so the lost motion is not observable; measure \

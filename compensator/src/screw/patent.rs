@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use units::{Approach, Metres};
 
-use super::ScrewModel;
+use super::{FitError, ScrewModel};
 use crate::measurement::Stroke;
 
 /// The patent's means of the deviations, in the deviations' own sign.
@@ -58,25 +58,20 @@ pub struct PatentUncertainty {
     pub slope: f64,
 }
 
-/// All strokes are the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("screw: no two different strokes; the slope is not observable")]
-pub struct OneStroke;
-
 /// Averages the strokes of one axis as the patent does.
 ///
 /// # Errors
 /// When there are no two different strokes.
-pub fn estimate(strokes: &[Stroke]) -> Result<PatentEstimate, OneStroke> {
+pub fn estimate(strokes: &[Stroke]) -> Result<PatentEstimate, FitError> {
     let ends = |it: &Stroke| it.stroke;
     let at_m = strokes.iter().map(ends).reduce(Metres::min);
     let at_n = strokes.iter().map(ends).reduce(Metres::max);
     let (Some(at_m), Some(at_n)) = (at_m, at_n) else {
-        return Err(OneStroke);
+        return Err(FitError::OneStroke);
     };
     // Written so that a NaN is refused.
     if at_n.partial_cmp(&at_m) != Some(core::cmp::Ordering::Greater) {
-        return Err(OneStroke);
+        return Err(FitError::OneStroke);
     }
     let (mean_at_m, rows_at_m) = mean(strokes.iter().filter(|it| it.stroke == at_m));
     let (mean_at_n, rows_at_n) = mean(strokes.iter().filter(|it| it.stroke == at_n));

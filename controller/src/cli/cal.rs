@@ -11,6 +11,7 @@ use truestage::{Failure, config};
 use units::{Metres, Radians};
 
 use super::output::{Ended, Output};
+use super::screw;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalCommand {
@@ -117,6 +118,7 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
     text += &match &record.content {
         Content::LinearErrorTable(content) => linear_lines(content),
         Content::RotaryErrorTable(content) => rotary_lines(content),
+        Content::ScrewModel(content) => screw::shown(content),
     };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
     output.result(&text, &json!({"id": id, "record": value}))
@@ -175,6 +177,7 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
     let (lines, values) = match &after.content {
         Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
         Content::RotaryErrorTable(new) => rotary_changes(before.rotary(&before_id)?, new),
+        Content::ScrewModel(new) => screw::changes(before.screw(&before_id)?, new),
     };
     output.result(&lines.join("\n"), &json!({"changes": values}))
 }

@@ -16,6 +16,7 @@ use truestage::store::{
 use truestage::{Failure, assemble, config, json as to_json, text};
 
 use super::output::{Ended, Output};
+use super::screw;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FitCommand {
@@ -35,9 +36,11 @@ pub(super) enum FitCommand {
         /// The data file.
         data: PathBuf,
     },
+    /// Ball screws, from columns axis,approach,stroke_um,deviation_um.
+    Screw(screw::ScrewArgs),
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
+pub(super) fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|source| Failure::File {
         path: path.to_owned(),
         source,
@@ -60,6 +63,7 @@ pub(super) fn fit(command: &FitCommand, output: Output) -> Ended {
             linear(data, save.as_deref(), axis.as_deref(), output)
         }
         FitCommand::Hall { data } => hall(data, output),
+        FitCommand::Screw(args) => screw::run(args, output),
     }
 }
 
@@ -97,9 +101,7 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
     output.result(&text, &value)
 }
 
-/// Stores a table measured elsewhere. The drive cannot be asked here, so its identity is what
-/// the configuration expects; with a serial number there it is checked like any other, without
-/// one any drive of that product will do.
+/// Stores a table measured elsewhere.
 fn store_fit(
     config_path: &Path,
     axis: Option<&str>,
@@ -109,33 +111,54 @@ fn store_fit(
 ) -> Result<String, Failure> {
     let loaded = config::load(config_path)?;
     let axes = &loaded.config.axis;
-    let known = || axes.keys().cloned().collect::<Vec<_>>().join(", ");
     let name = match (axis, axes.len()) {
         (Some(axis), _) => axis.to_owned(),
         (None, 1) => axes.keys().next().expect("there is one").clone(),
         (None, _) => {
             return Err(Failure::Usage {
                 what: "the machine has several axes".into(),
-                help: format!("add --axis with one of {}", known()),
+                help: format!(
+                    "add --axis with one of {}",
+                    axes.keys().cloned().collect::<Vec<_>>().join(", ")
+                ),
             });
         }
     };
-    let axis = axes.get(&name).ok_or_else(|| Failure::NoSuchAxis {
-        axis: name.clone(),
-        known: known(),
-    })?;
-    if let Some(limits) = &axis.compensation {
+    let head = head_of(&loaded, &name, data)?;
+    if let Some(limits) = &axes[&name].compensation {
         assemble::compensation(limits, &name, fitted.table.clone())?;
     }
     let section = &loaded.config.machine;
-    let head = RecordHead {
+    let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
+    let record = CalibrationRecord {
+        head,
+        content: Content::LinearErrorTable(content),
+    };
+    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
+}
+
+/// The head of a calibration of `axis` made from the file `data`. The drive cannot be asked here,
+/// so its identity is what the configuration expects; with a serial number there it is checked
+/// like any other, without one any drive of that product will do.
+pub(super) fn head_of(
+    loaded: &config::Loaded,
+    axis: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let axes = &loaded.config.axis;
+    let it = axes.get(axis).ok_or_else(|| Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
+    })?;
+    let section = &loaded.config.machine;
+    Ok(RecordHead {
         schema_version: SCHEMA_VERSION,
         machine: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
         config_hash: loaded.hash.clone(),
-        axis: name,
-        drive: IdentityRecord::from(&axis.configured_identity()),
-        resolution_m: Some(axis.resolution_nm * 1e-9),
+        axis: axis.to_owned(),
+        drive: IdentityRecord::from(&it.configured_identity()),
+        resolution_m: Some(it.resolution_nm * 1e-9),
         resolution_rad: None,
         created: utc_now(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
@@ -149,13 +172,7 @@ fn store_fit(
             ..Default::default()
         },
         environment: EnvironmentRecord::default(),
-    };
-    let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
-    let record = CalibrationRecord {
-        head,
-        content: Content::LinearErrorTable(content),
-    };
-    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
+    })
 }
 
 fn hall(path: &Path, output: Output) -> Ended {

@@ -7,6 +7,7 @@ mod output;
 mod page;
 mod progress;
 mod scan;
+mod screw;
 mod session;
 mod verbs;
 

@@ -8,7 +8,8 @@ use compensator::iso230::Figures;
 use units::{Metres, Radians};
 
 use crate::store::{
-    CalibrationRecord, Content, LinearContent, PointEntry, ReadJournal, RotaryContent, ZeroEntry,
+    CalibrationRecord, Content, LinearContent, PointEntry, ReadJournal, RotaryContent,
+    ScrewContent, ZeroEntry,
 };
 use crate::text;
 
@@ -69,6 +70,7 @@ pub fn render(page: &Page<'_>) -> String {
         html += &match &calibration.content {
             Content::LinearErrorTable(content) => linear_table(content),
             Content::RotaryErrorTable(content) => rotary_table(content),
+            Content::ScrewModel(content) => screw_table(content),
         };
     }
     if !page.zeros.is_empty() {
@@ -204,6 +206,22 @@ fn rotary_table(content: &RotaryContent) -> String {
             cell(Some(*error)),
             cell(content.standard_uncertainty_rad.get(line).copied()),
             cell(content.plate_error_rad.get(line).copied().flatten()),
+        );
+    }
+    html + "</table>"
+}
+
+fn screw_table(content: &ScrewContent) -> String {
+    let mut html = String::from("<table><tr><th>term</th><th>value</th><th>u</th></tr>");
+    for term in text::screw_terms(&content.model()) {
+        let u = term.standard_uncertainty;
+        let _ = write!(
+            html,
+            "<tr><td>{} ({})</td><td>{:.4}</td><td>{}</td></tr>",
+            term.name,
+            term.unit,
+            term.value,
+            u.map_or("–".to_owned(), |u| format!("{u:.4}")),
         );
     }
     html + "</table>"

@@ -24,8 +24,9 @@ pub use journal::{
 };
 pub use lease::Lease;
 pub use record::{
-    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
-    NodeRecord, ReadingName, RecordHead, RotaryContent,
+    CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,
+    InstrumentRecord, LinearContent, NodeRecord, ReadingName, RecordHead, RotaryContent,
+    ScrewContent, ScrewMethodName,
 };
 
 pub(crate) use atomic::write_new_or_replace;

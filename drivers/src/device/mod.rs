@@ -9,28 +9,23 @@ pub mod cia401;
 pub mod cia402;
 pub mod copley;
 pub mod dcon;
+mod error;
 #[cfg(test)]
 mod fake_node;
+pub mod in_sight;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;
 
-use core::fmt;
-use core::time::Duration;
-use units::{
-    Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, RelativeHumidity, Time, Volts,
-};
+use units::{Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts};
 
 pub use alarm::{Alarm, AmplifierTrouble};
+pub use error::{DeviceError, DeviceName, Seen};
 pub use shared_line::{LineUse, Urgency};
 
 use crate::transport::Input;
 use crate::wire::Payload;
-use crate::wire::canopen::nmt::NmtState;
-use crate::wire::canopen::sdo::AbortCode;
-use crate::wire::canopen::{NodeId, Object};
 use crate::wire::cia402::PowerState;
-use crate::wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
 
 /// The sans-io face that every device shows to the loop that drives it.
 pub trait Device {
@@ -146,6 +141,14 @@ pub enum AxisCommand<Q: Coordinate = Metres> {
         /// Search speed.
         speed: Q::Speed,
     },
+    /// Home on the first index pulse off the negative limit switch (method 1); the drive's
+    /// coordinates become `position` there.
+    HomeIndex {
+        /// The coordinate of the index pulse.
+        position: Q,
+        /// Search speed.
+        speed: Q::Speed,
+    },
     /// Home here (method 37): the drive's coordinate becomes `position`.
     HomeHere {
         /// The coordinate of where the axis stands now.
@@ -227,6 +230,39 @@ pub struct DisplacementReading {
     pub samples: u32,
 }
 
+/// An instrument that sees where a body is in a plane.
+pub trait PoseInstrument: Device {
+    /// Begins to take pictures until `exposures` of them are good, and averages their poses.
+    /// Only pictures taken after this call count. [`Device::poll_outcome`] says when it is
+    /// done; then [`PoseInstrument::pose`].
+    fn begin_pose(&mut self, now: Time, exposures: u32);
+
+    /// The last pose, `None` before the first and after a measurement that failed: a picture
+    /// that was judged bad never becomes a number.
+    fn pose(&self) -> Option<PoseReading>;
+}
+
+/// Where a body was seen, in the machine's frame, from where the instrument was taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseReading {
+    /// When the answer about the last picture arrived.
+    pub at: Time,
+    /// Displacement of the body's origin along x.
+    pub x: Metres,
+    /// Displacement of the body's origin along y.
+    pub y: Metres,
+    /// Turn, counter-clockwise.
+    pub angle: Radians,
+    /// Standard deviations of the single pictures in x, y and angle, zero for a single one.
+    pub standard_deviation: (Metres, Metres, Radians),
+    /// How like the taught target the worst picture was, 0 to 1.
+    pub score: f64,
+    /// How many pictures were averaged.
+    pub samples: u32,
+    /// How many more were taken and judged bad.
+    pub rejected: u32,
+}
+
 /// What an instrument's weather sensors say; `None` where it has none or they fell silent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Environment {
@@ -255,223 +291,4 @@ pub struct Identity {
     pub serial: u32,
     /// 0x1008, or what a serial device calls itself.
     pub name: String,
-}
-
-/// Why a command of a device failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "the Display text says what each field is")]
-pub enum DeviceError {
-    /// The node aborted a transfer.
-    #[error("{node}, {object}: aborted the transfer with {code} while {step}")]
-    SdoAbort {
-        node: NodeId,
-        object: Object,
-        code: AbortCode,
-        step: &'static str,
-    },
-    /// A transfer was not answered.
-    #[error("{node}, {object}: no answer within {waited:?} ({attempts} attempts) while {step}")]
-    SdoTimeout {
-        node: NodeId,
-        object: Object,
-        waited: Duration,
-        attempts: u32,
-        step: &'static str,
-    },
-    /// A transfer went wrong in another way and was aborted by us.
-    #[error("{node}, {object}: transfer broken off with {code} while {step}")]
-    SdoProtocol {
-        node: NodeId,
-        object: Object,
-        code: AbortCode,
-        step: &'static str,
-    },
-    /// The device is not the one the configuration names.
-    #[error(
-        "{node}: {what} is {seen:#010X}, the configuration says {expected:#010X}; \
-             fit the right device or correct the configuration"
-    )]
-    WrongIdentity {
-        node: NodeId,
-        what: &'static str,
-        expected: u32,
-        seen: u32,
-    },
-    /// A value read back differs from what was written.
-    #[error("{node}, {object}: read back {seen:#X}, wrote {expected:#X} ({step})")]
-    ReadBack {
-        node: NodeId,
-        object: Object,
-        expected: u64,
-        seen: u64,
-        step: &'static str,
-    },
-    /// The drive's units are not those of the configuration.
-    #[error(
-        "{node}, {object}: one encoder increment is {seen} position units, the configured scale \
-         says {expected}; correct the scale or the drive's factors"
-    )]
-    WrongScale {
-        node: NodeId,
-        object: Object,
-        expected: f64,
-        seen: f64,
-    },
-    /// Something that was awaited did not come.
-    #[error("{device}: waited {waited:?} for {awaited}, last saw {seen}")]
-    Timeout {
-        device: DeviceName,
-        awaited: &'static str,
-        waited: Duration,
-        seen: Seen,
-    },
-    /// The drive refused or failed a command.
-    #[error("{node}: {step} failed, drive is in {state}")]
-    DriveRefused {
-        node: NodeId,
-        step: &'static str,
-        state: PowerState,
-    },
-    /// The command needs something that is not so.
-    #[error("{device}: {step} needs {needs}")]
-    NotPossible {
-        device: DeviceName,
-        step: &'static str,
-        needs: &'static str,
-    },
-    /// A value cannot be represented in the drive's units.
-    #[error("{node}: {what} {value} {unit} does not fit {object} (limit {limit} {unit})")]
-    OutOfRange {
-        node: NodeId,
-        object: Object,
-        what: &'static str,
-        value: f64,
-        limit: f64,
-        unit: &'static str,
-    },
-    /// An alarm ended the command.
-    #[error("{device}: {step} ended by an alarm: {alarm}")]
-    Alarmed {
-        device: DeviceName,
-        step: &'static str,
-        alarm: Alarm,
-    },
-    /// An amplifier on a serial line did not answer.
-    #[error(
-        "{device}: no answer ({attempts} attempts) while {step}; its power, address, cable or \
-         the line's baud rate?"
-    )]
-    Unanswered {
-        device: DeviceName,
-        step: &'static str,
-        attempts: u32,
-    },
-    /// An amplifier on a serial line refused a command.
-    #[error("{device}{}: {code} while {step}", of_parameter(*parameter))]
-    Refused {
-        device: DeviceName,
-        parameter: Option<Parameter>,
-        code: ErrorCode,
-        step: &'static str,
-    },
-    /// A parameter read back differs from what was written, or is no number.
-    #[error("{device}, parameter {parameter}: read back {seen}, wrote {expected} ({step})")]
-    ParameterReadBack {
-        device: DeviceName,
-        parameter: Parameter,
-        expected: i64,
-        seen: String,
-        step: &'static str,
-    },
-    /// The amplifier is not the one the configuration names.
-    #[error(
-        "{device}: {what} is {seen}, the configuration says {expected}; fit the right device or \
-         correct the configuration"
-    )]
-    WrongAmplifier {
-        device: DeviceName,
-        what: &'static str,
-        expected: String,
-        seen: String,
-    },
-    /// A value cannot be represented in the amplifier's units.
-    #[error(
-        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
-    )]
-    ParameterOutOfRange {
-        device: DeviceName,
-        parameter: Parameter,
-        what: &'static str,
-        value: f64,
-        limit: f64,
-        unit: &'static str,
-    },
-    /// Latched faults are in the way.
-    #[error("{device}: {step} is not possible with latched faults: {faults}")]
-    Faulted {
-        device: DeviceName,
-        step: &'static str,
-        faults: Faults,
-    },
-    /// The amplifier broke a move off.
-    #[error("{device}: {step} was aborted by the amplifier, last saw {seen}")]
-    Aborted {
-        device: DeviceName,
-        step: &'static str,
-        seen: Seen,
-    },
-}
-
-fn of_parameter(parameter: Option<Parameter>) -> String {
-    parameter.map_or_else(String::new, |parameter| format!(", parameter {parameter}"))
-}
-
-/// Which device speaks: a node on the bus or a serial device by its kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum DeviceName {
-    /// On CAN.
-    Node(NodeId),
-    /// On a serial line.
-    Serial(&'static str),
-    /// One of several amplifiers behind a serial line.
-    Amplifier(Address),
-}
-
-impl fmt::Display for DeviceName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Node(node) => node.fmt(f),
-            Self::Serial(kind) => f.write_str(kind),
-            Self::Amplifier(address) => write!(f, "amplifier {address}"),
-        }
-    }
-}
-
-/// What was last seen when something awaited did not come.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "each is one kind of observation")]
-pub enum Seen {
-    Nothing,
-    Nmt(NmtState),
-    Power(PowerState),
-    Statusword(u16),
-    Mode(i8),
-    Position(LengthOrAngle),
-    Samples(u32),
-    Events(EventStatus),
-}
-
-impl fmt::Display for Seen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Nothing => f.write_str("nothing"),
-            Self::Nmt(state) => state.fmt(f),
-            Self::Power(state) => state.fmt(f),
-            Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
-            Self::Mode(raw) => write!(f, "mode {raw}"),
-            Self::Position(at) => write!(f, "position {at:.6}"),
-            Self::Samples(count) => write!(f, "{count} samples"),
-            Self::Events(events) => write!(f, "event status {:#010X}", events.bits()),
-        }
-    }
 }

@@ -10,6 +10,7 @@ pub mod canopen;
 pub mod cia402;
 pub mod copley;
 pub mod dcon;
+pub mod in_sight;
 pub mod slcan;
 pub mod umd2;
 

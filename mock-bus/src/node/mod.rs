@@ -7,6 +7,7 @@ pub mod cia401_analog;
 pub mod cia402_drive;
 pub mod copley_amp;
 pub mod dcon_module;
+pub mod in_sight_controller;
 pub mod profile;
 pub mod umd2_interferometer;
 

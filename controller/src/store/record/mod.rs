@@ -7,6 +7,7 @@
 
 mod linear;
 mod rotary;
+mod screw;
 
 use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use super::{StoreError, short};
 
 pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
+pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
@@ -69,6 +71,8 @@ pub enum Content {
     LinearErrorTable(LinearContent),
     /// Errors of a rotary table at the lines of a plate.
     RotaryErrorTable(RotaryContent),
+    /// Lead error, periodic error and lost motion of a ball screw.
+    ScrewModel(ScrewContent),
 }
 
 impl Content {
@@ -77,6 +81,7 @@ impl Content {
         match self {
             Self::LinearErrorTable(_) => LinearContent::KIND,
             Self::RotaryErrorTable(_) => RotaryContent::KIND,
+            Self::ScrewModel(_) => ScrewContent::KIND,
         }
     }
 
@@ -86,6 +91,9 @@ impl Content {
             Self::LinearErrorTable(it) => format!("{} nodes", it.nodes.len()),
             Self::RotaryErrorTable(it) => {
                 format!("{} lines, {} placements", it.lines, it.offsets.len())
+            }
+            Self::ScrewModel(it) => {
+                format!("{} strokes, {} harmonics", it.rows, it.harmonics.len())
             }
         }
     }

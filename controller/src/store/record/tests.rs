@@ -58,6 +58,28 @@ fn rotary() -> CalibrationRecord {
     record
 }
 
+fn screw() -> CalibrationRecord {
+    let mut record = record("A");
+    record.content = Content::ScrewModel(ScrewContent {
+        rows: 54,
+        offset_m: 1e-7,
+        slope_m_per_m: 6e-4,
+        lost_motion_m: 2.29e-6,
+        lead_m: Some(2e-3),
+        harmonics: vec![HarmonicRecord {
+            number: 1,
+            sine_m: 3e-7,
+            cosine_m: -2e-7,
+        }],
+        first_stroke_m: 5e-4,
+        last_stroke_m: 1.5e-3,
+        covariance_si: Some(vec![1e-16; 25]),
+        scatter_m: Some(2e-7),
+        ..ScrewContent::default()
+    });
+    record
+}
+
 fn store() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::new(folder.path(), "m");
@@ -79,6 +101,7 @@ fn every_kind_is_read_as_it_was_stored_and_says_what_it_is() {
     for (stored, kind, summary) in [
         (record("A"), LinearContent::KIND, "2 nodes"),
         (rotary(), RotaryContent::KIND, "3 lines, 2 placements"),
+        (screw(), ScrewContent::KIND, "54 strokes, 1 harmonics"),
     ] {
         let id = store.save(&stored).unwrap();
         assert_eq!(store.load(&id).unwrap(), stored);
@@ -102,6 +125,20 @@ fn a_calibration_of_another_kind_is_refused_by_name() {
     );
     assert!(record("A").rotary("id").is_err());
     assert!(rotary().rotary("id").is_ok());
+}
+
+#[test]
+fn a_screws_model_comes_back_to_the_last_bit() {
+    let Content::ScrewModel(content) = screw().content else {
+        panic!("another kind")
+    };
+    let model = content.model();
+    assert_eq!(
+        ScrewContent::new(&model, ScrewMethodName::LeastSquares, 54),
+        content
+    );
+    assert!(screw().screw("id").is_ok());
+    assert!(record("A").screw("id").is_err());
 }
 
 #[track_caller]

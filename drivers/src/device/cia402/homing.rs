@@ -48,20 +48,46 @@ impl Homing {
     }
 }
 
+/// Where the home is, and how fast it is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum HomingPlace<S> {
+    /// Where the axis stands.
+    Here,
+    /// Where it leaves its negative limit switch.
+    NegativeLimit(S),
+    /// At the first index pulse off that switch.
+    Index(S),
+}
+
+impl<S: Copy> HomingPlace<S> {
+    /// 0x6098. The negative end of the axis is the drive's positive one when the drive counts
+    /// against the axis.
+    pub(super) const fn method(&self, reversed: bool) -> i8 {
+        match (self, reversed) {
+            (Self::Here, _) => 37,
+            (Self::NegativeLimit(_), false) => 17,
+            (Self::NegativeLimit(_), true) => 18,
+            (Self::Index(_), false) => 1,
+            (Self::Index(_), true) => 2,
+        }
+    }
+
+    const fn speed(&self) -> Option<S> {
+        match self {
+            Self::Here => None,
+            Self::NegativeLimit(speed) | Self::Index(speed) => Some(*speed),
+        }
+    }
+}
+
 impl<Q: Coordinate> Cia402Drive<Q> {
-    /// With a search speed: on the negative limit switch; without: here.
-    pub(super) fn begin_homing(&mut self, now: Time, position: Q, search: Option<Q::Speed>) {
+    pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
+        let search = place.speed();
         if search.is_none() && !self.image.stands() {
             self.refuse("homing here", "an axis that stands");
             return;
         }
-        let reversed = self.settings.scale.resolution() < Q::ZERO;
-        let method = match search {
-            None => 37,
-            // The negative end of the axis is the drive's positive one when it counts against it.
-            Some(_) if reversed => 18,
-            Some(_) => 17,
-        };
+        let method = place.method(self.settings.scale.resolution() < Q::ZERO);
         let plan =
             counts_i32(&self.settings, HOME_OFFSET, "home position", position).and_then(|counts| {
                 let offset = match self.settings.home_offset {

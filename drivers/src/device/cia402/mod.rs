@@ -44,7 +44,7 @@ use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
-use homing::Homing;
+use homing::{Homing, HomingPlace};
 use image::{Image, Sample};
 use motion::{Halt, Move};
 use power::Power;
@@ -449,9 +449,14 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
                 None => self.refuse("starting", "a move that was prepared right before"),
             },
             AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, Some(speed));
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
             }
-            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, position, HomingPlace::Here);
+            }
         }
     }
 

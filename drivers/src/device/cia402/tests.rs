@@ -910,6 +910,21 @@ fn homing_on_the_limit_switch_sets_method_and_speeds() {
 }
 
 #[test]
+fn homing_on_an_index_pulse_sets_its_method_and_counts_the_other_way_with_the_drive() {
+    let command = AxisCommand::HomeIndex {
+        position: Metres::from_mm(-4.0),
+        speed: MetresPerSecond(0.005),
+    };
+    let mut rig = Rig::enabled();
+    assert_eq!(rig.does(command), Ok(()));
+    assert_eq!(rig.fake.node.get(0x6098, 0), 1);
+    assert_eq!(rig.fake.node.get(0x6099, 1), 500_000);
+    assert_eq!(rig.fake.node.get(0x607C, 0), -400_000);
+    let place: HomingPlace<MetresPerSecond> = HomingPlace::Index(MetresPerSecond(0.005));
+    assert_eq!(place.method(true), 2);
+}
+
+#[test]
 fn mirrored_coordinates_after_a_search_are_noticed_before_anything_moves_by_them() {
     let mut rig = Rig::enabled();
     rig.fake.offset_leads_to_zero = true;

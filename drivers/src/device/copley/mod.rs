@@ -50,7 +50,7 @@ use crate::transport::{Input, LinkState};
 use crate::wire::Payload;
 use crate::wire::cia402::PowerState;
 use crate::wire::copley::{Bank, EventStatus, Parameter};
-use homing::Homing;
+use homing::{Homing, HomingPlace};
 use image::{Image, Look};
 use link::Link;
 use motion::{Halt, Motion, Plan};
@@ -418,9 +418,14 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 None => self.refuse("starting", "a move that was prepared right before"),
             },
             AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, Some(speed));
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
             }
-            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, position, HomingPlace::Here);
+            }
         }
         self.pump(now);
     }

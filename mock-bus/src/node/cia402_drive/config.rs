@@ -61,6 +61,8 @@ pub struct Cia402DriveConfig {
     pub homing_acceleration_mm_per_s2: f64,
     /// Homing fails when no switch is found over this travel.
     pub homing_search_limit_mm: f64,
+    /// Whether the encoder's index is wired: homing methods 1, 2, 33 and 34.
+    pub has_index: bool,
     /// 0x605A at power-on: 6 as in EPOS4 (stay in quick stop active), 2 as in most others.
     pub quick_stop_option: i16,
     /// 0x6007 at power-on: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
@@ -118,6 +120,7 @@ impl Default for Cia402DriveConfig {
             homing_zero_speed_mm_per_s: 0.5,
             homing_acceleration_mm_per_s2: 200.0,
             homing_search_limit_mm: 500.0,
+            has_index: false,
             quick_stop_option: 6,
             abort_connection_option: 3,
             manners: Manners::default(),

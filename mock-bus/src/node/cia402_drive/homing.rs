@@ -1,7 +1,10 @@
-//! Homing mode: methods 17, 18 (limit switch), 35 and 37 (here) (CiA 402-2, 10.2).
+//! Homing mode: methods 1, 2 (limit switch and index pulse), 17, 18 (limit switch), 33, 34
+//! (index pulse), 35 and 37 (here) (CiA 402-2, 10.2).
 //!
 //! The position of the home is 0x607C afterwards. A limit-switch run searches the switch at
-//! 0x6099:01, leaves it at 0x6099:02, and the edge at which it is released is the home.
+//! 0x6099:01, leaves it at 0x6099:02, and the edge at which it is released is the home; with an
+//! index pulse, the first pulse behind that edge is. The encoder latches the count of the pulse,
+//! so its place does not depend on the speed.
 
 use drivers::wire::cia402::{Controlword, HomingStatus};
 use units::Time;
@@ -17,8 +20,10 @@ const FAR: f64 = 1e12;
 /// A run towards a limit switch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HomingRun {
-    /// −1 for the negative switch (17), +1 for the positive one (18).
+    /// −1 for the negative switch (1, 17), +1 for the positive one (2, 18).
     direction: f64,
+    /// Whether an index pulse is the home.
+    to_index: bool,
     step: Step,
     started_at: f64,
 }
@@ -29,8 +34,10 @@ enum Step {
     Seek,
     /// Slowing down on the switch.
     Stop,
-    /// Until it is released: that is home.
+    /// Until it is released: that is home, or where the index pulse is searched.
     BackOff,
+    /// Until the next index pulse after this one (by number): that is home.
+    Index { after: u64 },
     /// Slowing down behind it.
     Settle,
 }
@@ -65,17 +72,32 @@ impl Drive {
                 self.set_home(self.actual(m));
                 self.homing = HomingStatus::Done;
             }
-            17 => self.search(now, -1.0, m),
-            18 => self.search(now, 1.0, m),
+            1 => self.search(now, -1.0, true, m),
+            2 => self.search(now, 1.0, true, m),
+            17 => self.search(now, -1.0, false, m),
+            18 => self.search(now, 1.0, false, m),
+            // Backing off from nowhere: in the negative direction, as if off the positive switch.
+            33 => self.search_index(now, 1.0, m),
+            34 => self.search_index(now, -1.0, m),
             _ => self.fail_homing(now),
         }
     }
 
-    fn search(&mut self, now: Time, direction: f64, m: &mut impl Mechanism) {
+    fn search(&mut self, now: Time, direction: f64, to_index: bool, m: &mut impl Mechanism) {
         let on_switch = switch(direction, self.limits(m));
         let step = if on_switch { Step::BackOff } else { Step::Seek };
+        self.run(now, direction, to_index, step);
+    }
+
+    fn search_index(&mut self, now: Time, direction: f64, m: &mut impl Mechanism) {
+        let after = pulses(m);
+        self.run(now, direction, true, Step::Index { after });
+    }
+
+    fn run(&mut self, now: Time, direction: f64, to_index: bool, step: Step) {
         let run = HomingRun {
             direction,
+            to_index,
             step,
             started_at: self.demand(now).position,
         };
@@ -96,7 +118,9 @@ impl Drive {
         };
         self.profile = match step {
             Step::Seek => towards(run.direction, self.server.get(0x6099, 1)),
-            Step::BackOff => towards(-run.direction, self.server.get(0x6099, 2)),
+            Step::BackOff | Step::Index { .. } => {
+                towards(-run.direction, self.server.get(0x6099, 2))
+            }
             Step::Stop | Step::Settle => Profile::stopping(now, from, acceleration),
         };
         self.activity = Activity::Homing(HomingRun { step, ..run });
@@ -117,7 +141,18 @@ impl Drive {
             Step::Seek if lost || self.runs_into(opposite, travelled) => {
                 self.fail_homing(now);
             }
-            Step::BackOff if lost || opposite => self.fail_homing(now),
+            Step::BackOff | Step::Index { .. } if lost || opposite => self.fail_homing(now),
+            Step::Index { after } => {
+                if let Some(pulse) = m.index_pulse().filter(|pulse| pulse.number > after) {
+                    self.set_home(self.position_of(pulse.count));
+                    self.homing = HomingStatus::Attained;
+                    self.enter(now, run, Step::Settle);
+                }
+            }
+            Step::BackOff if !pressed && run.to_index => {
+                let after = pulses(m);
+                self.enter(now, run, Step::Index { after });
+            }
             Step::BackOff if !pressed => {
                 self.set_home(self.actual(m));
                 self.homing = HomingStatus::Attained;
@@ -157,4 +192,9 @@ impl Drive {
 /// The switch in `direction`.
 fn switch(direction: f64, (negative, positive): (bool, bool)) -> bool {
     if direction < 0.0 { negative } else { positive }
+}
+
+/// How many index pulses there have been.
+fn pulses(m: &impl Mechanism) -> u64 {
+    m.index_pulse().map_or(0, |pulse| pulse.number)
 }

@@ -1,6 +1,6 @@
 //! What the drive's power stage and encoder are wired to.
 
-use crate::plant::{Plant, Servo};
+use crate::plant::{IndexPulse, Plant, Servo};
 
 /// One axis, seen from its drive.
 pub(super) trait Mechanism {
@@ -10,6 +10,8 @@ pub(super) trait Mechanism {
     fn speed(&self) -> f64;
     /// Metres per count.
     fn resolution_m(&self) -> f64;
+    /// The encoder's last index pulse since its power came on.
+    fn index_pulse(&self) -> Option<IndexPulse>;
     /// Negative and positive limit switch.
     fn limit_switches(&self) -> (bool, bool);
     fn set_servo(&mut self, servo: Servo);
@@ -33,6 +35,10 @@ impl Mechanism for PlantAxis<'_> {
 
     fn resolution_m(&self) -> f64 {
         self.plant.encoder_resolution_m(self.axis)
+    }
+
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.plant.index_pulse(self.axis)
     }
 
     fn limit_switches(&self) -> (bool, bool) {

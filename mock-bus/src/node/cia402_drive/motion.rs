@@ -50,7 +50,12 @@ impl Drive {
 
     /// The actual position in drive coordinates, before it is cut to 32 bits.
     pub(super) fn actual(&self, m: &impl Mechanism) -> i64 {
-        self.sign() * m.counts() + self.offset
+        self.position_of(m.counts())
+    }
+
+    /// 0x6064 at an encoder count.
+    pub(super) fn position_of(&self, counts: i64) -> i64 {
+        self.sign() * counts + self.offset
     }
 
     pub(super) fn demand(&self, now: Time) -> MotionState {

@@ -13,6 +13,7 @@ const DEVICE_TYPE: u32 = 0x0002_0192;
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7;
 /// The homing methods this drive knows.
 const HOMING_METHODS: &[i64] = &[0, 17, 18, 35, 37];
+const HOMING_METHODS_WITH_INDEX: &[i64] = &[0, 1, 2, 17, 18, 33, 34, 35, 37];
 /// "increments" as an SI unit (CiA 303-2).
 const UNIT_INCREMENTS: i64 = 0x00B5_0000;
 /// Bytes of 0x2000, enough for a block upload of several blocks of ordinary clients.
@@ -114,7 +115,12 @@ fn insert_profile(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     use Kind::{I8, I32, U32};
     dictionary.insert(0x607C, 0, both(I32, 0));
-    let method = both(I8, 0).bounded(Bounds::OneOf(HOMING_METHODS));
+    let methods = if config.has_index {
+        HOMING_METHODS_WITH_INDEX
+    } else {
+        HOMING_METHODS
+    };
+    let method = both(I8, 0).bounded(Bounds::OneOf(methods));
     dictionary.insert(0x6098, 0, method);
     let positive = |mm: f64| {
         let counts = config.counts_of_mm(mm);
@@ -124,7 +130,7 @@ fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     let zero = positive(config.homing_zero_speed_mm_per_s);
     dictionary.insert_array(0x6099, vec![switch, zero]);
     dictionary.insert(0x609A, 0, positive(config.homing_acceleration_mm_per_s2));
-    let known = HOMING_METHODS[1..].iter();
+    let known = methods[1..].iter();
     let known = known.map(|method| Entry::constant(I8, *method));
     dictionary.insert_array(0x60E3, known.collect());
 }

@@ -520,23 +520,28 @@ fn homing_here_keeps_the_amplifiers_zero_and_remembers_the_coordinate() {
 
 #[test]
 fn homing_on_the_switch_searches_in_the_axiss_own_direction() {
-    for (resolution, method) in [(10e-9, 529), (-10e-9, 513)] {
+    let position = Metres::from_mm(-9.0);
+    let speed = MetresPerSecond(0.005);
+    let on_switch = AxisCommand::HomeNegativeLimit { position, speed };
+    let on_index = AxisCommand::HomeIndex { position, speed };
+    for (command, resolution, method) in [
+        (on_switch, 10e-9, 529),
+        (on_switch, -10e-9, 513),
+        (on_index, 10e-9, 561),
+        (on_index, -10e-9, 545),
+    ] {
         let mut rig = Rig::with(CopleySettings {
             scale: Scale::new(Metres(resolution)).unwrap(),
             ..settings()
         });
         rig.start().unwrap();
         rig.does(DriveCommand::Enable).unwrap();
-        rig.does(AxisCommand::HomeNegativeLimit {
-            position: Metres::from_mm(-9.0),
-            speed: MetresPerSecond(0.005),
-        })
-        .unwrap();
+        rig.does(command).unwrap();
         assert_eq!(rig.fake.ram[&Parameter::HOMING_METHOD.0], method);
         // 5 mm/s in 0.1 counts/s, and a fifth of it off the switch.
         assert_eq!(rig.fake.ram[&Parameter::HOMING_SPEED_FAST.0], 5_000_000);
         assert_eq!(rig.fake.ram[&Parameter::HOMING_SPEED_SLOW.0], 1_000_000);
-        assert_eq!(rig.axis.reading().unwrap().position, Metres::from_mm(-9.0));
+        assert_eq!(rig.axis.reading().unwrap().position, position);
     }
 }
 

@@ -1,12 +1,25 @@
 //! Homing on a limit switch and where the axis stands.
 
-use super::Bench;
+use super::{Bench, Cia402DriveConfig};
 
 const DONE: u16 = 0x1637;
 const FAILED: u16 = 0x2637;
 
 fn ready(method: i8, offset: i32) -> Bench {
-    let mut bench = Bench::new();
+    ready_on(Bench::new(), method, offset)
+}
+
+/// With an index wired, and a mark every 100 000 counts from 50 000 on.
+fn ready_with_index(method: i8, offset: i32) -> Bench {
+    let config = Cia402DriveConfig {
+        has_index: true,
+        homing_search_limit_mm: 20.0,
+        ..Cia402DriveConfig::default()
+    };
+    ready_on(Bench::with(config), method, offset)
+}
+
+fn ready_on(mut bench: Bench, method: i8, offset: i32) -> Bench {
     bench.write(0x6060, &[6]);
     bench.write(0x6098, &method.to_le_bytes());
     bench.write_i32(0x607C, offset);
@@ -59,6 +72,40 @@ fn method_18_mirrors_it() {
     bench.wait_until("homing done", |bench| bench.status() == DONE);
     let home = bench.axis.counts - i64::from(bench.position());
     assert!((99_940..=100_000).contains(&home), "home at {home}");
+}
+
+#[track_caller]
+fn check_index(method: i8, switches: (i64, i64), home: i64) {
+    let mut bench = ready_with_index(method, 700);
+    bench.axis.switches = switches;
+    bench.control(0x1F);
+    bench.wait_until("homing done", |bench| bench.status() == DONE);
+    let found = bench.axis.counts - i64::from(bench.position()) + 700;
+    assert_eq!(found, home, "to the count, whatever the speed");
+}
+
+#[test]
+fn an_index_pulse_off_the_switch_is_a_home_to_the_count() {
+    check_index(1, (-223_456, i64::MAX), -150_000);
+    check_index(2, (i64::MIN, 223_456), 150_000);
+    check_index(33, (i64::MIN, i64::MAX), -50_000);
+    check_index(34, (i64::MIN, i64::MAX), 50_000);
+}
+
+#[test]
+fn a_pulse_passed_on_the_way_to_the_switch_is_not_the_home() {
+    // The marks at -50 000 and -150 000 are passed twice; the first one after the edge counts.
+    check_index(1, (-250_000, i64::MAX), -150_000);
+}
+
+#[test]
+fn an_index_that_never_comes_is_a_homing_error() {
+    let mut bench = ready_with_index(1, 0);
+    bench.axis.switches = (-1_000, i64::MAX);
+    bench.control(0x1F);
+    let _ = bench.wait_ms(500);
+    bench.axis.switches = (-1_000, 20_000);
+    bench.wait_until("homing error", |bench| bench.status() == FAILED);
 }
 
 #[test]

@@ -15,7 +15,7 @@ use units::Time;
 
 use super::mechanism::Mechanism;
 use super::{Cia402DriveConfig, Drive};
-use crate::plant::Servo;
+use crate::plant::{IndexPulse, Servo};
 
 const RESOLUTION_M: f64 = 10e-9;
 
@@ -25,6 +25,7 @@ pub(super) struct IdealAxis {
     pub(super) counts: i64,
     /// Counts at and below which the negative switch is pressed, and the positive above.
     pub(super) switches: (i64, i64),
+    pub(super) index: Option<IndexPulse>,
     pub(super) blocked: bool,
     pub(super) servo: Servo,
     pub(super) commands: u64,
@@ -43,6 +44,10 @@ impl Mechanism for IdealAxis {
         RESOLUTION_M
     }
 
+    fn index_pulse(&self) -> Option<IndexPulse> {
+        self.index
+    }
+
     fn limit_switches(&self) -> (bool, bool) {
         (
             self.counts <= self.switches.0,
@@ -56,13 +61,29 @@ impl Mechanism for IdealAxis {
         if let Servo::Follow { demand_m } = servo
             && !self.blocked
         {
+            let before = self.counts;
             self.counts = (demand_m / RESOLUTION_M).round() as i64;
+            self.pass_marks(before);
         }
     }
 
     fn encoder_power(&mut self, on: bool) {
         if on {
             self.counts = 0;
+        }
+    }
+}
+
+impl IdealAxis {
+    /// One index mark every millimetre, at odd multiples of half of one.
+    fn pass_marks(&mut self, before: i64) {
+        const MARKS: i64 = 100_000;
+        let turn = |counts: i64| (counts + MARKS / 2).div_euclid(MARKS);
+        if turn(before) != turn(self.counts) {
+            self.index = Some(IndexPulse {
+                count: turn(before).max(turn(self.counts)) * MARKS - MARKS / 2,
+                number: self.index.map_or(1, |pulse| pulse.number + 1),
+            });
         }
     }
 }
@@ -84,6 +105,7 @@ impl Bench {
         let axis = IdealAxis {
             counts: 0,
             switches: (i64::MIN, i64::MAX),
+            index: None,
             blocked: false,
             servo: Servo::Off,
             commands: 0,

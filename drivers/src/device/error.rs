@@ -1,0 +1,253 @@
+//! Why a command failed, who speaks, and what was last seen.
+
+use core::fmt;
+use core::time::Duration;
+use units::LengthOrAngle;
+
+use super::Alarm;
+use crate::wire::canopen::nmt::NmtState;
+use crate::wire::canopen::sdo::AbortCode;
+use crate::wire::canopen::{NodeId, Object};
+use crate::wire::cia402::PowerState;
+use crate::wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
+
+/// Why a command of a device failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the Display text says what each field is")]
+pub enum DeviceError {
+    /// The node aborted a transfer.
+    #[error("{node}, {object}: aborted the transfer with {code} while {step}")]
+    SdoAbort {
+        node: NodeId,
+        object: Object,
+        code: AbortCode,
+        step: &'static str,
+    },
+    /// A transfer was not answered.
+    #[error("{node}, {object}: no answer within {waited:?} ({attempts} attempts) while {step}")]
+    SdoTimeout {
+        node: NodeId,
+        object: Object,
+        waited: Duration,
+        attempts: u32,
+        step: &'static str,
+    },
+    /// A transfer went wrong in another way and was aborted by us.
+    #[error("{node}, {object}: transfer broken off with {code} while {step}")]
+    SdoProtocol {
+        node: NodeId,
+        object: Object,
+        code: AbortCode,
+        step: &'static str,
+    },
+    /// The device is not the one the configuration names.
+    #[error(
+        "{node}: {what} is {seen:#010X}, the configuration says {expected:#010X}; \
+             fit the right device or correct the configuration"
+    )]
+    WrongIdentity {
+        node: NodeId,
+        what: &'static str,
+        expected: u32,
+        seen: u32,
+    },
+    /// A value read back differs from what was written.
+    #[error("{node}, {object}: read back {seen:#X}, wrote {expected:#X} ({step})")]
+    ReadBack {
+        node: NodeId,
+        object: Object,
+        expected: u64,
+        seen: u64,
+        step: &'static str,
+    },
+    /// The drive's units are not those of the configuration.
+    #[error(
+        "{node}, {object}: one encoder increment is {seen} position units, the configured scale \
+         says {expected}; correct the scale or the drive's factors"
+    )]
+    WrongScale {
+        node: NodeId,
+        object: Object,
+        expected: f64,
+        seen: f64,
+    },
+    /// Something that was awaited did not come.
+    #[error("{device}: waited {waited:?} for {awaited}, last saw {seen}")]
+    Timeout {
+        device: DeviceName,
+        awaited: &'static str,
+        waited: Duration,
+        seen: Seen,
+    },
+    /// The drive refused or failed a command.
+    #[error("{node}: {step} failed, drive is in {state}")]
+    DriveRefused {
+        node: NodeId,
+        step: &'static str,
+        state: PowerState,
+    },
+    /// The command needs something that is not so.
+    #[error("{device}: {step} needs {needs}")]
+    NotPossible {
+        device: DeviceName,
+        step: &'static str,
+        needs: &'static str,
+    },
+    /// A value cannot be represented in the drive's units.
+    #[error("{node}: {what} {value} {unit} does not fit {object} (limit {limit} {unit})")]
+    OutOfRange {
+        node: NodeId,
+        object: Object,
+        what: &'static str,
+        value: f64,
+        limit: f64,
+        unit: &'static str,
+    },
+    /// A device answered a command with something else than success.
+    #[error("{device}: {step} refused with {status}")]
+    Refused {
+        device: DeviceName,
+        step: &'static str,
+        status: crate::wire::in_sight::Status,
+    },
+    /// Too few good pictures.
+    #[error(
+        "{device}: {good} good pictures of {wanted}; of {} bad ones {without_target} showed no \
+         target and {judged_bad} were judged bad (best score {:.0} %); is the target in the \
+         field, clean, lit and at rest?",
+        without_target + judged_bad, best_score * 100.0
+    )]
+    NoGoodPicture {
+        device: DeviceName,
+        good: u32,
+        wanted: u32,
+        without_target: u32,
+        judged_bad: u32,
+        best_score: f64,
+    },
+    /// An alarm ended the command.
+    #[error("{device}: {step} ended by an alarm: {alarm}")]
+    Alarmed {
+        device: DeviceName,
+        step: &'static str,
+        alarm: Alarm,
+    },
+    /// An amplifier on a serial line did not answer.
+    #[error(
+        "{device}: no answer ({attempts} attempts) while {step}; its power, address, cable or \
+         the line's baud rate?"
+    )]
+    Unanswered {
+        device: DeviceName,
+        step: &'static str,
+        attempts: u32,
+    },
+    /// An amplifier on a serial line refused a command.
+    #[error("{device}{}: {code} while {step}", of_parameter(*parameter))]
+    AmplifierRefused {
+        device: DeviceName,
+        parameter: Option<Parameter>,
+        code: ErrorCode,
+        step: &'static str,
+    },
+    /// A parameter read back differs from what was written, or is no number.
+    #[error("{device}, parameter {parameter}: read back {seen}, wrote {expected} ({step})")]
+    ParameterReadBack {
+        device: DeviceName,
+        parameter: Parameter,
+        expected: i64,
+        seen: String,
+        step: &'static str,
+    },
+    /// The amplifier is not the one the configuration names.
+    #[error(
+        "{device}: {what} is {seen}, the configuration says {expected}; fit the right device or \
+         correct the configuration"
+    )]
+    WrongAmplifier {
+        device: DeviceName,
+        what: &'static str,
+        expected: String,
+        seen: String,
+    },
+    /// A value cannot be represented in the amplifier's units.
+    #[error(
+        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
+    )]
+    ParameterOutOfRange {
+        device: DeviceName,
+        parameter: Parameter,
+        what: &'static str,
+        value: f64,
+        limit: f64,
+        unit: &'static str,
+    },
+    /// Latched faults are in the way.
+    #[error("{device}: {step} is not possible with latched faults: {faults}")]
+    Faulted {
+        device: DeviceName,
+        step: &'static str,
+        faults: Faults,
+    },
+    /// The amplifier broke a move off.
+    #[error("{device}: {step} was aborted by the amplifier, last saw {seen}")]
+    Aborted {
+        device: DeviceName,
+        step: &'static str,
+        seen: Seen,
+    },
+}
+
+fn of_parameter(parameter: Option<Parameter>) -> String {
+    parameter.map_or_else(String::new, |parameter| format!(", parameter {parameter}"))
+}
+
+/// Which device speaks: a node on the bus or a serial device by its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DeviceName {
+    /// On CAN.
+    Node(NodeId),
+    /// On a serial line.
+    Serial(&'static str),
+    /// One of several amplifiers behind a serial line.
+    Amplifier(Address),
+}
+
+impl fmt::Display for DeviceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Node(node) => node.fmt(f),
+            Self::Serial(kind) => f.write_str(kind),
+            Self::Amplifier(address) => write!(f, "amplifier {address}"),
+        }
+    }
+}
+
+/// What was last seen when something awaited did not come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "each is one kind of observation")]
+pub enum Seen {
+    Nothing,
+    Nmt(NmtState),
+    Power(PowerState),
+    Statusword(u16),
+    Mode(i8),
+    Position(LengthOrAngle),
+    Samples(u32),
+    Events(EventStatus),
+}
+
+impl fmt::Display for Seen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => f.write_str("nothing"),
+            Self::Nmt(state) => state.fmt(f),
+            Self::Power(state) => state.fmt(f),
+            Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
+            Self::Mode(raw) => write!(f, "mode {raw}"),
+            Self::Position(at) => write!(f, "position {at:.6}"),
+            Self::Samples(count) => write!(f, "{count} samples"),
+            Self::Events(events) => write!(f, "event status {:#010X}", events.bits()),
+        }
+    }
+}
