@@ -201,7 +201,7 @@ fn home_here_is_zero_and_the_switch_is_found_from_outside() {
 #[test]
 fn a_blocked_axis_is_a_following_error_until_it_is_cleared() {
     let mut rig = Rig::enabled();
-    rig.plant.set_blocked(true);
+    rig.plant.set_blocked(0, true);
     rig.check("s r0xca 5000000", "ok");
     rig.check("t 1", "ok");
     rig.live(Duration::from_secs(1));
