@@ -133,6 +133,14 @@ pub enum Failure {
         /// What there is.
         known: String,
     },
+    /// There is no such image controller.
+    #[error("there is no camera `{camera}`; known: {known}")]
+    NoSuchCamera {
+        /// What was asked for.
+        camera: String,
+        /// What there is.
+        known: String,
+    },
     /// The Hall search failed.
     #[error("axis {axis}: {source}")]
     Search {
@@ -381,6 +389,7 @@ impl Failure {
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }
+            | Self::NoSuchCamera { .. }
             | Self::Figures(_)
             | Self::Data(_)
             | Self::Series(_)

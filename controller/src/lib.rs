@@ -31,6 +31,7 @@
 pub mod assemble;
 pub mod bus_plan;
 mod bus_watch;
+pub mod camera;
 pub mod config;
 pub mod cycle;
 pub mod emulated;

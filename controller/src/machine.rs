@@ -14,6 +14,7 @@ use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
 use drivers::device::{
     AnalogInput, Axis, AxisCommand, AxisReading, Device, DisplacementInstrument, Identity,
+    PoseInstrument,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Port, Transport};
@@ -22,6 +23,7 @@ use units::{Metres, Time};
 
 use crate::assemble;
 use crate::bus_watch::BusWatch;
+use crate::camera;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
@@ -55,6 +57,21 @@ pub(crate) struct Unit<D: ?Sized> {
     pub(crate) port: Port,
     pub(crate) device: Box<D>,
 }
+
+macro_rules! as_device {
+    ($($kind:path),*) => {$(
+        impl Unit<dyn $kind> {
+            fn as_device(&mut self) -> UnitMut<'_> {
+                UnitMut {
+                    port: self.port,
+                    device: &mut *self.device,
+                }
+            }
+        }
+    )*};
+}
+
+as_device!(Axis, AnalogInput, DisplacementInstrument, PoseInstrument);
 
 /// What is known about an axis beyond what its drive says.
 #[derive(Default)]
@@ -91,13 +108,14 @@ pub struct Machine {
     pub(crate) axes: Vec<Unit<dyn Axis>>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
+    pub(crate) cameras: Vec<Unit<dyn PoseInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
-    /// The instruments that were started, by name.
+    /// The instruments and cameras that were started, by name.
     pub(crate) started_instruments: BTreeSet<String>,
-    /// The instrument whose readings a procedure needs now: only its alarms count.
+    /// The instrument or camera whose readings a procedure needs now: only its alarms count.
     pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
     pub(crate) stop: StopRequest,
@@ -113,6 +131,7 @@ impl Machine {
             axes: assemble::axes(&config, &ports, loaded.patience),
             analogs: assemble::analogs(&config, &ports, loaded.patience),
             instruments: assemble::instruments(&config, &ports, loaded.patience),
+            cameras: camera::cameras(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
             bus_watch: BusWatch::new(&config, &ports),
             memory: config
@@ -234,53 +253,36 @@ impl Machine {
         Ok(self.axis(axis)?.device.power_state())
     }
 
+    /// Every device with its name: axes, then analog modules, instruments and cameras.
+    fn devices(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
+        let axes = self.axes.iter().map(|it| (&it.name, &*it.device as _));
+        let analogs = self.analogs.iter().map(|it| (&it.name, &*it.device as _));
+        let instruments = self.instruments.iter();
+        let instruments = instruments.map(|it| (&it.name, &*it.device as _));
+        let cameras = self.cameras.iter().map(|it| (&it.name, &*it.device as _));
+        axes.chain(analogs).chain(instruments).chain(cameras)
+    }
+
     /// What every device said it is, by its name in the configuration.
     pub fn identities(&self) -> BTreeMap<String, Identity> {
-        let axes = self
-            .axes
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        let analogs = self
-            .analogs
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        let instruments = self
-            .instruments
-            .iter()
-            .map(|unit| (&unit.name, unit.device.identity()));
-        axes.chain(analogs)
-            .chain(instruments)
-            .filter_map(|(name, identity)| Some((name.clone(), identity?)))
+        self.devices()
+            .filter_map(|(name, device)| Some((name.clone(), device.identity()?)))
             .collect()
     }
 
     /// Counters of every device: dropped, late, mismatched and the like.
     pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
-        let axes = self
-            .axes
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        let analogs = self
-            .analogs
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        let instruments = self
-            .instruments
-            .iter()
-            .map(|unit| (&unit.name, unit.device.counters()));
-        axes.chain(analogs)
-            .chain(instruments)
-            .flat_map(|(name, counters)| {
-                counters
-                    .into_iter()
-                    .map(move |(what, count)| (name.clone(), what, count))
+        self.devices()
+            .flat_map(|(name, device)| {
+                let counters = device.counters().into_iter();
+                counters.map(move |(what, count)| (name.clone(), what, count))
             })
             .collect()
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
-    /// moves. Instruments are started when a procedure first needs them: a machine in
-    /// production has none.
+    /// moves. Instruments and cameras are started when a procedure first needs them: a machine
+    /// in production may have none.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
@@ -303,19 +305,20 @@ impl Machine {
         Ok(())
     }
 
-    /// The names of all devices: axes, then analog modules, then instruments.
+    /// The names of all devices: axes, then analog modules, instruments and cameras.
     pub fn device_names(&self) -> Vec<String> {
-        let axes = self.axes.iter().map(|unit| unit.name.clone());
-        let analogs = self.analogs.iter().map(|unit| unit.name.clone());
-        let instruments = self.instruments.iter().map(|unit| unit.name.clone());
-        axes.chain(analogs).chain(instruments).collect()
+        self.devices().map(|(name, _)| name.clone()).collect()
     }
 
     /// Starts an instrument, unless it runs already (its datum stands then), and counts its
     /// alarms from now on.
     pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
+        self.use_device(self.instrument_device(self.instrument_index(name)), name)
+    }
+
+    /// The same for device number `at`, an instrument or a camera called `name`.
+    pub(crate) fn use_device(&mut self, at: usize, name: &str) -> Result<(), Failure> {
         if !self.started_instruments.contains(name) {
-            let at = self.instrument_device(self.instrument_index(name));
             let now = self.now();
             self.device_mut(at).device.start(now);
             self.await_outcome(at, "start", START_LIMIT)?;
@@ -421,34 +424,26 @@ impl Machine {
     }
 
     pub(crate) fn device_count(&self) -> usize {
-        self.axes.len() + self.analogs.len() + self.instruments.len()
+        self.axes.len() + self.analogs.len() + self.instruments.len() + self.cameras.len()
     }
 
     pub(crate) fn device_name(&self, at: usize) -> String {
         self.device_names().swap_remove(at)
     }
 
-    /// Device number `at`: axes first, then analog modules, then instruments.
+    /// Device number `at`, in the order of [`Machine::device_names`].
     pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
         let (axes, analogs) = (self.axes.len(), self.analogs.len());
+        let machines_own = axes + analogs;
+        let instruments = machines_own + self.instruments.len();
         if at < axes {
-            let unit = &mut self.axes[at];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
-        } else if at < axes + analogs {
-            let unit = &mut self.analogs[at - axes];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
+            self.axes[at].as_device()
+        } else if at < machines_own {
+            self.analogs[at - axes].as_device()
+        } else if at < instruments {
+            self.instruments[at - machines_own].as_device()
         } else {
-            let unit = &mut self.instruments[at - axes - analogs];
-            UnitMut {
-                port: unit.port,
-                device: &mut *unit.device,
-            }
+            self.cameras[at - instruments].as_device()
         }
     }
 

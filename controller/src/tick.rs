@@ -219,13 +219,10 @@ impl Machine {
         }
     }
 
-    /// An instrument that nobody reads may have its beam blocked.
+    /// An instrument or a camera that nobody reads may have its beam blocked.
     fn alarm_counts(&self, at: usize) -> bool {
-        let first_instrument = self.axes.len() + self.analogs.len();
-        match at.checked_sub(first_instrument) {
-            None => true,
-            Some(at) => self.instrument_in_use.as_ref() == Some(&self.instruments[at].name),
-        }
+        let machines_own = self.axes.len() + self.analogs.len();
+        at < machines_own || self.instrument_in_use == Some(self.device_name(at))
     }
 
     /// A drive that was reset has lost its origin, whoever is listening.

@@ -127,10 +127,10 @@ pub enum DeviceConfig {
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
     DconModule(DconModuleConfig),
-    /// Copley Controls servo amplifiers, on one serial line.
-    CopleyAmps(CopleyAmpsConfig),
     /// In-Sight vision system, on a serial line.
     InSightController(InSightControllerConfig),
+    /// Copley Controls servo amplifiers, on one serial line.
+    CopleyAmps(CopleyAmpsConfig),
 }
 
 impl DeviceConfig {
@@ -141,10 +141,10 @@ impl DeviceConfig {
             Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
-            Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
             Self::InSightController(config) => {
                 Box::new(InSightControllerNode::new(config, seed, name))
             }
+            Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
         }
     }
 
@@ -153,8 +153,8 @@ impl DeviceConfig {
             Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
             Self::Umd2Interferometer(_)
             | Self::DconModule(_)
-            | Self::CopleyAmps(_)
-            | Self::InSightController(_) => false,
+            | Self::InSightController(_)
+            | Self::CopleyAmps(_) => false,
         }
     }
 }
@@ -398,12 +398,12 @@ impl DeviceConfig {
                 positive("batch_samples", f64::from(config.batch_samples))
             }
             Self::DconModule(config) => positive("channels", config.channels as f64),
-            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
             Self::InSightController(config) => {
                 positive("length_unit_um", config.length_unit_um)?;
                 positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
                 positive("exposure_ms", config.exposure_ms)
             }
+            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
         }
     }
 }

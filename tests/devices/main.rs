@@ -2,5 +2,6 @@
 
 mod amplifiers;
 mod analog;
+mod camera;
 mod drive;
 mod interferometer;

@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{EMULATED, MACHINE, Rig, machine_config};
+use crate::rig::{LINEAR, MACHINE, Rig, Shipped, UVW, shipped_config};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -20,6 +20,7 @@ static REAL_TIME: Mutex<()> = Mutex::new(());
 /// What a machine is made from: seed, configuration, description of the emulation.
 #[derive(Clone, Debug)]
 pub struct Setup {
+    shipped: Shipped,
     seed: u64,
     interface: &'static str,
     machine: Vec<(String, String)>,
@@ -27,9 +28,19 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The shipped machine with the noise and errors of `seed`.
+    /// The shipped linear machine with the noise and errors of `seed`.
     pub const fn new(seed: u64) -> Self {
+        Self::of(LINEAR, seed)
+    }
+
+    /// The shipped alignment platform with the noise and errors of `seed`.
+    pub const fn uvw(seed: u64) -> Self {
+        Self::of(UVW, seed)
+    }
+
+    const fn of(shipped: Shipped, seed: u64) -> Self {
         Self {
+            shipped,
             seed,
             interface: INTERFACE,
             machine: Vec::new(),
@@ -111,9 +122,10 @@ impl Emulator {
         let turn = (rig != Rig::InProcess)
             .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let mut loaded = machine_config(folder.path(), |text| replace(text, &setup.machine));
+        let change = |text| replace(text, &setup.machine);
+        let mut loaded = shipped_config(&setup.shipped, folder.path(), change);
         loaded.patience = ports::patience(rig.speed());
-        let text = replace(EMULATED.to_owned(), &setup.emulated);
+        let text = replace(setup.shipped.emulated.to_owned(), &setup.emulated);
         let (speed, seed) = (rig.speed(), setup.seed);
         let emulation = match rig {
             Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),

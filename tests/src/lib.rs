@@ -14,6 +14,8 @@ mod stand;
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use interface::{Interface, run};
-pub use rig::{Bench, EMULATED, MACHINE, Rig, machine_config, rigs};
+pub use rig::{
+    Bench, EMULATED, LINEAR, MACHINE, Rig, Shipped, UVW, machine_config, rigs, shipped_config,
+};
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};

@@ -13,6 +13,27 @@ pub const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
 /// The shipped description of its emulation.
 pub const EMULATED: &str = include_str!("../../configs/emulated/linear.toml");
 
+/// A machine that ships: its configuration and the description of its emulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Shipped {
+    /// What the controller is told.
+    pub machine: &'static str,
+    /// What is emulated.
+    pub emulated: &'static str,
+}
+
+/// The linear machine.
+pub const LINEAR: Shipped = Shipped {
+    machine: MACHINE,
+    emulated: EMULATED,
+};
+
+/// The alignment platform.
+pub const UVW: Shipped = Shipped {
+    machine: include_str!("../../configs/machines/uvw.toml"),
+    emulated: include_str!("../../configs/emulated/uvw.toml"),
+};
+
 /// Which bus a test runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {
@@ -56,11 +77,23 @@ pub fn rigs() -> Vec<Rig> {
 /// # Panics
 /// When the changed text is no configuration.
 pub fn machine_config(folder: &Path, change: impl Fn(String) -> String) -> Loaded {
-    let text = change(MACHINE.replace(
+    shipped_config(&LINEAR, folder, change)
+}
+
+/// The same of any machine that ships.
+///
+/// # Panics
+/// When the changed text is no configuration.
+pub fn shipped_config(
+    shipped: &Shipped,
+    folder: &Path,
+    change: impl Fn(String) -> String,
+) -> Loaded {
+    let text = change(shipped.machine.replace(
         "\"machine-data\"",
         &format!("{:?}", folder.display().to_string()),
     ));
-    config::parse(&text, "linear.toml").unwrap_or_else(|error| panic!("{error}"))
+    config::parse(&text, "machine.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A machine in virtual time with everything a test looks at.

@@ -18,7 +18,8 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let machine = &loaded.config.machine;
     let text = format!(
-        "{}: sound; machine {} (stage {}), {} axes, {} analog modules, {} instruments\n\
+        "{}: sound; machine {} (stage {}), {} axes, {} analog modules, {} instruments, \
+         {} cameras\n\
          calibrations of it carry the configuration hash {}",
         path.display(),
         machine.name,
@@ -26,6 +27,7 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
         loaded.config.axis.len(),
         loaded.config.analog.len(),
         loaded.config.instrument.len(),
+        loaded.config.camera.len(),
         &loaded.hash[..12],
     );
     output.result(

@@ -3,11 +3,13 @@
 //! Micrometres and millimetres live here and on the screen only; every key carries its unit
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
+mod camera;
 mod diagnostic;
 mod load;
 mod model;
 mod validate;
 
+pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{

@@ -5,6 +5,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::camera::CameraConfig;
+
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,6 +29,9 @@ pub struct MachineConfig {
     /// Measuring instruments by name.
     #[serde(default)]
     pub instrument: BTreeMap<String, InstrumentConfig>,
+    /// Image controllers by name.
+    #[serde(default)]
+    pub camera: BTreeMap<String, CameraConfig>,
 }
 
 /// Who the machine is, and where its records live.

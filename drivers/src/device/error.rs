@@ -144,7 +144,7 @@ pub enum DeviceError {
     },
     /// An amplifier on a serial line refused a command.
     #[error("{device}{}: {code} while {step}", of_parameter(*parameter))]
-    AmplifierRefused {
+    RefusedByAmplifier {
         device: DeviceName,
         parameter: Option<Parameter>,
         code: ErrorCode,

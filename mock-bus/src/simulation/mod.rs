@@ -13,6 +13,8 @@ mod traffic;
 #[cfg(test)]
 mod linear_tests;
 #[cfg(test)]
+mod platform_tests;
+#[cfg(test)]
 mod tests;
 
 use core::any::Any;

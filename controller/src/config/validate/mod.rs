@@ -1,12 +1,14 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
 mod axis;
+mod camera;
 mod cycle;
 mod judge;
 
 use std::collections::BTreeMap;
 
 use self::axis::{check_axis, check_axis_name, check_lines};
+use self::camera::check_cameras;
 use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
 use self::judge::Judge;
@@ -66,6 +68,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
             instrument,
         );
     }
+    check_cameras(config, &mut findings);
     check_node_ids(config, &mut findings);
     check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.

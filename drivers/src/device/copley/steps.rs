@@ -108,7 +108,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         match (step.wanted, reply) {
             (_, Reply::Error(_)) if step.optional => {}
             (_, Reply::Error(code)) => {
-                let error = DeviceError::AmplifierRefused {
+                let error = DeviceError::RefusedByAmplifier {
                     device: self.name(),
                     parameter: step.parameter(),
                     code,

@@ -143,6 +143,9 @@ impl InSight {
                 deadline = now + self.settings.inspection_timeout;
                 self.picture_due = deadline;
             }
+            Question::Job if matches!(self.work, Work::Starting) => {
+                deadline = now + self.settings.start_period;
+            }
             Question::Job | Question::Online | Question::Count | Question::Result => {}
         }
         self.refusal = None;
@@ -238,7 +241,8 @@ impl InSight {
                 self.ask(now, Question::Result);
             }
             (Question::Job, Work::Measuring(_)) => self.ask(now, Question::Count),
-            (Question::Info, _) => self.check_serial(now),
+            // Without information it is the answer to a question that was repeated.
+            (Question::Info, _) if !self.info.is_empty() => self.check_serial(now),
             _ => self.counts.old_answers += 1,
         }
     }
@@ -287,7 +291,7 @@ impl InSight {
             // Somebody else triggers, or the job was loaded anew: which picture this is, and
             // when it was taken, nobody knows.
             self.counts.strangers += 1;
-            return self.failed(now, Question::Result);
+            return self.failed(now, Question::Result, "a picture that nobody else triggers");
         }
         self.counts.pictures += 1;
         let Work::Measuring(measurement) = &mut self.work else {
@@ -308,7 +312,7 @@ impl InSight {
         self.counts.old_results += 1;
         if self.fenced || now >= self.picture_due {
             self.pending = false;
-            return self.failed(now, Question::Picture);
+            return self.failed(now, Question::Picture, "a picture after the trigger");
         }
         let until = now + self.settings.result_period;
         self.state = State::Resting { until };
@@ -324,15 +328,20 @@ impl InSight {
         }
     }
 
-    /// An exchange failed: behind a new fence the work goes on.
-    fn failed(&mut self, now: Time, question: Question) {
+    /// An exchange failed: behind a new fence the work goes on. A start is tried until the
+    /// system must have booted.
+    fn failed(&mut self, now: Time, question: Question, awaited: &'static str) {
         self.failures += 1;
-        if self.failures > self.settings.retries {
+        let is_last = match self.work {
+            Work::Starting => now.since(self.since) >= self.settings.start_timeout,
+            Work::Measuring(_) | Work::Nothing => self.failures > self.settings.retries,
+        };
+        if is_last {
             return match self.refusal {
                 Some(status) => self.refuse(question, status),
                 None => self.finish(Err(DeviceError::Timeout {
                     device: NAME,
-                    awaited: question.awaited(),
+                    awaited,
                     waited: now.since(self.since),
                     seen: Seen::Nothing,
                 })),
@@ -380,7 +389,7 @@ impl Device for InSight {
         match self.state {
             State::Asked { question, deadline } if deadline <= now => {
                 self.counts.late += 1;
-                self.failed(now, question);
+                self.failed(now, question, question.awaited());
             }
             State::Resting { until } if until <= now => self.ask(now, Question::Result),
             State::Idle | State::Asked { .. } | State::Resting { .. } => {}

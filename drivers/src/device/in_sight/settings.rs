@@ -46,13 +46,17 @@ pub struct InSightSettings {
     pub score_min: f64,
     /// So many bad pictures may be left out of one pose.
     pub rejects_max: u32,
+    /// How long the start may take, the system's own boot included.
+    pub start_timeout: Duration,
+    /// How often a system that may still boot is asked for its job.
+    pub start_period: Duration,
     /// How long an answer may take.
     pub answer_timeout: Duration,
     /// How long taking and judging a picture may take.
     pub inspection_timeout: Duration,
     /// From one look at the result to the next while it is still that of the picture before.
     pub result_period: Duration,
-    /// How often a step is tried again.
+    /// How often a step of a measurement is tried again.
     pub retries: u32,
     /// This many damaged lines in a row raise an alarm.
     pub garbage_lines_max: u64,
@@ -71,6 +75,8 @@ impl InSightSettings {
             targets: 2,
             score_min: 0.5,
             rejects_max: 3,
+            start_timeout: Duration::from_secs(10),
+            start_period: Duration::from_millis(500),
             answer_timeout: Duration::from_millis(500),
             inspection_timeout: Duration::from_secs(3),
             result_period: Duration::from_millis(20),

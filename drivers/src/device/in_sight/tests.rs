@@ -254,7 +254,7 @@ fn refusals_are_told_with_their_status() {
 #[test]
 fn a_job_that_was_never_saved_is_told_as_a_refusal_not_as_silence() {
     let mut bench = Bench::new(settings());
-    for _ in 0..4 {
+    while bench.device.poll_timeout() < Time::NEVER {
         bench.answer("-2");
         bench.wait();
     }
@@ -264,12 +264,21 @@ fn a_job_that_was_never_saved_is_told_as_a_refusal_not_as_silence() {
 #[test]
 fn nobody_there_is_a_time_out_that_says_what_was_awaited() {
     let mut bench = Bench::new(settings());
-    for _ in 0..4 {
+    while bench.device.poll_timeout() < Time::NEVER {
         bench.wait();
     }
     let told = bench.failure();
-    assert!(told.contains("GF") && told.contains("2s"), "{told}");
-    assert_eq!(bench.sent(), ["GF"; 3]);
+    assert!(told.contains("GF") && told.contains("10s"), "{told}");
+    assert_eq!(bench.sent(), ["GF"; 19]);
+    let mut bench = Bench::started(3);
+    bench.begin(1);
+    for _ in 0..4 {
+        bench.wait();
+    }
+    assert!(
+        bench.failure().contains("2s"),
+        "a measurement is not that patient"
+    );
 }
 
 /// The picture comes, but after we gave up waiting: the fence stands behind it.
@@ -354,6 +363,14 @@ fn somebody_elses_trigger_spoils_a_picture_and_is_counted() {
     bench.result(6);
     assert_eq!(bench.pose().samples, 1);
     assert_eq!(bench.counter("strange_triggers"), 1);
+    let mut bench = Bench::measuring(3, 1);
+    for count in [5, 7, 9, 11] {
+        bench.answer("1");
+        bench.result(count);
+        bench.answers(&["1", "uvw.job"]);
+        bench.result(count);
+    }
+    assert!(bench.failure().contains("nobody else triggers"));
 }
 
 #[test]
@@ -425,6 +442,21 @@ fn a_cell_that_holds_no_inspection_is_no_measurement() {
         assert!(bench.failure().contains("GV"), "{cell}");
         assert!(bench.counter("damaged_lines") > 0);
     }
+}
+
+#[test]
+fn a_system_that_boots_is_asked_again_and_its_repeated_answers_do_no_harm() {
+    let mut bench = Bench::new(settings());
+    bench.wait();
+    bench.wait();
+    assert_eq!(bench.sent(), ["GF"; 2]);
+    bench.answers(&["1", "uvw.job"]);
+    assert_eq!(bench.sent(), ["GI", "GF"]);
+    bench.answers(&["1", "uvw.job", "1", "uvw.job"]);
+    assert_eq!(bench.sent(), Vec::<String>::new());
+    bench.answers(&INFO);
+    bench.answers(&["1", "uvw.job"]);
+    assert_eq!(bench.sent(), ["SO1"]);
 }
 
 #[test]

@@ -1,0 +1,52 @@
+//! Whether an image controller's section makes sense.
+
+use drivers::wire::in_sight::Cell;
+
+use super::judge::{Finding, Judge};
+use crate::config::{CameraConfig, MachineConfig};
+
+pub(super) fn check_cameras(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    for (name, camera) in &config.camera {
+        let mut judge = Judge::at(format!("camera.{name}"), findings);
+        if config.instrument.contains_key(name) {
+            judge.say(
+                "",
+                format!("an instrument is called `{name}`, too"),
+                "give every instrument a name of its own",
+            );
+        }
+        check_camera(&mut judge, config, camera);
+    }
+}
+
+fn check_camera(judge: &mut Judge<'_>, config: &MachineConfig, camera: &CameraConfig) {
+    judge.known("line", &camera.line, &config.serial, "serial line");
+    let job = camera.job.to_ascii_lowercase();
+    if !(job.ends_with(".job") || job.ends_with(".jobx")) {
+        judge.say(
+            "job",
+            format!("`{}` is no job", camera.job),
+            "give the name that In-Sight Explorer shows, with `.job` or `.jobx`",
+        );
+    }
+    if Cell::parse(&camera.result_cell).is_none() {
+        judge.say(
+            "result_cell",
+            format!("`{}` is no cell", camera.result_cell),
+            "give a letter and a row, such as \"C7\"",
+        );
+    }
+    judge.within("length_um_per_unit", camera.length_um_per_unit, 1e-6, 1e6);
+    let angle = camera.angle_arcsec_per_unit;
+    judge.within("angle_arcsec_per_unit", angle, 1e-6, 1e6);
+    judge.within("rotation_deg", camera.rotation_deg, -360.0, 360.0);
+    judge.within("targets", camera.targets.into(), 1.0, 100.0);
+    judge.within("score_min_percent", camera.score_min_percent, 0.0, 100.0);
+    judge.within("rejects_max", camera.rejects_max.into(), 0.0, 1000.0);
+    let timeout = camera.inspection_timeout_ms;
+    judge.within("inspection_timeout_ms", timeout, 10.0, 60_000.0);
+    let uncertainty = camera.standard_uncertainty_um;
+    judge.within("standard_uncertainty_um", uncertainty, 0.0, 1e6);
+    let uncertainty = camera.standard_uncertainty_arcsec;
+    judge.within("standard_uncertainty_arcsec", uncertainty, 0.0, 1e6);
+}
