@@ -7,7 +7,8 @@ use drivers::device::{Device, DeviceError, PoseInstrument, PoseReading};
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::in_sight_controller::InSightControllerNode;
 use mock_bus::plant::Pose;
-use tests::{Desk, Emulator, Rig, Setup, rigs};
+use tests::{Desk, Emulator, Rig, Setup, on_every_rig, rigs};
+use truestage::Failure;
 use truestage::camera::in_sight_settings;
 
 type Eye = Desk<InSight>;
@@ -279,4 +280,31 @@ fn a_controller_that_is_not_there_is_a_time_out() {
     let mut eye = desk(Rig::InProcess, &setup);
     let told = eye.start().expect_err("it boots for ever").to_string();
     assert!(told.contains("GF"), "{told}");
+}
+
+#[test]
+fn a_machine_looks_through_its_camera() {
+    on_every_rig(&Setup::uvw(35), |stand| {
+        assert_eq!(stand.machine.camera_names(), ["eye"]);
+        let seen = stand.machine.look("eye", 10)?;
+        let is = stand.simulation(|it| it.truth().platform().expect("it is one").pose());
+        assert!((seen.x - is.x).abs().um() < 0.2, "{seen:?} {is:?}");
+        assert!((seen.y - is.y).abs().um() < 0.2, "{seen:?} {is:?}");
+        let names = stand.machine.device_names();
+        assert_eq!(names, ["u", "v", "w", "eye"]);
+        let identity = &stand.machine.identities()["eye"];
+        assert!(identity.name.contains("platform.job"), "{identity:?}");
+        let counted = stand.machine.counters();
+        assert!(counted.contains(&("eye".to_owned(), "pictures", 10)));
+        let absent = FaultConfig::permanent(Fault::TargetAbsent);
+        stand
+            .simulation(|it| it.inject(absent))
+            .expect("marks can be taken away");
+        let failure = stand.machine.look("eye", 1).expect_err("nothing is there");
+        assert_eq!(failure.exit_code(), 4, "{failure}");
+        assert!(failure.to_string().contains("no target"), "{failure}");
+        let failure = stand.machine.look("ear", 1).expect_err("it is no camera");
+        assert!(matches!(failure, Failure::NoSuchCamera { .. }), "{failure}");
+        Ok(())
+    });
 }

@@ -5,3 +5,4 @@ mod analog;
 mod camera;
 mod drive;
 mod interferometer;
+mod screw;

@@ -47,7 +47,7 @@ impl Client {
                 Event::Payload(Payload::Bytes(bytes)) => {
                     self.said.push_str(core::str::from_utf8(&bytes).unwrap());
                 }
-                Event::BusError(_) | Event::Link(_) => {}
+                Event::Payload(Payload::Control(_)) | Event::BusError(_) | Event::Link(_) => {}
             }
         }
     }

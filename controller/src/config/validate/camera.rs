@@ -50,3 +50,47 @@ fn check_camera(judge: &mut Judge<'_>, config: &MachineConfig, camera: &CameraCo
     let uncertainty = camera.standard_uncertainty_arcsec;
     judge.within("standard_uncertainty_arcsec", uncertainty, 0.0, 1e6);
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::config::{ConfigError, parse};
+
+    const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
+
+    #[track_caller]
+    fn check(from: &str, to: &str, key: &str) {
+        assert!(UVW.contains(from), "{from}");
+        match parse(&UVW.replace(from, to), "uvw.toml") {
+            Err(ConfigError::Invalid { findings }) => {
+                assert!(findings.iter().any(|it| it.key == key), "{findings:?}");
+            }
+            other => panic!("{to}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_shipped_platform_is_sound() {
+        parse(UVW, "uvw.toml").unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    #[test]
+    fn what_no_camera_can_be_is_found_where_it_stands() {
+        check("line = \"vision\"", "line = \"visoin\"", "camera.eye.line");
+        check("platform.job", "platform", "camera.eye.job");
+        check("\"C7\"", "\"C400\"", "camera.eye.result_cell");
+        let key = "camera.eye.length_um_per_unit";
+        check("um_per_unit = 1.0", "um_per_unit = nan", key);
+        let key = "camera.eye.angle_arcsec_per_unit";
+        check("arcsec_per_unit = 1.0", "arcsec_per_unit = 0.0", key);
+        check(
+            "rotation_deg = 0.0",
+            "rotation_deg = inf",
+            "camera.eye.rotation_deg",
+        );
+        check("targets = 2", "targets = 0", "camera.eye.targets");
+        let key = "camera.eye.score_min_percent";
+        check("score_min_percent = 60.0", "score_min_percent = 101.0", key);
+        let key = "camera.eye.inspection_timeout_ms";
+        check("timeout_ms = 2000.0", "timeout_ms = 0.0", key);
+    }
+}
