@@ -208,7 +208,11 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
         .instrument
         .iter()
         .map(|(name, it)| (&*it.line, format!("instrument.{name}.line")));
-    for (line, key) in analogs.chain(instruments) {
+    let cameras = config
+        .camera
+        .iter()
+        .map(|(name, it)| (&*it.line, format!("camera.{name}.line")));
+    for (line, key) in analogs.chain(instruments).chain(cameras) {
         if let Some(owner) = owned.get(line) {
             findings.push(Finding {
                 key,
