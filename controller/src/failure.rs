@@ -10,6 +10,7 @@ use drivers::transport::{LinkState, SendError};
 use units::Metres;
 
 use crate::config::ConfigError;
+use crate::cycle::platform::PlatformFailure;
 use crate::emulated::EmulatedError;
 use crate::store::StoreError;
 
@@ -19,6 +20,9 @@ pub enum Failure {
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A platform did not do what it was asked.
+    #[error(transparent)]
+    Platform(#[from] PlatformFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -386,6 +390,7 @@ impl Failure {
     /// 5 the result is out of tolerance.
     pub const fn exit_code(&self) -> u8 {
         match self {
+            Self::Platform(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }

@@ -25,6 +25,7 @@ use crate::assemble;
 use crate::bus_watch::BusWatch;
 use crate::camera;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::cycle::platform::PlatformState;
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
@@ -111,6 +112,7 @@ pub struct Machine {
     pub(crate) cameras: Vec<Unit<dyn PoseInstrument>>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) memory: BTreeMap<String, AxisMemory>,
+    pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
     /// The instruments and cameras that were started, by name.
@@ -142,6 +144,7 @@ impl Machine {
             port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
             config_hash: loaded.hash.clone(),
             patience: loaded.patience,
+            platform: PlatformState::of(&config),
             config,
             transport,
             outbox: Outbox::default(),
@@ -291,6 +294,9 @@ impl Machine {
         for memory in self.memory.values_mut() {
             memory.zeroed = false;
             memory.approach.forget();
+        }
+        if let Some(platform) = &mut self.platform {
+            platform.forget();
         }
         self.set_sync(true)?;
         let machine_devices = self.axes.len() + self.analogs.len();

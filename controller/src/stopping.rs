@@ -62,6 +62,9 @@ impl Machine {
         for memory in self.memory.values_mut() {
             memory.approach.forget();
         }
+        if let Some(platform) = &mut self.platform {
+            platform.interrupted_before_it_ends();
+        }
         let _ = self.set_sync(false);
         self.supervision = Supervision::Off;
     }

@@ -24,10 +24,8 @@ fn over_serial() -> Setup {
     Setup::uvw_copley(41)
 }
 
-/// The drives of a group start at SYNC.
 fn over_can() -> Setup {
-    let key = "watch_master_ms = 500\n";
-    Setup::uvw(41).machine(key, &format!("{key}synchronous_start = true\n"))
+    Setup::uvw(41)
 }
 
 fn group(rig: Rig, setup: &Setup) -> Group {
@@ -315,7 +313,8 @@ fn on_can_synchronous_drives_start_at_the_same_sync() {
     // One SYNC is one moment for all; their answers follow each other on the bus.
     assert_eq!(truly, Duration::ZERO);
     assert!(told < Duration::from_micros(1500), "{told:?}");
-    let (_, truly) = can_skew(&Setup::uvw(41));
+    let setting = "synchronous_start = true";
+    let (_, truly) = can_skew(&over_can().machine(setting, "synchronous_start = false"));
     assert!(
         truly > Duration::ZERO && truly < Duration::from_millis(1),
         "{truly:?}"

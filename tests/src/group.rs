@@ -2,9 +2,7 @@
 
 use core::time::Duration;
 
-use drivers::device::{
-    Alarm, Axis, AxisCommand, AxisReading, DeviceError, LineUse, may_start_together,
-};
+use drivers::device::{Alarm, Axis, AxisCommand, AxisReading, DeviceError, LineUse};
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::{Payload, Port, Transport};
 use drivers::wire::canopen::NodeId;
@@ -311,9 +309,10 @@ impl Group {
     /// When an axis moved and does not say when it started.
     pub fn start_together(&mut self) -> Result<Start, DeviceError> {
         if let Some(period) = self.sync_period {
+            let before = self.reading(0).at;
             self.live_until(|group| {
-                let samples = group.members.iter().filter_map(|it| it.axis.reading());
-                may_start_together(samples.map(|it| it.at), group.now(), period)
+                let sample = group.reading(0).at;
+                sample != before && group.now().since(sample) * 2 <= period
             });
         }
         for at in 0..self.len() {

@@ -144,10 +144,29 @@ impl Bench {
         emulated: impl Fn(String) -> String,
         wrap: impl FnOnce(drivers::transport::in_process::InProcess<Emulated>) -> Box<dyn Transport>,
     ) -> Self {
+        Self::build(&LINEAR, seed, machine, emulated, wrap)
+    }
+
+    /// Any machine that ships, with changes to its configuration.
+    ///
+    /// # Panics
+    /// When the changed text is none any more.
+    pub fn of(shipped: &Shipped, seed: u64, machine: impl Fn(String) -> String) -> Self {
+        Self::build(shipped, seed, machine, |text| text, |it| Box::new(it))
+    }
+
+    fn build(
+        shipped: &Shipped,
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+        wrap: impl FnOnce(drivers::transport::in_process::InProcess<Emulated>) -> Box<dyn Transport>,
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let loaded = machine_config(folder.path(), machine);
-        let emulated = Emulated::new(&emulated(EMULATED.to_owned()), seed, &loaded.config)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let loaded = shipped_config(shipped, folder.path(), machine);
+        let text = emulated(shipped.emulated.to_owned());
+        let emulated =
+            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
         let store = Store::new(folder.path(), &loaded.config.machine.name);
         Self {

@@ -1,4 +1,5 @@
 //! Whole cycles of whole machines, on every bus and in virtual time.
 
 mod linear;
+mod platform;
 mod virtual_time;

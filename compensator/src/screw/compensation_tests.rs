@@ -204,6 +204,31 @@ fn an_unknown_engagement_is_taken_up_or_owned_up_to() {
 }
 
 #[test]
+fn a_take_up_goes_only_as_far_as_the_play_is_still_open() {
+    let plain = Screw {
+        offset_um: 0.0,
+        slope_um_per_mm: 0.0,
+        ..Screw::PLAIN
+    };
+    let c = made(&plain);
+    // 1.0 of 2.3 µm are taken up in reverse.
+    let memory = c.expected(um(99.0), &forward_at(0.1)).after;
+    check_um(
+        c.take_up_move(&memory, Approach::Reverse).unwrap(),
+        99.0 - 1.3,
+    );
+    check_um(
+        c.take_up_move(&memory, Approach::Forward).unwrap(),
+        99.0 + 1.0,
+    );
+    check_um(
+        c.take_up_move(&forward_at(0.1), Approach::Reverse).unwrap(),
+        100.0 - 2.3,
+    );
+    assert_eq!(c.take_up_move(&forward_at(0.1), Approach::Forward), None);
+}
+
+#[test]
 fn memory_survives_power_off_only_where_the_screw_was_left() {
     let left = forward_at(2.0);
     assert_eq!(left.found_at(um(2000.1), um(0.5)), left);

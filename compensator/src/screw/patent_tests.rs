@@ -106,12 +106,12 @@ fn unequal_repeats_are_weighed_as_they_are() {
     assert!((u.slope - expected).abs() < 1e-12);
 }
 
-/// Seeds 0 to 399, 3 strokes of 12 rows from either side: the squares of (estimate − truth)/u
+/// Seeds 0 to 3999, 3 strokes of 12 rows from either side: the squares of (estimate − truth)/u
 /// average 1 within three standard deviations of such an average.
 #[test]
 fn the_uncertainties_are_honest() {
     let mut squares = [0.0; 2];
-    for seed in 0..400 {
+    for seed in 0..4000 {
         let mut noise = Noise(seed);
         let mut rows = Vec::new();
         for stroke in [500.0, 1000.0, 1500.0] {
@@ -129,8 +129,11 @@ fn the_uncertainties_are_honest() {
     }
     // 30 degrees of freedom: mean 30/28 = 1.07, standard deviation of one square 1.6.
     for square in squares {
-        let mean = square / 400.0;
-        assert!((mean - 1.07).abs() < 3.0 * 1.6 / 20.0, "{mean}");
+        let mean = square / 4000.0;
+        assert!(
+            (mean - 1.07).abs() < 3.0 * 1.6 / 4000.0_f64.sqrt(),
+            "{mean}"
+        );
     }
 }
 

@@ -5,6 +5,7 @@ mod data;
 mod demo;
 mod output;
 mod page;
+mod platform;
 mod progress;
 mod scan;
 mod screw;
@@ -124,9 +125,12 @@ struct VerifyArgs {
 struct MoveArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// Where to: `x=12.5mm`, `x=-300um`.
+    /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`.
     #[arg(value_name = "AXIS=LENGTH")]
     targets: Vec<String>,
+    /// A platform moves on until the image agrees.
+    #[arg(long)]
+    align: bool,
 }
 
 impl MoveArgs {
@@ -141,6 +145,19 @@ impl MoveArgs {
     }
 }
 
+/// What a verb does depends on what the configuration describes.
+fn either(
+    machine: &MachineArgs,
+    of_a_platform: impl FnOnce() -> output::Ended,
+    of_an_axis: impl FnOnce() -> output::Ended,
+) -> output::Ended {
+    if platform::is_described_by(&machine.config)? {
+        of_a_platform()
+    } else {
+        of_an_axis()
+    }
+}
+
 /// Runs the command line of this process.
 pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -150,10 +167,29 @@ pub(crate) fn main() -> ExitCode {
         Command::Check { config } => verbs::check(&config, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => verbs::reset(&args, output),
-        Command::Zero(args) => verbs::zero(&args, output),
-        Command::Calibrate(args) => verbs::calibrate(&args, output),
-        Command::Verify(args) => verbs::verify(&args, output),
-        Command::Move(args) => verbs::move_to(&args.settle(), output),
+        Command::Zero(args) => either(
+            &args.machine,
+            || platform::zero(&args, output),
+            || verbs::zero(&args, output),
+        ),
+        Command::Calibrate(args) => either(
+            &args.axis.machine,
+            || platform::calibrate(&args, output),
+            || verbs::calibrate(&args, output),
+        ),
+        Command::Verify(args) => either(
+            &args.axis.machine,
+            || platform::verify(&args, output),
+            || verbs::verify(&args, output),
+        ),
+        Command::Move(args) => {
+            let args = args.settle();
+            either(
+                &args.machine,
+                || platform::move_to(&args, output),
+                || verbs::move_to(&args, output),
+            )
+        }
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),

@@ -232,6 +232,12 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    if args.align {
+        return Err(Failure::Usage {
+            what: "--align is for platforms, which a camera sees".into(),
+            help: "leave it out".into(),
+        });
+    }
     if args.targets.is_empty() {
         return Err(Failure::Usage {
             what: "`move` needs a target".into(),

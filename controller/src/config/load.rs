@@ -85,7 +85,12 @@ fn calibration_hash(config: &MachineConfig) -> String {
             }
         })
         .collect();
-    let text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    let mut text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
+    for it in config.platform.iter().flat_map(|it| &it.actuator) {
+        // Points and directions turn what the camera sees into strokes; the index is their zero.
+        let place = (it.point_mm, it.direction, it.lead_mm, it.index_mm);
+        text += &format!("\n{} {place:?}", it.axis);
+    }
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
@@ -338,6 +343,34 @@ mod tests {
             usual.options.abort_connection
         );
         assert_eq!(told.home_offset, HomeOffset::IsZeroFromHome);
+    }
+
+    #[test]
+    fn the_hash_of_a_platform_follows_where_its_screws_push() {
+        const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+        let hash = |text: &str| parse(text, "m").unwrap().hash;
+        let moved = UVW.replacen("point_mm = [-80.0, 80.0]", "point_mm = [-80.0, 81.0]", 1);
+        let slower = UVW.replacen("settle_ms = 30", "settle_ms = 40", 1);
+        assert_ne!(hash(UVW), hash(&moved));
+        assert_eq!(hash(UVW), hash(&slower));
+    }
+
+    #[test]
+    fn a_platform_that_nothing_holds_or_reaches_is_refused_with_the_reason() {
+        const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+        let refused = |from: &str, to: &str| {
+            let text = UVW.replacen(from, to, 1);
+            assert_ne!(text, UVW, "{from}");
+            parse(&text, "m").unwrap_err().to_string()
+        };
+        let all_along_x = refused("direction = [0.0, 1.0]", "direction = [1.0, 0.0]");
+        assert!(all_along_x.contains("actuator"), "{all_along_x}");
+        let too_far = refused("x_max_mm = 1.5", "x_max_mm = 4.5");
+        assert!(too_far.contains("the screws do not"), "{too_far}");
+        let blind = refused("camera = \"eye\"", "camera = \"ear\"");
+        assert!(blind.contains("there is no camera `ear`"), "{blind}");
+        let turning = refused("overrun_mm = 0.1", "overrun_mm = 0.001");
+        assert!(turning.contains("overrun_mm"), "{turning}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod camera;
 mod diagnostic;
 mod load;
 mod model;
+mod platform;
 mod validate;
 
 pub use camera::{CameraConfig, CameraDevice};
@@ -17,4 +18,8 @@ pub use model::{
     CanBus, CanTransport, CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig,
     InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig, MachineSection,
     OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+};
+pub use platform::{
+    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
+    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };

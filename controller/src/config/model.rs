@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::camera::CameraConfig;
+use super::platform::PlatformConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -32,6 +33,8 @@ pub struct MachineConfig {
     /// Image controllers by name.
     #[serde(default)]
     pub camera: BTreeMap<String, CameraConfig>,
+    /// The alignment platform that the axes move, if they move one.
+    pub platform: Option<PlatformConfig>,
 }
 
 /// Who the machine is, and where its records live.

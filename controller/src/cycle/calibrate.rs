@@ -235,7 +235,7 @@ pub(super) fn missing(axis: &str, section: &'static str) -> Failure {
     }
 }
 
-pub(super) fn note_failure(journal: &mut Journal, failure: &Failure) {
+pub(crate) fn note_failure(journal: &mut Journal, failure: &Failure) {
     // The failure itself is on its way to the operator; a journal that cannot take the note
     // as well changes nothing about it.
     let _ = journal.write(&Entry::Failed {

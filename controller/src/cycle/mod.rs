@@ -6,6 +6,7 @@ mod calibrate;
 mod cross_check;
 mod datum;
 mod measure;
+pub mod platform;
 mod scan;
 mod travel;
 mod verify;
@@ -17,6 +18,7 @@ pub use scan::Found;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;
 
+pub(crate) use calibrate::note_failure;
 pub(crate) use datum::Datum;
 pub use measure::series_of;
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::pose::{PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
 
@@ -106,6 +107,10 @@ pub enum Entry {
     Point(PointEntry),
     /// A zero.
     Zero(ZeroEntry),
+    /// A stroke of one screw of a platform.
+    Stroke(StrokeEntry),
+    /// A pose of a platform that was looked at.
+    Pose(PoseEntry),
     /// A run is whole, and the place of its datum still reads what it should.
     Closed(ClosureEntry),
     /// The run was continued here after an interruption.
@@ -223,6 +228,10 @@ pub struct ReadJournal {
     pub zeros: Vec<ZeroEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
+    /// Strokes of a platform's screws.
+    pub strokes: Vec<StrokeEntry>,
+    /// Poses of a platform.
+    pub poses: Vec<PoseEntry>,
     /// Whether the run was finished.
     pub complete: bool,
     /// How many bytes are whole lines.
@@ -369,6 +378,8 @@ fn take(
                 points: Vec::new(),
                 zeros: Vec::new(),
                 closures: Vec::new(),
+                strokes: Vec::new(),
+                poses: Vec::new(),
                 complete: false,
                 valid_bytes: 0,
                 torn: false,
@@ -378,6 +389,8 @@ fn take(
         (Entry::Point(point), Some(read)) => read.points.push(point),
         (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
         (Entry::Closed(closure), Some(read)) => read.closures.push(closure),
+        (Entry::Stroke(stroke), Some(read)) => read.strokes.push(stroke),
+        (Entry::Pose(pose), Some(read)) => read.poses.push(pose),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;
             read.keep_whole_runs();

@@ -14,6 +14,7 @@ mod atomic;
 mod calibration;
 mod journal;
 mod lease;
+mod pose;
 mod record;
 
 use std::path::{Path, PathBuf};
@@ -23,6 +24,7 @@ pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
+pub use pose::{PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
     CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,
     InstrumentRecord, LinearContent, NodeRecord, ReadingName, RecordHead, RotaryContent,

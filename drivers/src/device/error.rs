@@ -1,7 +1,8 @@
-//! Why a command failed, who speaks, and what was last seen.
+//! Why a device failed at what it was told: where, what was awaited, what was seen.
 
 use core::fmt;
 use core::time::Duration;
+
 use units::LengthOrAngle;
 
 use super::Alarm;

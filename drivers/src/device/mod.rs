@@ -15,7 +15,6 @@ mod fake_node;
 pub mod in_sight;
 pub mod serial_line;
 mod shared_line;
-mod start_window;
 pub mod umd2;
 
 use units::{Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts};
@@ -23,7 +22,6 @@ use units::{Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumid
 pub use alarm::{Alarm, AmplifierTrouble};
 pub use error::{DeviceError, DeviceName, Seen};
 pub use shared_line::{LineUse, Urgency};
-pub use start_window::may_start_together;
 
 use crate::transport::Input;
 use crate::wire::Payload;

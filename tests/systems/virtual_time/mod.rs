@@ -3,5 +3,6 @@
 
 mod linear;
 mod linear_zero;
+mod platform;
 mod repeatable;
 mod serial_zero;

@@ -4,6 +4,7 @@ mod axis;
 mod camera;
 mod cycle;
 mod judge;
+mod platform;
 
 use std::collections::BTreeMap;
 
@@ -69,6 +70,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
     }
     check_cameras(config, &mut findings);
+    platform::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.

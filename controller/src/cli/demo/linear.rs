@@ -1,29 +1,20 @@
-//! `truestage demo`: the whole cycle on an emulated machine, over real protocols.
-//!
-//! The emulated devices run in a thread of their own behind pseudo-terminals: CAN as SLCAN,
-//! the interferometer as a serial line. The controller side is the one of every other verb.
+//! The linear stage: zero by Hall sensors, error table by interferometer, power cycles.
 
-use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use clap::Args;
 use compensator::iso230::Figures;
 use serde_json::{Value, json};
-use truestage::config::{self, Loaded};
 use truestage::cycle::{CalibrateOptions, Calibrated, Verified, VerifyOptions, Zeroed};
 use truestage::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
 use truestage::report::{self, Page, Section};
-use truestage::store::{Lease, ZeroEntry, read_journal};
-use truestage::{Failure, Machine, Store, json as to_json, ports, text};
+use truestage::store::{ZeroEntry, read_journal};
+use truestage::{Failure, Machine, Store, json as to_json, text};
 use units::{Metres, Volts};
 
-use super::output::{Ended, Output};
-use super::progress::Bars;
-use super::session::stop_on_signals;
+use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
+use crate::cli::output::Output;
 
-const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
-const LINEAR_EMULATED: &str = include_str!("../../../configs/emulated/linear.toml");
 const AXIS: &str = "x";
 /// What aged, warmed and disturbed Hall sensors may do between two power-ups.
 const DRIFT: DriftLimits = DriftLimits {
@@ -31,27 +22,6 @@ const DRIFT: DriftLimits = DriftLimits {
     gain: 0.03,
     gain_per_m: 0.0,
 };
-/// How long the mains stays off, and what the drives take to boot, in machine time.
-const POWER_OFF: Duration = Duration::from_millis(800);
-
-#[derive(Debug, Args)]
-pub(super) struct DemoArgs {
-    /// Which machine.
-    #[arg(long, default_value = "linear")]
-    machine: String,
-    /// The emulated stage's errors, noise and drift; the same seed is the same stage.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// How much faster than real time the emulated machine lives.
-    #[arg(long, default_value_t = 10.0)]
-    speed: f64,
-    /// How often the power is cycled.
-    #[arg(long, default_value_t = 3)]
-    power_cycles: u64,
-    /// Where calibrations, runs and the report go; the configuration's folder if not given.
-    #[arg(long)]
-    data_dir: Option<PathBuf>,
-}
 
 /// One zero after a power cycle, and where two methods put it.
 struct Rezero {
@@ -72,65 +42,21 @@ struct Story {
     after: Verified,
 }
 
-pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
-    let started = Instant::now();
-    let loaded = load(args)?;
-    let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
-    let _lease = Lease::take(&store, "demo")?;
-    let emulated = EmulatedOnPtys::start(LINEAR_EMULATED, args.seed, args.speed)?;
-    let transport = ports::open(
-        &loaded.config,
-        &emulated.overrides(&loaded.config)?,
-        ports::Use::Measurement,
-        args.speed,
-    )?;
-    let mut machine = Machine::new(&loaded, Box::new(transport));
-    machine.observe(Box::new(Bars::new(
-        output.is_json() || !std::io::stderr().is_terminal(),
-    )));
-    stop_on_signals(&machine.stop_request())?;
-    announce(args, &loaded, &emulated, output);
-    let story = machine.guarded(|machine| tell(machine, &store, &emulated, args, output))?;
-    let report = write_report(&store, &story)?;
-    let text = summary(&story, &report, started.elapsed(), args.speed);
-    let value = to_value(&story, &report, started.elapsed());
-    match out_of_tolerance(&story) {
-        None => output.result(&text, &value),
-        Some(failure) => output.bad_result(&text, value, failure),
-    }
-}
-
-fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
-    if args.machine != "linear" {
-        return Err(Failure::Usage {
-            what: format!("there is no emulated machine `{}`", args.machine),
-            help: "known: linear".into(),
-        });
-    }
-    if !(args.speed.is_finite() && args.speed > 0.0) {
-        return Err(Failure::Usage {
-            what: format!("a speed of {}", args.speed),
-            help: "give a positive number; 1 is real time".into(),
-        });
-    }
-    let mut loaded = config::parse(LINEAR, "configs/machines/linear.toml")?;
-    loaded.patience = ports::patience(args.speed);
-    if let Some(folder) = &args.data_dir {
-        loaded.config.machine.data_dir.clone_from(folder);
-    }
-    Ok(loaded)
-}
-
-fn announce(args: &DemoArgs, loaded: &Loaded, emulated: &EmulatedOnPtys, output: Output) {
-    let machine = &loaded.config.machine;
-    output.note(&format!(
-        "truestage demo: emulated machine `{}` (stage {}), seed {}, {}× real time",
-        machine.name, machine.stage_serial, args.seed, args.speed
-    ));
-    for line in emulated.description() {
-        output.note(&format!("  {line}"));
-    }
+pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+    let Stand {
+        machine,
+        store,
+        emulated,
+        started,
+    } = stand;
+    let story = machine.guarded(|machine| tell(machine, store, emulated, args, output))?;
+    let report = write_report(store, &story)?;
+    let wall = started.elapsed();
+    Ok(Shown {
+        text: summary(&story, &report, wall, args.speed),
+        value: to_value(&story, &report, wall),
+        bad: out_of_tolerance(&story),
+    })
 }
 
 fn tell(
@@ -254,10 +180,7 @@ fn summary(story: &Story, report: &std::path::Path, wall: Duration, speed: f64) 
         String::new(),
         format!("calibration  {} (active)", story.calibrated.path.display()),
         format!("report       {}", report.display()),
-        format!(
-            "took {:.1} s; the emulated machine lived {speed}× faster",
-            wall.as_secs_f64()
-        ),
+        took(wall, speed),
     ]);
     lines.join("\n")
 }

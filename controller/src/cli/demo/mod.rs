@@ -1,0 +1,158 @@
+//! `truestage demo`: the whole cycle on an emulated machine, over real protocols.
+//!
+//! The emulated devices run in a thread of their own behind pseudo-terminals: CAN as SLCAN,
+//! everything else as serial lines. The controller side is the one of every other verb.
+
+mod linear;
+mod uvw;
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde_json::Value;
+use truestage::config::{self, Loaded};
+use truestage::emulated::EmulatedOnPtys;
+use truestage::store::Lease;
+use truestage::{Failure, Machine, Store, ports};
+
+use super::output::{Ended, Output};
+use super::progress::Bars;
+use super::session::stop_on_signals;
+
+/// How long the mains stays off, and what the drives take to boot, in machine time.
+const POWER_OFF: Duration = Duration::from_millis(800);
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArgs {
+    /// Which machine.
+    #[arg(long, value_enum, default_value_t = Which::Linear)]
+    machine: Which,
+    /// The emulated stage's errors, noise and drift; the same seed is the same stage.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How much faster than real time the emulated machine lives.
+    #[arg(long, default_value_t = 10.0)]
+    speed: f64,
+    /// How often the power is cycled.
+    #[arg(long, default_value_t = 3)]
+    power_cycles: u64,
+    /// Where calibrations, runs and the report go; the configuration's folder if not given.
+    #[arg(long)]
+    data_dir: Option<PathBuf>,
+}
+
+/// The machines there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// A linear-motor stage with Hall sensors and a laser interferometer.
+    Linear,
+    /// An alignment platform on three screws, seen by an image controller.
+    Uvw,
+}
+
+impl Which {
+    /// Where its configuration ships, that configuration, and what it is emulated from.
+    const fn files(self) -> [&'static str; 3] {
+        match self {
+            Self::Linear => [
+                "configs/machines/linear.toml",
+                include_str!("../../../../configs/machines/linear.toml"),
+                include_str!("../../../../configs/emulated/linear.toml"),
+            ],
+            Self::Uvw => [
+                "configs/machines/uvw.toml",
+                include_str!("../../../../configs/machines/uvw.toml"),
+                include_str!("../../../../configs/emulated/uvw.toml"),
+            ],
+        }
+    }
+}
+
+/// A machine to show, and its emulation.
+struct Stand {
+    machine: Machine,
+    store: Store,
+    emulated: EmulatedOnPtys,
+    started: Instant,
+}
+
+/// What was shown.
+struct Shown {
+    text: String,
+    value: Value,
+    /// What is out of tolerance, if anything is.
+    bad: Option<Failure>,
+}
+
+pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
+    let started = Instant::now();
+    let loaded = load(args)?;
+    let section = &loaded.config.machine;
+    let store = Store::new(&section.data_dir, &section.name);
+    let _lease = Lease::take(&store, "demo")?;
+    let [_, _, description] = args.machine.files();
+    let emulated = EmulatedOnPtys::start(description, args.seed, args.speed)?;
+    let transport = ports::open(
+        &loaded.config,
+        &emulated.overrides(&loaded.config)?,
+        ports::Use::Measurement,
+        args.speed,
+    )?;
+    let mut machine = Machine::new(&loaded, Box::new(transport));
+    machine.observe(Box::new(Bars::new(
+        output.is_json() || !std::io::stderr().is_terminal(),
+    )));
+    stop_on_signals(&machine.stop_request())?;
+    announce(args, &loaded, &emulated, output);
+    let mut stand = Stand {
+        machine,
+        store,
+        emulated,
+        started,
+    };
+    let shown = match args.machine {
+        Which::Linear => linear::show(&mut stand, args, output),
+        Which::Uvw => uvw::show(&mut stand, args, output),
+    }?;
+    match shown.bad {
+        None => output.result(&shown.text, &shown.value),
+        Some(failure) => output.bad_result(&shown.text, shown.value, failure),
+    }
+}
+
+fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
+    if !(args.speed.is_finite() && args.speed > 0.0) {
+        return Err(Failure::Usage {
+            what: format!("a speed of {}", args.speed),
+            help: "give a positive number; 1 is real time".into(),
+        });
+    }
+    let [path, text, _] = args.machine.files();
+    let mut loaded = config::parse(text, path)?;
+    loaded.patience = ports::patience(args.speed);
+    if let Some(folder) = &args.data_dir {
+        loaded.config.machine.data_dir.clone_from(folder);
+    }
+    Ok(loaded)
+}
+
+fn announce(args: &DemoArgs, loaded: &Loaded, emulated: &EmulatedOnPtys, output: Output) {
+    let machine = &loaded.config.machine;
+    output.note(&format!(
+        "truestage demo: emulated machine `{}` (stage {}), seed {}, {}× real time",
+        machine.name, machine.stage_serial, args.seed, args.speed
+    ));
+    for line in emulated.description() {
+        output.note(&format!("  {line}"));
+    }
+}
+
+/// The last line of every demonstration.
+fn took(wall: Duration, speed: f64) -> String {
+    format!(
+        "took {:.1} s; the emulated machine lived {speed}× faster",
+        wall.as_secs_f64()
+    )
+}

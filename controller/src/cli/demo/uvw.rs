@@ -1,0 +1,112 @@
+//! The alignment platform: index pulses, one model a screw by the camera, poses, alignment.
+
+use serde_json::json;
+use truestage::cycle::platform::{Aligned, PlatformCalibrated, PlatformVerified, Pose};
+use truestage::emulated::HallDrift;
+use truestage::{Failure, json as to_json};
+use units::{Metres, Radians};
+
+use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
+use crate::cli::output::Output;
+use crate::cli::platform::{
+    calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
+};
+
+/// Everything the demonstration found.
+struct Story {
+    found: PlatformVerified,
+    calibrated: PlatformCalibrated,
+    left: PlatformVerified,
+    after: PlatformVerified,
+    aligned: Aligned,
+}
+
+pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+    let story = tell(stand, args, output)?;
+    let wall = stand.started.elapsed();
+    let bad = [&story.left, &story.after];
+    let bad = bad.into_iter().find(|it| !it.is_within_tolerance());
+    Ok(Shown {
+        text: [
+            String::new(),
+            verified_text("as found", &story.found),
+            String::new(),
+            calibrated_text(&story.calibrated),
+            String::new(),
+            verified_text("as left", &story.left),
+            verified_text("after a power cycle", &story.after),
+            format!(
+                "aligned by the image in {} moves: {:.3} µm off after the first, {:.3} µm then",
+                story.aligned.moves,
+                story.aligned.open_loop.um(),
+                story.aligned.left.um()
+            ),
+            String::new(),
+            took(wall, args.speed),
+        ]
+        .join("\n"),
+        value: json!({
+            "as_found": verified_value(&story.found),
+            "calibration": calibrated_value(&story.calibrated),
+            "as_left": verified_value(&story.left),
+            "as_left_after_power_cycle": verified_value(&story.after),
+            "alignment": {
+                "moves": story.aligned.moves,
+                "open_loop_um": to_json::um(story.aligned.open_loop),
+                "left_um": to_json::um(story.aligned.left),
+            },
+            "wall_s": wall.as_secs_f64(),
+        }),
+        bad: bad.map(out_of_tolerance),
+    })
+}
+
+fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Failure> {
+    let Stand {
+        machine,
+        store,
+        emulated,
+        ..
+    } = stand;
+    machine.guarded(|machine| {
+        output.note("1 start: identities, set-up, supervision");
+        machine.start()?;
+        output.note("2 zero: every screw on its index pulse, reached forward");
+        machine.zero_platform(store)?;
+        output.note("3 as found: poses all over the work range, seen by the camera");
+        let found = machine.verify_platform(store, false)?;
+        machine.move_pose(Pose::default())?;
+        output.note("4 calibrate: lead error, periodic error and lost motion of each screw");
+        let calibrated = machine.calibrate_platform(store)?;
+        output.note("5 as left: the same poses, compensated, open loop");
+        let left = machine.verify_platform(store, true)?;
+        output.note("6 power off and on; zero again, as left");
+        machine.shut_down()?;
+        emulated.power_cycle(HallDrift::default())?;
+        let back = machine.now() + POWER_OFF;
+        machine.run_until(back)?;
+        machine.start()?;
+        machine.zero_platform(store)?;
+        let after = machine.verify_platform(store, true)?;
+        output.note("7 align: move until the image agrees");
+        let aligned = machine.align_pose(somewhere(args.seed))?;
+        machine.shut_down()?;
+        Ok(Story {
+            found,
+            calibrated,
+            left,
+            after,
+            aligned,
+        })
+    })
+}
+
+/// Another pose for each seed.
+fn somewhere(seed: u64) -> Pose {
+    let place = |step: f64| ((seed as f64 * step).fract() - 0.5) * 2.0;
+    Pose {
+        x: Metres::from_mm(place(0.618)),
+        y: Metres::from_mm(place(0.414)),
+        angle: Radians::from_arcsec(900.0 * place(0.732)),
+    }
+}

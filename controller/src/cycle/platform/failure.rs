@@ -1,0 +1,102 @@
+//! What can go wrong with a platform beyond what can go wrong with its axes.
+
+use compensator::platform::{ForwardError, OutOfReach, PathError};
+use compensator::screw;
+use units::Metres;
+
+/// Why a platform did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum PlatformFailure {
+    /// The machine has no platform.
+    #[error("this machine is no platform: its configuration has no [platform]")]
+    None,
+    /// A section of the configuration is missing.
+    #[error("[platform.{section}] is missing in the configuration")]
+    NotConfigured {
+        /// Which section.
+        section: &'static str,
+    },
+    /// No origin since the screws were last powered.
+    #[error("platform: not zeroed since power-on; run `truestage zero` first")]
+    NotZeroed,
+    /// The pose is out of the actuators' reach.
+    #[error("{0}; nothing was moved")]
+    OutOfReach(#[from] OutOfReach),
+    /// The pose is outside the work range.
+    #[error(
+        "platform: {what} = {seen:.6} {unit} is outside the work range of ±{limit} {unit}; nothing \
+         was moved"
+    )]
+    OutOfRange {
+        /// Which coordinate.
+        what: &'static str,
+        /// Its value.
+        seen: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The largest magnitude allowed.
+        limit: f64,
+    },
+    /// The way to the pose is out of reach.
+    #[error("{0}; nothing was moved")]
+    Path(#[from] PathError),
+    /// A screw's stroke is outside what was calibrated.
+    #[error("axis {axis}: {source}; nothing was moved")]
+    OutOfCalibration {
+        /// Which axis.
+        axis: String,
+        /// Where.
+        source: screw::OutOfRange,
+    },
+    /// Strokes that belong to no pose.
+    #[error(transparent)]
+    Forward(#[from] ForwardError),
+    /// The strokes measured give no model.
+    #[error("axis {axis}: {source}; nothing was stored")]
+    Fit {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: screw::FitError,
+    },
+    /// The image does not agree after all moves allowed.
+    #[error(
+        "platform: after {moves} moves the image still differs by {:.3} µm, the tolerance is {:.3} µm",
+        seen.um(), limit.um()
+    )]
+    NotAligned {
+        /// How many moves were made.
+        moves: u32,
+        /// The largest error, angle at the edge included.
+        seen: Metres,
+        /// The tolerance.
+        limit: Metres,
+    },
+    /// A pose verified is out of tolerance.
+    #[error(
+        "platform: largest error {:.3} µm, the tolerance is {:.3} µm",
+        seen.um(), limit.um()
+    )]
+    OutOfTolerance {
+        /// The largest error, angle at the edge included.
+        seen: Metres,
+        /// The tolerance.
+        limit: Metres,
+    },
+}
+
+impl PlatformFailure {
+    /// As [`crate::Failure::exit_code`].
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::None | Self::NotConfigured { .. } => 2,
+            Self::NotZeroed
+            | Self::OutOfReach(_)
+            | Self::OutOfRange { .. }
+            | Self::Path(_)
+            | Self::OutOfCalibration { .. } => 3,
+            Self::Forward(_) => 4,
+            Self::Fit { .. } | Self::NotAligned { .. } | Self::OutOfTolerance { .. } => 5,
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! The cycle of an alignment platform (system S1): its pose is made of the strokes of three or
+//! four screws, and seen by a camera.
+//!
+//! deviation of a screw = stroke by the camera − stroke commanded, where the camera's pose is
+//! turned into strokes by the exact kinematics, counted from the pose in which all screws stand
+//! at their zero, reached forward.
+
+mod calibrate;
+mod failure;
+mod look;
+mod moves;
+mod state;
+mod verify;
+mod zero;
+
+pub use calibrate::{PlatformCalibrated, ScrewCalibrated};
+pub use compensator::platform::Pose;
+pub use failure::PlatformFailure;
+pub use moves::PoseMoved;
+pub use verify::{Aligned, PlatformVerified, PoseChecked};
+pub use zero::PlatformZeroed;
+
+pub(crate) use state::{PlatformState, kinematics};

@@ -1,0 +1,84 @@
+//! What a journal says of a platform.
+
+use compensator::platform::Pose;
+use serde::{Deserialize, Serialize};
+use units::{Metres, Radians};
+
+/// A pose, metres and radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the names carry quantity and unit")]
+pub struct PoseRecord {
+    pub x_m: f64,
+    pub y_m: f64,
+    pub angle_rad: f64,
+}
+
+impl From<Pose> for PoseRecord {
+    fn from(pose: Pose) -> Self {
+        Self {
+            x_m: pose.x.value(),
+            y_m: pose.y.value(),
+            angle_rad: pose.angle.value(),
+        }
+    }
+}
+
+impl From<PoseRecord> for Pose {
+    fn from(record: PoseRecord) -> Self {
+        Self {
+            x: Metres(record.x_m),
+            y: Metres(record.y_m),
+            angle: Radians(record.angle_rad),
+        }
+    }
+}
+
+/// A stroke of one screw, seen by the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StrokeEntry {
+    /// Which axis.
+    pub axis: String,
+    /// Which run, from 1.
+    pub run: u32,
+    /// `+` or `-`.
+    pub approach: char,
+    /// Where the screw was commanded to, metres.
+    pub stroke_m: f64,
+    /// Where the camera's pose says that it pushed the platform, metres.
+    pub measured_m: f64,
+    /// That pose, seen from the pose zero.
+    pub pose: PoseRecord,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+/// A pose that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseEntry {
+    /// Where the platform was told to be; `None` where only its place was asked for.
+    pub target: Option<PoseRecord>,
+    /// What each screw was commanded, in the order of the configuration, metres.
+    pub set_points_m: Vec<f64>,
+    /// Where the camera saw it.
+    pub seen: PoseRecord,
+    /// From the start of the first screw to that of the last, seconds.
+    pub skew_s: Option<f64>,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+impl PoseEntry {
+    /// A look without a move.
+    pub fn looked(seen: Pose, at_s: f64) -> Self {
+        Self {
+            target: None,
+            set_points_m: Vec::new(),
+            seen: seen.into(),
+            skew_s: None,
+            at_s,
+        }
+    }
+}
