@@ -222,3 +222,83 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::config::{ConfigError, parse};
+
+    const DRIVES: &str = include_str!("../../../../configs/machines/uvw.toml");
+    const AMPLIFIERS: &str = include_str!("../../../../configs/machines/uvw-copley.toml");
+
+    /// The finding at `key` after `from`, once, has become `to`.
+    #[track_caller]
+    fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
+        assert!(text.contains(from), "{from}");
+        match parse(&text.replacen(from, to, 1), "machine.toml") {
+            Err(ConfigError::Invalid { findings }) => {
+                let told = findings
+                    .iter()
+                    .any(|it| it.key == key && it.cause.contains(says));
+                assert!(told, "{findings:?}");
+            }
+            other => panic!("{to}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_same_platform_is_sound_on_either_bus() {
+        for text in [DRIVES, AMPLIFIERS] {
+            parse(text, "machine.toml").unwrap_or_else(|error| panic!("{error}"));
+        }
+    }
+
+    #[test]
+    fn each_device_needs_its_own_keys_and_has_no_others() {
+        let says = "a cia402 axis needs `heartbeat_producer_ms`";
+        let key = "axis.u.device";
+        check(DRIVES, "heartbeat_producer_ms = 50\n", "", key, says);
+        let says = "a copley axis needs `line`, `poll_period_ms`";
+        let both = "line = \"amps\"\naddress = 0                    # at the cable\n";
+        let gone = AMPLIFIERS.replacen(both, "address = 0\n", 1);
+        check(&gone, "poll_period_ms = 20.0\n", "", key, says);
+        let says = "a copley axis has no such key";
+        for (stranger, key) in [
+            ("watch_master_ms = 500\n", "axis.u.watch_master_ms"),
+            ("synchronous_start = true\n", "axis.u.synchronous_start"),
+        ] {
+            let to = format!("device = \"copley\"\n{stranger}");
+            check(AMPLIFIERS, "device = \"copley\"\n", &to, key, says);
+        }
+        let to = "device = \"cia402\"\naddress = 1\n";
+        let says = "a cia402 axis has no such key";
+        check(DRIVES, "device = \"cia402\"\n", to, "axis.u.address", says);
+    }
+
+    #[test]
+    fn what_a_line_of_amplifiers_cannot_be_is_found_where_it_stands() {
+        let again = "amplifier 1 on amps is already axis.v.address";
+        let (from, key) = ("address = 2", "axis.w.address");
+        check(AMPLIFIERS, from, "address = 1", key, again);
+        check(AMPLIFIERS, from, "address = 128", key, "128");
+        let (from, key) = ("baud_bit_per_s = 115200        #", "axis.u.line");
+        let to = "baud_bit_per_s = 14400 #";
+        check(AMPLIFIERS, from, to, key, "no rate of an amplifier");
+        let (from, key) = ("line = \"vision\"", "camera.eye.line");
+        let says = "amps belongs to amplifiers (axis.u.address)";
+        check(AMPLIFIERS, from, "line = \"amps\"", key, says);
+        let (from, key) = ("line = \"amps\"", "axis.u.line");
+        check(AMPLIFIERS, from, "line = \"ampz\"", key, "ampz");
+        let (from, key) = ("poll_period_ms = 20.0", "axis.u.poll_period_ms");
+        check(AMPLIFIERS, from, "poll_period_ms = 0.0", key, "");
+    }
+
+    #[test]
+    fn a_hall_search_over_a_serial_line_is_refused() {
+        let linear = include_str!("../../../../configs/machines/linear.toml");
+        let begin = linear.find("[axis.x.zero]").expect("it has a zero");
+        let end = linear.find("[axis.x.calibrate]").expect("it comes next");
+        let zero = linear[begin..end].replace("axis.x", "axis.u");
+        let text = format!("{AMPLIFIERS}\n{zero}");
+        check(&text, "", "", "axis.u.zero", "voltages of one SYNC");
+    }
+}
