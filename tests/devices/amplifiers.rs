@@ -343,7 +343,7 @@ fn a_lost_ok_to_a_start_is_resolved_by_asking_and_never_by_starting_again() {
         for at in 0..3 {
             assert_eq!(starts(group, at, from), 1, "axis {at}");
         }
-        // The line was being cleaned meanwhile: the skew says so.
+        // The line was being cleaned before the others were told: the skew says so.
         assert!(start.skew > Duration::from_millis(100), "{start:?}");
         Ok(())
     });

@@ -76,7 +76,8 @@ pub trait ServoDrive: Device {
     fn is_homed(&self) -> bool;
 
     /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
-    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`. `None`
+    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`; when
+    /// that was lost, the moment it was to start, since the motion may be as old. `None`
     /// before the first motion and from a new command until its motion begins.
     fn started_at(&self) -> Option<Time>;
 }
