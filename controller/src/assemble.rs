@@ -4,18 +4,20 @@
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
 mod copley;
+mod patience;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
 
 pub use copley::copley_settings;
+use patience::{patient_drive, patient_node, patient_pdos};
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use compensator::hall_zero;
 use compensator::length_correction::{
     self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
 };
-use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings, NodeTimeouts};
+use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
@@ -25,7 +27,6 @@ use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use drivers::transport::Port;
 use drivers::wire::canopen::NodeId;
 use units::{
@@ -208,42 +209,6 @@ fn node_settings(
         missed_pdos_max: patient_pdos(&usual, millis(consumer), patience),
         timeouts: patient_node(usual.timeouts, patience),
         ..usual
-    }
-}
-
-/// Where the clock is faster than the wall's, a pause of the host silences process data and
-/// heartbeats alike, so they are waited for alike.
-fn patient_pdos(usual: &NodeSettings, consumer_time: Duration, patience: u32) -> u32 {
-    if patience == 1 {
-        return usual.missed_pdos_max;
-    }
-    let periods = (consumer_time * patience).as_nanos() / usual.sync_period.as_nanos().max(1);
-    u32::try_from(periods).map_or(u32::MAX, |it| it.max(usual.missed_pdos_max))
-}
-
-/// See [`crate::config::Loaded::patience`].
-fn patient_node(usual: NodeTimeouts, patience: u32) -> NodeTimeouts {
-    NodeTimeouts {
-        boot: usual.boot * patience,
-        sdo: SdoTimeouts {
-            response: usual.sdo.response * patience,
-            block_segment: usual.sdo.block_segment * patience,
-            ..usual.sdo
-        },
-        operational: usual.operational * patience,
-    }
-}
-
-fn patient_drive(usual: Cia402Timeouts, patience: u32) -> Cia402Timeouts {
-    Cia402Timeouts {
-        transition: usual.transition * patience,
-        mode: usual.mode * patience,
-        set_point: usual.set_point * patience,
-        settling: usual.settling * patience,
-        standing: usual.standing * patience,
-        homing: usual.homing * patience,
-        new_position: usual.new_position * patience,
-        repeat: usual.repeat * patience,
     }
 }
 
