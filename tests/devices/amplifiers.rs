@@ -8,7 +8,7 @@ use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
 use mock_bus::simulation::Simulation;
-use tests::{Emulator, Group, Rig, Setup, rigs};
+use tests::{Emulator, Group, Rig, Setup, Stand, rigs};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 
 const NODE: &str = "amplifiers";
@@ -511,6 +511,29 @@ fn an_amplifier_that_is_another_one_is_refused_before_anything_is_set() {
             "{rig:?}: {refused:?}"
         );
         assert!(group.said.iter().all(|(_, line)| !line.starts_with("1 s")));
+    }
+}
+
+#[test]
+fn a_scan_says_who_is_on_the_line_and_who_should_be() {
+    let setup = over_serial()
+        .emulated("serial_number = 4002", "serial_number = 4012")
+        .machine("address = 2", "address = 5");
+    for rig in rigs() {
+        let found = Stand::new(rig, &setup).machine.scan().expect("lines work");
+        let of = |name: &str| {
+            let it = found.iter().find(|it| it.name.as_deref() == Some(name));
+            it.unwrap_or_else(|| panic!("{rig:?}: {name} is not in {found:?}"))
+        };
+        assert_eq!(of("u").identity.as_ref().map(|it| it.serial), Some(4001));
+        assert!(of("u").mismatches.is_empty(), "{rig:?}: {found:?}");
+        assert!(of("v").mismatches[0].contains("4012"), "{rig:?}: {found:?}");
+        // Nobody is there.
+        assert!(of("w").identity.is_none());
+        assert!(
+            of("w").mismatches[0].contains("amplifier 5"),
+            "{rig:?}: {found:?}"
+        );
     }
 }
 

@@ -53,6 +53,12 @@ pub trait Device {
     /// Begins the start procedure: who is it, is it what the configuration says, set it up.
     fn start(&mut self, now: Time);
 
+    /// Begins the first part of the start, who it is, and leaves it at that where the rest would
+    /// change something that matters. The device is not in service then.
+    fn identify(&mut self, now: Time) {
+        self.start(now);
+    }
+
     /// How the last command (or the start) went, once, when it has ended.
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>>;
 

@@ -104,6 +104,8 @@ pub struct CopleyAxis<Q: Coordinate = Metres> {
     image: Image,
     activity: Activity,
     identity: Option<Identity>,
+    /// The start ends with the identity.
+    asks_only: bool,
     /// The coordinate of the amplifier's 0, in counts.
     origin: Counts,
     homed: bool,
@@ -138,6 +140,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             image,
             activity: Activity::Idle,
             identity: None,
+            asks_only: false,
             origin: Counts(0),
             homed: false,
             profile: None,
@@ -337,6 +340,13 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
 
     fn start(&mut self, now: Time) {
         self.begin_start(now);
+        self.asks_only = false;
+    }
+
+    /// An amplifier that holds something stays enabled.
+    fn identify(&mut self, now: Time) {
+        self.begin_start(now);
+        self.asks_only = true;
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {

@@ -214,6 +214,23 @@ fn an_amplifier_after_power_on_is_broken_in_and_brought_to_the_lines_rate() {
 }
 
 #[test]
+fn an_amplifier_that_is_only_asked_who_it_is_stays_as_it_is() {
+    let mut rig = Rig::new();
+    rig.fake.rate = 115_200;
+    rig.axis.identify(rig.now);
+    rig.outcome().unwrap();
+    rig.live(MS * 1000);
+    assert_eq!(
+        rig.sent,
+        ["<115200>", "g r0x90", "2 g f0x81", "2 g f0x80", "2 g r0x94"]
+    );
+    assert_eq!(rig.axis.identity().unwrap().serial, 4002);
+    assert_eq!(rig.axis.power_state(), None);
+    rig.start().unwrap();
+    assert!(rig.axis.power_state().is_some());
+}
+
+#[test]
 fn what_the_start_sets_is_read_back() {
     let mut rig = Rig::new();
     rig.start().unwrap();
