@@ -3,12 +3,14 @@
 //! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
+mod copley;
 mod patience;
 mod rotary;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
 
+pub use copley::copley_settings;
 use patience::{patient_drive, patient_node, patient_pdos};
 pub use rotary::rotary_settings;
 pub(crate) use rotary::{index_limit, rotaries};
@@ -23,6 +25,7 @@ use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
 };
+use drivers::device::copley::CopleyAxis;
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
@@ -68,16 +71,22 @@ pub(crate) fn axes(
         .axis
         .iter()
         .map(|(name, axis)| {
+            let port = axis.port().expect(CHECKED);
             let device: Box<dyn Axis> = match axis.device {
                 AxisDevice::Cia402 => Box::new(Cia402Drive::new(cia402_settings(
                     axis,
-                    &config.can[&axis.bus],
+                    &config.can[port],
+                    patience,
+                ))),
+                AxisDevice::Copley => Box::new(CopleyAxis::new(copley_settings(
+                    axis,
+                    &config.serial[port],
                     patience,
                 ))),
             };
             Unit {
                 name: name.clone(),
-                port: ports[&axis.bus],
+                port: ports[port],
                 device,
             }
         })
@@ -159,6 +168,7 @@ pub(crate) fn expected_nodes(
     let axes = config
         .axis
         .iter()
+        .filter_map(|(name, axis)| Some((name, axis.can()?)))
         .filter(|(_, axis)| axis.bus == bus)
         .map(|(name, axis)| (axis.node_id, (name.clone(), axis.identity.clone())));
     let analogs = config
@@ -234,14 +244,18 @@ pub(crate) fn reference_limit(zero: &ZeroConfig, axis: &AxisConfig) -> Duration 
     Duration::from_secs_f64(10.0 + 2.0 * travel_mm / zero.reference_speed_mm_per_s)
 }
 
-/// The drive of an axis, as its driver is told.
+/// The drive of an axis, as its driver is told; the configuration has been checked.
+///
+/// # Panics
+/// When the axis has another device.
 pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
+    let can = axis.can().expect(CHECKED);
     let heartbeats = (
-        axis.heartbeat_producer_ms,
-        axis.heartbeat_consumer_ms,
-        axis.watch_master_ms,
+        can.heartbeat_producer_ms,
+        can.heartbeat_consumer_ms,
+        can.watch_master_ms,
     );
-    let common = node_settings(axis.node_id, bus, &axis.identity, heartbeats, patience);
+    let common = node_settings(can.node_id, bus, can.identity, heartbeats, patience);
     let homing = axis.zero.as_ref().map(|zero| reference_limit(zero, axis));
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
@@ -255,14 +269,15 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
         )),
         following_error: Some((
             Metres::from_um(axis.following_error_limit_um),
-            millis(axis.following_error_timeout_ms),
+            millis(can.following_error_timeout_ms),
         )),
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
         stall_max: usual.common.sync_period * (patience - 1),
-        home_offset: home_offset(axis.home_offset),
-        options: option_codes(&axis.option_codes, usual.options),
+        home_offset: home_offset(can.home_offset),
+        options: option_codes(&can.option_codes, usual.options),
+        synchronous_start: can.synchronous_start,
         timeouts: patient_drive(
             Cia402Timeouts {
                 homing: homing.unwrap_or(usual.timeouts.homing),

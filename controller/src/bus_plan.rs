@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use drivers::protocol::bus_load::{BusLoad, BusLoadError, BusPlan};
 
-use crate::config::MachineConfig;
+use crate::config::{AxisConfig, MachineConfig};
 
 /// Bytes of the PDOs a CiA 402 drive sends at every SYNC: statusword, position and mode; then
 /// the following error.
@@ -25,7 +25,8 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, sync_period)
         .with_heartbeat(ms(bus.master_heartbeat_ms));
-    for axis in config.axis.values().filter(|axis| axis.bus == name) {
+    let axes = config.axis.values().filter_map(AxisConfig::can);
+    for axis in axes.filter(|axis| axis.bus == name) {
         plan = plan
             .with_pdos(&DRIVE_PDO_BYTES)
             .with_heartbeat(ms(axis.heartbeat_producer_ms));

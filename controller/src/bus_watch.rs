@@ -15,7 +15,7 @@ use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
 use drivers::wire::canopen::{Function, NodeId};
 use units::Time;
 
-use crate::config::MachineConfig;
+use crate::config::{AxisConfig, MachineConfig};
 use crate::failure::Failure;
 
 /// The identifier of SYNC.
@@ -162,8 +162,10 @@ fn masters_own(config: &MachineConfig, bus: &str, master: u8) -> BTreeMap<u16, &
             "a heartbeat with this controller's own node number",
         );
     }
-    let axes = config.axis.values().map(|it| (&it.bus, it.node_id));
-    let rotaries = config.rotary.values().map(|it| (&it.bus, it.node_id));
+    let axes = config.axis.values().filter_map(AxisConfig::can);
+    let axes = axes.map(|it| (it.bus, it.node_id));
+    let rotaries = config.rotary.values();
+    let rotaries = rotaries.map(|it| (&*it.bus, it.node_id));
     for (_, node_id) in axes.chain(rotaries).filter(|(on, _)| *on == bus) {
         if let Some(node) = NodeId::new(node_id) {
             own.insert(

@@ -148,7 +148,8 @@ fn endpoints(
     });
     let machines_own = |name: &String| {
         let mut analogs = config.analog.values();
-        analogs.any(|it| it.line.as_ref() == Some(name))
+        let mut axes = config.axis.values();
+        analogs.any(|it| it.line.as_ref() == Some(name)) || axes.any(|it| it.port() == Some(name))
     };
     let lines = config
         .serial

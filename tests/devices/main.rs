@@ -1,5 +1,6 @@
 //! Each device's driver against its emulation, the same on every bus.
 
+mod amplifiers;
 mod analog;
 mod camera;
 mod drive;

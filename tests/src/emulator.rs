@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, shipped_config};
+use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, shipped_config};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -36,6 +36,11 @@ impl Setup {
     /// The shipped alignment platform with the noise and errors of `seed`.
     pub const fn uvw(seed: u64) -> Self {
         Self::of(UVW, seed)
+    }
+
+    /// The alignment platform whose axes are amplifiers on a serial line.
+    pub const fn uvw_copley(seed: u64) -> Self {
+        Self::of(UVW_COPLEY, seed)
     }
 
     const fn of(shipped: Shipped, seed: u64) -> Self {

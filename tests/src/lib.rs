@@ -6,6 +6,7 @@
 
 mod desk;
 mod emulator;
+mod group;
 mod interface;
 mod rig;
 mod slcan_hub;
@@ -13,9 +14,10 @@ mod stand;
 
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
+pub use group::{Group, Start};
 pub use interface::{Interface, run};
 pub use rig::{
-    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, machine_config, rigs,
+    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, machine_config, rigs,
     shipped_config,
 };
 pub use slcan_hub::SlcanHub;

@@ -40,6 +40,12 @@ pub const ROTARY: Shipped = Shipped {
     emulated: include_str!("../../configs/emulated/rotary.toml"),
 };
 
+/// The alignment platform with amplifiers on a serial line in place of drives on CAN.
+pub const UVW_COPLEY: Shipped = Shipped {
+    machine: include_str!("../../configs/machines/uvw-copley.toml"),
+    emulated: include_str!("../../configs/emulated/uvw-copley.toml"),
+};
+
 /// Which bus a test runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {

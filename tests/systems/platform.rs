@@ -40,10 +40,18 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
 
 #[test]
 fn the_whole_cycle_brings_the_platform_within_two_micrometres_on_every_bus() {
-    // Fewer strokes and poses than it ships with: this is about the buses.
-    let setup = Setup::uvw(1)
+    on_every_rig(&shortened(Setup::uvw(1)), cycle);
+}
+
+#[test]
+fn the_same_cycle_runs_with_amplifiers_on_a_serial_line_in_place_of_the_drives() {
+    on_every_rig(&shortened(Setup::uvw_copley(1)), cycle);
+}
+
+/// Fewer strokes and poses than it ships with: this is about the buses.
+fn shortened(setup: Setup) -> Setup {
+    setup
         .machine("step_mm = 0.25", "step_mm = 0.625")
         .machine("runs = 2", "runs = 1")
-        .machine("poses = 20", "poses = 8");
-    on_every_rig(&setup, cycle);
+        .machine("poses = 20", "poses = 8")
 }

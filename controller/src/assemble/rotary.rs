@@ -12,8 +12,8 @@ use units::{Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale};
 
 use super::{CHECKED, home_offset, millis, node_settings, option_codes, patient_drive};
 use crate::config::{
-    AxisDevice, CanBus, EdgeName, LineDetectorConfig, MachineConfig, PositionRangeName,
-    RotaryConfig,
+    CanBus, EdgeName, LineDetectorConfig, MachineConfig, PositionRangeName, RotaryConfig,
+    RotaryDevice,
 };
 use crate::machine::Unit;
 
@@ -27,7 +27,7 @@ pub(crate) fn rotaries(
         .iter()
         .map(|(name, rotary)| {
             let device: Box<dyn RotaryAxis> = match rotary.device {
-                AxisDevice::Cia402 => Box::new(Cia402Drive::new(rotary_settings(
+                RotaryDevice::Cia402 => Box::new(Cia402Drive::new(rotary_settings(
                     rotary,
                     &config.can[&rotary.bus],
                     patience,

@@ -70,14 +70,19 @@ fn calibration_hash(config: &MachineConfig) -> String {
         .iter()
         .map(|(name, axis)| {
             let zero = axis.zero.as_ref();
-            format!(
-                "{name} {:?} {} {} {:?} {:?}",
-                axis.device,
-                axis.node_id,
-                axis.resolution_nm,
-                axis.identity,
-                zero.map(|zero| (&zero.analog, zero.level_below_peak_v)),
-            )
+            let zero = zero.map(|zero| (&zero.analog, zero.level_below_peak_v));
+            let (device, resolution_nm) = (axis.device, axis.resolution_nm);
+            match (axis.can(), axis.serial()) {
+                (Some(can), _) => {
+                    let (node_id, identity) = (can.node_id, can.identity);
+                    format!("{name} {device:?} {node_id} {resolution_nm} {identity:?} {zero:?}")
+                }
+                (None, serial) => {
+                    let address = serial.map(|it| it.address);
+                    let amplifier = axis.amplifier.as_ref();
+                    format!("{name} {device:?} {address:?} {resolution_nm} {amplifier:?} {zero:?}")
+                }
+            }
         })
         .collect();
     let mut text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));

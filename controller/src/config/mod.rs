@@ -15,15 +15,16 @@ pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
-    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanBus, CanTransport,
-    CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig, InstrumentConfig,
-    InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OptionCodesConfig,
-    SerialLine, VerifyConfig, ZeroConfig,
+    AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
+    CanBus, CanTransport, CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig,
+    InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig, MachineSection,
+    OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
     PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };
 pub use rotary::{
-    DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryZeroConfig,
+    DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryDevice,
+    RotaryZeroConfig,
 };

@@ -1,5 +1,6 @@
 //! The configuration file's structure, version 1. Each key's suffix is its unit.
 
+use drivers::device::Identity;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -92,6 +93,8 @@ pub struct SerialLine {
 pub enum AxisDevice {
     /// A CiA 402 drive on CAN.
     Cia402,
+    /// A Copley Controls amplifier on a serial line.
+    Copley,
 }
 
 /// What a CANopen node must answer at start.
@@ -129,14 +132,26 @@ pub struct OptionCodesConfig {
     pub fault_reaction: Option<i16>,
 }
 
-/// One axis and what is done with it.
+/// What an amplifier on a serial line must answer at start.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct AmplifierConfig {
+    pub model: Option<String>,
+    pub serial_number: Option<u32>,
+}
+
+/// One axis and what is done with it. Which of the optional keys its device needs, and which it
+/// does not know, is checked when the file is read.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct AxisConfig {
     pub device: AxisDevice,
-    pub bus: String,
-    pub node_id: u8,
+    pub bus: Option<String>,
+    pub node_id: Option<u8>,
+    pub line: Option<String>,
+    pub address: Option<u8>,
     pub resolution_nm: f64,
     pub soft_min_mm: f64,
     pub soft_max_mm: f64,
@@ -145,22 +160,110 @@ pub struct AxisConfig {
     pub acceleration_mm_per_s2: f64,
     pub quick_stop_deceleration_mm_per_s2: f64,
     pub following_error_limit_um: f64,
-    pub following_error_timeout_ms: u16,
+    pub following_error_timeout_ms: Option<u16>,
     pub position_window_um: f64,
     pub position_window_time_ms: u16,
     pub move_timeout_s: f64,
-    pub heartbeat_producer_ms: u16,
-    pub heartbeat_consumer_ms: u16,
-    pub watch_master_ms: u16,
-    #[serde(default)]
-    pub home_offset: HomeOffsetName,
-    #[serde(default)]
-    pub option_codes: OptionCodesConfig,
-    pub identity: IdentityConfig,
+    pub heartbeat_producer_ms: Option<u16>,
+    pub heartbeat_consumer_ms: Option<u16>,
+    pub watch_master_ms: Option<u16>,
+    pub home_offset: Option<HomeOffsetName>,
+    pub option_codes: Option<OptionCodesConfig>,
+    pub synchronous_start: Option<bool>,
+    pub identity: Option<IdentityConfig>,
+    pub poll_period_ms: Option<f64>,
+    pub amplifier: Option<AmplifierConfig>,
     pub zero: Option<ZeroConfig>,
     pub calibrate: Option<CalibrateConfig>,
     pub verify: Option<VerifyConfig>,
     pub compensation: Option<CompensationConfig>,
+}
+
+/// What only an axis on CAN has.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct CanAxis<'a> {
+    pub bus: &'a str,
+    pub node_id: u8,
+    pub following_error_timeout_ms: u16,
+    pub heartbeat_producer_ms: u16,
+    pub heartbeat_consumer_ms: u16,
+    pub watch_master_ms: u16,
+    pub home_offset: HomeOffsetName,
+    pub option_codes: OptionCodesConfig,
+    pub synchronous_start: bool,
+    pub identity: &'a IdentityConfig,
+}
+
+/// What only an axis on a serial line has.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct SerialAxis<'a> {
+    pub line: &'a str,
+    pub address: u8,
+    pub poll_period_ms: f64,
+    pub model: Option<&'a str>,
+    pub serial_number: Option<u32>,
+}
+
+impl AxisConfig {
+    /// The part of a CiA 402 drive; `None` for another device, or while a key is missing.
+    pub fn can(&self) -> Option<CanAxis<'_>> {
+        if self.device != AxisDevice::Cia402 {
+            return None;
+        }
+        Some(CanAxis {
+            bus: self.bus.as_deref()?,
+            node_id: self.node_id?,
+            following_error_timeout_ms: self.following_error_timeout_ms?,
+            heartbeat_producer_ms: self.heartbeat_producer_ms?,
+            heartbeat_consumer_ms: self.heartbeat_consumer_ms?,
+            watch_master_ms: self.watch_master_ms?,
+            home_offset: self.home_offset.unwrap_or_default(),
+            option_codes: self.option_codes.unwrap_or_default(),
+            synchronous_start: self.synchronous_start.unwrap_or(false),
+            identity: self.identity.as_ref()?,
+        })
+    }
+
+    /// Likewise of a Copley amplifier.
+    pub fn serial(&self) -> Option<SerialAxis<'_>> {
+        if self.device != AxisDevice::Copley {
+            return None;
+        }
+        let amplifier = self.amplifier.as_ref();
+        Some(SerialAxis {
+            line: self.line.as_deref()?,
+            address: self.address?,
+            poll_period_ms: self.poll_period_ms?,
+            model: amplifier.and_then(|it| it.model.as_deref()),
+            serial_number: amplifier.and_then(|it| it.serial_number),
+        })
+    }
+
+    /// The bus or line that it is on.
+    pub fn port(&self) -> Option<&str> {
+        let can = self.can().map(|it| it.bus);
+        can.or_else(|| self.serial().map(|it| it.line))
+    }
+
+    /// Who its drive is, as far as the configuration says it.
+    pub fn configured_identity(&self) -> Identity {
+        let of_can = self.identity.as_ref().map(|it| Identity {
+            device_type: it.device_type,
+            vendor: it.vendor_id,
+            product: it.product_code,
+            revision: it.revision.unwrap_or(0),
+            serial: it.serial_number.unwrap_or(0),
+            name: String::new(),
+        });
+        let of_line = self.amplifier.as_ref().map(|it| Identity {
+            serial: it.serial_number.unwrap_or(0),
+            name: it.model.clone().unwrap_or_default(),
+            ..Identity::default()
+        });
+        of_can.or(of_line).unwrap_or_default()
+    }
 }
 
 /// The kinds of analog module.

@@ -2,7 +2,15 @@
 
 use serde::Deserialize;
 
-use super::model::{AxisDevice, HomeOffsetName, IdentityConfig, OptionCodesConfig};
+use super::model::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
+
+/// The kinds of drive of a rotary axis: those with a touch probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RotaryDevice {
+    /// A CiA 402 drive on CAN.
+    Cia402,
+}
 
 /// Where the position of a rotary axis's drive starts again (0x607B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -42,7 +50,7 @@ pub enum EdgeName {
 #[serde(deny_unknown_fields)]
 #[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryConfig {
-    pub device: AxisDevice,
+    pub device: RotaryDevice,
     pub bus: String,
     pub node_id: u8,
     pub counts_per_turn: u32,

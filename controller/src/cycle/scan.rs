@@ -1,7 +1,8 @@
 //! Scan: who is on the buses, asked without changing anything.
 //!
 //! Every node number of every CAN bus is asked for its device type (0x1000) and identity
-//! (0x1018) by expedited SDO upload; nothing is written and no node changes its state.
+//! (0x1018) by expedited SDO upload; nothing is written and no node changes its state. Devices on
+//! serial lines are asked by their drivers.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -45,6 +46,9 @@ const BATCH: usize = 8;
 const ASKED_AGAIN_MAX: u32 = 2;
 /// How long the last answers may take.
 const PATIENCE: Duration = Duration::from_millis(300);
+
+/// Devices on serial lines say themselves what is wrong, before this has passed.
+const SERIAL_LIMIT: Duration = Duration::from_secs(15);
 
 type Answers = BTreeMap<NodeId, BTreeMap<Object, u32>>;
 
@@ -147,7 +151,7 @@ impl Machine {
         }
     }
 
-    /// Everything on a serial line: analog modules and instruments.
+    /// Everything on a serial line: amplifiers, analog modules and instruments.
     fn scan_serial(&mut self) -> Vec<Found> {
         let lines: Vec<_> = (0..self.device_count())
             .filter(|at| {
@@ -159,8 +163,8 @@ impl Machine {
             .into_iter()
             .map(|at| {
                 let now = self.now();
-                self.device_mut(at).device.start(now);
-                let started = self.await_outcome(at, "answer", Duration::from_secs(5));
+                self.device_mut(at).device.identify(now);
+                let started = self.await_outcome(at, "answer", SERIAL_LIMIT);
                 let port = self.device_mut(at).port;
                 Found {
                     port: self.port_names[&port].clone(),

@@ -278,7 +278,8 @@ impl Machine {
     }
 
     fn pairing(&self, axis: &str, config: &ZeroConfig) -> Result<Pairing, Failure> {
-        let bus = &self.axis_config(axis)?.bus;
+        let can = self.axis_config(axis)?.can();
+        let bus = can.expect("the check asks for a drive on CAN").bus;
         let sync_s = self.config.can[bus].sync_period_ms * 1e-3;
         let poll_s = self.config.analog[&config.analog]
             .poll_period_ms

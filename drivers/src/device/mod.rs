@@ -57,6 +57,12 @@ pub trait Device {
     /// Begins the start procedure: who is it, is it what the configuration says, set it up.
     fn start(&mut self, now: Time);
 
+    /// Begins the first part of the start, who it is, and leaves it at that where the rest would
+    /// change something that matters. The device is not in service then.
+    fn identify(&mut self, now: Time) {
+        self.start(now);
+    }
+
     /// How the last command (or the start) went, once, when it has ended.
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>>;
 
@@ -80,7 +86,8 @@ pub trait ServoDrive: Device {
     fn is_homed(&self) -> bool;
 
     /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
-    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`. `None`
+    /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`; when
+    /// that was lost, the moment it was to start, since the motion may be as old. `None`
     /// before the first motion and from a new command until its motion begins.
     fn started_at(&self) -> Option<Time>;
 }

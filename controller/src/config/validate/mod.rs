@@ -1,5 +1,6 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
+mod axis;
 mod camera;
 mod cycle;
 mod judge;
@@ -8,6 +9,7 @@ mod rotary;
 
 use std::collections::BTreeMap;
 
+use self::axis::{check_axis, check_axis_name, check_lines};
 use self::camera::check_cameras;
 use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
@@ -16,7 +18,7 @@ use self::rotary::check_rotaries;
 use drivers::protocol::bus_load::BusLoadError;
 
 use super::model::{
-    AnalogConfig, AnalogDevice, AxisConfig, CanBus, CanTransport, InstrumentConfig, MachineConfig,
+    AnalogConfig, AnalogDevice, CanBus, CanTransport, InstrumentConfig, MachineConfig,
 };
 use crate::assemble;
 use crate::bus_plan;
@@ -73,6 +75,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     check_cameras(config, &mut findings);
     platform::check(config, &mut findings);
     check_node_ids(config, &mut findings);
+    check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
     if findings.is_empty() {
         check_bus_load(config, &mut findings);
@@ -103,18 +106,6 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
             "the machine has no axis",
             "add an [axis.NAME] or a [rotary.NAME] section",
         );
-    }
-}
-
-/// Axes name files, and stand in words of the command line (`x=1mm`).
-fn check_axis_name(findings: &mut Vec<Finding>, section: &str, name: &str) {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.is_empty() || !name.chars().all(plain) {
-        findings.push(Finding {
-            key: format!("{section}.{name}"),
-            cause: format!("`{name}` cannot name an axis"),
-            help: "use letters, digits and _".into(),
-        });
     }
 }
 
@@ -176,54 +167,6 @@ fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_m
             format!(
                 "give at least {least}; without it a killed controller would not stop the stage"
             ),
-        );
-    }
-}
-
-fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    judge.known("bus", &axis.bus, &config.can, "CAN bus");
-    judge.within("node_id", axis.node_id.into(), 1.0, 127.0);
-    judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);
-    judge.below(
-        ("soft_min_mm", axis.soft_min_mm),
-        ("soft_max_mm", axis.soft_max_mm),
-    );
-    judge.within("speed_max_mm_per_s", axis.speed_max_mm_per_s, 1e-3, 1e5);
-    judge.within(
-        "speed_mm_per_s",
-        axis.speed_mm_per_s,
-        1e-3,
-        axis.speed_max_mm_per_s,
-    );
-    judge.within(
-        "acceleration_mm_per_s2",
-        axis.acceleration_mm_per_s2,
-        1e-2,
-        1e6,
-    );
-    let quick_stop = axis.quick_stop_deceleration_mm_per_s2;
-    judge.within("quick_stop_deceleration_mm_per_s2", quick_stop, 1e-2, 1e7);
-    judge.within(
-        "following_error_limit_um",
-        axis.following_error_limit_um,
-        1e-3,
-        1e5,
-    );
-    judge.within("position_window_um", axis.position_window_um, 1e-4, 1e4);
-    judge.within("move_timeout_s", axis.move_timeout_s, 0.01, 1e5);
-    check_heartbeat(
-        judge,
-        axis.heartbeat_producer_ms,
-        axis.heartbeat_consumer_ms,
-    );
-    check_watch(judge, config, &axis.bus, axis.watch_master_ms);
-    let counts =
-        axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
-    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
-        judge.say(
-            "resolution_nm",
-            format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
-            "use a coarser resolution or a shorter range",
         );
     }
 }
@@ -390,7 +333,7 @@ fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let axes = config
         .axis
         .iter()
-        .map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
+        .filter_map(|(name, it)| Some((it.bus.as_deref()?, it.node_id?, format!("axis.{name}"))));
     let rotaries = config
         .rotary
         .iter()

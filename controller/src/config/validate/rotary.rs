@@ -1,7 +1,8 @@
 //! Whether what is said about a rotary axis makes sense.
 
+use super::axis::check_axis_name;
 use super::judge::{Finding, Judge};
-use super::{check_axis_name, check_heartbeat, check_watch};
+use super::{check_heartbeat, check_watch};
 use crate::config::model::MachineConfig;
 use crate::config::rotary::RotaryConfig;
 

@@ -213,15 +213,29 @@ impl Machine {
     }
 
     /// Right after a sample there is the most time until the next SYNC: what is sent now
-    /// reaches all drives before it.
+    /// reaches all drives before it. A sample that was read late is no such moment. On a line
+    /// without SYNC there is nothing to wait for.
     fn await_next_sample(&mut self, axis: &str) -> Result<(), Failure> {
-        let limit = self.move_limit(axis)?;
-        let deadline = self.now() + limit;
+        let Some(period) = self.sync_period(axis)? else {
+            return Ok(());
+        };
+        let deadline = self.now() + self.move_limit(axis)?;
         let before = self.reading(axis)?.map(|reading| reading.at);
-        while self.reading(axis)?.map(|reading| reading.at) == before && self.now() < deadline {
+        loop {
+            let sample = self.reading(axis)?.map(|reading| reading.at);
+            let is_new = sample != before;
+            let is_fresh = sample.is_some_and(|at| self.now().since(at) * 2 <= period);
+            if is_new && is_fresh || self.now() >= deadline {
+                return Ok(());
+            }
             self.tick(deadline)?;
         }
-        Ok(())
+    }
+
+    fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
+        let bus = self.axis_config(axis)?.bus.as_ref();
+        let bus = bus.and_then(|bus| self.config.can.get(bus));
+        Ok(bus.map(|bus| Duration::from_secs_f64(bus.sync_period_ms * 1e-3)))
     }
 
     fn start_skew(&self, moving: &[(String, usize)]) -> Result<Option<Duration>, Failure> {

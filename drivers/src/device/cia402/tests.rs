@@ -599,6 +599,74 @@ fn a_move_shakes_hands_and_ends_at_the_target() {
     assert!(rig.sent.iter().all(|line| line.starts_with("205#")));
 }
 
+fn prepare(um: f64) -> AxisCommand {
+    AxisCommand::Prepare {
+        target: Metres::from_um(um),
+        speed: MetresPerSecond(0.1),
+        acceleration: MetresPerSecondSquared(1.0),
+    }
+}
+
+#[test]
+fn a_prepared_move_lacks_only_its_edge_and_the_start_sends_that_alone() {
+    let mut rig = Rig::enabled();
+    rig.sent.clear();
+    assert_eq!(rig.does(prepare(1500.0)), Ok(()));
+    // The target is there, the set-point bit is not.
+    assert_eq!(rig.sent.last().unwrap(), "205#0F00F0490200");
+    assert_eq!(rig.controlwords(), ["0F00"]);
+    assert_eq!((rig.fake.position(), rig.drive.started_at()), (0, None));
+    rig.sent.clear();
+    let told = rig.now;
+    assert_eq!(rig.does(AxisCommand::Start), Ok(()));
+    assert_eq!(rig.fake.position(), 150_000);
+    assert_eq!(rig.controlwords(), ["3F00", "0F00"]);
+    assert!(rig.sent.iter().all(|line| line.starts_with("205#")));
+    let started = rig.drive.started_at().unwrap();
+    assert!(started.since(told) <= rig.drive.settings().common.sync_period * 2);
+}
+
+#[track_caller]
+fn check_nothing_prepared(rig: &mut Rig) {
+    rig.sent.clear();
+    let refused = rig.does(AxisCommand::Start);
+    let is_refused = matches!(
+        refused,
+        Err(DeviceError::NotPossible {
+            step: "starting",
+            ..
+        })
+    );
+    assert!(is_refused, "{refused:?}");
+    assert!(!rig.controlwords().contains(&"3F00".to_owned()));
+}
+
+#[test]
+fn a_start_with_nothing_prepared_is_refused() {
+    let mut rig = Rig::enabled();
+    check_nothing_prepared(&mut rig);
+    rig.does(prepare(1500.0)).unwrap();
+    rig.does(DriveCommand::Halt).unwrap();
+    check_nothing_prepared(&mut rig);
+    rig.does(prepare(1500.0)).unwrap();
+    rig.does(AxisCommand::Start).unwrap();
+    check_nothing_prepared(&mut rig);
+}
+
+#[test]
+fn a_drive_of_a_group_takes_its_controlword_over_at_sync() {
+    let rpdo_1 = |synchronous_start| {
+        let mut rig = Rig::with(Cia402Settings {
+            synchronous_start,
+            ..settings()
+        });
+        rig.start().unwrap();
+        rig.fake.node.get(0x1400, 2) as u8
+    };
+    assert_eq!(rpdo_1(false), 255);
+    assert_eq!(rpdo_1(true), 1);
+}
+
 #[test]
 fn target_reached_of_the_move_before_does_not_end_a_move() {
     let mut rig = Rig::enabled();

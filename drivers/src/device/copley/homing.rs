@@ -1,5 +1,5 @@
 //! Homing: on the negative limit switch (method 529, or 513 when the amplifier counts against the
-//! axis) and here (method 512).
+//! axis), on the first index pulse off it (561 or 545) and here (512).
 //!
 //! Either way the amplifier's coordinate becomes 0 at home; which coordinate of the axis that is,
 //! the driver remembers. The software limits, which are in force once the amplifier is homed, are
@@ -20,6 +20,38 @@ const RESOLVING: &str = "finding out whether homing has begun";
 const LIMITING: &str = "setting the software limits";
 /// The way off the switch is so much slower than the way to it.
 const SLOWER: i64 = 5;
+
+/// Where the home is, and how fast it is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum HomingPlace<S> {
+    /// Where the axis stands.
+    Here,
+    /// Where it leaves its negative limit switch.
+    NegativeLimit(S),
+    /// At the first index pulse off that switch.
+    Index(S),
+}
+
+impl<S: Copy> HomingPlace<S> {
+    /// The negative end of the axis is the amplifier's positive one when that counts against the
+    /// axis.
+    const fn method(&self, reversed: bool) -> HomingMethod {
+        match (self, reversed) {
+            (Self::Here, _) => HomingMethod::Here,
+            (Self::NegativeLimit(_), false) => HomingMethod::NegativeLimit,
+            (Self::NegativeLimit(_), true) => HomingMethod::PositiveLimit,
+            (Self::Index(_), false) => HomingMethod::NegativeLimitToIndex,
+            (Self::Index(_), true) => HomingMethod::PositiveLimitToIndex,
+        }
+    }
+
+    const fn speed(&self) -> Option<S> {
+        match self {
+            Self::Here => None,
+            Self::NegativeLimit(speed) | Self::Index(speed) => Some(*speed),
+        }
+    }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
@@ -50,13 +82,13 @@ impl Homing {
 }
 
 impl<Q: Coordinate> CopleyAxis<Q> {
-    /// With a search speed: on the negative limit switch; without: here.
-    pub(super) fn begin_homing(&mut self, now: Time, position: Q, search: Option<Q::Speed>) {
+    pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
+        let search = place.speed();
         if search.is_none() && self.image.events.contains(EventStatus::IN_MOTION) {
             self.refuse("homing here", "an axis that stands");
             return;
         }
-        let steps = self.homing_steps(position, search);
+        let steps = self.homing_steps(position, place);
         match steps {
             Err(error) => self.finish(Err(error)),
             Ok((position, steps)) => {
@@ -77,23 +109,17 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     fn homing_steps(
         &self,
         position: Q,
-        search: Option<Q::Speed>,
+        place: HomingPlace<Q::Speed>,
     ) -> Result<(Counts, Vec<Step>), DeviceError> {
         let settings = &self.settings;
-        let reversed = settings.scale.resolution() < Q::ZERO;
-        let method = match search {
-            None => HomingMethod::Here,
-            // The negative end of the axis is the amplifier's positive one.
-            Some(_) if reversed => HomingMethod::PositiveLimit,
-            Some(_) => HomingMethod::NegativeLimit,
-        };
+        let method = place.method(settings.scale.resolution() < Q::ZERO);
         let parameter = Parameter::HOME_OFFSET;
         let origin = Counts(0);
         let home = amplifier_counts(settings, parameter, "home position", position, origin)?;
         let mut steps = Step::check(Parameter::HOMING_METHOD, method.raw(), PREPARING).to_vec();
         // Amplifiers move by the offset.
         steps.extend(Step::check(parameter, 0, PREPARING));
-        if let Some(search) = search {
+        if let Some(search) = place.speed() {
             let fast = speed(settings, Parameter::HOMING_SPEED_FAST, search)?;
             let parameter = Parameter::HOMING_ACCELERATION;
             let rate = acceleration(settings, parameter, settings.homing_acceleration)?;

@@ -50,7 +50,7 @@ use crate::transport::{Input, LinkState};
 use crate::wire::Payload;
 use crate::wire::cia402::PowerState;
 use crate::wire::copley::{Bank, EventStatus, Parameter};
-use homing::Homing;
+use homing::{Homing, HomingPlace};
 use image::{Image, Look};
 use link::Link;
 use motion::{Halt, Motion, Plan};
@@ -104,6 +104,8 @@ pub struct CopleyAxis<Q: Coordinate = Metres> {
     image: Image,
     activity: Activity,
     identity: Option<Identity>,
+    /// The start ends with the identity.
+    asks_only: bool,
     /// The coordinate of the amplifier's 0, in counts.
     origin: Counts,
     homed: bool,
@@ -138,6 +140,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             image,
             activity: Activity::Idle,
             identity: None,
+            asks_only: false,
             origin: Counts(0),
             homed: false,
             profile: None,
@@ -337,6 +340,13 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
 
     fn start(&mut self, now: Time) {
         self.begin_start(now);
+        self.asks_only = false;
+    }
+
+    /// An amplifier that holds something stays enabled.
+    fn identify(&mut self, now: Time) {
+        self.begin_start(now);
+        self.asks_only = true;
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
@@ -418,15 +428,20 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 None => self.refuse("starting", "a move that was prepared right before"),
             },
             AxisCommand::HomeNegativeLimit { position, speed } => {
-                self.begin_homing(now, position, Some(speed));
+                self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
             }
-            AxisCommand::HomeIndex { .. } | AxisCommand::HomeNextIndex { .. } => {
+            AxisCommand::HomeNextIndex { .. } => {
                 self.refuse(
-                    "homing on the index pulse",
+                    "homing on the next index mark",
                     "a drive that looks for it itself",
                 );
             }
-            AxisCommand::HomeHere { position } => self.begin_homing(now, position, None),
+            AxisCommand::HomeIndex { position, speed } => {
+                self.begin_homing(now, position, HomingPlace::Index(speed));
+            }
+            AxisCommand::HomeHere { position } => {
+                self.begin_homing(now, position, HomingPlace::Here);
+            }
         }
         self.pump(now);
     }

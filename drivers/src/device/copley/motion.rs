@@ -147,7 +147,10 @@ impl<Q: Coordinate> CopleyAxis<Q> {
 
     pub(super) fn motion_step_done(&mut self, now: Time) {
         let Activity::Motion(Motion {
-            mut plan, phase, ..
+            mut plan,
+            phase,
+            since,
+            ..
         }) = self.activity
         else {
             return;
@@ -166,14 +169,14 @@ impl<Q: Coordinate> CopleyAxis<Q> {
                     self.prepared = Some(plan);
                 }
             }
-            Phase::Starting { .. } => self.has_started(now, plan),
-            Phase::Resolving { attempts } => self.resolve(now, plan, attempts),
+            Phase::Starting { .. } => self.has_started(now, now, plan),
+            Phase::Resolving { attempts } => self.resolve(now, since, plan, attempts),
             Phase::Running => {}
         }
     }
 
-    fn has_started(&mut self, now: Time, plan: Plan) {
-        self.started_at = Some(now);
+    fn has_started(&mut self, now: Time, at: Time, plan: Plan) {
+        self.started_at = Some(at);
         self.activity = Activity::Motion(Motion {
             plan,
             phase: Phase::Running,
@@ -199,7 +202,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         self.run(now, steps, Urgency::Start);
     }
 
-    fn resolve(&mut self, now: Time, plan: Plan, attempts: u32) {
+    /// `told`: when it was to start. It has, if at all, since then.
+    fn resolve(&mut self, now: Time, told: Time, plan: Plan, attempts: u32) {
         let status = self
             .script
             .number(Parameter::TRAJECTORY_STATUS)
@@ -208,7 +212,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         let runs = status & i64::from(TrajectoryStatus::RUNNING.bits()) != 0;
         let has_moved = commanded.is_some_and(|at| at != plan.from);
         if runs || has_moved || plan.from == plan.target {
-            self.has_started(now, plan);
+            self.has_started(now, told, plan);
         } else if attempts < 2 && !plan.in_company {
             // It is known to stand where it stood: nothing was begun.
             self.begin_prepared(now, plan);

@@ -62,8 +62,13 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         };
         let next = match phase {
             Starting::Finding | Starting::Looking => return,
+            Starting::Asking if self.asks_only => {
+                let identified = self.take_identity();
+                self.link.close();
+                return self.finish(identified);
+            }
             Starting::Asking => self
-                .identify()
+                .take_identity()
                 .and_then(|()| self.configuration())
                 .map(|steps| self.run(now, steps, Urgency::Command))
                 .map(|()| Starting::Configuring),
@@ -85,7 +90,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         }
     }
 
-    fn identify(&mut self) -> Result<(), DeviceError> {
+    fn take_identity(&mut self) -> Result<(), DeviceError> {
         let script: &Script = &self.script;
         let model = script.text(Parameter::MODEL).unwrap_or("").to_owned();
         let serial = script.number(Parameter::SERIAL_NUMBER);

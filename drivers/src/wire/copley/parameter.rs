@@ -128,6 +128,10 @@ pub enum HomingMethod {
     PositiveLimit,
     /// The edge of the negative limit switch.
     NegativeLimit,
+    /// The first index pulse off the positive limit switch.
+    PositiveLimitToIndex,
+    /// The first index pulse off the negative limit switch.
+    NegativeLimitToIndex,
     /// Another.
     Unknown(i64),
 }
@@ -139,6 +143,8 @@ impl HomingMethod {
             512 => Self::Here,
             513 => Self::PositiveLimit,
             529 => Self::NegativeLimit,
+            545 => Self::PositiveLimitToIndex,
+            561 => Self::NegativeLimitToIndex,
             other => Self::Unknown(other),
         }
     }
@@ -149,6 +155,8 @@ impl HomingMethod {
             Self::Here => 512,
             Self::PositiveLimit => 513,
             Self::NegativeLimit => 529,
+            Self::PositiveLimitToIndex => 545,
+            Self::NegativeLimitToIndex => 561,
             Self::Unknown(raw) => raw,
         }
     }

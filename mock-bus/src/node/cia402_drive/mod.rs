@@ -109,6 +109,11 @@ impl Cia402DriveNode {
         self.drive.power.wire()
     }
 
+    /// When the motion to the last set-point truly began: for judges only.
+    pub const fn moved_at(&self) -> Option<Time> {
+        self.drive.moved_at
+    }
+
     /// Which faults were delivered, and how often.
     pub fn deliveries(&self) -> &Deliveries {
         self.drive.server.deliveries()
@@ -182,6 +187,8 @@ struct Drive {
     servo_due: Time,
     following_since: Option<Time>,
     in_window_since: Option<Time>,
+    /// When the last set-point's motion began.
+    moved_at: Option<Time>,
     internal_limit: bool,
     fault: Option<EmergencyCode>,
     safe_torque_off: bool,
@@ -220,6 +227,7 @@ impl Drive {
             servo_due: Time::ZERO,
             following_since: None,
             in_window_since: None,
+            moved_at: None,
             internal_limit: false,
             fault: None,
             safe_torque_off: false,

@@ -154,6 +154,7 @@ impl Drive {
         self.positioning.current = Some(set_point);
         self.profile = Profile::to_target(now, from, set_point.target, set_point.limits);
         self.activity = Activity::Positioning;
+        self.moved_at = Some(now);
         self.look_now();
         self.proceed(now, m);
     }

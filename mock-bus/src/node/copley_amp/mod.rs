@@ -11,7 +11,8 @@
 //! is error 32; `ok` to `t 1` says nothing about motion.
 //!
 //! Absent: several axes in one amplifier, S-curves, velocity moves, writing the position,
-//! copying to and from flash, program registers, homing other than 512, 513 and 529.
+//! copying to and from flash, program registers, homing other than 512, 513, 529, 545
+//! and 561.
 
 mod amp;
 mod config;

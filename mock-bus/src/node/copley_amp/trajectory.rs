@@ -24,11 +24,13 @@ pub(super) enum Motion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HomingStep {
     /// Until the switch is pressed.
-    Seek,
+    Seek { to_index: bool },
     /// Slowing down on the switch.
-    Stop,
-    /// Until it is released: that is home.
-    BackOff,
+    Stop { to_index: bool },
+    /// Until it is released: that is home, or where the index pulse is searched.
+    BackOff { to_index: bool },
+    /// Until the next index pulse after this one (by number): that is home.
+    Index { after: u64 },
     /// To the place of the edge.
     Return,
 }
@@ -117,20 +119,22 @@ impl Amp {
             .remove(TrajectoryStatus::REFERENCED | TrajectoryStatus::HOMING_ERROR);
         match HomingMethod::from_raw(self.ram(Parameter::HOMING_METHOD)) {
             HomingMethod::Here => self.set_home(now, self.position(plant)),
-            HomingMethod::NegativeLimit => self.seek(now, -1.0, plant),
-            HomingMethod::PositiveLimit => self.seek(now, 1.0, plant),
+            HomingMethod::NegativeLimit => self.seek(now, -1.0, false, plant),
+            HomingMethod::PositiveLimit => self.seek(now, 1.0, false, plant),
+            HomingMethod::NegativeLimitToIndex => self.seek(now, -1.0, true, plant),
+            HomingMethod::PositiveLimitToIndex => self.seek(now, 1.0, true, plant),
             HomingMethod::Unknown(_) => return Err(ErrorCode::OutOfRange),
         }
         Ok(())
     }
 
-    fn seek(&mut self, now: Time, side: f64, plant: &Plant) {
+    fn seek(&mut self, now: Time, side: f64, to_index: bool, plant: &Plant) {
         self.trajectory.insert(TrajectoryStatus::HOMING);
         self.moved_at = Some(now);
         let step = if self.pressed(side, plant) {
-            HomingStep::BackOff
+            HomingStep::BackOff { to_index }
         } else {
-            HomingStep::Seek
+            HomingStep::Seek { to_index }
         };
         self.enter(now, side, step);
     }
@@ -152,9 +156,11 @@ impl Amp {
             self.ram(Parameter::HOMING_SPEED_SLOW),
         );
         self.profile = match step {
-            HomingStep::Seek => towards(from.position + side * FAR, fast),
-            HomingStep::BackOff => towards(from.position - side * FAR, slow),
-            HomingStep::Stop => Profile::stopping(now, from, acceleration),
+            HomingStep::Seek { .. } => towards(from.position + side * FAR, fast),
+            HomingStep::BackOff { .. } | HomingStep::Index { .. } => {
+                towards(from.position - side * FAR, slow)
+            }
+            HomingStep::Stop { .. } => Profile::stopping(now, from, acceleration),
             HomingStep::Return => towards(0.0, slow),
         };
         self.motion = Motion::Homing(side, step);
@@ -203,27 +209,47 @@ impl Amp {
 
     fn home_on(&mut self, now: Time, side: f64, step: HomingStep, plant: &mut Plant) {
         let pressed = self.pressed(side, plant);
+        let opposite = self.pressed(-side, plant);
         match step {
-            HomingStep::Seek if pressed => self.enter(now, side, HomingStep::Stop),
-            HomingStep::Stop if self.profile.is_done(now) => {
-                self.enter(now, side, HomingStep::BackOff);
+            HomingStep::Seek { to_index } if pressed => {
+                self.enter(now, side, HomingStep::Stop { to_index });
             }
-            HomingStep::BackOff if !pressed => {
-                self.set_home(now, self.position(plant));
-                // Referenced, but not home before it stands there.
-                self.trajectory.remove(TrajectoryStatus::REFERENCED);
-                self.enter(now, side, HomingStep::Return);
+            HomingStep::Stop { to_index } if self.profile.is_done(now) => {
+                self.enter(now, side, HomingStep::BackOff { to_index });
+            }
+            HomingStep::BackOff { to_index: true } if !pressed => {
+                let pulse = plant.index_pulse(self.config.axis);
+                let after = pulse.map_or(0, |pulse| pulse.number);
+                self.enter(now, side, HomingStep::Index { after });
+            }
+            HomingStep::BackOff { to_index: false } if !pressed => {
+                self.found_home(now, side, self.position(plant));
+            }
+            HomingStep::Index { after } if !opposite => {
+                let pulse = plant.index_pulse(self.config.axis);
+                if let Some(pulse) = pulse.filter(|pulse| pulse.number > after) {
+                    self.found_home(now, side, pulse.count + self.offset);
+                }
             }
             HomingStep::Return if self.profile.is_done(now) => {
                 self.trajectory.remove(TrajectoryStatus::HOMING);
                 self.trajectory.insert(TrajectoryStatus::REFERENCED);
                 self.stand(plant);
             }
-            HomingStep::Seek | HomingStep::BackOff if self.pressed(-side, plant) && !pressed => {
-                self.abort(now);
-            }
-            HomingStep::Seek | HomingStep::Stop | HomingStep::BackOff | HomingStep::Return => {}
+            HomingStep::Seek { .. } | HomingStep::Index { .. } if opposite => self.abort(now),
+            HomingStep::Seek { .. }
+            | HomingStep::Stop { .. }
+            | HomingStep::BackOff { .. }
+            | HomingStep::Index { .. }
+            | HomingStep::Return => {}
         }
+    }
+
+    fn found_home(&mut self, now: Time, side: f64, position: i64) {
+        self.set_home(now, position);
+        // Referenced, but not home before it stands there.
+        self.trajectory.remove(TrajectoryStatus::REFERENCED);
+        self.enter(now, side, HomingStep::Return);
     }
 
     /// Whether the motion would go on into a switch, or beyond a software limit.

@@ -214,6 +214,23 @@ fn an_amplifier_after_power_on_is_broken_in_and_brought_to_the_lines_rate() {
 }
 
 #[test]
+fn an_amplifier_that_is_only_asked_who_it_is_stays_as_it_is() {
+    let mut rig = Rig::new();
+    rig.fake.rate = 115_200;
+    rig.axis.identify(rig.now);
+    rig.outcome().unwrap();
+    rig.live(MS * 1000);
+    assert_eq!(
+        rig.sent,
+        ["<115200>", "g r0x90", "2 g f0x81", "2 g f0x80", "2 g r0x94"]
+    );
+    assert_eq!(rig.axis.identity().unwrap().serial, 4002);
+    assert_eq!(rig.axis.power_state(), None);
+    rig.start().unwrap();
+    assert!(rig.axis.power_state().is_some());
+}
+
+#[test]
 fn what_the_start_sets_is_read_back() {
     let mut rig = Rig::new();
     rig.start().unwrap();
@@ -520,23 +537,28 @@ fn homing_here_keeps_the_amplifiers_zero_and_remembers_the_coordinate() {
 
 #[test]
 fn homing_on_the_switch_searches_in_the_axiss_own_direction() {
-    for (resolution, method) in [(10e-9, 529), (-10e-9, 513)] {
+    let position = Metres::from_mm(-9.0);
+    let speed = MetresPerSecond(0.005);
+    let on_switch = AxisCommand::HomeNegativeLimit { position, speed };
+    let on_index = AxisCommand::HomeIndex { position, speed };
+    for (command, resolution, method) in [
+        (on_switch, 10e-9, 529),
+        (on_switch, -10e-9, 513),
+        (on_index, 10e-9, 561),
+        (on_index, -10e-9, 545),
+    ] {
         let mut rig = Rig::with(CopleySettings {
             scale: Scale::new(Metres(resolution)).unwrap(),
             ..settings()
         });
         rig.start().unwrap();
         rig.does(DriveCommand::Enable).unwrap();
-        rig.does(AxisCommand::HomeNegativeLimit {
-            position: Metres::from_mm(-9.0),
-            speed: MetresPerSecond(0.005),
-        })
-        .unwrap();
+        rig.does(command).unwrap();
         assert_eq!(rig.fake.ram[&Parameter::HOMING_METHOD.0], method);
         // 5 mm/s in 0.1 counts/s, and a fifth of it off the switch.
         assert_eq!(rig.fake.ram[&Parameter::HOMING_SPEED_FAST.0], 5_000_000);
         assert_eq!(rig.fake.ram[&Parameter::HOMING_SPEED_SLOW.0], 1_000_000);
-        assert_eq!(rig.axis.reading().unwrap().position, Metres::from_mm(-9.0));
+        assert_eq!(rig.axis.reading().unwrap().position, position);
     }
 }
 

@@ -1,0 +1,63 @@
+//! Amplifiers on serial lines: from the configuration's words to their driver's settings.
+
+use core::time::Duration;
+
+use drivers::device::copley::{CopleySettings, CopleyTimeouts};
+use drivers::wire::copley::Address;
+use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+
+use super::{CHECKED, millis, reference_limit};
+use crate::config::{AxisConfig, SerialLine};
+
+/// A Copley amplifier, as its driver is told; the configuration has been checked.
+///
+/// # Panics
+/// When the axis has another device.
+pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: u32) -> CopleySettings {
+    let serial = axis.serial().expect(CHECKED);
+    let address = Address::node(serial.address).expect(CHECKED);
+    let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
+    let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
+    let acceleration = MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3);
+    let quick_stop = MetresPerSecondSquared(axis.quick_stop_deceleration_mm_per_s2 * 1e-3);
+    let usual = CopleySettings::new(address, scale, speed_max, acceleration.max(quick_stop));
+    let homing = axis.zero.as_ref().map(|zero| reference_limit(zero, axis));
+    CopleySettings {
+        baud: line.baud_bit_per_s,
+        model: serial.model.map(str::to_owned),
+        serial: serial.serial_number,
+        soft_limits: Some((
+            Metres::from_mm(axis.soft_min_mm),
+            Metres::from_mm(axis.soft_max_mm),
+        )),
+        following_error: Some(Metres::from_um(axis.following_error_limit_um)),
+        position_window: Metres::from_um(axis.position_window_um),
+        position_window_time: millis(axis.position_window_time_ms),
+        quick_stop_deceleration: quick_stop,
+        poll_period: Duration::from_secs_f64(serial.poll_period_ms * 1e-3),
+        timeouts: patient(
+            CopleyTimeouts {
+                homing: homing.unwrap_or(usual.timeouts.homing),
+                ..usual.timeouts
+            },
+            patience,
+        ),
+        ..usual
+    }
+}
+
+/// See [`crate::config::Loaded::patience`].
+fn patient(usual: CopleyTimeouts, patience: u32) -> CopleyTimeouts {
+    CopleyTimeouts {
+        reply: usual.reply * patience,
+        quiet: usual.quiet * patience,
+        find: usual.find * patience,
+        drain: usual.drain * patience,
+        silence: usual.silence * patience,
+        transition: usual.transition * patience,
+        motion: usual.motion * patience,
+        settling: usual.settling * patience,
+        standing: usual.standing * patience,
+        homing: usual.homing * patience,
+    }
+}

@@ -1,0 +1,304 @@
+//! Whether an axis makes sense, and its device has what it needs and nothing else.
+
+use std::collections::BTreeMap;
+
+use super::judge::{Finding, Judge};
+use super::{check_heartbeat, check_watch};
+use crate::config::model::{AxisConfig, AxisDevice, MachineConfig};
+
+/// The rates that both amplifiers and serial ports have.
+const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
+
+/// Axes name files, and stand in words of the command line (`x=1mm`).
+pub(super) fn check_axis_name(findings: &mut Vec<Finding>, section: &str, name: &str) {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.is_empty() || !name.chars().all(plain) {
+        findings.push(Finding {
+            key: format!("{section}.{name}"),
+            cause: format!("`{name}` cannot name an axis"),
+            help: "use letters, digits and _".into(),
+        });
+    }
+}
+
+pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
+    judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);
+    judge.below(
+        ("soft_min_mm", axis.soft_min_mm),
+        ("soft_max_mm", axis.soft_max_mm),
+    );
+    judge.within("speed_max_mm_per_s", axis.speed_max_mm_per_s, 1e-3, 1e5);
+    judge.within(
+        "speed_mm_per_s",
+        axis.speed_mm_per_s,
+        1e-3,
+        axis.speed_max_mm_per_s,
+    );
+    judge.within(
+        "acceleration_mm_per_s2",
+        axis.acceleration_mm_per_s2,
+        1e-2,
+        1e6,
+    );
+    let quick_stop = axis.quick_stop_deceleration_mm_per_s2;
+    judge.within("quick_stop_deceleration_mm_per_s2", quick_stop, 1e-2, 1e7);
+    judge.within(
+        "following_error_limit_um",
+        axis.following_error_limit_um,
+        1e-3,
+        1e5,
+    );
+    judge.within("position_window_um", axis.position_window_um, 1e-4, 1e4);
+    judge.within("move_timeout_s", axis.move_timeout_s, 0.01, 1e5);
+    match axis.device {
+        AxisDevice::Cia402 => check_cia402(judge, config, axis),
+        AxisDevice::Copley => check_copley(judge, config, axis),
+    }
+    check_strangers(judge, axis);
+    let counts =
+        axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
+    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
+        judge.say(
+            "resolution_nm",
+            format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
+            "use a coarser resolution or a shorter range",
+        );
+    }
+}
+
+/// Keys that only drives on CAN have, and whether each is there; the first ones are needed.
+fn can_keys(axis: &AxisConfig) -> [(&'static str, bool); 10] {
+    [
+        ("bus", axis.bus.is_some()),
+        ("node_id", axis.node_id.is_some()),
+        (
+            "following_error_timeout_ms",
+            axis.following_error_timeout_ms.is_some(),
+        ),
+        (
+            "heartbeat_producer_ms",
+            axis.heartbeat_producer_ms.is_some(),
+        ),
+        (
+            "heartbeat_consumer_ms",
+            axis.heartbeat_consumer_ms.is_some(),
+        ),
+        ("watch_master_ms", axis.watch_master_ms.is_some()),
+        ("identity", axis.identity.is_some()),
+        ("home_offset", axis.home_offset.is_some()),
+        ("option_codes", axis.option_codes.is_some()),
+        ("synchronous_start", axis.synchronous_start.is_some()),
+    ]
+}
+
+const CAN_KEYS_NEEDED: usize = 7;
+
+/// Likewise of amplifiers on serial lines.
+fn line_keys(axis: &AxisConfig) -> [(&'static str, bool); 4] {
+    [
+        ("line", axis.line.is_some()),
+        ("address", axis.address.is_some()),
+        ("poll_period_ms", axis.poll_period_ms.is_some()),
+        ("amplifier", axis.amplifier.is_some()),
+    ]
+}
+
+const LINE_KEYS_NEEDED: usize = 3;
+
+fn check_needed(judge: &mut Judge<'_>, device: &str, needed: &[(&str, bool)]) {
+    let missing: Vec<_> = needed
+        .iter()
+        .filter(|(_, is_there)| !is_there)
+        .map(|(key, _)| format!("`{key}`"))
+        .collect();
+    if !missing.is_empty() {
+        let missing = missing.join(", ");
+        judge.say(
+            "device",
+            format!("a {device} axis needs {missing}"),
+            format!("add {missing}; configs/README.md describes every key"),
+        );
+    }
+}
+
+/// A key of another kind of device would be believed to do something.
+fn check_strangers(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let (can, line) = (can_keys(axis), line_keys(axis));
+    let (name, strangers) = match axis.device {
+        AxisDevice::Cia402 => ("cia402", line.as_slice()),
+        AxisDevice::Copley => ("copley", can.as_slice()),
+    };
+    for (key, _) in strangers.iter().filter(|(_, is_there)| *is_there) {
+        judge.say(key, format!("a {name} axis has no such key"), "remove it");
+    }
+}
+
+fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
+    check_needed(judge, "cia402", &can_keys(axis)[..CAN_KEYS_NEEDED]);
+    if let Some(bus) = &axis.bus {
+        judge.known("bus", bus, &config.can, "CAN bus");
+    }
+    if let Some(node) = axis.node_id {
+        judge.within("node_id", node.into(), 1.0, 127.0);
+    }
+    if let (Some(producer), Some(consumer)) =
+        (axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms)
+    {
+        check_heartbeat(judge, producer, consumer);
+    }
+    if let (Some(bus), Some(watch)) = (&axis.bus, axis.watch_master_ms) {
+        check_watch(judge, config, bus, watch);
+    }
+}
+
+fn check_copley(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
+    check_needed(judge, "copley", &line_keys(axis)[..LINE_KEYS_NEEDED]);
+    if let Some(address) = axis.address {
+        judge.within("address", address.into(), 0.0, 127.0);
+    }
+    if axis.zero.is_some() {
+        judge.say(
+            "zero",
+            "the Hall search needs positions and voltages of one SYNC; a copley axis has none",
+            "remove the section, or use a drive on CAN",
+        );
+    }
+    if let Some(period) = axis.poll_period_ms {
+        judge.within("poll_period_ms", period, 1.0, 300.0);
+    }
+    let Some(name) = &axis.line else {
+        return;
+    };
+    judge.known("line", name, &config.serial, "serial line");
+    if let Some(line) = config.serial.get(name)
+        && !AMPLIFIER_RATES.contains(&line.baud_bit_per_s)
+    {
+        judge.say(
+            "line",
+            format!("{} bit/s is no rate of an amplifier", line.baud_bit_per_s),
+            format!("give serial.{name}.baud_bit_per_s one of {AMPLIFIER_RATES:?}"),
+        );
+    }
+}
+
+/// Amplifiers share a line by their addresses; nothing else can share it with them.
+pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    let mut taken: BTreeMap<(&str, u8), String> = BTreeMap::new();
+    let mut owned: BTreeMap<&str, String> = BTreeMap::new();
+    for (name, axis) in &config.axis {
+        let Some(line) = axis.line.as_deref() else {
+            continue;
+        };
+        let key = format!("axis.{name}.address");
+        owned.entry(line).or_insert_with(|| key.clone());
+        let address = axis.address.unwrap_or(0);
+        if let Some(other) = taken.insert((line, address), key.clone()) {
+            findings.push(Finding {
+                key,
+                cause: format!("amplifier {address} on {line} is already {other}"),
+                help: "every amplifier on a line needs its own address".into(),
+            });
+        }
+    }
+    let analogs = config
+        .analog
+        .iter()
+        .filter_map(|(name, it)| Some((it.line.as_deref()?, format!("analog.{name}.line"))));
+    let instruments = config
+        .instrument
+        .iter()
+        .map(|(name, it)| (&*it.line, format!("instrument.{name}.line")));
+    let cameras = config
+        .camera
+        .iter()
+        .map(|(name, it)| (&*it.line, format!("camera.{name}.line")));
+    for (line, key) in analogs.chain(instruments).chain(cameras) {
+        if let Some(owner) = owned.get(line) {
+            findings.push(Finding {
+                key,
+                cause: format!("{line} belongs to amplifiers ({owner})"),
+                help: "give it a serial line of its own".into(),
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::{ConfigError, parse};
+
+    const DRIVES: &str = include_str!("../../../../configs/machines/uvw.toml");
+    const AMPLIFIERS: &str = include_str!("../../../../configs/machines/uvw-copley.toml");
+
+    /// The finding at `key` after `from`, once, has become `to`.
+    #[track_caller]
+    fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
+        assert!(text.contains(from), "{from}");
+        match parse(&text.replacen(from, to, 1), "machine.toml") {
+            Err(ConfigError::Invalid { findings }) => {
+                let told = findings
+                    .iter()
+                    .any(|it| it.key == key && it.cause.contains(says));
+                assert!(told, "{findings:?}");
+            }
+            other => panic!("{to}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_same_platform_is_sound_on_either_bus() {
+        for text in [DRIVES, AMPLIFIERS] {
+            parse(text, "machine.toml").unwrap_or_else(|error| panic!("{error}"));
+        }
+    }
+
+    #[test]
+    fn each_device_needs_its_own_keys_and_has_no_others() {
+        let says = "a cia402 axis needs `heartbeat_producer_ms`";
+        let key = "axis.u.device";
+        check(DRIVES, "heartbeat_producer_ms = 50\n", "", key, says);
+        let says = "a copley axis needs `line`, `poll_period_ms`";
+        let both = "line = \"amps\"\naddress = 0                    # at the cable\n";
+        let gone = AMPLIFIERS.replacen(both, "address = 0\n", 1);
+        check(&gone, "poll_period_ms = 20.0\n", "", key, says);
+        let says = "a copley axis has no such key";
+        for (stranger, key) in [
+            ("watch_master_ms = 500\n", "axis.u.watch_master_ms"),
+            ("synchronous_start = true\n", "axis.u.synchronous_start"),
+        ] {
+            let to = format!("device = \"copley\"\n{stranger}");
+            check(AMPLIFIERS, "device = \"copley\"\n", &to, key, says);
+        }
+        let to = "device = \"cia402\"\naddress = 1\n";
+        let says = "a cia402 axis has no such key";
+        check(DRIVES, "device = \"cia402\"\n", to, "axis.u.address", says);
+    }
+
+    #[test]
+    fn what_a_line_of_amplifiers_cannot_be_is_found_where_it_stands() {
+        let again = "amplifier 1 on amps is already axis.v.address";
+        let (from, key) = ("address = 2", "axis.w.address");
+        check(AMPLIFIERS, from, "address = 1", key, again);
+        check(AMPLIFIERS, from, "address = 128", key, "128");
+        let (from, key) = ("baud_bit_per_s = 115200        #", "axis.u.line");
+        let to = "baud_bit_per_s = 14400 #";
+        check(AMPLIFIERS, from, to, key, "no rate of an amplifier");
+        let (from, key) = ("line = \"vision\"", "camera.eye.line");
+        let says = "amps belongs to amplifiers (axis.u.address)";
+        check(AMPLIFIERS, from, "line = \"amps\"", key, says);
+        let (from, key) = ("line = \"amps\"", "axis.u.line");
+        check(AMPLIFIERS, from, "line = \"ampz\"", key, "ampz");
+        let (from, key) = ("poll_period_ms = 20.0", "axis.u.poll_period_ms");
+        check(AMPLIFIERS, from, "poll_period_ms = 0.0", key, "");
+    }
+
+    #[test]
+    fn a_hall_search_over_a_serial_line_is_refused() {
+        let linear = include_str!("../../../../configs/machines/linear.toml");
+        let begin = linear.find("[axis.x.zero]").expect("it has a zero");
+        let end = linear.find("[axis.x.calibrate]").expect("it comes next");
+        let zero = linear[begin..end].replace("axis.x", "axis.u");
+        let text = format!("{AMPLIFIERS}\n{zero}");
+        check(&text, "", "", "axis.u.zero", "voltages of one SYNC");
+    }
+}
