@@ -73,5 +73,5 @@ fn shortened(setup: Setup) -> Setup {
     setup
         .machine("step_mm = 0.25", "step_mm = 0.625")
         .machine("runs = 2", "runs = 1")
-        .machine("poses = 20", "poses = 8")
+        .machine("poses = 20", "poses = 5")
 }

@@ -23,6 +23,8 @@ pub struct AxisStrokes {
     pub axis: String,
     /// The line of its first row, when it was read from a file.
     pub line: Option<usize>,
+    /// The line of each stroke, when they were read from a file; empty otherwise.
+    pub lines: Vec<usize>,
     /// Its strokes: finite, and not all the same.
     pub strokes: Vec<Stroke>,
 }
@@ -103,6 +105,7 @@ impl StrokeSeries {
                 axes.push(AxisStrokes {
                     axis,
                     line: None,
+                    lines: Vec::new(),
                     strokes: Vec::new(),
                 });
                 axes.len() - 1
@@ -141,8 +144,10 @@ impl StrokeSeries {
         let names: Vec<String> = strokes.iter().map(|(axis, _)| axis.clone()).collect();
         let mut series = Self::new(strokes).map_err(|error| placed(&table, error))?;
         for axis in &mut series.axes {
-            let row = names.iter().position(|name| *name == axis.axis);
-            axis.line = row.map(|row| table.line(row));
+            let rows = names.iter().enumerate();
+            let own = rows.filter(|(_, name)| **name == axis.axis);
+            axis.lines = own.map(|(row, _)| table.line(row)).collect();
+            axis.line = axis.lines.first().copied();
         }
         Ok(series)
     }
@@ -254,6 +259,7 @@ mod tests {
             (u.axis.as_str(), u.line, u.strokes.len()),
             ("u", Some(3), 3)
         );
+        assert_eq!((&u.lines[..], &w.lines[..]), (&[3, 5, 6][..], &[4, 7][..]));
         assert_eq!(
             (w.axis.as_str(), w.line, w.strokes.len()),
             ("w", Some(4), 2)
