@@ -156,24 +156,34 @@ fn at_edge(angle: Radians, edge: Metres) -> Metres {
     Metres(angle.value() * edge.value())
 }
 
+/// A row of figures: its name, and its cell for each visit.
+type Row = (&'static str, fn(&Visit<'_>) -> String);
+
+const ROWS: [Row; 5] = [
+    ("poses", |it| it.poses.len().to_string()),
+    ("largest error (µm)", |it| um(it.largest())),
+    ("rms error (µm)", |it| um(it.rms())),
+    ("tolerance (µm)", |it| or_dash(it.tolerance.map(um))),
+    ("largest skew of the starts (ms)", |it| {
+        or_dash(it.skew_max_s().map(|it| format!("{:.3}", it * 1e3)))
+    }),
+];
+
+fn um(length: Metres) -> String {
+    format!("{:.3}", length.um())
+}
+
+fn or_dash(text: Option<String>) -> String {
+    text.unwrap_or("–".to_owned())
+}
+
 fn visit_figures(visits: &[Visit<'_>]) -> String {
     let mut html = String::from("<table><tr><th></th>");
     for visit in visits {
         let _ = write!(html, "<th>{}</th>", escape(visit.title));
     }
     html += "</tr>";
-    let um = |length: Metres| format!("{:.3}", length.um());
-    let or_dash = |text: Option<String>| text.unwrap_or("–".to_owned());
-    let rows: [(&str, &dyn Fn(&Visit<'_>) -> String); 5] = [
-        ("poses", &|it| it.poses.len().to_string()),
-        ("largest error (µm)", &|it| um(it.largest())),
-        ("rms error (µm)", &|it| um(it.rms())),
-        ("tolerance (µm)", &|it| or_dash(it.tolerance.map(um))),
-        ("largest skew of the starts (ms)", &|it| {
-            or_dash(it.skew_max_s().map(|it| format!("{:.3}", it * 1e3)))
-        }),
-    ];
-    for (name, cell) in rows {
+    for (name, cell) in ROWS {
         let _ = write!(html, "<tr><td>{name}</td>");
         for visit in visits {
             let _ = write!(html, "<td>{}</td>", cell(visit));
@@ -255,7 +265,7 @@ fn pose_table(visit: &Visit<'_>) -> String {
             it.error.y.um(),
             it.error.angle.arcsec(),
             it.largest.um(),
-            skew.map_or("–".to_owned(), |it| format!("{:.3}", it * 1e3)),
+            or_dash(skew.map(|it| format!("{:.3}", it * 1e3))),
         );
     }
     html + "</table>"
@@ -288,9 +298,7 @@ fn screws(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -
                     "<p>calibration {}, {} strokes, a single stop scatters by {} µm</p>{}",
                     short(id),
                     strokes.len(),
-                    content
-                        .scatter_m
-                        .map_or("–".to_owned(), |it| format!("{:.3}", Metres(it).um())),
+                    or_dash(content.scatter_m.map(|it| um(Metres(it)))),
                     screw_table(content)
                 );
             }
