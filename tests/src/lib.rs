@@ -8,6 +8,7 @@ mod desk;
 mod emulator;
 mod group;
 mod interface;
+mod pose_judge;
 mod rig;
 mod slcan_hub;
 mod stand;
@@ -16,6 +17,7 @@ pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use group::{Group, Start};
 pub use interface::{Interface, run};
+pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, machine_config, rigs,
     shipped_config,

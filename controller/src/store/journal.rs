@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::pose::{PoseEntry, StrokeEntry};
+use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
 
@@ -107,6 +107,8 @@ pub enum Entry {
     Point(PointEntry),
     /// A zero.
     Zero(ZeroEntry),
+    /// What a platform is made of.
+    Arrangement(ArrangementEntry),
     /// A stroke of one screw of a platform.
     Stroke(StrokeEntry),
     /// A pose of a platform that was looked at.
@@ -228,6 +230,8 @@ pub struct ReadJournal {
     pub zeros: Vec<ZeroEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
+    /// What the platform is made of, where the run was one of a platform.
+    pub arrangement: Option<ArrangementEntry>,
     /// Strokes of a platform's screws.
     pub strokes: Vec<StrokeEntry>,
     /// Poses of a platform.
@@ -378,6 +382,7 @@ fn take(
                 points: Vec::new(),
                 zeros: Vec::new(),
                 closures: Vec::new(),
+                arrangement: None,
                 strokes: Vec::new(),
                 poses: Vec::new(),
                 complete: false,
@@ -389,6 +394,7 @@ fn take(
         (Entry::Point(point), Some(read)) => read.points.push(point),
         (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
         (Entry::Closed(closure), Some(read)) => read.closures.push(closure),
+        (Entry::Arrangement(it), Some(read)) => read.arrangement = Some(it),
         (Entry::Stroke(stroke), Some(read)) => read.strokes.push(stroke),
         (Entry::Pose(pose), Some(read)) => read.poses.push(pose),
         (Entry::Resumed { .. }, Some(read)) => {

@@ -50,6 +50,8 @@ enum Which {
     Linear,
     /// An alignment platform on three screws, seen by an image controller.
     Uvw,
+    /// The same with amplifiers on a serial line in place of drives on CAN.
+    UvwCopley,
 }
 
 impl Which {
@@ -65,6 +67,11 @@ impl Which {
                 "configs/machines/uvw.toml",
                 include_str!("../../../../configs/machines/uvw.toml"),
                 include_str!("../../../../configs/emulated/uvw.toml"),
+            ],
+            Self::UvwCopley => [
+                "configs/machines/uvw-copley.toml",
+                include_str!("../../../../configs/machines/uvw-copley.toml"),
+                include_str!("../../../../configs/emulated/uvw-copley.toml"),
             ],
         }
     }
@@ -114,7 +121,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     };
     let shown = match args.machine {
         Which::Linear => linear::show(&mut stand, args, output),
-        Which::Uvw => uvw::show(&mut stand, args, output),
+        Which::Uvw | Which::UvwCopley => uvw::show(&mut stand, args, output),
     }?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),
