@@ -225,7 +225,7 @@ impl Plant {
     }
 
     /// Somebody takes up the table's plate, turns it by so many lines and fixes it again.
-    pub fn turn_plate(&mut self, lines: i64) {
+    pub fn turn_plate(&mut self, lines: f64) {
         if let Some(table) = self.machine.table_mut() {
             table.turn_plate(lines);
         }
