@@ -7,6 +7,7 @@
 mod desk;
 mod emulator;
 mod group;
+mod hand;
 mod interface;
 mod rig;
 mod slcan_hub;
@@ -15,6 +16,7 @@ mod stand;
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use group::{Group, Start};
+pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, machine_config, rigs,

@@ -26,6 +26,12 @@ const SWEEP_LIMIT: Duration = Duration::from_secs(10);
 /// The longest it may take to come to rest.
 const REST_LIMIT: Duration = Duration::from_secs(3);
 
+/// The fastest turn at which every line of a plate is read: the drive's latch keeps one position,
+/// which comes with the next SYNC, and that one may be lost or late.
+pub(crate) fn speed_max(lines: u32, sync_period_ms: f64) -> f64 {
+    360.0 / f64::from(lines) * SPACING_SHARE / (2.0 * sync_period_ms * 1e-3)
+}
+
 /// How a plate is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepOptions {
@@ -106,7 +112,7 @@ impl Machine {
     }
 
     /// Waits until the rotary axis has stood without a break.
-    fn rest(&mut self, axis: &str) -> Result<(), Failure> {
+    pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
         let limit = REST_LIMIT * self.patience;
         let start = self.now();
         let mut since = start;

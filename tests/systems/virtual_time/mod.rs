@@ -5,5 +5,6 @@ mod linear;
 mod linear_zero;
 mod platform;
 mod repeatable;
+mod rotary;
 mod rotary_table;
 mod serial_zero;
