@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 pub use copley::copley_settings;
 use patience::{patient_drive, patient_node, patient_pdos};
-pub use rotary::rotary_settings;
+pub use rotary::{periodic_compensation, rotary_settings};
 pub(crate) use rotary::{index_limit, rotaries};
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};

@@ -208,14 +208,10 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
         ..head.clone()
     };
     head.belongs_to(&id, &here)?;
-    if !loaded.config.axis.contains_key(&head.axis) {
-        let known = loaded
-            .config
-            .axis
-            .keys()
-            .cloned()
-            .collect::<Vec<_>>()
-            .join(", ");
+    let axes = &loaded.config.axis;
+    let known: Vec<_> = axes.keys().chain(loaded.config.rotary.keys()).collect();
+    if !known.contains(&&head.axis) {
+        let known = known.into_iter().cloned().collect::<Vec<_>>().join(", ");
         return Err(Failure::NoSuchAxis {
             axis: head.axis,
             known,

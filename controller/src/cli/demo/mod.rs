@@ -4,6 +4,7 @@
 //! everything else as serial lines. The controller side is the one of every other verb.
 
 mod linear;
+mod rotary;
 mod uvw;
 
 use std::io::IsTerminal;
@@ -50,6 +51,8 @@ enum Which {
     Linear,
     /// An alignment platform on three screws, seen by an image controller.
     Uvw,
+    /// A rotary table and a plate of lines, turned from placement to placement.
+    Rotary,
 }
 
 impl Which {
@@ -65,6 +68,11 @@ impl Which {
                 "configs/machines/uvw.toml",
                 include_str!("../../../../configs/machines/uvw.toml"),
                 include_str!("../../../../configs/emulated/uvw.toml"),
+            ],
+            Self::Rotary => [
+                "configs/machines/rotary.toml",
+                include_str!("../../../../configs/machines/rotary.toml"),
+                include_str!("../../../../configs/emulated/rotary.toml"),
             ],
         }
     }
@@ -115,6 +123,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let shown = match args.machine {
         Which::Linear => linear::show(&mut stand, args, output),
         Which::Uvw => uvw::show(&mut stand, args, output),
+        Which::Rotary => rotary::show(&mut stand, args, output),
     }?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),

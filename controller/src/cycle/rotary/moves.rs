@@ -1,10 +1,10 @@
 //! Moves of a rotary axis that are compensated, and the calibration they use.
 
-use compensator::rotary::{PeriodicCompensation, PeriodicInterpolation, PeriodicLimits};
+use compensator::rotary::PeriodicCompensation;
 use units::Radians;
 
 use super::failure::RotaryFailure;
-use crate::config::PeriodicInterpolationName;
+use crate::assemble;
 use crate::cycle::Way;
 use crate::cycle::calibrate::missing;
 use crate::failure::Failure;
@@ -135,18 +135,7 @@ impl Machine {
     ) -> Result<PeriodicCompensation, Failure> {
         let config = self.rotary_config(axis)?.compensation.as_ref();
         let config = config.ok_or_else(|| missing(axis, "compensation"))?;
-        let interpolation = match config.interpolation {
-            PeriodicInterpolationName::BandLimited => PeriodicInterpolation::BandLimited,
-            PeriodicInterpolationName::Linear => PeriodicInterpolation::Linear,
-        };
-        let limits = PeriodicLimits {
-            size: Radians::from_arcsec(config.size_limit_arcsec),
-            slope: config.slope_limit,
-        };
-        PeriodicCompensation::new(content.table(id)?, interpolation, limits).map_err(|source| {
-            let axis = axis.to_owned();
-            Failure::RotaryCompensation { axis, source }
-        })
+        assemble::periodic_compensation(config, axis, content.table(id)?)
     }
 
     pub(super) fn require_table_zeroed(&self, axis: &str) -> Result<(), Failure> {
