@@ -40,6 +40,13 @@ impl<'a> Hand<'a> {
         self
     }
 
+    /// It does what it is asked for ever.
+    #[must_use]
+    pub const fn stays(mut self) -> Self {
+        self.leaves_after = None;
+        self
+    }
+
     /// The plate lies there to begin with, in lines from where it lay first.
     #[must_use]
     pub const fn lies_at(mut self, lines: f64) -> Self {

@@ -1,7 +1,7 @@
 //! What a verb acts upon: a platform, linear axes or rotary axes, as the configuration says.
 
-use truestage::config::{self, MachineConfig};
 use truestage::Failure;
+use truestage::config::{self, MachineConfig};
 
 use super::MachineArgs;
 use super::output::Ended;
@@ -82,7 +82,8 @@ mod tests {
     #[test]
     fn of_several_kinds_one_must_be_named() {
         let rotary = ROTARY.find("[rotary.c]").unwrap();
-        let mixed = format!("{LINEAR}\n{}", &ROTARY[rotary..]).replace("node_id = 1\ncounts", "node_id = 9\ncounts");
+        let mixed = format!("{LINEAR}\n{}", &ROTARY[rotary..])
+            .replace("node_id = 1\ncounts", "node_id = 9\ncounts");
         check(&mixed, &[], None);
         check(&mixed, &["x"], Some(Kind::Linear));
         check(&mixed, &["c"], Some(Kind::Rotary));

@@ -226,8 +226,12 @@ pub(crate) fn main() -> ExitCode {
         Command::Move(args) => {
             let args = args.settle();
             by_kind(&args.machine, args.named(), |kind| match kind {
-                Kind::Platform => args.without_way().and_then(|()| platform::move_to(&args, output)),
-                Kind::Linear => args.without_way().and_then(|()| verbs::move_to(&args, output)),
+                Kind::Platform => args
+                    .without_way()
+                    .and_then(|()| platform::move_to(&args, output)),
+                Kind::Linear => args
+                    .without_way()
+                    .and_then(|()| verbs::move_to(&args, output)),
                 Kind::Rotary => table::move_to(&args, output),
             })
         }

@@ -176,12 +176,14 @@ pub(super) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
     let solution = &calibrated.solution;
     let largest = |values: &[Radians]| values.iter().fold(Radians::ZERO, |a, b| a.max(b.abs()));
     let plate: Vec<Radians> = solution.plate_error.iter().copied().flatten().collect();
-    let u = solution.standard_uncertainty().map_or("unknown".to_owned(), |u| {
-        format!("{:.4}″ at most", largest(&u).arcsec())
-    });
-    let scatter = calibrated.scatter.map_or("unknown".to_owned(), |it| {
-        format!("{:.4}″", it.arcsec())
-    });
+    let u = solution
+        .standard_uncertainty()
+        .map_or("unknown".to_owned(), |u| {
+            format!("{:.4}″ at most", largest(&u).arcsec())
+        });
+    let scatter = calibrated
+        .scatter
+        .map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
     let mut text = format!(
         "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″, \
          plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
@@ -261,11 +263,7 @@ pub(super) fn verified_text(verified: &RotaryVerified) -> String {
 }
 
 fn figures_value(figures: &RotaryFigures) -> Value {
-    let deviations: Vec<_> = figures
-        .deviations
-        .iter()
-        .map(|it| it.map(arcsec))
-        .collect();
+    let deviations: Vec<_> = figures.deviations.iter().map(|it| it.map(arcsec)).collect();
     json!({
         "largest_arcsec": arcsec(figures.largest),
         "rms_arcsec": arcsec(figures.rms),
@@ -316,7 +314,9 @@ mod tests {
             assert_eq!(axis, "c");
             assert!((angle.degrees() - degrees).abs() < 1e-9, "{text}");
         }
-        for text in ["c=90", "c", "=1deg", "c=1mm", "c=nandeg", "c=infrad", "c=1,5deg"] {
+        for text in [
+            "c=90", "c", "=1deg", "c=1mm", "c=nandeg", "c=infrad", "c=1,5deg",
+        ] {
             assert!(target(text).is_err(), "{text}");
         }
     }

@@ -162,7 +162,9 @@ impl RotaryCalibrateConfig {
                     OptimiseName::Rms => Criterion::Rms,
                 };
                 let placements = self.placements.unwrap_or_default() as usize;
-                rotary::plan(lines, placements, criterion)?.offsets().to_vec()
+                rotary::plan(lines, placements, criterion)?
+                    .offsets()
+                    .to_vec()
             }
         };
         Ok(Design::new(lines, &offsets, self.amplification_limit)?)

@@ -584,7 +584,13 @@ mod tests {
                 at_s: 0.0,
             })
         };
-        for entry in [sweep(0.0), sweep(0.0), placed(0.0), sweep(73.0), placed(73.0)] {
+        for entry in [
+            sweep(0.0),
+            sweep(0.0),
+            placed(0.0),
+            sweep(73.0),
+            placed(73.0),
+        ] {
             journal.write(&entry).unwrap();
         }
         journal.write(&Entry::Misplaced { offset: 73.0 }).unwrap();

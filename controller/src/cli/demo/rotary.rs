@@ -3,7 +3,9 @@
 use compensator::rotary::Design;
 use serde_json::json;
 use truestage::Failure;
-use truestage::cycle::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryMoved, RotaryVerified};
+use truestage::cycle::rotary::{
+    Operator, PlateTask, RotaryCalibrated, RotaryMoved, RotaryVerified,
+};
 use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
 use units::Radians;

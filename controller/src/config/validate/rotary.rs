@@ -4,8 +4,8 @@ use super::axis::check_axis_name;
 use super::judge::{Finding, Judge};
 use super::{check_heartbeat, check_watch};
 use crate::config::model::MachineConfig;
-use crate::cycle::sweep;
 use crate::config::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
+use crate::cycle::sweep;
 
 pub(super) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
     for (name, rotary) in &config.rotary {

@@ -86,7 +86,10 @@ impl Machine {
             id,
             solution,
             closure: closures.fold(Radians::ZERO, Radians::max),
-            scatter: placed.iter().filter_map(|it| it.scatter).reduce(Radians::max),
+            scatter: placed
+                .iter()
+                .filter_map(|it| it.scatter)
+                .reduce(Radians::max),
             largest: largest.unwrap_or(Radians::ZERO),
         })
     }

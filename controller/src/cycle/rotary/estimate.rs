@@ -28,7 +28,11 @@ const LIMITS: PeriodicLimits = PeriodicLimits {
     slope: 0.5,
 };
 
-pub(super) fn series(axis: &str, run: &PlateRun, placed: &[Placed]) -> Result<RotarySeries, Failure> {
+pub(super) fn series(
+    axis: &str,
+    run: &PlateRun,
+    placed: &[Placed],
+) -> Result<RotarySeries, Failure> {
     let placements = placed.iter().map(|it| Placement {
         offset: it.offset as usize,
         readings: it.by_line(),
@@ -77,7 +81,8 @@ fn solve(axis: &str, series: &RotarySeries, options: &SolveOptions) -> Result<So
 /// be. `None` when the table is too rough to say that.
 fn at_nominal_positions(read: &RotarySeries, solution: &Solution) -> Option<RotarySeries> {
     let table = PeriodicTable::new(solution.deviations(), None).ok()?;
-    let curve = PeriodicCompensation::new(table, PeriodicInterpolation::BandLimited, LIMITS).ok()?;
+    let curve =
+        PeriodicCompensation::new(table, PeriodicInterpolation::BandLimited, LIMITS).ok()?;
     let lines = read.lines();
     let moved = |offset: usize, line: usize, reading: Radians| {
         let nominal = Radians(TAU * ((line + offset) % lines) as f64 / lines as f64);

@@ -103,6 +103,9 @@ mod tests {
         check(PlateMove::TurnBy(-31.5), "by 31.5 lines (31.5000°)");
         check(PlateMove::TurnBy(-31.5), "at smaller angles");
         check(PlateMove::TurnBy(0.0), "leave it where it is");
-        check(PlateMove::LieAt, "73 lines (73.0000°) from the first placement");
+        check(
+            PlateMove::LieAt,
+            "73 lines (73.0000°) from the first placement",
+        );
     }
 }

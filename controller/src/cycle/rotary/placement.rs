@@ -2,8 +2,9 @@
 
 use core::f64::consts::TAU;
 use core::time::Duration;
+use std::collections::BTreeMap;
 
-use compensator::uncertainty::{median, robust_sigma};
+use compensator::uncertainty::{median, robust_sigma, standard_deviation};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use super::failure::RotaryFailure;
@@ -24,6 +25,8 @@ const MISSING_SHARE: f64 = 0.25;
 const SECTORS: usize = 8;
 /// A part has at least so many lines, where there are as many.
 const SECTOR_LINES: usize = 8;
+/// From how many standard deviations on a difference of two passes is no noise.
+const WILD: f64 = 5.0;
 /// So many lines are named in a warning.
 const NAMED: usize = 6;
 
@@ -92,9 +95,7 @@ impl Placed {
         let both = || forward.iter().zip(&reverse);
         let deviations = both().map(|(f, r)| Some(Radians(((*f)? + (*r)?) / 2.0)));
         let apart: Vec<f64> = both().filter_map(|(f, r)| Some((*f)? - (*r)?)).collect();
-        let late = median(&apart).unwrap_or(0.0);
-        let apart: Vec<f64> = apart.iter().map(|it| it - late).collect();
-        let scatter = robust_sigma(&apart).map(|it| it * (f64::from(passes) / 2.0).sqrt());
+        let scatter = scatter_of(apart).map(|it| it * (f64::from(passes) / 2.0).sqrt());
         Self {
             offset: placement.offset,
             deviations: deviations.collect(),
@@ -110,6 +111,16 @@ impl Placed {
         readings.rotate_left(whole);
         readings
     }
+}
+
+/// The standard deviation of values of which some are wild.
+fn scatter_of(mut values: Vec<f64>) -> Option<f64> {
+    let middle = median(&values)?;
+    values.iter_mut().for_each(|it| *it -= middle);
+    // The median of a coarse encoder's counts is coarse itself: it only tells what is wild.
+    let wild = WILD * robust_sigma(&values)?;
+    values.retain(|it| it.abs() <= wild);
+    standard_deviation(&values)
 }
 
 fn mean_of<'a>(sweeps: impl Iterator<Item = &'a SweepEntry>) -> Vec<Option<f64>> {
@@ -148,7 +159,10 @@ fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
 
 impl Machine {
     /// The plate and how it is read, as configured.
-    pub(super) fn plate_run(&self, axis: &str) -> Result<(PlateRun, RotaryCalibrateConfig), Failure> {
+    pub(super) fn plate_run(
+        &self,
+        axis: &str,
+    ) -> Result<(PlateRun, RotaryCalibrateConfig), Failure> {
         let config = self.rotary_config(axis)?;
         let run = config.calibrate.clone();
         let run = run.ok_or_else(|| missing(axis, "calibrate"))?;
@@ -224,14 +238,20 @@ impl Machine {
             self.check_lines(axis, run, &sweep)?;
             // A placement lies somewhere; its passes must agree about where.
             phase = phase.or(Some(sweep.phase.value()));
-            let entry = entry_of(&sweep, offset, number / 2 + 1, approach, self.now().seconds());
+            let entry = entry_of(
+                &sweep,
+                offset,
+                number / 2 + 1,
+                approach,
+                self.now().seconds(),
+            );
             journal.write(&Entry::Sweep(entry.clone()))?;
-            self.warn_of_lines(axis, &entry);
             sweeps.push(entry);
             let done = u64::from(done + number + 1);
             let observer = &mut self.observer;
             observer.progress(run.stage, axis, done, total.into());
         }
+        self.warn_of_lines(axis, &sweeps);
         let placement = self.closed(axis, run, offset, &sweeps)?;
         journal.write(&Entry::Placed(placement))?;
         journal.flush_to_disk()?;
@@ -275,48 +295,74 @@ impl Machine {
     }
 
     /// Lines that were not read are no reason to stop, but to clean the plate.
-    fn warn_of_lines(&mut self, axis: &str, sweep: &SweepEntry) {
-        let lines = sweep.deviations_rad.len().max(1) as i64;
-        let whole = sweep.offset.floor() as i64;
-        let name = |position: &u32| (i64::from(*position) - whole).rem_euclid(lines).to_string();
-        for (what, positions) in [
-            ("not seen (dirt?)", &sweep.missing),
-            ("seen twice (a scratch?)", &sweep.doubled),
-            ("overwritten before they were read", &sweep.overwritten),
-        ] {
-            if positions.is_empty() {
-                continue;
+    fn warn_of_lines(&mut self, axis: &str, sweeps: &[SweepEntry]) {
+        let first = &sweeps[0];
+        let seldom = |list: fn(&SweepEntry) -> &Vec<u32>, times: usize| {
+            let mut counts = BTreeMap::new();
+            for position in sweeps.iter().flat_map(list) {
+                *counts.entry(*position).or_insert(0_usize) += 1;
             }
-            let mut named: Vec<String> = positions.iter().take(NAMED).map(name).collect();
-            if positions.len() > NAMED {
-                named.push(format!("and {} more", positions.len() - NAMED));
-            }
-            self.observer.warning(&format!(
-                "axis {axis}, offset {}, pass {} {}: lines {what}: {}",
-                sweep.offset,
-                sweep.pass,
-                sweep.approach,
-                named.join(", ")
+            counts.retain(|_, count| *count >= times);
+            counts.into_keys().collect::<Vec<_>>()
+        };
+        let mut say = |text: String| {
+            let text = format!("axis {axis}, plate at offset {}: {text}", first.offset);
+            self.observer.warning(&text);
+        };
+        let unseen = seldom(|it| &it.missing, sweeps.len());
+        if !unseen.is_empty() {
+            say(format!("not seen (dirt?): {}", names(first, &unseen)));
+        }
+        let doubled = seldom(|it| &it.doubled, 1);
+        if !doubled.is_empty() {
+            say(format!(
+                "seen twice (a scratch?): {}",
+                names(first, &doubled)
             ));
         }
-        if !sweep.strays_rad.is_empty() {
-            let (count, first) = (sweep.strays_rad.len(), Radians(sweep.strays_rad[0]));
-            self.observer.warning(&format!(
-                "axis {axis}, offset {}: {count} edge(s) where no line is, the first at {:.4}°",
-                sweep.offset,
-                first.degrees()
+        let again = seldom(|it| &it.overwritten, sweeps.len());
+        if !again.is_empty() {
+            let names = names(first, &again);
+            say(format!(
+                "overwritten unread in every pass (a scratch?): {names}"
+            ));
+        }
+        let unread: usize = sweeps.iter().map(|it| it.overwritten.len()).sum();
+        let unread = unread - again.len() * sweeps.len();
+        if unread > 0 {
+            let total = first.deviations_rad.len() * sweeps.len();
+            say(format!(
+                "{unread} of {total} readings were overwritten before they were read: the computer is \
+                 busy, or the table too fast"
+            ));
+        }
+        let strays: Vec<f64> = sweeps
+            .iter()
+            .flat_map(|it| &it.strays_rad)
+            .copied()
+            .collect();
+        if let Some(stray) = strays.first() {
+            let (count, degrees) = (strays.len(), stray.to_degrees());
+            say(format!(
+                "{count} edge(s) where no line is, one at {degrees:.4}°"
             ));
         }
     }
 }
 
-fn entry_of(
-    sweep: &Sweep,
-    offset: f64,
-    pass: u32,
-    approach: Approach,
-    at_s: f64,
-) -> SweepEntry {
+/// Table positions as lines of the plate; of many, the first.
+fn names(sweep: &SweepEntry, positions: &[u32]) -> String {
+    let lines = sweep.deviations_rad.len().max(1) as i64;
+    let whole = sweep.offset.floor() as i64;
+    let name = |position: &u32| (i64::from(*position) - whole).rem_euclid(lines).to_string();
+    let mut named: Vec<String> = positions.iter().take(NAMED).map(name).collect();
+    if positions.len() > NAMED {
+        named.push(format!("and {} more", positions.len() - NAMED));
+    }
+    format!("line {}", named.join(", "))
+}
+
+fn entry_of(sweep: &Sweep, offset: f64, pass: u32, approach: Approach, at_s: f64) -> SweepEntry {
     let value = |it: &Option<Radians>| it.map(Radians::value);
     SweepEntry {
         offset,
@@ -367,10 +413,14 @@ mod tests {
 
     #[test]
     fn a_slip_within_the_last_lines_of_a_pass_shows() {
-        let first: Vec<Option<f64>> = (0..360).map(|at| Some(if at < 350 { 1.0 } else { 6.0 })).collect();
+        let first: Vec<Option<f64>> = (0..360)
+            .map(|at| Some(if at < 350 { 1.0 } else { 6.0 }))
+            .collect();
         let again = vec![Some(6.0); 360];
         assert!((closure(&first, &again) - 5.0).abs() < 1e-12);
-        let late: Vec<Option<f64>> = (0..360).map(|at| Some(if at < 350 { 1.0 } else { 6.0 })).collect();
+        let late: Vec<Option<f64>> = (0..360)
+            .map(|at| Some(if at < 350 { 1.0 } else { 6.0 }))
+            .collect();
         let closed = closure(&vec![Some(1.0); 360], &late);
         assert!((closed - 5.0 * 10.0 / 45.0).abs() < 1e-12, "{closed}");
         assert_eq!(closure(&first, &first), 0.0);

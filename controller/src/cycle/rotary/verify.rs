@@ -97,7 +97,10 @@ impl Machine {
             ..run
         };
         let known = self.known_plate(axis, &run, compensated)?;
-        let id = known.as_ref().map(|it| it.id.clone()).filter(|_| compensated);
+        let id = known
+            .as_ref()
+            .map(|it| it.id.clone())
+            .filter(|_| compensated);
         let header = self.rotary_header("verify", axis, &run, id);
         let mut journal = Journal::create(&store.runs(), &header)?;
         let offset = config.offset_lines;
@@ -111,9 +114,10 @@ impl Machine {
             offset_lines: offset,
             found: figures(&placed, known.as_ref(), None),
             plate_known: known.is_some(),
-            left: known.as_ref().filter(|_| compensated).map(|known| {
-                figures(&placed, Some(known), Some(&known.compensation))
-            }),
+            left: known
+                .as_ref()
+                .filter(|_| compensated)
+                .map(|known| figures(&placed, Some(known), Some(&known.compensation))),
             noise: placed
                 .scatter
                 .map(|it| it / (2.0 * f64::from(run.passes)).sqrt()),

@@ -172,6 +172,14 @@ impl Table {
         self.plate.smudge(line, smudged);
     }
 
+    pub(super) fn shift_line(&mut self, line: u32, shift: Radians) {
+        self.detector.shift(line, shift);
+    }
+
+    pub(super) const fn set_detector_dead(&mut self, dead: bool) {
+        self.detector.set_dead(dead);
+    }
+
     pub(super) fn set_scratched(&mut self, line: u32, scratched: bool) {
         self.detector.scratch(line, scratched);
     }
