@@ -4,4 +4,5 @@ mod interrupted;
 mod programs;
 mod rotary;
 mod screw;
+mod table;
 mod verbs;
