@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 
 pub use copley::copley_settings;
 use patience::{patient_drive, patient_node, patient_pdos};
-pub use rotary::rotary_settings;
 pub(crate) use rotary::{index_limit, rotaries};
+pub use rotary::{periodic_compensation, rotary_settings};
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use compensator::hall_zero;

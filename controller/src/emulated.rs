@@ -212,7 +212,7 @@ impl EmulatedOnPtys {
     ///
     /// # Errors
     /// When the machine's thread has ended.
-    pub fn turn_plate(&self, lines: i64) -> Result<(), EmulatedError> {
+    pub fn turn_plate(&self, lines: f64) -> Result<(), EmulatedError> {
         Ok(self.running.turn_plate(lines)?)
     }
 }

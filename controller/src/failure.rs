@@ -11,6 +11,7 @@ use units::Metres;
 
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
+use crate::cycle::rotary::RotaryFailure;
 use crate::emulated::EmulatedError;
 use crate::store::StoreError;
 
@@ -23,6 +24,9 @@ pub enum Failure {
     /// A platform did not do what it was asked.
     #[error(transparent)]
     Platform(#[from] PlatformFailure),
+    /// A rotary table did not do what it was asked.
+    #[error(transparent)]
+    Table(#[from] RotaryFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -429,6 +433,7 @@ impl Failure {
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Platform(failure) => failure.exit_code(),
+            Self::Table(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }

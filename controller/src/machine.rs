@@ -26,6 +26,7 @@ use crate::bus_watch::BusWatch;
 use crate::camera;
 use crate::config::{AxisConfig, Loaded, MachineConfig};
 use crate::cycle::platform::PlatformState;
+use crate::cycle::rotary::TableInUse;
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
@@ -77,6 +78,10 @@ pub(crate) struct AxisMemory {
 pub(crate) struct RotaryMemory {
     /// Zeroed on the index mark since the drive was last powered.
     pub(crate) zeroed: bool,
+    /// The calibration in use.
+    pub(crate) calibration: Option<TableInUse>,
+    /// Where the plate was read last, in lines; `None` when somebody may have turned it since.
+    pub(crate) plate_at: Option<f64>,
 }
 
 /// How alarms are taken.
@@ -265,7 +270,9 @@ impl Machine {
             memory.zeroed = false;
             memory.approach.forget();
         }
-        self.rotary_memory.clear();
+        for memory in self.rotary_memory.values_mut() {
+            memory.zeroed = false;
+        }
         if let Some(platform) = &mut self.platform {
             platform.forget();
         }

@@ -239,7 +239,7 @@ impl Machine {
         if at < self.axes.len() {
             self.remember(&name).zeroed = false;
         } else {
-            self.rotary_memory.remove(&name);
+            self.rotary_memory.entry(name).or_default().zeroed = false;
         }
     }
 

@@ -5,4 +5,5 @@ mod platform;
 mod programs;
 mod rotary;
 mod screw;
+mod table;
 mod verbs;

@@ -11,7 +11,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use tests::{EMULATED, INTERFACE, MACHINE, Rig, rigs};
+use tests::{INTERFACE, LINEAR, Rig, Shipped, rigs};
 
 /// Machines share the processor, and on SocketCAN the interface: one after the other.
 static ONE_MACHINE: Mutex<()> = Mutex::new(());
@@ -132,6 +132,7 @@ pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Ended {
 /// An emulated machine in a process of its own, and a folder with its configuration.
 pub(crate) struct Bench {
     rig: Rig,
+    shipped: Shipped,
     mock: Process,
     ports: Vec<String>,
     folder: tempfile::TempDir,
@@ -139,11 +140,17 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Starts `mock-bus`; it says where its ports are.
+    /// Starts `mock-bus` with the linear machine; it says where its ports are.
     pub(crate) fn new(rig: Rig) -> Self {
+        Self::of(rig, LINEAR, |text| text)
+    }
+
+    /// The same with any machine that ships, its emulation after `change`.
+    pub(crate) fn of(rig: Rig, shipped: Shipped, change: impl Fn(String) -> String) -> Self {
+        let emulated = change(shipped.emulated.to_owned());
         let turn = ONE_MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        fs::write(folder.path().join("emulated.toml"), EMULATED).expect("a file can be written");
+        fs::write(folder.path().join("emulated.toml"), &emulated).expect("a file can be written");
         let mut command = Command::new(program("mock-bus"));
         command.current_dir(folder.path());
         command.args(["emulated.toml", "--seed", "51", "--speed", &speed(rig)]);
@@ -153,9 +160,10 @@ impl Bench {
             command.args(["--slcan", "can0"]);
         }
         let mut mock = Process::start(&mut command);
-        let ports = read_ports(&mut mock);
+        let ports = read_ports(&mut mock, &emulated);
         let bench = Self {
             rig,
+            shipped,
             mock,
             ports,
             folder,
@@ -177,7 +185,10 @@ impl Bench {
 
     /// Where its records are.
     pub(crate) fn records(&self) -> PathBuf {
-        self.folder().join("machine-data/linear")
+        let name = self.shipped.machine.lines();
+        let name = name.filter_map(|line| line.strip_prefix("name = "));
+        let name: String = name.take(1).map(|it| it.replace('"', "")).collect();
+        self.folder().join("machine-data").join(name)
     }
 
     /// The endpoint of a port of the machine.
@@ -189,7 +200,9 @@ impl Bench {
 
     /// Writes the shipped configuration, with fewer measurements and after `change`.
     pub(crate) fn configure(&self, name: &str, change: impl Fn(String) -> String) {
-        let short = MACHINE
+        let short = self
+            .shipped
+            .machine
             .replace("runs = 3", "runs = 2")
             .replace("targets = 8\nruns = 5", "targets = 4\nruns = 2");
         fs::write(self.folder().join(name), change(short)).expect("a file can be written");
@@ -213,9 +226,14 @@ impl Bench {
         let uses_machine = ["scan", "zero", "calibrate", "verify", "move"];
         if uses_machine.contains(&words[0]) {
             command.args(["--clock-speed", &speed(self.rig)]);
-            for name in ["can0", "laser"] {
-                let port = format!("{name}={}", self.port(name));
-                command.args(["--port", &port]);
+            let machine = self.shipped.machine;
+            let uses = |name: &str| machine.contains(&format!(".{name}]"));
+            for port in self
+                .ports
+                .iter()
+                .filter(|it| it.split('=').next().is_some_and(uses))
+            {
+                command.args(["--port", port]);
             }
         }
         command.args(&words[1..]);
@@ -246,8 +264,8 @@ pub(crate) fn speed(rig: Rig) -> String {
 }
 
 /// `can0: slcan /dev/pts/4` and the like become endpoints `can0=slcan:/dev/pts/4`.
-fn read_ports(mock: &mut Process) -> Vec<String> {
-    let ports = EMULATED.matches("[[ports]]").count();
+fn read_ports(mock: &mut Process, emulated: &str) -> Vec<String> {
+    let ports = emulated.matches("[[ports]]").count();
     let output = mock.0.stdout.as_mut().expect("it is piped");
     let lines = BufReader::new(output).lines().take(ports);
     let ports: Vec<_> = lines

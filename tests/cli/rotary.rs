@@ -223,7 +223,7 @@ fn placements_and_options_of_no_use_are_told_and_nothing_is_stored() {
         &["--amplification-limit", "1"],
         &["is amplified", "the limit is 1.0"],
     );
-    check_refused(&good, &[], &["its axes (x) are linear"]);
+    check_refused(&good, &[], &["no axis is a rotary one"]);
     let urad = folder();
     fs::write(
         urad.path().join("u.csv"),

@@ -7,6 +7,7 @@
 mod desk;
 mod emulator;
 mod group;
+mod hand;
 mod interface;
 mod pose_judge;
 mod rig;
@@ -16,6 +17,7 @@ mod stand;
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use group::{Group, Start};
+pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use rig::{

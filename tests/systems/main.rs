@@ -2,4 +2,5 @@
 
 mod linear;
 mod platform;
+mod rotary;
 mod virtual_time;

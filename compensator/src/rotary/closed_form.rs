@@ -10,11 +10,8 @@ use std::sync::Arc;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-use super::design::Design;
+use super::design::{Design, INFORMATION_MIN};
 use super::lanes::sum;
-
-/// Information below it is rounding of none; two placements one line apart of 100 000 have 2e-9.
-const INFORMATION_MIN: f64 = 1e-12;
 
 /// The transforms and weights of one design.
 pub(super) struct ClosedForm {

@@ -2,6 +2,9 @@
 
 use core::f64::consts::PI;
 
+/// Information below it is rounding of none; two placements one line apart of 100 000 have 2e-9.
+pub(super) const INFORMATION_MIN: f64 = 1e-12;
+
 /// Why offsets cannot part the table from the plate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
@@ -159,6 +162,12 @@ impl Design {
     /// How often harmonic k stands in a full spectrum: with its negative, except half of an even N.
     fn weight(&self, harmonic: usize) -> f64 {
         if 2 * harmonic == self.lines { 1.0 } else { 2.0 }
+    }
+
+    /// How many terms of a full spectrum the offsets leave with the plate.
+    pub(super) fn unseen(&self) -> usize {
+        let unseen = (1..=self.harmonics()).filter(|k| self.information[*k] <= INFORMATION_MIN);
+        unseen.map(|k| self.weight(k) as usize).sum()
     }
 
     pub(super) fn information(&self) -> &[f64] {

@@ -234,6 +234,28 @@ mod tests {
         }
     }
 
+    /// Without the third placement the others are 12 lines apart, in 12 separate groups of lines.
+    #[test]
+    fn a_gap_where_the_others_do_not_see_every_harmonic_is_borne() {
+        for turned in [7, 9] {
+            let mut noise = Noise(3);
+            let truth = Truth::new(60, &mut noise);
+            let mut read = |offset: usize, named: usize, gap: usize| {
+                let reading = truth.reading(offset, named) + 0.05 * noise.normal();
+                (named != gap).then(|| Radians::from_arcsec(reading))
+            };
+            let placements = [(0, 0, 20), (12, 12, 41), (7, turned, 60)];
+            let placements = placements.map(|(offset, turned, gap)| Placement {
+                offset,
+                readings: (0..60).map(|named| read(turned, named, gap)).collect(),
+            });
+            let series = RotarySeries::new(60, placements.into()).unwrap();
+            let found = misplaced(&series, &SolveOptions::default());
+            let expected = (turned == 9).then_some((2, 9));
+            assert_eq!(found.map(|it| (it.placement, it.likely)), expected);
+        }
+    }
+
     #[test]
     fn two_placements_cannot_judge_each_other() {
         let mut noise = Noise(1);

@@ -369,11 +369,14 @@ impl<'a> Solver<'a> {
     }
 
     /// Readings less unknowns: N − 1 table errors, N − 1 plate errors and P constants of complete
-    /// readings, and one for each gap but the one that a line never read has for itself.
+    /// readings, less what of the table is left with the plate, and one for each gap but the one
+    /// that a line never read has for itself.
     fn degrees_of_freedom(&self, fit: &Fit<'_, '_>) -> usize {
         let (lines, placements) = (self.design.lines(), self.design.offsets().len());
         let unknowns = fit.gaps.as_ref().map_or(0, Gaps::unknowns);
-        (placements - 2) * (lines - 1) - unknowns
+        let complete = (placements - 2) * (lines - 1) + self.design.unseen();
+        // As many gaps as that have no factor; should rounding have found one, nothing is free.
+        complete.saturating_sub(unknowns)
     }
 
     fn solution(&self, readings: &[f64], fit: Fit<'_, '_>) -> Result<Solution, SolveError> {

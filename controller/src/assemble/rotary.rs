@@ -3,6 +3,9 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
+use compensator::rotary::{
+    PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable,
+};
 use drivers::device::RotaryAxis;
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, Edge, LatchSettings, PositionRange, Turn,
@@ -12,9 +15,10 @@ use units::{Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale};
 
 use super::{CHECKED, home_offset, millis, node_settings, option_codes, patient_drive};
 use crate::config::{
-    CanBus, EdgeName, LineDetectorConfig, MachineConfig, PositionRangeName, RotaryConfig,
-    RotaryDevice,
+    CanBus, EdgeName, LineDetectorConfig, MachineConfig, PeriodicInterpolationName,
+    PositionRangeName, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
 };
+use crate::failure::Failure;
 use crate::machine::Unit;
 
 pub(crate) fn rotaries(
@@ -104,6 +108,29 @@ pub fn rotary_settings(
 pub(crate) fn index_limit(rotary: &RotaryConfig) -> Option<Duration> {
     let speed = rotary.zero.as_ref()?.index_speed_deg_per_s;
     Some(Duration::from_secs_f64(10.0 + 2.0 * 360.0 / speed))
+}
+
+/// The compensation of a rotary axis from its table, within the limits of the configuration.
+///
+/// # Errors
+/// When it breaks a limit of size or slope.
+pub fn periodic_compensation(
+    config: &RotaryCompensationConfig,
+    axis: &str,
+    table: PeriodicTable,
+) -> Result<PeriodicCompensation, Failure> {
+    let interpolation = match config.interpolation {
+        PeriodicInterpolationName::BandLimited => PeriodicInterpolation::BandLimited,
+        PeriodicInterpolationName::Linear => PeriodicInterpolation::Linear,
+    };
+    let limits = PeriodicLimits {
+        size: Radians::from_arcsec(config.size_limit_arcsec),
+        slope: config.slope_limit,
+    };
+    PeriodicCompensation::new(table, interpolation, limits).map_err(|source| {
+        let axis = axis.to_owned();
+        Failure::RotaryCompensation { axis, source }
+    })
 }
 
 const fn turn(rotary: &RotaryConfig) -> Turn {

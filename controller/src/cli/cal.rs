@@ -221,13 +221,14 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
 }
 
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
-    let axes = &loaded.config.axis;
-    if axes.contains_key(axis) {
+    let config = &loaded.config;
+    let known: Vec<_> = config.axis.keys().chain(config.rotary.keys()).collect();
+    if known.iter().any(|it| *it == axis) {
         return Ok(());
     }
     Err(Failure::NoSuchAxis {
         axis: axis.to_owned(),
-        known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
+        known: known.into_iter().cloned().collect::<Vec<_>>().join(", "),
     })
 }
 

@@ -1,5 +1,7 @@
 //! `truestage fit` and `truestage iso230`: the mathematics on data measured elsewhere.
 
+use core::f64::consts::TAU;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
@@ -7,6 +9,7 @@ use compensator::error_table::{self, FitOptions, Fitted};
 use compensator::hall_zero::fit_hall;
 use compensator::iso230;
 use compensator::measurement::{HallSeries, LinearSeries};
+use drivers::device::Identity;
 use serde_json::json;
 use truestage::cycle::utc_now;
 use truestage::store::{
@@ -140,28 +143,53 @@ fn store_fit(
     Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
 }
 
-/// The head of a calibration of `axis` made from the file `data`. The drive cannot be asked here,
-/// so its identity is what the configuration expects; with a serial number there it is checked
-/// like any other, without one any drive of that product will do.
+/// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be
+/// asked here, so its identity is what the configuration expects; with a serial number there it is
+/// checked like any other, without one any drive of that product will do.
 pub(super) fn head_of(
     loaded: &config::Loaded,
     axis: &str,
     data: &Path,
 ) -> Result<RecordHead, Failure> {
     let axes = &loaded.config.axis;
-    let it = axes.get(axis).ok_or_else(|| Failure::NoSuchAxis {
+    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
+    Ok(RecordHead {
+        resolution_m: Some(it.resolution_nm * 1e-9),
+        ..head(loaded, axis, &it.configured_identity(), data)
+    })
+}
+
+/// The same of the rotary `axis`.
+pub(super) fn rotary_head_of(
+    loaded: &config::Loaded,
+    axis: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let axes = &loaded.config.rotary;
+    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
+    Ok(RecordHead {
+        resolution_rad: Some(TAU / f64::from(it.counts_per_turn)),
+        ..head(loaded, axis, &it.configured_identity(), data)
+    })
+}
+
+fn no_such_axis<T>(axis: &str, axes: &BTreeMap<String, T>) -> Failure {
+    Failure::NoSuchAxis {
         axis: axis.to_owned(),
         known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
-    })?;
+    }
+}
+
+fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> RecordHead {
     let section = &loaded.config.machine;
-    Ok(RecordHead {
+    RecordHead {
         schema_version: SCHEMA_VERSION,
         machine: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
         config_hash: loaded.hash.clone(),
         axis: axis.to_owned(),
-        drive: IdentityRecord::from(&it.configured_identity()),
-        resolution_m: Some(it.resolution_nm * 1e-9),
+        drive: IdentityRecord::from(drive),
+        resolution_m: None,
         resolution_rad: None,
         created: utc_now(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
@@ -175,7 +203,7 @@ pub(super) fn head_of(
             ..Default::default()
         },
         environment: EnvironmentRecord::default(),
-    })
+    }
 }
 
 fn hall(path: &Path, output: Output) -> Ended {

@@ -3,6 +3,8 @@
 mod cal;
 mod data;
 mod demo;
+mod kind;
+mod operator;
 mod output;
 mod page;
 mod platform;
@@ -11,13 +13,15 @@ mod rotary;
 mod scan;
 mod screw;
 mod session;
+mod table;
 mod verbs;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use kind::{Kind, by_kind};
 use output::Output;
 
 /// Makes precision motion stages go where they are told.
@@ -45,11 +49,11 @@ enum Command {
     Scan(MachineArgs),
     /// Acknowledge the fault of a drive, once; nothing moves.
     Reset(AxisArgs),
-    /// Find the origin with the Hall sensors.
+    /// Find the origin: with Hall sensors, on index pulses, or on an index mark.
     Zero(AxisArgs),
     /// Zero, measure the deviations, store and activate the calibration.
     Calibrate(CalibrateArgs),
-    /// Zero, measure between the calibrated positions, judge by ISO 230-2.
+    /// Zero, measure between the calibrated positions, judge.
     Verify(VerifyArgs),
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
@@ -98,6 +102,12 @@ struct AxisArgs {
     axis: Option<String>,
 }
 
+impl AxisArgs {
+    fn by_kind(&self, verb: impl FnOnce(Kind) -> output::Ended) -> output::Ended {
+        by_kind(&self.machine, self.axis.as_deref().into_iter(), verb)
+    }
+}
+
 /// What a bare `--resume` stands for; no file is called that by accident.
 const NEWEST_RUN: &str = "<newest>";
 
@@ -111,6 +121,9 @@ struct CalibrateArgs {
     /// Save although the place measured first and last differs by more than the limit.
     #[arg(long)]
     accept_drift: bool,
+    /// Do not wait for the person who turns the plate of a rotary table.
+    #[arg(long)]
+    yes: bool,
 }
 
 #[derive(Clone, Debug, Args)]
@@ -123,18 +136,37 @@ struct VerifyArgs {
     /// Continue the newest interrupted run of this axis, or the journal given.
     #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
     resume: Option<PathBuf>,
+    /// Do not wait for the person who turns the plate of a rotary table.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// Which way round a rotary axis goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum WayName {
+    /// Less than half a turn.
+    Shortest,
+    /// With growing angles, less than a turn.
+    Forward,
+    /// With falling angles, less than a turn.
+    Reverse,
+    /// As many turns as the angle says, from the zero.
+    Turns,
 }
 
 #[derive(Clone, Debug, Args)]
 struct MoveArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`.
-    #[arg(value_name = "AXIS=LENGTH")]
+    /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`, a rotary axis `c=90deg`.
+    #[arg(value_name = "AXIS=PLACE")]
     targets: Vec<String>,
     /// A platform moves on until the image agrees.
     #[arg(long)]
     align: bool,
+    /// Which way round a rotary axis goes; the shortest when not given.
+    #[arg(long, value_enum)]
+    way: Option<WayName>,
 }
 
 impl MoveArgs {
@@ -147,18 +179,23 @@ impl MoveArgs {
         }
         self
     }
-}
 
-/// What a verb does depends on what the configuration describes.
-fn either(
-    machine: &MachineArgs,
-    of_a_platform: impl FnOnce() -> output::Ended,
-    of_an_axis: impl FnOnce() -> output::Ended,
-) -> output::Ended {
-    if platform::is_described_by(&machine.config)? {
-        of_a_platform()
-    } else {
-        of_an_axis()
+    /// The axes that it names.
+    fn named(&self) -> impl Iterator<Item = &str> {
+        let targets = self.targets.iter();
+        targets.filter_map(|it| Some(it.split_once('=')?.0))
+    }
+
+    /// # Errors
+    /// When it says which way round what does not turn.
+    fn without_way(&self) -> Result<(), truestage::Failure> {
+        match self.way {
+            None => Ok(()),
+            Some(_) => Err(truestage::Failure::Usage {
+                what: "--way is for rotary axes".into(),
+                help: "leave it out".into(),
+            }),
+        }
     }
 }
 
@@ -171,28 +208,32 @@ pub(crate) fn main() -> ExitCode {
         Command::Check { config } => verbs::check(&config, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => verbs::reset(&args, output),
-        Command::Zero(args) => either(
-            &args.machine,
-            || platform::zero(&args, output),
-            || verbs::zero(&args, output),
-        ),
-        Command::Calibrate(args) => either(
-            &args.axis.machine,
-            || platform::calibrate(&args, output),
-            || verbs::calibrate(&args, output),
-        ),
-        Command::Verify(args) => either(
-            &args.axis.machine,
-            || platform::verify(&args, output),
-            || verbs::verify(&args, output),
-        ),
+        Command::Zero(args) => args.by_kind(|kind| match kind {
+            Kind::Platform => platform::zero(&args, output),
+            Kind::Linear => verbs::zero(&args, output),
+            Kind::Rotary => table::zero(&args, output),
+        }),
+        Command::Calibrate(args) => args.axis.by_kind(|kind| match kind {
+            Kind::Platform => platform::calibrate(&args, output),
+            Kind::Linear => verbs::calibrate(&args, output),
+            Kind::Rotary => table::calibrate(&args, output),
+        }),
+        Command::Verify(args) => args.axis.by_kind(|kind| match kind {
+            Kind::Platform => platform::verify(&args, output),
+            Kind::Linear => verbs::verify(&args, output),
+            Kind::Rotary => table::verify(&args, output),
+        }),
         Command::Move(args) => {
             let args = args.settle();
-            either(
-                &args.machine,
-                || platform::move_to(&args, output),
-                || verbs::move_to(&args, output),
-            )
+            by_kind(&args.machine, args.named(), |kind| match kind {
+                Kind::Platform => args
+                    .without_way()
+                    .and_then(|()| platform::move_to(&args, output)),
+                Kind::Linear => args
+                    .without_way()
+                    .and_then(|()| verbs::move_to(&args, output)),
+                Kind::Rotary => table::move_to(&args, output),
+            })
         }
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),

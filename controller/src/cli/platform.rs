@@ -1,24 +1,17 @@
 //! The verbs of the cycle on an alignment platform (system S1).
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 use truestage::cycle::platform::{
     Aligned, PlatformCalibrated, PlatformFailure, PlatformVerified, Pose, PoseMoved,
 };
 use truestage::ports::Use;
-use truestage::{Failure, Machine, Store, config, json as to_json};
+use truestage::{Failure, Machine, Store, json as to_json};
 use units::{Metres, Radians};
 
 use super::output::{Ended, Output};
 use super::screw::outlier_lines;
 use super::session::Session;
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
-
-/// Whether the configuration is that of a platform.
-pub(super) fn is_described_by(path: &Path) -> Result<bool, Failure> {
-    Ok(config::load(path)?.config.platform.is_some())
-}
 
 /// Starts the platform, zeroes it, runs `procedure`, switches off.
 fn with_zeroed_platform<R>(
@@ -339,7 +332,7 @@ fn length(text: &str) -> Option<Metres> {
     measure(text, &units).map(Metres)
 }
 
-fn angle(text: &str) -> Option<Radians> {
+pub(super) fn angle(text: &str) -> Option<Radians> {
     let degree = 1.0_f64.to_radians();
     let units = [
         ("arcsec", degree / 3600.0),

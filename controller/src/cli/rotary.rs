@@ -11,11 +11,11 @@ use compensator::rotary::{
 };
 use serde_json::{Value, json};
 use truestage::json::rotary as to_json;
-use truestage::store::RotaryContent;
-use truestage::{Failure, config};
+use truestage::store::{CalibrationRecord, Content, RotaryContent, Store, short};
+use truestage::{Failure, assemble, config};
 use units::Radians;
 
-use super::data::read;
+use super::data::{read, rotary_head_of};
 use super::output::{Ended, Output};
 
 /// Harmonics that a plan prints; `--json` has them all.
@@ -70,7 +70,7 @@ pub(super) struct RotaryArgs {
     /// Store it as a calibration of this machine.
     #[arg(long, value_name = "CONFIG")]
     save: Option<PathBuf>,
-    /// The axis it belongs to; the only one when there is one.
+    /// The rotary axis it belongs to; the only one when there is one.
     #[arg(long)]
     axis: Option<String>,
 }
@@ -156,10 +156,19 @@ pub(super) fn fit(args: &RotaryArgs, output: Output) -> Ended {
         place: file,
         source,
     })?;
+    let mut value = to_json::solution(&solution);
+    let mut text = solution_text(&solution);
     if let Some(config) = &args.save {
-        return Err(not_yet(config, args.axis.as_deref())?);
+        let id = save(config, args, &solution)?;
+        text += &format!(
+            "\nstored as {} (use it with `truestage cal activate {} {}`)",
+            short(&id),
+            config.display(),
+            short(&id)
+        );
+        value["calibration"] = json!(id);
     }
-    output.result(&solution_text(&solution), &to_json::solution(&solution))
+    output.result(&text, &value)
 }
 
 fn noise(arcsec: f64) -> Result<Radians, Failure> {
@@ -221,19 +230,36 @@ fn name(reading: &Reading) -> String {
     format!("line {} at offset {}", reading.line, reading.offset)
 }
 
-/// Why it cannot be stored: no axis of a machine file is a rotary one.
-fn not_yet(path: &Path, axis: Option<&str>) -> Result<Failure, Failure> {
+/// Stores a table measured elsewhere.
+fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, Failure> {
     let loaded = config::load(path)?;
-    let axes = &loaded.config.axis;
-    let known = axes.keys().cloned().collect::<Vec<_>>().join(", ");
-    if let Some(axis) = axis.filter(|axis| !axes.contains_key(*axis)) {
-        let axis = axis.to_owned();
-        return Ok(Failure::NoSuchAxis { axis, known });
+    let axes = &loaded.config.rotary;
+    let axis = match (&args.axis, axes.len()) {
+        (Some(axis), _) => axis.clone(),
+        (None, 1) => axes.keys().next().expect("there is one").clone(),
+        (None, 0) => {
+            return Err(Failure::Usage {
+                what: format!("{}: no axis is a rotary one", path.display()),
+                help: "a rotary error table cannot be stored for any of them".into(),
+            });
+        }
+        (None, _) => {
+            let names: Vec<_> = axes.keys().cloned().collect();
+            return Err(Failure::Usage {
+                what: "the machine has several rotary axes".into(),
+                help: format!("add --axis with one of {}", names.join(", ")),
+            });
+        }
+    };
+    let head = rotary_head_of(&loaded, &axis, &args.data)?;
+    let content = RotaryContent::new(solution);
+    if let Some(limits) = &axes[&axis].compensation {
+        assemble::periodic_compensation(limits, &axis, content.table("just made")?)?;
     }
-    Ok(Failure::Usage {
-        what: format!("{}: its axes ({known}) are linear", path.display()),
-        help: "a rotary error table cannot be stored for any of them".into(),
-    })
+    let section = &loaded.config.machine;
+    let content = Content::RotaryErrorTable(content);
+    let record = CalibrationRecord { head, content };
+    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
 }
 
 /// A stored table, for `cal show`.

@@ -87,11 +87,14 @@ pub(super) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The axis asked for, or the only one.
-pub(super) fn choose_axis(machine: &Machine, args: &AxisArgs) -> Result<String, Failure> {
-    let names = machine.axis_names();
+/// The axis asked for, or the only one of `names`.
+pub(super) fn choose_axis(names: Vec<String>, args: &AxisArgs) -> Result<String, Failure> {
     match (&args.axis, names.as_slice()) {
-        (Some(axis), _) => machine.axis_config(axis).map(|_| axis.clone()),
+        (Some(axis), known) if known.contains(axis) => Ok(axis.clone()),
+        (Some(axis), known) => Err(Failure::NoSuchAxis {
+            axis: axis.clone(),
+            known: known.join(", "),
+        }),
         (None, [only]) => Ok(only.clone()),
         (None, _) => Err(Failure::Usage {
             what: "the machine has several axes".into(),

@@ -53,7 +53,7 @@ fn with_zeroed_axis<R>(
     procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
-    let axis = choose_axis(&session.machine, args)?;
+    let axis = choose_axis(session.machine.axis_names(), args)?;
     let store = session.store.clone();
     let resume = journal_to_resume(resume, &store, verb, &axis)?;
     if load_calibration && store.active(&axis)?.current.is_none() {
@@ -82,7 +82,7 @@ fn with_zeroed_axis<R>(
 
 pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "zero", Use::Motion, output)?;
-    let axis = choose_axis(&session.machine, args)?;
+    let axis = choose_axis(session.machine.axis_names(), args)?;
     let store = session.store.clone();
     let (zeroed, counters) = session.machine.guarded(|machine| {
         machine.start()?;
@@ -122,7 +122,9 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
 /// Acknowledges a drive's fault; nothing moves.
 pub(super) fn reset(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "reset", Use::Motion, output)?;
-    let axis = choose_axis(&session.machine, args)?;
+    let mut names = session.machine.axis_names();
+    names.extend(session.machine.rotary_names());
+    let axis = choose_axis(names, args)?;
     let (before, after, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         let before = machine.power_state(&axis)?;
@@ -329,7 +331,7 @@ fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
 }
 
 /// The journal named, or, for a bare `--resume`, the newest incomplete one of this axis.
-fn journal_to_resume(
+pub(super) fn journal_to_resume(
     resume: Option<&PathBuf>,
     store: &Store,
     verb: &str,

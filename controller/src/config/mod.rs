@@ -25,6 +25,7 @@ pub use platform::{
     PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
 };
 pub use rotary::{
-    DirectionName, EdgeName, LineDetectorConfig, PositionRangeName, RotaryConfig, RotaryDevice,
-    RotaryZeroConfig,
+    DirectionName, EdgeName, LineDetectorConfig, OptimiseName, PeriodicInterpolationName,
+    PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
+    RotaryVerifyConfig, RotaryZeroConfig,
 };

@@ -1,5 +1,7 @@
 //! The part of a configuration that is about rotary axes. Each key's suffix is its unit.
 
+use compensator::rotary::{self, Criterion, Design, PlanError};
+use drivers::device::Identity;
 use serde::Deserialize;
 
 use super::model::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
@@ -76,6 +78,9 @@ pub struct RotaryConfig {
     pub identity: IdentityConfig,
     pub zero: Option<RotaryZeroConfig>,
     pub line_detector: Option<LineDetectorConfig>,
+    pub calibrate: Option<RotaryCalibrateConfig>,
+    pub verify: Option<RotaryVerifyConfig>,
+    pub compensation: Option<RotaryCompensationConfig>,
 }
 
 /// The zero: the encoder's index mark.
@@ -96,4 +101,102 @@ pub struct LineDetectorConfig {
     #[serde(default)]
     pub edge: EdgeName,
     pub input: Option<i16>,
+}
+
+impl RotaryConfig {
+    /// Who its drive must be, as far as the configuration says.
+    pub fn configured_identity(&self) -> Identity {
+        let it = &self.identity;
+        Identity {
+            device_type: it.device_type,
+            vendor: it.vendor_id,
+            product: it.product_code,
+            revision: it.revision.unwrap_or(0),
+            serial: it.serial_number.unwrap_or(0),
+            name: String::new(),
+        }
+    }
+}
+
+/// What planned offsets keep small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OptimiseName {
+    /// The noise of the worst harmonic.
+    #[default]
+    Worst,
+    /// The rms noise of a table error.
+    Rms,
+}
+
+/// The calibration run: a plate read in several placements.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct RotaryCalibrateConfig {
+    pub plate: String,
+    pub lines: u32,
+    pub offsets: Option<Vec<u32>>,
+    pub placements: Option<u32>,
+    pub optimise: Option<OptimiseName>,
+    pub passes: u32,
+    pub speed_deg_per_s: Option<f64>,
+    pub reading_noise_arcsec: f64,
+    pub amplification_limit: f64,
+    pub closure_limit_arcsec: f64,
+}
+
+impl RotaryCalibrateConfig {
+    /// The placements: those given, or those planned.
+    ///
+    /// # Errors
+    /// When there are none that part table and plate within the limit.
+    pub fn design(&self) -> Result<Design, PlanError> {
+        let lines = self.lines as usize;
+        let given = self.offsets.as_ref();
+        let offsets = match given {
+            Some(offsets) => offsets.iter().map(|it| *it as usize).collect(),
+            None => {
+                let criterion = match self.optimise.unwrap_or_default() {
+                    OptimiseName::Worst => Criterion::Worst,
+                    OptimiseName::Rms => Criterion::Rms,
+                };
+                let placements = self.placements.unwrap_or_default() as usize;
+                rotary::plan(lines, placements, criterion)?
+                    .offsets()
+                    .to_vec()
+            }
+        };
+        Ok(Design::new(lines, &offsets, self.amplification_limit)?)
+    }
+}
+
+/// The verification: the same plate in a further placement.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct RotaryVerifyConfig {
+    pub offset_lines: f64,
+    pub passes: u32,
+    pub tolerance_arcsec: f64,
+}
+
+/// How the deviation between two lines is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PeriodicInterpolationName {
+    /// The trigonometric polynomial through all lines.
+    BandLimited,
+    /// Straight lines.
+    Linear,
+}
+
+/// How a table's error is undone, and its limits.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct RotaryCompensationConfig {
+    pub interpolation: PeriodicInterpolationName,
+    pub size_limit_arcsec: f64,
+    pub slope_limit: f64,
 }

@@ -1,5 +1,6 @@
 //! Calibrate: measure the deviations, fit the error table, store it with all it depends on.
 
+use core::f64::consts::TAU;
 use core::time::Duration;
 use std::path::PathBuf;
 
@@ -165,6 +166,7 @@ impl Machine {
     /// The head of a record without measurements, which says who this machine is.
     pub fn this_machine(&self, axis: &str) -> RecordHead {
         let config = self.config.axis.get(axis);
+        let rotary = self.config.rotary.get(axis);
         RecordHead {
             schema_version: SCHEMA_VERSION,
             machine: self.config.machine.name.clone(),
@@ -173,7 +175,7 @@ impl Machine {
             axis: axis.to_owned(),
             drive: self.drive_record(axis),
             resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
-            resolution_rad: None,
+            resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
             created: String::new(),
             program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
             source: String::new(),
@@ -183,7 +185,8 @@ impl Machine {
     }
 
     fn drive_record(&self, axis: &str) -> IdentityRecord {
-        let identity = self.axis(axis).ok().and_then(|unit| unit.device.identity());
+        let drive = self.drive_index(axis).ok();
+        let identity = drive.and_then(|at| self.drive(at).identity());
         identity
             .as_ref()
             .map(IdentityRecord::from)

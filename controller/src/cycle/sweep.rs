@@ -7,6 +7,7 @@
 
 use core::f64::consts::TAU;
 use core::time::Duration;
+use std::collections::BTreeSet;
 
 use drivers::device::{LatchCommand, Latched, Repeat};
 use units::{Approach, Radians, RadiansPerSecond};
@@ -25,6 +26,12 @@ const REST: Duration = Duration::from_millis(50);
 const SWEEP_LIMIT: Duration = Duration::from_secs(10);
 /// The longest it may take to come to rest.
 const REST_LIMIT: Duration = Duration::from_secs(3);
+
+/// The fastest turn at which every line of a plate is read: the drive's latch keeps one position,
+/// which comes with the next SYNC, and that one may be lost or late.
+pub(crate) fn speed_max(lines: u32, sync_period_ms: f64) -> f64 {
+    360.0 / f64::from(lines) * SPACING_SHARE / (2.0 * sync_period_ms * 1e-3)
+}
 
 /// How a plate is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +59,7 @@ pub struct Sweep {
     pub missing: Vec<u32>,
     /// Positions at which more than one edge came: scratched?
     pub doubled: Vec<u32>,
-    /// Positions at which an edge was overwritten before it was read.
+    /// Positions at which an edge was, or may have been, overwritten before it was read.
     pub overwritten: Vec<u32>,
     /// Readings that are near no line.
     pub strays: Vec<Radians>,
@@ -106,7 +113,7 @@ impl Machine {
     }
 
     /// Waits until the rotary axis has stood without a break.
-    fn rest(&mut self, axis: &str) -> Result<(), Failure> {
+    pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
         let limit = REST_LIMIT * self.patience;
         let start = self.now();
         let mut since = start;
@@ -143,6 +150,7 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
         ..Sweep::default()
     };
     let mut edges = vec![0_u32; options.lines as usize];
+    let mut unread = BTreeSet::new();
     for edge in latched {
         let number = ((edge.position.value() - phase) / spacing).round();
         let off = edge.position.value() - phase - number * spacing;
@@ -157,11 +165,17 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
         edges[at as usize] += 1;
         sweep.deviations[at as usize] = Some(edge.position - Radians(number * spacing));
         if edge.missed > 0 {
+            // The edges before it, and perhaps the line's own by one of a scratch.
+            let before = i64::from(edge.missed.min(options.lines));
+            let back =
+                |by: i64| (number as i64 - by * options.approach.sign() as i64).rem_euclid(lines);
+            unread.extend((0..=before).map(|by| back(by) as u32));
             sweep.overwritten.push(at);
         }
     }
     for (at, count) in (0_u32..).zip(&edges) {
         match count {
+            0 if unread.contains(&at) => sweep.overwritten.push(at),
             0 => sweep.missing.push(at),
             1 => {}
             _ => sweep.doubled.push(at),
@@ -259,6 +273,35 @@ mod tests {
         assert_eq!(sweep.deviations[100], None);
         assert_eq!(sweep.strays.len(), 1);
         assert_eq!(sweep.read(), 359);
+    }
+
+    #[test]
+    fn lines_overwritten_unread_are_not_called_unseen() {
+        let overwrite = |latched: &mut Vec<Latched<Radians>>| {
+            let place = |degrees: f64| {
+                move |it: &Latched<Radians>| it.position.degrees().round() == degrees
+            };
+            latched.retain(|it| !place(51.0)(it) && !place(52.0)(it) && !place(200.0)(it));
+        };
+        let mut latched = plate(0.0);
+        overwrite(&mut latched);
+        let mark = |latched: &mut Vec<Latched<Radians>>, degrees: f64| {
+            let at = latched
+                .iter()
+                .position(|it| it.position.degrees().round() == degrees);
+            latched[at.unwrap()].missed = 2;
+        };
+        mark(&mut latched, 53.0);
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.overwritten, [53, 51, 52]);
+        assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
+        let mut latched = plate(0.0);
+        overwrite(&mut latched);
+        latched.reverse();
+        mark(&mut latched, 50.0);
+        let sweep = assign(&latched, Radians::TURN, &options(Approach::Reverse, None));
+        assert_eq!(sweep.overwritten, [50, 51, 52]);
+        assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
 use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
@@ -113,6 +114,17 @@ pub enum Entry {
     Stroke(StrokeEntry),
     /// A pose of a platform that was looked at.
     Pose(PoseEntry),
+    /// How a plate is to be read: the second line of such a run.
+    PlatePlan(PlatePlanEntry),
+    /// A pass over the lines of a plate.
+    Sweep(SweepEntry),
+    /// A placement of a plate was read whole.
+    Placed(PlacementEntry),
+    /// A placement turned out to be another one than was asked for: it must be read again.
+    Misplaced {
+        /// By how many lines the plate was to be turned.
+        offset: f64,
+    },
     /// A run is whole, and the place of its datum still reads what it should.
     Closed(ClosureEntry),
     /// The run was continued here after an interruption.
@@ -236,6 +248,12 @@ pub struct ReadJournal {
     pub strokes: Vec<StrokeEntry>,
     /// Poses of a platform.
     pub poses: Vec<PoseEntry>,
+    /// How a plate is read.
+    pub plate_plan: Option<PlatePlanEntry>,
+    /// Passes over it.
+    pub sweeps: Vec<SweepEntry>,
+    /// Its placements that were read whole.
+    pub placements: Vec<PlacementEntry>,
     /// Whether the run was finished.
     pub complete: bool,
     /// How many bytes are whole lines.
@@ -258,6 +276,13 @@ impl ReadJournal {
             .filter(|it| is_kept(it.run))
             .copied()
             .collect();
+        let placed = |offset: f64| self.placements.iter().any(|it| it.offset == offset);
+        self.sweeps.retain(|it| placed(it.offset));
+    }
+
+    fn forget_placement(&mut self, offset: f64) {
+        self.sweeps.retain(|it| it.offset != offset);
+        self.placements.retain(|it| it.offset != offset);
     }
 }
 
@@ -385,6 +410,9 @@ fn take(
                 arrangement: None,
                 strokes: Vec::new(),
                 poses: Vec::new(),
+                plate_plan: None,
+                sweeps: Vec::new(),
+                placements: Vec::new(),
                 complete: false,
                 valid_bytes: 0,
                 torn: false,
@@ -397,6 +425,10 @@ fn take(
         (Entry::Arrangement(it), Some(read)) => read.arrangement = Some(it),
         (Entry::Stroke(stroke), Some(read)) => read.strokes.push(stroke),
         (Entry::Pose(pose), Some(read)) => read.poses.push(pose),
+        (Entry::PlatePlan(plan), Some(read)) => read.plate_plan = Some(plan),
+        (Entry::Sweep(sweep), Some(read)) => read.sweeps.push(sweep),
+        (Entry::Placed(placement), Some(read)) => read.placements.push(placement),
+        (Entry::Misplaced { offset }, Some(read)) => read.forget_placement(offset),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;
             read.keep_whole_runs();
@@ -539,6 +571,43 @@ mod tests {
         let runs: Vec<_> = read.points.iter().map(|point| point.run).collect();
         assert_eq!(runs, [1, 1, 1, 1, 2, 2, 2, 2]);
         assert_eq!(read_journal(&path).unwrap().points, read.points);
+    }
+
+    #[test]
+    fn of_a_plate_whole_placements_are_kept_that_lay_where_they_should() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        let sweep = |offset| {
+            Entry::Sweep(SweepEntry {
+                offset,
+                ..SweepEntry::default()
+            })
+        };
+        let placed = |offset| {
+            Entry::Placed(PlacementEntry {
+                offset,
+                closure_rad: 0.0,
+                at_s: 0.0,
+            })
+        };
+        for entry in [
+            sweep(0.0),
+            sweep(0.0),
+            placed(0.0),
+            sweep(73.0),
+            placed(73.0),
+        ] {
+            journal.write(&entry).unwrap();
+        }
+        journal.write(&Entry::Misplaced { offset: 73.0 }).unwrap();
+        journal.write(&sweep(162.0)).unwrap();
+        let path = journal.path().to_owned();
+        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        assert_eq!((read.sweeps.len(), read.placements.len()), (2, 1));
+        journal.write(&sweep(73.0)).unwrap();
+        journal.write(&placed(73.0)).unwrap();
+        let read = read_journal(&path).unwrap();
+        assert_eq!((read.sweeps.len(), read.placements.len()), (3, 2));
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod atomic;
 mod calibration;
 mod journal;
 mod lease;
+mod plate;
 mod pose;
 mod record;
 
@@ -24,6 +25,7 @@ pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
+pub use plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
     CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,

@@ -148,6 +148,10 @@ pub enum Fault {
     LineSmudged { line: u32 },
     /// A scratch beside a line of the table's plate gives a second edge.
     LineScratched { line: u32 },
+    /// The line detector is bumped whenever this line passes, and sees it elsewhere.
+    LineShifted { line: u32, shift_arcsec: f64 },
+    /// The line detector sees nothing.
+    DetectorDead,
     /// The machine shakes under its instruments (standard deviation).
     Vibration { amplitude_um: f64 },
     /// The instrument's temperature, pressure and humidity stand still.

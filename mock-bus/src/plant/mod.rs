@@ -24,7 +24,7 @@ mod truth;
 #[cfg(test)]
 mod tests;
 
-use units::{Metres, Time};
+use units::{Metres, Radians, Time};
 
 pub use analog::InputFault;
 pub use camera::{Mark, Target};
@@ -225,7 +225,7 @@ impl Plant {
     }
 
     /// Somebody takes up the table's plate, turns it by so many lines and fixes it again.
-    pub fn turn_plate(&mut self, lines: i64) {
+    pub fn turn_plate(&mut self, lines: f64) {
         if let Some(table) = self.machine.table_mut() {
             table.turn_plate(lines);
         }
@@ -242,6 +242,20 @@ impl Plant {
     pub fn set_line_scratched(&mut self, line: u32, scratched: bool) {
         if let Some(table) = self.machine.table_mut() {
             table.set_scratched(line, scratched);
+        }
+    }
+
+    /// Lets the line detector see a line so far beside its place; zero is where it is.
+    pub fn shift_line(&mut self, line: u32, shift: Radians) {
+        if let Some(table) = self.machine.table_mut() {
+            table.shift_line(line, shift);
+        }
+    }
+
+    /// Lets the line detector see nothing, or everything again.
+    pub fn set_detector_dead(&mut self, dead: bool) {
+        if let Some(table) = self.machine.table_mut() {
+            table.set_detector_dead(dead);
         }
     }
 

@@ -246,7 +246,7 @@ impl Running {
     ///
     /// # Errors
     /// When the machine has stopped.
-    pub fn turn_plate(&self, lines: i64) -> Result<(), RunError> {
+    pub fn turn_plate(&self, lines: f64) -> Result<(), RunError> {
         self.with(move |machine| machine.turn_plate(lines))
     }
 

@@ -1,7 +1,7 @@
 //! What a fault that lasts does to the machine when it begins, and what its end undoes.
 
 use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
-use units::{Celsius, Metres, Pascals, RelativeHumidity};
+use units::{Celsius, Metres, Pascals, Radians, RelativeHumidity};
 
 use super::{Event, Link, Simulation};
 use crate::bus::Sender;
@@ -73,6 +73,13 @@ impl Simulation {
             }
             Fault::LineSmudged { line } => plant.set_line_smudged(line, on),
             Fault::LineScratched { line } => plant.set_line_scratched(line, on),
+            Fault::LineShifted { line, shift_arcsec } => {
+                plant.shift_line(
+                    line,
+                    Radians::from_arcsec(if on { shift_arcsec } else { 0.0 }),
+                );
+            }
+            Fault::DetectorDead => plant.set_detector_dead(on),
             Fault::Vibration { amplitude_um } => {
                 plant.set_vibration(Metres::from_um(if on { amplitude_um } else { 0.0 }));
             }

@@ -279,7 +279,7 @@ impl Simulation {
 
     /// Somebody takes up the table's plate, turns it by so many lines against the table and
     /// fixes it again, a little off as ever. Nothing happens on a machine without one.
-    pub fn turn_plate(&mut self, lines: i64) {
+    pub fn turn_plate(&mut self, lines: f64) {
         self.plant.turn_plate(lines);
     }
 

@@ -6,5 +6,6 @@ mod linear_zero;
 mod platform;
 mod platform_knowledge;
 mod repeatable;
+mod rotary;
 mod rotary_table;
 mod serial_zero;

@@ -65,7 +65,7 @@ fn sweeps_of_several_placements_read_table_and_plate_to_the_detectors_noise() {
     run(&mut bench, |bench| {
         ready(bench)?;
         let mut phase = None;
-        for turned in [0, 1, 18, 113] {
+        for turned in [0.0, 1.0, 18.0, 113.0] {
             bench.emulated.simulation_mut().turn_plate(turned);
             for approach in [Approach::Forward, Approach::Reverse] {
                 let begun = bench.machine.now();
@@ -119,7 +119,7 @@ fn missing_and_doubtful_lines_are_named_by_their_place_on_the_table() {
     run(&mut bench, |bench| {
         ready(bench)?;
         let mut simulation = bench.emulated.simulation_mut();
-        simulation.turn_plate(10);
+        simulation.turn_plate(10.0);
         let faults = [
             Fault::LineSmudged { line: 355 },
             Fault::LineSmudged { line: 20 },

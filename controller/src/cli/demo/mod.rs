@@ -4,6 +4,7 @@
 //! everything else as serial lines. The controller side is the one of every other verb.
 
 mod linear;
+mod rotary;
 mod uvw;
 
 use std::io::IsTerminal;
@@ -52,6 +53,8 @@ enum Which {
     Uvw,
     /// The same with amplifiers on a serial line in place of drives on CAN.
     UvwCopley,
+    /// A rotary table and a plate of lines, turned from placement to placement.
+    Rotary,
 }
 
 impl Which {
@@ -72,6 +75,11 @@ impl Which {
                 "configs/machines/uvw-copley.toml",
                 include_str!("../../../../configs/machines/uvw-copley.toml"),
                 include_str!("../../../../configs/emulated/uvw-copley.toml"),
+            ],
+            Self::Rotary => [
+                "configs/machines/rotary.toml",
+                include_str!("../../../../configs/machines/rotary.toml"),
+                include_str!("../../../../configs/emulated/rotary.toml"),
             ],
         }
     }
@@ -122,6 +130,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let shown = match args.machine {
         Which::Linear => linear::show(&mut stand, args, output),
         Which::Uvw | Which::UvwCopley => uvw::show(&mut stand, args, output),
+        Which::Rotary => rotary::show(&mut stand, args, output),
     }?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),

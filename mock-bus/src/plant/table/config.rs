@@ -154,6 +154,9 @@ pub struct PlateConfig {
     pub placement_error_arcsec: f64,
     /// Lines that cannot be seen.
     pub smudged_lines: Vec<u32>,
+    /// By how many lines somebody turns it, one after the other, each time that the drive is
+    /// switched off after more than one and a half turns since the time before.
+    pub hand_lines: Vec<f64>,
 }
 
 impl Default for PlateConfig {
@@ -166,6 +169,7 @@ impl Default for PlateConfig {
             placement_lines: 0,
             placement_error_arcsec: 60.0,
             smudged_lines: Vec::new(),
+            hand_lines: Vec::new(),
         }
     }
 }

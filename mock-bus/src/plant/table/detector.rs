@@ -1,7 +1,7 @@
 //! What sees the plate's lines pass, and the edges that it gives.
 
 use core::time::Duration;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use units::{Radians, Time};
 
@@ -32,6 +32,9 @@ pub(super) struct Detector {
     latency_s: f64,
     pulse_s: f64,
     scratched: BTreeSet<u32>,
+    /// By how much lines are seen beside their places, radians.
+    shifted: BTreeMap<u32, f64>,
+    dead: bool,
     edges: VecDeque<ProbeEdge>,
     passages: u64,
     stream: Stream,
@@ -44,6 +47,8 @@ impl Detector {
             latency_s: config.latency_us * 1e-6,
             pulse_s: config.pulse_us * 1e-6,
             scratched: BTreeSet::new(),
+            shifted: BTreeMap::new(),
+            dead: false,
             edges: VecDeque::new(),
             passages: 0,
             stream: Stream::new(seed, "line detector"),
@@ -59,6 +64,15 @@ impl Detector {
         }
     }
 
+    /// A bump that comes whenever the line does.
+    pub(super) fn shift(&mut self, line: u32, shift: Radians) {
+        self.shifted.insert(line, shift.value());
+    }
+
+    pub(super) const fn set_dead(&mut self, dead: bool) {
+        self.dead = dead;
+    }
+
     /// How many lines it has seen.
     pub(super) const fn passages(&self) -> u64 {
         self.passages
@@ -66,8 +80,12 @@ impl Detector {
 
     /// A line passes; `counts` is what the encoder makes of a reading.
     pub(super) fn see(&mut self, passage: Passage, counts: impl Fn(f64) -> i64) {
+        if self.dead {
+            return;
+        }
         self.passages += 1;
-        let noise = self.noise * self.stream.gaussian();
+        let shift = self.shifted.get(&passage.line).copied().unwrap_or(0.0);
+        let noise = self.noise * self.stream.gaussian() + shift;
         self.pulse(passage, noise, &counts);
         if self.scratched.contains(&passage.line) {
             let behind = Radians::from_arcsec(SCRATCH_ARCSEC).value();

@@ -24,6 +24,7 @@ mod truth;
 
 use core::f64::consts::TAU;
 use core::time::Duration;
+use std::collections::VecDeque;
 
 use units::{Radians, Time};
 
@@ -48,6 +49,10 @@ pub(super) struct Table {
     error: EncoderError,
     plate: Plate,
     detector: Detector,
+    /// What a hand does that nobody calls, in order.
+    hand_lines: VecDeque<f64>,
+    /// How many lines had been seen when the plate was turned last.
+    passages_before: u64,
     /// The grid step that ends next.
     step: u64,
     power_cycle_shift: f64,
@@ -71,6 +76,8 @@ impl Table {
             error: EncoderError::new(encoder, &config.bearing, seed),
             plate: Plate::new(&config.plate, seed),
             detector: Detector::new(&config.detector, seed),
+            hand_lines: config.plate.hand_lines.iter().copied().collect(),
+            passages_before: 0,
             step: 0,
             power_cycle_shift: config.motion.power_cycle_shift_deg.to_radians(),
             shift,
@@ -146,12 +153,31 @@ impl Table {
         self.mass.push(self.shift.between(-limit, limit));
     }
 
-    pub(super) fn turn_plate(&mut self, lines: i64) {
+    pub(super) fn turn_plate(&mut self, lines: f64) {
         self.plate.turn(lines);
+        self.passages_before = self.detector.passages();
+    }
+
+    /// Somebody who waits until the plate has been read and the drive is off.
+    fn lend_a_hand(&mut self) {
+        let read = self.detector.passages() - self.passages_before;
+        if 2 * read > 3 * self.plate.lines() as u64
+            && let Some(lines) = self.hand_lines.pop_front()
+        {
+            self.turn_plate(lines);
+        }
     }
 
     pub(super) fn set_smudged(&mut self, line: u32, smudged: bool) {
         self.plate.smudge(line, smudged);
+    }
+
+    pub(super) fn shift_line(&mut self, line: u32, shift: Radians) {
+        self.detector.shift(line, shift);
+    }
+
+    pub(super) const fn set_detector_dead(&mut self, dead: bool) {
+        self.detector.set_dead(dead);
     }
 
     pub(super) fn set_scratched(&mut self, line: u32, scratched: bool) {
@@ -162,6 +188,9 @@ impl Table {
 impl Actuator for Table {
     fn set_servo(&mut self, now: Time, servo: Servo) {
         self.mass.set_servo(now, servo);
+        if servo == Servo::Off {
+            self.lend_a_hand();
+        }
     }
 
     fn counts(&self, now: Time) -> i64 {

@@ -13,10 +13,13 @@ use super::config::PlateConfig;
 pub(super) struct Plate {
     /// Where each line is on the plate, minus where it should be.
     errors: Vec<f64>,
-    /// By how many lines the plate is turned against the table.
+    /// By how many lines the plate is turned against the table; of a part of a line, half and
+    /// more is counted as a whole one.
     placement_lines: i64,
-    /// What the placement is off by.
+    /// The part of a line that is left, and what the placement is off by.
     placement_error: f64,
+    /// By how many lines it was meant to be turned.
+    turned: f64,
     placement_error_max: f64,
     hand: Stream,
     smudged: BTreeSet<u32>,
@@ -28,11 +31,12 @@ impl Plate {
             errors: errors(config, &mut Stream::new(seed, "plate lines")),
             placement_lines: config.placement_lines,
             placement_error: 0.0,
+            turned: config.placement_lines as f64,
             placement_error_max: Radians::from_arcsec(config.placement_error_arcsec).value(),
             hand: Stream::new(seed, "plate placement"),
             smudged: config.smudged_lines.iter().copied().collect(),
         };
-        plate.turn(0);
+        plate.turn(0.0);
         plate
     }
 
@@ -45,10 +49,13 @@ impl Plate {
     }
 
     /// Somebody takes it up, turns it by so many lines and fixes it again.
-    pub(super) fn turn(&mut self, lines: i64) {
-        self.placement_lines += lines;
+    pub(super) fn turn(&mut self, lines: f64) {
+        self.turned += lines;
+        let whole = self.turned.round();
         let limit = self.placement_error_max;
-        self.placement_error = self.hand.between(-limit, limit);
+        let slip = self.hand.between(-limit, limit);
+        self.placement_lines = whole as i64;
+        self.placement_error = (self.turned - whole) * self.spacing() + slip;
     }
 
     pub(super) const fn placement(&self) -> (i64, f64) {

@@ -171,7 +171,7 @@ fn a_turned_plate_shifts_its_lines_by_whole_spacings_and_a_little() {
     let mut plant = plant_of(|_| {}, 5);
     let before = plant.truth().table().unwrap().line_angle(10);
     let (_, off_before) = plant.truth().table().unwrap().placement();
-    plant.turn_plate(7);
+    plant.turn_plate(7.0);
     let truth = plant.truth().table().unwrap();
     let (lines, off) = truth.placement();
     assert_eq!(lines, 7);
@@ -179,6 +179,30 @@ fn a_turned_plate_shifts_its_lines_by_whole_spacings_and_a_little() {
     assert!(off.abs().arcsec() <= 60.0);
     let shift = truth.line_angle(10) - before - (off - off_before);
     assert!((shift.degrees() - 7.0).abs() < 1e-9);
+}
+
+#[test]
+fn half_a_line_is_a_turn_too_and_turns_add_up() {
+    let mut plant = plant_of(|table| table.plate.placement_error_arcsec = 0.0, 5);
+    let before = plant.truth().table().unwrap().line_angle(10);
+    for expected in [7.5, 15.0, -1.25] {
+        let turned = (plant.truth().table().unwrap().line_angle(10) - before).degrees();
+        plant.turn_plate(expected - turned);
+        let turned = plant.truth().table().unwrap().line_angle(10) - before;
+        assert!((turned.degrees() - expected).abs() < 1e-9, "{turned:?}");
+    }
+}
+
+#[test]
+fn the_hand_turns_the_plate_when_it_was_read_and_the_drive_is_off() {
+    let mut plant = plant_of(|table| table.plate.hand_lines = vec![73.0, -2.0], 5);
+    let placement = |plant: &Plant| plant.truth().table().unwrap().placement().0;
+    let mut now = Time::ZERO;
+    for (angle, expected) in [(TAU, 0), (TAU, 73), (TAU, 73), (-TAU, 71), (2.0 * TAU, 71)] {
+        turn(&mut plant, &mut now, angle, 4.0);
+        plant.set_servo(0, Servo::Off);
+        assert_eq!(placement(&plant), expected);
+    }
 }
 
 #[test]

@@ -49,7 +49,8 @@ impl<'a> TableTruth<'a> {
         Radians(self.table.plate.error(line as i64))
     }
 
-    /// By how many lines the plate is turned against the table, and what that is off by.
+    /// By how many lines the plate is turned against the table, to the nearest whole one, and
+    /// what that is off by.
     pub const fn placement(&self) -> (i64, Radians) {
         let (lines, error) = self.table.plate.placement();
         (lines, Radians(error))

@@ -1,0 +1,170 @@
+//! What can go wrong with a rotary table beyond what can go wrong with its drive.
+
+use compensator::measurement::RotarySeriesError;
+use compensator::rotary::{Misplaced, NotAnAngle, SolveError};
+use units::Radians;
+
+/// Why a rotary table did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum RotaryFailure {
+    /// Most of the plate cannot be seen.
+    #[error(
+        "axis {axis}: only {seen} of {lines} lines were read in one pass, a quarter may be missing; \
+         clean the plate, focus the detector, or turn slower"
+    )]
+    TooFewLines {
+        /// Which axis.
+        axis: String,
+        /// How many were read.
+        seen: usize,
+        /// The lines of the plate.
+        lines: u32,
+    },
+    /// The plate or the detector moved while a placement was read.
+    #[error(
+        "axis {axis}: the lines of the placement at offset {offset} moved by {:.3} arcsec while they \
+         were read, the limit is {:.3} arcsec; fix plate and detector, let the temperature settle; \
+         what was read of this placement is void, those before are kept: continue with --resume",
+        seen.arcsec(), limit.arcsec()
+    )]
+    Slipped {
+        /// Which axis.
+        axis: String,
+        /// The placement.
+        offset: f64,
+        /// By how much, in the worst eighth of the turn.
+        seen: Radians,
+        /// How much is allowed.
+        limit: Radians,
+    },
+    /// The plate was turned otherwise than was asked for.
+    #[error(
+        "axis {axis}: {source} Nothing was stored; continue with --resume, which asks for that \
+         placement again and keeps the others"
+    )]
+    Misplaced {
+        /// Which axis.
+        axis: String,
+        /// Which placement, and what it fits.
+        source: Misplaced,
+    },
+    /// The plate of a verification lies elsewhere.
+    #[error(
+        "axis {axis}: the plate does not lie at offset {expected} but at {seen} (the readings differ \
+         by {:.3} arcsec rms from what the calibration says of the plate there, by {:.3} where it was \
+         to lie); turn it by {} lines and verify again",
+        residual.arcsec(), residual_expected.arcsec(), expected - seen
+    )]
+    LiesElsewhere {
+        /// Which axis.
+        axis: String,
+        /// Where it was to lie, in lines.
+        expected: f64,
+        /// Where it lies.
+        seen: f64,
+        /// rms of reading − prediction there.
+        residual: Radians,
+        /// The same where it was to lie.
+        residual_expected: Radians,
+    },
+    /// Another plate than that of the calibration.
+    #[error(
+        "axis {axis}: the calibration in use was made with plate `{expected}`, the configuration \
+         names `{seen}`; verify with that one, whose lines are known, or calibrate with this one"
+    )]
+    OtherPlate {
+        /// Which axis.
+        axis: String,
+        /// The calibration's.
+        expected: String,
+        /// The configuration's.
+        seen: String,
+    },
+    /// The readings are worse than they can be.
+    #[error(
+        "axis {axis}: readings scatter by {:.4} arcsec {about}, {:.4} were expected \
+         (reading_noise_arcsec); nothing was stored: look for vibration, a loose plate, a detector \
+         out of focus, or state what it really does",
+        seen.arcsec(), expected.arcsec()
+    )]
+    Noise {
+        /// Which axis.
+        axis: String,
+        /// About what.
+        about: &'static str,
+        /// One pass over one line.
+        seen: Radians,
+        /// As stated in the configuration.
+        expected: Radians,
+    },
+    /// Placements that are no series.
+    #[error("axis {axis}: {source}")]
+    Series {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: RotarySeriesError,
+    },
+    /// The readings do not determine the table's error.
+    #[error("axis {axis}: {source}; nothing was stored")]
+    Estimate {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: SolveError,
+    },
+    /// A target that is no angle.
+    #[error("axis {axis}: {source}; nothing was moved")]
+    NotAnAngle {
+        /// Which axis.
+        axis: String,
+        /// What it is.
+        source: NotAnAngle,
+    },
+    /// With its calibration the table is worse than without; it is not used any more.
+    #[error(
+        "axis {axis}: CALIBRATION {calibration} MAKES THE TABLE WORSE: deviation {:.3} arcsec rms with \
+         it, {:.3} without; it was taken out of use: was the encoder touched since?",
+        after.arcsec(), before.arcsec()
+    )]
+    MadeWorse {
+        /// Which axis.
+        axis: String,
+        /// The calibration, shortened.
+        calibration: String,
+        /// Without it.
+        before: Radians,
+        /// With it.
+        after: Radians,
+    },
+    /// A verification is out of tolerance.
+    #[error(
+        "axis {axis}: largest deviation {:.3} arcsec, the tolerance is {:.3} arcsec",
+        seen.arcsec(), limit.arcsec()
+    )]
+    OutOfTolerance {
+        /// Which axis.
+        axis: String,
+        /// The largest deviation.
+        seen: Radians,
+        /// The tolerance.
+        limit: Radians,
+    },
+}
+
+impl RotaryFailure {
+    /// As [`crate::Failure::exit_code`].
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::OtherPlate { .. } => 2,
+            Self::Misplaced { .. } | Self::LiesElsewhere { .. } | Self::NotAnAngle { .. } => 3,
+            Self::TooFewLines { .. } => 4,
+            Self::Slipped { .. }
+            | Self::Noise { .. }
+            | Self::Series { .. }
+            | Self::Estimate { .. }
+            | Self::MadeWorse { .. }
+            | Self::OutOfTolerance { .. } => 5,
+        }
+    }
+}

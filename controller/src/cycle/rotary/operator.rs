@@ -1,0 +1,111 @@
+//! The person who turns the plate.
+
+use crate::failure::Failure;
+
+/// What is to be done with the plate. Lines are those of the plate; a plate turned by some lines
+/// is read so many line spacings later, at larger angles of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlateMove {
+    /// Fix it, no matter how: this is the first placement.
+    Fix,
+    /// Turn it by so many lines from where it was read last.
+    TurnBy(f64),
+    /// Bring it to the offset of the task; it is not known where it lies.
+    LieAt,
+}
+
+/// A placement that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlateTask {
+    /// The table's axis.
+    pub axis: String,
+    /// The plate's serial number.
+    pub plate: String,
+    /// Its lines.
+    pub lines: u32,
+    /// Which placement, from 1, of how many.
+    pub step: (usize, usize),
+    /// Where the plate shall lie, in lines from the first placement.
+    pub offset: f64,
+    /// What is to be done.
+    pub by: PlateMove,
+}
+
+impl PlateTask {
+    /// For the person.
+    pub fn text(&self) -> String {
+        let degrees = |lines: f64| lines * 360.0 / f64::from(self.lines);
+        let what = match self.by {
+            PlateMove::Fix => "fix it on the table, in any position".to_owned(),
+            PlateMove::TurnBy(lines) if lines.abs() < 1e-9 => "leave it where it is".to_owned(),
+            PlateMove::TurnBy(lines) => format!(
+                "turn it on the table by {} lines ({:.4}°), so that its lines are read at {} \
+                 angles, and fix it again",
+                lines.abs(),
+                degrees(lines.abs()),
+                if lines > 0.0 { "larger" } else { "smaller" },
+            ),
+            PlateMove::LieAt => format!(
+                "it must lie {} lines ({:.4}°) from the first placement, so that its lines are \
+                 read at so much larger angles than there",
+                self.offset,
+                degrees(self.offset),
+            ),
+        };
+        let (number, of) = self.step;
+        format!(
+            "axis {}, plate {}, placement {number} of {of}: {what}",
+            self.axis, self.plate
+        )
+    }
+}
+
+/// Who turns the plate. The machine lives on while it waits: it asks once, and then again and
+/// again whether it has been done. The axis is switched off meanwhile; that is no safe stop.
+pub trait Operator {
+    /// Asks for a placement.
+    ///
+    /// # Errors
+    /// When nobody can be asked.
+    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure>;
+
+    /// Whether it has been done.
+    ///
+    /// # Errors
+    /// When it will not be done any more.
+    fn is_done(&mut self) -> Result<bool, Failure>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(by: PlateMove, expected: &str) {
+        let task = PlateTask {
+            axis: "c".into(),
+            plate: "A7".into(),
+            lines: 360,
+            step: (2, 4),
+            offset: 73.0,
+            by,
+        };
+        let text = task.text();
+        assert!(text.starts_with("axis c, plate A7, placement 2 of 4: "));
+        assert!(text.contains(expected), "{text}");
+    }
+
+    #[test]
+    fn a_person_is_told_how_far_and_which_way() {
+        check(PlateMove::Fix, "in any position");
+        check(PlateMove::TurnBy(73.0), "by 73 lines (73.0000°)");
+        check(PlateMove::TurnBy(73.0), "at larger angles");
+        check(PlateMove::TurnBy(-31.5), "by 31.5 lines (31.5000°)");
+        check(PlateMove::TurnBy(-31.5), "at smaller angles");
+        check(PlateMove::TurnBy(0.0), "leave it where it is");
+        check(
+            PlateMove::LieAt,
+            "73 lines (73.0000°) from the first placement",
+        );
+    }
+}

@@ -1,0 +1,428 @@
+//! One placement of a plate: asked for, read in both directions, and looked at again.
+
+use core::f64::consts::TAU;
+use core::time::Duration;
+use std::collections::BTreeMap;
+
+use compensator::uncertainty::{median, robust_sigma, standard_deviation};
+use units::{Approach, Radians, RadiansPerSecond};
+
+use super::failure::RotaryFailure;
+use super::operator::{Operator, PlateMove, PlateTask};
+use crate::config::RotaryCalibrateConfig;
+use crate::cycle::calibrate::missing;
+use crate::cycle::{Sweep, SweepOptions};
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::observer::Stage;
+use crate::store::{Entry, Journal, PlacementEntry, PlatePlanEntry, SweepEntry};
+
+/// How long the machine lives between two looks at the person.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Of the lines of a plate so many may be missing in a pass.
+const MISSING_SHARE: f64 = 0.25;
+/// The parts of a turn in which a plate may have moved.
+const SECTORS: usize = 8;
+/// A part has at least so many lines, where there are as many.
+const SECTOR_LINES: usize = 8;
+/// From how many standard deviations on a difference of two passes is no noise.
+const WILD: f64 = 5.0;
+/// So many lines are named in a warning.
+const NAMED: usize = 6;
+
+/// How a plate is read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PlateRun {
+    pub(super) plate: String,
+    pub(super) lines: u32,
+    pub(super) passes: u32,
+    pub(super) speed: RadiansPerSecond,
+    /// Standard deviation of one line in one pass, as it is stated.
+    pub(super) noise: Radians,
+    /// `None`: a plate that moved is accepted.
+    pub(super) closure_limit: Option<Radians>,
+    pub(super) stage: Stage,
+}
+
+impl PlateRun {
+    pub(super) fn spacing(&self) -> f64 {
+        TAU / f64::from(self.lines)
+    }
+
+    pub(super) fn plan(&self, offsets: Vec<f64>) -> PlatePlanEntry {
+        PlatePlanEntry {
+            plate: self.plate.clone(),
+            lines: self.lines,
+            offsets,
+            passes: self.passes,
+            speed_rad_per_s: self.speed.value(),
+        }
+    }
+
+    /// Standard deviation of a reading that is the mean of passes in both directions.
+    pub(super) fn noise_of_mean(&self) -> Radians {
+        self.noise / (2.0 * f64::from(self.passes)).sqrt()
+    }
+
+    /// Passes of one placement, the repeated one included.
+    pub(super) const fn sweeps(&self) -> u32 {
+        2 * self.passes + 1
+    }
+}
+
+/// What was read in one placement. Lists count table positions.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Placed {
+    pub(super) offset: f64,
+    /// Mean of both directions, in which what the detector is late by cancels; `None` where a
+    /// line was not read in both.
+    pub(super) deviations: Vec<Option<Radians>>,
+    /// Standard deviation of one line in one pass, by what the directions differ.
+    pub(super) scatter: Option<Radians>,
+    pub(super) closure: Radians,
+}
+
+impl Placed {
+    /// What `sweeps` of one placement, `passes` in each direction, say.
+    pub(super) fn of(placement: &PlacementEntry, sweeps: &[SweepEntry], passes: u32) -> Self {
+        let own = |approach: char| {
+            let own = sweeps
+                .iter()
+                .filter(move |it| it.offset == placement.offset && it.pass <= passes);
+            mean_of(own.filter(move |it| it.approach == approach))
+        };
+        let (forward, reverse) = (own('+'), own('-'));
+        let both = || forward.iter().zip(&reverse);
+        let deviations = both().map(|(f, r)| Some(Radians(((*f)? + (*r)?) / 2.0)));
+        let apart: Vec<f64> = both().filter_map(|(f, r)| Some((*f)? - (*r)?)).collect();
+        let scatter = scatter_of(apart).map(|it| it * (f64::from(passes) / 2.0).sqrt());
+        Self {
+            offset: placement.offset,
+            deviations: deviations.collect(),
+            scatter: scatter.map(Radians),
+            closure: Radians(placement.closure_rad),
+        }
+    }
+
+    /// By line of the plate: line n is read at position n + offset, its whole part.
+    pub(super) fn by_line(&self) -> Vec<Option<Radians>> {
+        let mut readings = self.deviations.clone();
+        let whole = self.offset.floor() as usize % readings.len().max(1);
+        readings.rotate_left(whole);
+        readings
+    }
+}
+
+/// The standard deviation of values of which some are wild.
+fn scatter_of(mut values: Vec<f64>) -> Option<f64> {
+    let middle = median(&values)?;
+    values.iter_mut().for_each(|it| *it -= middle);
+    // The median of a coarse encoder's counts is coarse itself: it only tells what is wild.
+    let wild = WILD * robust_sigma(&values)?;
+    values.retain(|it| it.abs() <= wild);
+    standard_deviation(&values)
+}
+
+fn mean_of<'a>(sweeps: impl Iterator<Item = &'a SweepEntry>) -> Vec<Option<f64>> {
+    let mut sums: Vec<(f64, u32)> = Vec::new();
+    for sweep in sweeps {
+        sums.resize(sweep.deviations_rad.len(), (0.0, 0));
+        for (sum, value) in sums.iter_mut().zip(&sweep.deviations_rad) {
+            if let Some(value) = value {
+                *sum = (sum.0 + value, sum.1 + 1);
+            }
+        }
+    }
+    let mean = |(sum, count): (f64, u32)| (count > 0).then(|| sum / f64::from(count));
+    sums.into_iter().map(mean).collect()
+}
+
+/// By how much the second of two equal passes differs from the first: the mean over a part of the
+/// turn, of that part where it is largest. A plate that slips in the middle of a pass shows, too.
+fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
+    let apart: Vec<Option<f64>> = first
+        .iter()
+        .zip(again)
+        .map(|(first, again)| Some((*again)? - (*first)?))
+        .collect();
+    let sectors = (apart.len() / SECTOR_LINES).clamp(1, SECTORS);
+    let of_sector = |lines: &[Option<f64>]| {
+        let seen: Vec<f64> = lines.iter().flatten().copied().collect();
+        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+        if seen.is_empty() { 0.0 } else { mean }
+    };
+    let means = apart.chunks(apart.len().div_ceil(sectors).max(1));
+    means
+        .map(of_sector)
+        .fold(0.0, |a, b| if b.abs() > f64::abs(a) { b } else { a })
+}
+
+impl Machine {
+    /// The plate and how it is read, as configured.
+    pub(super) fn plate_run(
+        &self,
+        axis: &str,
+    ) -> Result<(PlateRun, RotaryCalibrateConfig), Failure> {
+        let config = self.rotary_config(axis)?;
+        let run = config.calibrate.clone();
+        let run = run.ok_or_else(|| missing(axis, "calibrate"))?;
+        let speed = run.speed_deg_per_s.unwrap_or(config.speed_deg_per_s);
+        let plate = PlateRun {
+            plate: run.plate.clone(),
+            lines: run.lines,
+            passes: run.passes,
+            speed: RadiansPerSecond(speed.to_radians()),
+            noise: Radians::from_arcsec(run.reading_noise_arcsec),
+            closure_limit: Some(Radians::from_arcsec(run.closure_limit_arcsec)),
+            stage: Stage::Calibrate,
+        };
+        Ok((plate, run))
+    }
+
+    /// Has the plate brought to `offset`; the axis is off while somebody has his hands in.
+    pub(super) fn place_plate(
+        &mut self,
+        axis: &str,
+        run: &PlateRun,
+        offset: f64,
+        step: (usize, usize),
+        operator: &mut dyn Operator,
+    ) -> Result<(), Failure> {
+        self.rest(axis)?;
+        self.disable(axis)?;
+        let lies_at = self.remember_table(axis).plate_at.take();
+        let is_first = run.stage == Stage::Calibrate && step.0 == 1;
+        operator.ask(&PlateTask {
+            axis: axis.to_owned(),
+            plate: run.plate.clone(),
+            lines: run.lines,
+            step,
+            offset,
+            by: match lies_at {
+                _ if is_first && offset == 0.0 => PlateMove::Fix,
+                Some(before) => PlateMove::TurnBy(offset - before),
+                None => PlateMove::LieAt,
+            },
+        })?;
+        while !operator.is_done()? {
+            let look = self.now() + LOOK_EVERY;
+            self.tick(look)?;
+        }
+        self.enable(axis)
+    }
+
+    /// Reads the plate as it lies, `done` passes of `total` being read already.
+    pub(super) fn read_placement(
+        &mut self,
+        axis: &str,
+        run: &PlateRun,
+        offset: f64,
+        (done, total): (u32, u32),
+        journal: &mut Journal,
+    ) -> Result<Placed, Failure> {
+        let mut phase = Some(offset.fract() * run.spacing()).filter(|it| *it != 0.0);
+        let mut sweeps: Vec<SweepEntry> = Vec::new();
+        for number in 0..run.sweeps() {
+            let approach = if number % 2 == 0 {
+                Approach::Forward
+            } else {
+                Approach::Reverse
+            };
+            let options = SweepOptions {
+                lines: run.lines,
+                approach,
+                speed: Some(run.speed),
+                phase: phase.map(Radians),
+            };
+            let sweep = self.sweep(axis, &options)?;
+            self.check_lines(axis, run, &sweep)?;
+            // A placement lies somewhere; its passes must agree about where.
+            phase = phase.or(Some(sweep.phase.value()));
+            let entry = entry_of(
+                &sweep,
+                offset,
+                number / 2 + 1,
+                approach,
+                self.now().seconds(),
+            );
+            journal.write(&Entry::Sweep(entry.clone()))?;
+            sweeps.push(entry);
+            let done = u64::from(done + number + 1);
+            let observer = &mut self.observer;
+            observer.progress(run.stage, axis, done, total.into());
+        }
+        self.warn_of_lines(axis, &sweeps);
+        let placement = self.closed(axis, run, offset, &sweeps)?;
+        journal.write(&Entry::Placed(placement))?;
+        journal.flush_to_disk()?;
+        self.remember_table(axis).plate_at = Some(offset);
+        Ok(Placed::of(&placement, &sweeps, run.passes))
+    }
+
+    fn check_lines(&self, axis: &str, run: &PlateRun, sweep: &Sweep) -> Result<(), RotaryFailure> {
+        let (seen, lines) = (sweep.read(), run.lines);
+        if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
+            return Ok(());
+        }
+        let axis = axis.to_owned();
+        Err(RotaryFailure::TooFewLines { axis, seen, lines })
+    }
+
+    fn closed(
+        &self,
+        axis: &str,
+        run: &PlateRun,
+        offset: f64,
+        sweeps: &[SweepEntry],
+    ) -> Result<PlacementEntry, RotaryFailure> {
+        let (first, again) = (&sweeps[0], &sweeps[sweeps.len() - 1]);
+        let closure_rad = closure(&first.deviations_rad, &again.deviations_rad);
+        let placement = PlacementEntry {
+            offset,
+            closure_rad,
+            at_s: self.now().seconds(),
+        };
+        let seen = Radians(closure_rad);
+        match run.closure_limit {
+            Some(limit) if seen.abs() > limit => Err(RotaryFailure::Slipped {
+                axis: axis.to_owned(),
+                offset,
+                seen,
+                limit,
+            }),
+            _ => Ok(placement),
+        }
+    }
+
+    /// Lines that were not read are no reason to stop, but to clean the plate.
+    fn warn_of_lines(&mut self, axis: &str, sweeps: &[SweepEntry]) {
+        let first = &sweeps[0];
+        let seldom = |list: fn(&SweepEntry) -> &Vec<u32>, times: usize| {
+            let mut counts = BTreeMap::new();
+            for position in sweeps.iter().flat_map(list) {
+                *counts.entry(*position).or_insert(0_usize) += 1;
+            }
+            counts.retain(|_, count| *count >= times);
+            counts.into_keys().collect::<Vec<_>>()
+        };
+        let mut say = |text: String| {
+            let text = format!("axis {axis}, plate at offset {}: {text}", first.offset);
+            self.observer.warning(&text);
+        };
+        let unseen = seldom(|it| &it.missing, sweeps.len());
+        if !unseen.is_empty() {
+            say(format!("not seen (dirt?): {}", names(first, &unseen)));
+        }
+        let doubled = seldom(|it| &it.doubled, 1);
+        if !doubled.is_empty() {
+            say(format!(
+                "seen twice (a scratch?): {}",
+                names(first, &doubled)
+            ));
+        }
+        let again = seldom(|it| &it.overwritten, sweeps.len());
+        if !again.is_empty() {
+            let names = names(first, &again);
+            say(format!(
+                "overwritten unread in every pass (a scratch?): {names}"
+            ));
+        }
+        let unread: usize = sweeps.iter().map(|it| it.overwritten.len()).sum();
+        let unread = unread - again.len() * sweeps.len();
+        if unread > 0 {
+            let total = first.deviations_rad.len() * sweeps.len();
+            say(format!(
+                "{unread} of {total} readings were overwritten before they were read: the computer is \
+                 busy, or the table too fast"
+            ));
+        }
+        let strays: Vec<f64> = sweeps
+            .iter()
+            .flat_map(|it| &it.strays_rad)
+            .copied()
+            .collect();
+        if let Some(stray) = strays.first() {
+            let (count, degrees) = (strays.len(), stray.to_degrees());
+            say(format!(
+                "{count} edge(s) where no line is, one at {degrees:.4}°"
+            ));
+        }
+    }
+}
+
+/// Table positions as lines of the plate; of many, the first.
+fn names(sweep: &SweepEntry, positions: &[u32]) -> String {
+    let lines = sweep.deviations_rad.len().max(1) as i64;
+    let whole = sweep.offset.floor() as i64;
+    let name = |position: &u32| (i64::from(*position) - whole).rem_euclid(lines).to_string();
+    let mut named: Vec<String> = positions.iter().take(NAMED).map(name).collect();
+    if positions.len() > NAMED {
+        named.push(format!("and {} more", positions.len() - NAMED));
+    }
+    format!("line {}", named.join(", "))
+}
+
+fn entry_of(sweep: &Sweep, offset: f64, pass: u32, approach: Approach, at_s: f64) -> SweepEntry {
+    let value = |it: &Option<Radians>| it.map(Radians::value);
+    SweepEntry {
+        offset,
+        pass,
+        approach: approach.symbol(),
+        phase_rad: sweep.phase.value(),
+        deviations_rad: sweep.deviations.iter().map(value).collect(),
+        missing: sweep.missing.clone(),
+        doubled: sweep.doubled.clone(),
+        overwritten: sweep.overwritten.clone(),
+        strays_rad: sweep.strays.iter().map(|it| it.value()).collect(),
+        at_s,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(pass: u32, approach: char, values: &[Option<f64>]) -> SweepEntry {
+        SweepEntry {
+            offset: 2.0,
+            pass,
+            approach,
+            deviations_rad: values.to_vec(),
+            ..SweepEntry::default()
+        }
+    }
+
+    #[test]
+    fn what_the_detector_is_late_by_cancels_and_a_line_seen_from_one_side_only_is_none() {
+        let sweeps = [
+            sweep(1, '+', &[Some(1.5), Some(2.5), Some(3.5), Some(4.5)]),
+            sweep(1, '-', &[Some(0.5), None, Some(2.5), Some(3.5)]),
+            // The repeated pass is for the closure alone.
+            sweep(2, '+', &[Some(9.0); 4]),
+        ];
+        let placement = PlacementEntry {
+            offset: 2.0,
+            closure_rad: 0.0,
+            at_s: 0.0,
+        };
+        let placed = Placed::of(&placement, &sweeps, 1);
+        let some = |value| Some(Radians(value));
+        assert_eq!(placed.deviations, [some(1.0), None, some(3.0), some(4.0)]);
+        assert_eq!(placed.by_line(), [some(3.0), some(4.0), some(1.0), None]);
+    }
+
+    #[test]
+    fn a_slip_within_the_last_lines_of_a_pass_shows() {
+        let first: Vec<Option<f64>> = (0..360)
+            .map(|at| Some(if at < 350 { 1.0 } else { 6.0 }))
+            .collect();
+        let again = vec![Some(6.0); 360];
+        assert!((closure(&first, &again) - 5.0).abs() < 1e-12);
+        let late: Vec<Option<f64>> = (0..360)
+            .map(|at| Some(if at < 350 { 1.0 } else { 6.0 }))
+            .collect();
+        let closed = closure(&vec![Some(1.0); 360], &late);
+        assert!((closed - 5.0 * 10.0 / 45.0).abs() < 1e-12, "{closed}");
+        assert_eq!(closure(&first, &first), 0.0);
+    }
+}

@@ -1,0 +1,268 @@
+//! Verify a rotary table: the plate of the calibration in a placement of its own.
+//!
+//! Each line is now read by another part of the table than ever before, and table and plate must
+//! agree with what the calibration says of both. At an offset of whole lines the places are those
+//! of the calibration; half a line beyond, they lie between them and the interpolation is on trial.
+//!
+//! What this sees: an error of the table of harmonic k, with the weight |w_s − w̄| (s the offset, w̄
+//! the mean over the placements of the calibration), which is never below 1 − |w̄|. What it cannot
+//! see: where the zero is, and what table and detector do alike for every placement, such as a
+//! detector that moves with the table. It judges readings of a table that turns; that a move comes
+//! to rest where its reading says is the drive's affair.
+
+use std::path::PathBuf;
+
+use compensator::rotary::PeriodicCompensation;
+use compensator::uncertainty::rms;
+use core::f64::consts::TAU;
+use units::Radians;
+
+use super::failure::RotaryFailure;
+use super::moves::TableInUse;
+use super::operator::Operator;
+use super::placement::{Placed, PlateRun};
+use crate::cycle::calibrate::missing;
+use crate::cycle::note_failure;
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::observer::Stage;
+use crate::store::{Entry, Journal, Store, short};
+
+/// How much better another place of the plate must fit.
+const BETTER: f64 = 3.0;
+
+/// Deviations (actual − target) of one state of the table, less their mean.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RotaryFigures {
+    /// At the place of each line of the plate; `None` where it was not read or is not known.
+    pub deviations: Vec<Option<Radians>>,
+    /// The largest magnitude.
+    pub largest: Radians,
+    /// Root mean square.
+    pub rms: Radians,
+}
+
+/// A verification of a rotary table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotaryVerified {
+    /// Where the plate lay, in lines.
+    pub offset_lines: f64,
+    /// The table without its calibration. Where no calibration knows the plate, its errors are in
+    /// it.
+    pub found: RotaryFigures,
+    /// Whether the plate's errors were known.
+    pub plate_known: bool,
+    /// The table with its calibration, where that was wanted.
+    pub left: Option<RotaryFigures>,
+    /// What of the rms is the scatter of this verification's own readings.
+    pub noise: Option<Radians>,
+    /// By how much the plate moved while it was read.
+    pub closure: Radians,
+    /// The tolerance of the configuration.
+    pub tolerance: Radians,
+    /// Where every pass is.
+    pub journal: PathBuf,
+}
+
+impl RotaryVerified {
+    /// Whether the table with its calibration is within the tolerance; without one, never.
+    pub fn is_within_tolerance(&self) -> bool {
+        let left = self.left.as_ref();
+        left.is_some_and(|it| it.largest <= self.tolerance)
+    }
+}
+
+impl Machine {
+    /// Has the plate placed at the configuration's verification offset, reads it, and judges.
+    /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
+    /// than without the calibration is one, and takes the calibration out of use.
+    ///
+    /// # Errors
+    /// Not zeroed; `compensated` without a calibration; another plate than the calibration's, or
+    /// one that lies elsewhere; whatever stops the machine.
+    pub fn verify_rotary(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        compensated: bool,
+        operator: &mut dyn Operator,
+    ) -> Result<RotaryVerified, Failure> {
+        self.require_table_zeroed(axis)?;
+        let config = self.rotary_config(axis)?.verify.clone();
+        let config = config.ok_or_else(|| missing(axis, "verify"))?;
+        let (run, _) = self.plate_run(axis)?;
+        let run = PlateRun {
+            passes: config.passes,
+            stage: Stage::Verify,
+            ..run
+        };
+        let known = self.known_plate(axis, &run, compensated)?;
+        let id = known
+            .as_ref()
+            .map(|it| it.id.clone())
+            .filter(|_| compensated);
+        let header = self.rotary_header("verify", axis, &run, id);
+        let mut journal = Journal::create(&store.runs(), &header)?;
+        let offset = config.offset_lines;
+        let read = self.read_verification(axis, &run, offset, &mut journal, operator);
+        let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
+        if let Some(known) = &known {
+            lies_there(axis, known, &placed)
+                .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        }
+        let verified = RotaryVerified {
+            offset_lines: offset,
+            found: figures(&placed, known.as_ref(), None),
+            plate_known: known.is_some(),
+            left: known
+                .as_ref()
+                .filter(|_| compensated)
+                .map(|known| figures(&placed, Some(known), Some(&known.compensation))),
+            noise: placed
+                .scatter
+                .map(|it| it / (2.0 * f64::from(run.passes)).sqrt()),
+            closure: placed.closure,
+            tolerance: Radians::from_arcsec(config.tolerance_arcsec),
+            journal: journal.path().to_owned(),
+        };
+        self.judge_table(axis, store, &verified)
+            .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(verified)
+    }
+
+    fn read_verification(
+        &mut self,
+        axis: &str,
+        run: &PlateRun,
+        offset: f64,
+        journal: &mut Journal,
+        operator: &mut dyn Operator,
+    ) -> Result<Placed, Failure> {
+        journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
+        self.place_plate(axis, run, offset, (1, 1), operator)?;
+        self.read_placement(axis, run, offset, (0, run.sweeps()), journal)
+    }
+
+    /// What the calibration in use says of the plate.
+    fn known_plate(
+        &self,
+        axis: &str,
+        run: &PlateRun,
+        compensated: bool,
+    ) -> Result<Option<TableInUse>, Failure> {
+        let memory = self.rotary_memory.get(axis);
+        let known = memory.and_then(|it| it.calibration.clone());
+        match known {
+            None if compensated => Err(Failure::Usage {
+                what: format!("axis {axis} uses no calibration"),
+                help: "load or make one, or verify uncompensated".into(),
+            }),
+            Some(known) if known.plate != run.plate || known.content.lines != run.lines => {
+                let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
+                Err(RotaryFailure::OtherPlate {
+                    axis: axis.to_owned(),
+                    expected: lines(&known.plate, known.content.lines),
+                    seen: lines(&run.plate, run.lines),
+                }
+                .into())
+            }
+            known => Ok(known),
+        }
+    }
+
+    fn judge_table(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        verified: &RotaryVerified,
+    ) -> Result<(), Failure> {
+        let Some(left) = &verified.left else {
+            return Ok(());
+        };
+        if verified.is_within_tolerance() || left.rms <= verified.found.rms {
+            return Ok(());
+        }
+        let memory = self.remember_table(axis);
+        let id = memory.calibration.take().map(|it| it.id);
+        if id.is_some() && store.active(axis)?.current == id {
+            store.retire(axis)?;
+        }
+        Err(RotaryFailure::MadeWorse {
+            axis: axis.to_owned(),
+            calibration: id.as_deref().map(short).unwrap_or_default(),
+            before: verified.found.rms,
+            after: left.rms,
+        }
+        .into())
+    }
+}
+
+/// Of each line: its true angle, as the calibration knows the plate, less what the table reads
+/// (or, with `table`, what it reads corrected), less the mean of that.
+fn figures(
+    placed: &Placed,
+    known: Option<&TableInUse>,
+    table: Option<&PeriodicCompensation>,
+) -> RotaryFigures {
+    let readings = placed.by_line();
+    let lines = readings.len();
+    let whole = placed.offset.floor() as usize;
+    let deviation = |line: usize| {
+        let reading = readings[line]?;
+        let plate = match known {
+            Some(known) => (*known.content.plate_error_rad.get(line)?)?,
+            None => 0.0,
+        };
+        let position = TAU * ((line + whole) % lines) as f64 / lines as f64;
+        let corrected = match table {
+            Some(table) => table.deviation(Radians(position) + reading).ok()?,
+            None => Radians::ZERO,
+        };
+        Some(Radians(plate) - reading - corrected)
+    };
+    centred((0..lines).map(deviation).collect())
+}
+
+fn centred(values: Vec<Option<Radians>>) -> RotaryFigures {
+    let seen: Vec<f64> = values.iter().flatten().map(|it| it.value()).collect();
+    let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
+    let less: Vec<f64> = seen.iter().map(|it| it - mean).collect();
+    let deviations = values.iter().map(|it| it.map(|it| it - Radians(mean)));
+    RotaryFigures {
+        deviations: deviations.collect(),
+        largest: Radians(less.iter().fold(0.0, |a, b| a.max(b.abs()))),
+        rms: Radians(if less.is_empty() { 0.0 } else { rms(&less) }),
+    }
+}
+
+/// Whether the lines that were read are those that lie there, by what the calibration knows of the
+/// plate.
+fn lies_there(axis: &str, known: &TableInUse, placed: &Placed) -> Result<(), Failure> {
+    let readings = placed.by_line();
+    let lines = readings.len();
+    let residual = |turned: usize| {
+        // Every line is called so many lines too high.
+        let mut as_placed = placed.clone();
+        as_placed.offset = (placed.offset + turned as f64) % lines as f64;
+        figures(&as_placed, Some(known), Some(&known.compensation)).rms
+    };
+    let residuals: Vec<Radians> = (0..lines).map(residual).collect();
+    let each = residuals.iter().enumerate();
+    let best = each.min_by(|a, b| a.1.value().total_cmp(&b.1.value()));
+    let Some((best, fits)) = best else {
+        return Ok(());
+    };
+    if best == 0 || *fits * BETTER >= residuals[0] {
+        return Ok(());
+    }
+    Err(RotaryFailure::LiesElsewhere {
+        axis: axis.to_owned(),
+        expected: placed.offset,
+        seen: (placed.offset + best as f64) % lines as f64,
+        residual: *fits,
+        residual_expected: residuals[0],
+    }
+    .into())
+}

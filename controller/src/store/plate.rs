@@ -1,0 +1,57 @@
+//! What a journal says of the plate of a rotary table. Angles are radians.
+
+use serde::{Deserialize, Serialize};
+
+/// How the plate is to be read: what a run that is continued must have in common with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlatePlanEntry {
+    /// The plate's serial number.
+    pub plate: String,
+    /// Its lines.
+    pub lines: u32,
+    /// By how many lines it is turned in each placement.
+    pub offsets: Vec<f64>,
+    /// Passes in each direction and placement.
+    pub passes: u32,
+    /// Speed of a pass, radians per second.
+    pub speed_rad_per_s: f64,
+}
+
+/// One pass over all lines. Lists count table positions, in line spacings from the zero.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SweepEntry {
+    /// By how many lines the plate was to be turned.
+    pub offset: f64,
+    /// Which pass of this placement, from 1; one beyond the last is the first repeated.
+    pub pass: u32,
+    /// `+` or `-`.
+    pub approach: char,
+    /// What the deviations have in common, roughly.
+    pub phase_rad: f64,
+    /// Reading minus nominal at each table position; `None` where no single line was read.
+    pub deviations_rad: Vec<Option<f64>>,
+    /// Positions at which no line was seen.
+    pub missing: Vec<u32>,
+    /// Positions at which more than one edge came.
+    pub doubled: Vec<u32>,
+    /// Positions at which an edge was overwritten before it was read.
+    pub overwritten: Vec<u32>,
+    /// Readings near no line.
+    pub strays_rad: Vec<f64>,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+/// A placement was read, and the plate still lies where it lay.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlacementEntry {
+    /// By how many lines the plate was to be turned.
+    pub offset: f64,
+    /// What the first pass had moved by when it was repeated: of eight parts of the turn, the most.
+    pub closure_rad: f64,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}

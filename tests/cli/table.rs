@@ -1,0 +1,139 @@
+//! The cycle of a rotary table in processes of their own: somebody turns the plate meanwhile.
+
+use std::fs;
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use tests::{ROTARY, Rig};
+use truestage::store::{ReadJournal, SweepEntry, read_journal};
+
+use crate::programs::{Bench, live_rigs};
+
+/// Three placements, and the emulator's hand that turns the plate whenever it was read: the last
+/// time to where it is verified.
+const OFFSETS: &str = "offsets = [0, 73, 162]";
+const HAND: &str = "hand_lines = [73.0, 89.0, 38.5]";
+
+fn bench(rig: Rig) -> Bench {
+    let bench = Bench::of(rig, ROTARY, |text| text.replace("hand_lines = []", HAND));
+    bench.configure("machine.toml", |text| {
+        let text = text.replace("placements = 4 ", &format!("{OFFSETS} "));
+        let text = text.replace("amplification_limit = 3.0", "amplification_limit = 5.0");
+        text.replace("optimise = ", "# ")
+    });
+    bench
+}
+
+fn text(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The one journal of a calibration, as far as it is written.
+fn journal(bench: &Bench) -> Option<ReadJournal> {
+    let runs = fs::read_dir(bench.records().join("runs")).ok()?;
+    let paths = runs.map(|it| it.expect("a folder can be read").path());
+    let mut paths = paths.filter(|path| path.to_string_lossy().contains("-calibrate-"));
+    read_journal(&paths.next()?).ok()
+}
+
+fn of_the_first(journal: &ReadJournal) -> Vec<SweepEntry> {
+    let sweeps = journal.sweeps.iter();
+    sweeps.filter(|it| it.offset == 0.0).cloned().collect()
+}
+
+#[test]
+fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_is_killed() {
+    for rig in live_rigs() {
+        let bench = bench(rig);
+        let zero = bench.run(&["zero"]).with_code(0);
+        assert_eq!(zero["axis"], "c");
+        refuses_without_a_person(&bench);
+
+        let mut process = bench.start(&["calibrate", "--yes"]);
+        process.wait_until(|| journal(&bench).is_some_and(|it| it.placements.len() == 1));
+        process.signal(Signal::SIGKILL);
+        assert_eq!(process.end().code, None);
+        let before = journal(&bench).expect("whole placements are kept");
+        assert!(!before.complete);
+
+        let resumed = bench.run(&["calibrate", "--resume", "--yes"]);
+        assert!(resumed.said.contains("placement 2 of 3"), "{resumed:?}");
+        assert!(!resumed.said.contains("placement 1 of 3"), "{resumed:?}");
+        let calibrated = resumed.with_code(0);
+        let after = journal(&bench).expect("it is the same journal");
+        assert!(after.complete && after.placements.len() == 3);
+        assert_eq!(of_the_first(&after), of_the_first(&before));
+        assert_eq!(calibrated["offsets"], serde_json::json!([0, 73, 162]));
+        let id = text(&calibrated["calibration"]);
+        is_shown(&bench, id);
+
+        let verified = bench.run(&["verify", "--yes"]).with_code(0);
+        assert!(number(&verified["as_found"]["largest_arcsec"]) > 8.0);
+        assert!(number(&verified["as_left"]["largest_arcsec"]) < 0.3);
+        for run in [&verified["journal"], &calibrated["journal"]] {
+            let page = bench.run(&["report", text(run), "--output", "page.html"]);
+            page.with_code(0);
+            let page = fs::read_to_string(bench.folder().join("page.html")).unwrap();
+            assert!(page.contains("<svg"), "a report has pictures");
+        }
+        moves(&bench, id);
+    }
+}
+
+/// Nobody is there to turn the plate: nothing moves, nothing is written.
+fn refuses_without_a_person(bench: &Bench) {
+    for verb in ["calibrate", "verify"] {
+        let refused = bench.run(&[verb]).with_code(2);
+        let error = text(&refused["error"]);
+        assert!(
+            error.contains("turn the plate") && error.contains("--yes"),
+            "{error}"
+        );
+    }
+    assert!(journal(bench).is_none());
+}
+
+fn is_shown(bench: &Bench, id: &str) {
+    let list = bench.run(&["cal", "list"]).with_code(0);
+    let listed = &list["calibrations"][0];
+    assert_eq!(
+        (&listed["id"], &listed["kind"]),
+        (&id.into(), &"rotary_error_table".into())
+    );
+    assert_eq!(listed["active"], true);
+    let shown = bench
+        .run(&["cal", "show", "machine.toml", &id[..8]])
+        .with_code(0);
+    assert_eq!(shown["record"]["lines"], 360);
+    assert_eq!(shown["record"]["instrument"]["name"], "GP-360-0001");
+    let active = bench.run(&["cal", "activate", "machine.toml", &id[..8]]);
+    active.with_code(0);
+}
+
+fn moves(bench: &Bench, id: &str) {
+    let far = ["move", "machine.toml", "c=770.5deg", "--way", "turns"];
+    let moved = bench.run(&far).with_code(0);
+    let it = &moved["moves"][0];
+    assert_eq!((&it["axis"], &it["calibration"]), (&"c".into(), &id.into()));
+    assert!((number(&it["target_deg"]) - 770.5).abs() < 1e-9);
+    assert!((number(&it["expected_deg"]) - 770.5).abs() * 3600.0 < 0.3);
+    let corrected = (number(&it["set_point_deg"]) - 770.5) * 3600.0;
+    assert!(corrected != 0.0 && corrected.abs() < 15.0, "{corrected}");
+    for words in [
+        ["c=90", "--way=turns"],
+        ["x=90deg", "--way=turns"],
+        ["c=1mm", "--way=turns"],
+    ] {
+        bench
+            .run(&["move", "machine.toml", words[0], words[1]])
+            .with_code(2);
+    }
+}
