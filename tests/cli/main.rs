@@ -1,6 +1,7 @@
 //! The commands as a user runs them: `mock-bus` in one process, `truestage` in others.
 
 mod interrupted;
+mod platform;
 mod programs;
 mod rotary;
 mod screw;

@@ -106,6 +106,71 @@ fn least_squares_tells_slope_lost_motion_and_only_the_harmonics_that_are_there()
     assert_eq!(result["axes"]["u"]["harmonics"], serde_json::json!([]));
 }
 
+#[test]
+fn a_row_that_does_not_belong_is_named_by_its_line_and_only_the_patent_uses_it() {
+    let folder = folder();
+    let clean = fit(folder.path(), &two_screws(), &["--lead-mm", "2"]).with_code(0);
+    // Row 30 of x, line 31 of the file: its deviation lost a digit.
+    let rows: Vec<String> = two_screws().lines().map(str::to_owned).collect();
+    let (head, deviation) = rows[29].rsplit_once(',').expect("four cells");
+    let right: f64 = deviation.parse().expect("a number");
+    let mut wrong = rows.clone();
+    wrong[29] = format!("{head},{:.5}", right + 20.0);
+    let wrong = wrong.join("\n") + "\n";
+
+    let result = fit(folder.path(), &wrong, &["--lead-mm", "2"]).with_code(0);
+    let outliers = result["axes"]["x"]["outliers"].as_array().expect("a list");
+    let [named] = outliers.as_slice() else {
+        panic!("{outliers:?}")
+    };
+    assert_eq!(named["line"], 31);
+    assert_eq!(named["approach"], "+");
+    check(named, "deviation_um", right + 20.0, 1e-4);
+    check(named, "residual_um", 20.0, 0.3);
+    assert_eq!(result["axes"]["u"]["outliers"], serde_json::json!([]));
+    for key in ["slope_um_per_mm", "lost_motion_um"] {
+        let without = clean["axes"]["x"][key].as_f64().expect("a number");
+        check(&result["axes"]["x"], key, without, 0.005);
+    }
+
+    let patent = ["--method", "patent"];
+    let mean = |rows: &str| {
+        let result = fit(folder.path(), rows, &patent).with_code(0);
+        let mean = &result["axes"]["x"]["mean_lost_motion_um"];
+        mean.as_f64().expect("a number")
+    };
+    // 240 rows: one that is 20 µm off moves the mean of all by a 240th of that.
+    let moved = mean(&wrong) - mean(&two_screws());
+    assert!((moved - 20.0 / 240.0).abs() < 1e-6, "{moved}");
+}
+
+#[test]
+fn nothing_is_stored_of_a_file_with_anything_wrong_in_it() {
+    let folder = folder();
+    let path = folder.path();
+    fs::write(path.join("machine.toml"), MACHINE).expect("a file can be written");
+    let rows = two_screws();
+    let good: Vec<&str> = rows.lines().take(240).collect();
+    let with = |row: &str| format!("{}\n{row}\n", good.join("\n"));
+    let save = ["--lead-mm", "2", "--save", "machine.toml"];
+    for (rows, says) in [
+        (with("x,+,500"), "data.csv:242:8"),
+        (with("x,+,500,NaN"), "data.csv:242:9"),
+        (with("x,+,500 mm,1.0"), "data.csv:242:5"),
+        (with("u,+,500,1.0"), "data.csv:242:5"),
+        (with("x,+,0.5,90000"), "micrometres and millimetres"),
+    ] {
+        let refused = fit(path, &rows, &save).with_code(2);
+        let error = refused["error"].to_string();
+        assert!(error.contains(says), "`{says}` is not in {error}");
+    }
+    let list = truestage(path, &["cal", "list"]).with_code(0);
+    assert_eq!(list["calibrations"], serde_json::json!([]));
+    // The same rows without the wrong one are stored.
+    let whole = format!("{}\n", good.join("\n"));
+    fit(path, &whole, &save).with_code(0);
+}
+
 #[track_caller]
 fn check_refused(rows: &str, words: &[&str], says: &[&str]) {
     let folder = folder();

@@ -9,6 +9,7 @@ mod emulator;
 mod group;
 mod hand;
 mod interface;
+mod pose_judge;
 mod rig;
 mod slcan_hub;
 mod stand;
@@ -18,6 +19,7 @@ pub use emulator::{Emulator, INTERFACE, Setup};
 pub use group::{Group, Start};
 pub use hand::Hand;
 pub use interface::{Interface, run};
+pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, machine_config, rigs,
     shipped_config,

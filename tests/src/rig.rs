@@ -184,6 +184,19 @@ impl Bench {
         Self::build(shipped, seed, machine, |text| text, |it| Box::new(it))
     }
 
+    /// The same with changes to its emulation too.
+    ///
+    /// # Panics
+    /// When a changed text is none any more.
+    pub fn shaped(
+        shipped: &Shipped,
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+    ) -> Self {
+        Self::build(shipped, seed, machine, emulated, |it| Box::new(it))
+    }
+
     fn build(
         shipped: &Shipped,
         seed: u64,

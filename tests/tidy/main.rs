@@ -23,6 +23,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
 /// The only files of the controller that may name the emulator.
 const EMULATOR_USERS: &[&str] = &["controller/src/emulated.rs"];
 
+/// What may use an emulated machine: who shows it, and who tells its failures.
+const EMULATED_MACHINE_USERS: &[&str] = &[
+    "controller/src/emulated.rs",
+    "controller/src/failure.rs",
+    "controller/src/cli/demo/",
+];
+
 const FILE_LINES_MAX: usize = 500;
 
 fn root() -> PathBuf {
@@ -136,14 +143,51 @@ fn the_emulator_shares_only_byte_codecs_with_the_drivers() {
 
 #[test]
 fn only_the_demonstration_knows_the_emulator() {
-    for (name, text) in sources("controller") {
-        if EMULATOR_USERS.contains(&name.as_str()) {
-            continue;
-        }
-        for (line, code) in code_lines(&text) {
-            assert!(!code.contains("mock_bus"), "{name}:{line}: {}", code.trim());
-        }
+    let offences: Vec<String> = sources("controller")
+        .iter()
+        .flat_map(|(name, text)| emulator_offences(name, text))
+        .collect();
+    assert!(offences.is_empty(), "{}", offences.join("\n"));
+}
+
+/// Where a file of the controller reaches further into the emulator than it may. What no file
+/// may read is the truth: an estimate that looked at it would prove nothing.
+fn emulator_offences(name: &str, text: &str) -> Vec<String> {
+    let mut forbidden = vec![".truth(", "Truth"];
+    if !EMULATOR_USERS.contains(&name) {
+        forbidden.extend(["mock_bus", "simulation(", "simulation_mut(", ".running("]);
     }
+    if !EMULATED_MACHINE_USERS.iter().any(|it| name.starts_with(it)) {
+        forbidden.push("emulated::");
+    }
+    let lines = code_lines(text).filter(|(_, code)| forbidden.iter().any(|it| code.contains(it)));
+    lines
+        .map(|(line, code)| format!("{name}:{line}: {}", code.trim()))
+        .collect()
+}
+
+#[test]
+fn whoever_reads_the_truth_is_caught_whatever_the_way_to_it() {
+    let verify = "controller/src/cycle/platform/verify.rs";
+    for code in [
+        "use mock_bus::simulation::Simulation;",
+        "    let seen = mock_bus::plant::Pose::default();",
+        "use crate::emulated::Emulated;",
+        "    let seen = self.emulated.simulation().truth().platform();",
+        "fn judge(truth: &PlatformTruth<'_>) {}",
+    ] {
+        assert_eq!(emulator_offences(verify, code).len(), 1, "{code}");
+    }
+    let demo = "controller/src/cli/demo/uvw.rs";
+    let allowed = "use truestage::emulated::HallDrift;";
+    assert_eq!(emulator_offences(demo, allowed), [""; 0]);
+    let peeks = "    let truly = emulated.simulation().truth().position();";
+    assert_eq!(emulator_offences(demo, peeks).len(), 1);
+    let emulated = EMULATOR_USERS[0];
+    assert_eq!(
+        emulator_offences(emulated, "self.simulation.borrow().truth()").len(),
+        1
+    );
 }
 
 #[test]

@@ -164,6 +164,21 @@ pub enum Fault {
         /// The only stroke.
         stroke_um: f64,
     },
+    /// A stroke a thousand times shorter than the others.
+    #[error(
+        "axis {axis}: a stroke of {stroke_um} um stands beside strokes from {least_um} to {most_um} um; \
+         are micrometres and millimetres mixed?"
+    )]
+    MixedUnits {
+        /// Which axis.
+        axis: String,
+        /// The stroke.
+        stroke_um: f64,
+        /// The shortest of the others.
+        least_um: f64,
+        /// The longest of the others.
+        most_um: f64,
+    },
     /// A deviation larger than any stroke of its axis.
     #[error(
         "axis {axis}: the deviation of {deviation_um} um is larger than its longest stroke, \

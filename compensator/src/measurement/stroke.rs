@@ -23,6 +23,8 @@ pub struct AxisStrokes {
     pub axis: String,
     /// The line of its first row, when it was read from a file.
     pub line: Option<usize>,
+    /// The line of each stroke, when they were read from a file; empty otherwise.
+    pub lines: Vec<usize>,
     /// Its strokes: finite, and not all the same.
     pub strokes: Vec<Stroke>,
 }
@@ -53,6 +55,21 @@ pub enum StrokeError {
         axis: String,
         /// The only stroke.
         stroke: Metres,
+    },
+    /// A stroke a thousand times shorter than the others.
+    #[error(
+        "axis {axis}: a stroke of {} um beside strokes from {} to {} um", stroke.um(),
+        others.0.um(), others.1.um()
+    )]
+    MixedUnits {
+        /// Which one.
+        index: usize,
+        /// The axis.
+        axis: String,
+        /// The stroke.
+        stroke: Metres,
+        /// The shortest and the longest of the others, without sign.
+        others: (Metres, Metres),
     },
     /// A deviation larger than any stroke of its axis.
     #[error(
@@ -103,6 +120,7 @@ impl StrokeSeries {
                 axes.push(AxisStrokes {
                     axis,
                     line: None,
+                    lines: Vec::new(),
                     strokes: Vec::new(),
                 });
                 axes.len() - 1
@@ -141,8 +159,10 @@ impl StrokeSeries {
         let names: Vec<String> = strokes.iter().map(|(axis, _)| axis.clone()).collect();
         let mut series = Self::new(strokes).map_err(|error| placed(&table, error))?;
         for axis in &mut series.axes {
-            let row = names.iter().position(|name| *name == axis.axis);
-            axis.line = row.map(|row| table.line(row));
+            let rows = names.iter().enumerate();
+            let own = rows.filter(|(_, name)| **name == axis.axis);
+            axis.lines = own.map(|(row, _)| table.line(row)).collect();
+            axis.line = axis.lines.first().copied();
         }
         Ok(series)
     }
@@ -172,6 +192,14 @@ fn check_axis(axis: &AxisStrokes, places: &[usize]) -> Result<(), StrokeError> {
             stroke: strokes[0].stroke,
         });
     }
+    if let Some((at, others)) = mixed_units(strokes) {
+        return Err(StrokeError::MixedUnits {
+            index: places[at],
+            axis: name(),
+            stroke: strokes[at].stroke,
+            others,
+        });
+    }
     let longest = strokes
         .iter()
         .fold(Metres::ZERO, |most, it| most.max(it.stroke.abs()));
@@ -184,6 +212,25 @@ fn check_axis(axis: &AxisStrokes, places: &[usize]) -> Result<(), StrokeError> {
         }),
         None => Ok(()),
     }
+}
+
+/// The first stroke that would fit the others as millimetres, and how long those are: none lies
+/// between the short ones and the long ones, and a thousand times the short ones are long ones.
+fn mixed_units(strokes: &[Stroke]) -> Option<(usize, (Metres, Metres))> {
+    const GAP: f64 = 100.0;
+    let mut lengths: Vec<f64> = strokes.iter().map(|it| it.stroke.abs().value()).collect();
+    lengths.retain(|it| *it > 0.0);
+    lengths.sort_by(f64::total_cmp);
+    let split = lengths.windows(2).position(|it| it[1] > GAP * it[0])?;
+    let (short, long) = lengths.split_at(split + 1);
+    let (least, most) = (long[0], long[long.len() - 1]);
+    let fits = |it: &f64| (0.5 * least..=2.0 * most).contains(&(it * 1e3));
+    let at = strokes.iter().position(|it| {
+        let length = it.stroke.abs().value();
+        length > 0.0 && length < least
+    })?;
+    let all_fit = short.iter().all(fits);
+    all_fit.then_some((at, (Metres(least), Metres(most))))
 }
 
 /// Puts the place of the offending row on an error of the whole series.
@@ -205,6 +252,20 @@ fn placed(table: &Table, error: StrokeError) -> DataError {
         } => {
             let stroke_um = stroke.um();
             table.fail(index, 2, Fault::OneStroke { axis, stroke_um })
+        }
+        StrokeError::MixedUnits {
+            index,
+            axis,
+            stroke,
+            others: (least, most),
+        } => {
+            let fault = Fault::MixedUnits {
+                axis,
+                stroke_um: stroke.um(),
+                least_um: least.um(),
+                most_um: most.um(),
+            };
+            table.fail(index, 2, fault)
         }
         StrokeError::Implausible {
             index,
@@ -254,6 +315,7 @@ mod tests {
             (u.axis.as_str(), u.line, u.strokes.len()),
             ("u", Some(3), 3)
         );
+        assert_eq!((&u.lines[..], &w.lines[..]), (&[3, 5, 6][..], &[4, 7][..]));
         assert_eq!(
             (w.axis.as_str(), w.line, w.strokes.len()),
             ("w", Some(4), 2)
@@ -295,6 +357,28 @@ mod tests {
     fn a_deviation_beyond_every_stroke_is_a_mistake_of_units() {
         let rows = "u,+,0.5,0.0020\nu,+,1.5,0.0026\nu,+,1.0,2.1\n";
         check_rows(rows, 4, 9, "micrometres and millimetres mixed?");
+    }
+
+    #[test]
+    fn a_stroke_in_millimetres_among_micrometres_is_told_with_its_place() {
+        let rows = "u,+,500,2\nu,+,1000,2\nu,+,1.5,2\nu,-,500,3\n";
+        check_rows(
+            rows,
+            4,
+            5,
+            "1.5 um stands beside strokes from 500 to 1000 um",
+        );
+        let rows = "u,+,1,0.3\nu,+,500,0.3\nu,+,1500,0.3\n";
+        check_rows(rows, 2, 5, "are micrometres and millimetres mixed?");
+        // What passes zero, or grows by tens, is not mixed.
+        for strokes in [
+            &["-500", "-0.0004", "0", "500"][..],
+            &["1", "10", "100", "1000", "10000"],
+        ] {
+            let rows: Vec<String> = strokes.iter().map(|it| format!("u,+,{it},0.3")).collect();
+            let text = format!("{HEADER}{}\n", rows.join("\n"));
+            StrokeSeries::from_csv(&text, "screw.csv").unwrap();
+        }
     }
 
     #[test]

@@ -3,7 +3,9 @@
 //! The steps are Gauss-Newton's (for three actuators Newton's) and are halved until the misfit
 //! of the strokes shrinks. Two poses may belong to one set of strokes, on both sides of the turn
 //! at which the actuators lose their hold; the one on the start's side is found, and that side
-//! is the whole of [`Platform::angles`].
+//! is the whole of [`Platform::angles`]. Four actuators decide the turn alone, but away from it
+//! their misfit may have another least, at which they contradict each other by far: where they
+//! do, other starts are tried and the least misfit of all is taken.
 
 use nalgebra::SVector;
 use units::{Metres, Radians};
@@ -25,6 +27,9 @@ const LAST_STEP: f64 = 1e-11;
 
 /// The misfit, as a share of the lengths involved, that three strokes may keep by rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Four actuators that contradict each other are looked at from so many turns.
+const STARTS: u32 = 8;
 
 /// A pose and how well the strokes agree on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +104,37 @@ impl Platform {
             }
             *slot = stroke.value();
         }
-        self.newton(&wanted, start.raw())
+        let found = self.newton(&wanted, start.raw());
+        if self.rows.len() == 3 {
+            return found;
+        }
+        match found {
+            Ok(found) if found.inconsistency.value() <= ROUNDING * self.reach(found.pose.raw()) => {
+                Ok(found)
+            }
+            found => self.least_misfit(&wanted, start, found),
+        }
+    }
+
+    /// The best of `found` and of what is found from other turns.
+    fn least_misfit(
+        &self,
+        wanted: &[f64; 4],
+        start: Pose,
+        found: Result<Forward, ForwardError>,
+    ) -> Result<Forward, ForwardError> {
+        let (min, max) = self.angles;
+        let from = |at: u32| {
+            let [x, y, _] = start.raw();
+            let share = (f64::from(at) + 0.5) / f64::from(STARTS);
+            self.newton(wanted, [x, y, min + share * (max - min)]).ok()
+        };
+        let is_held = |it: &Forward| (min..=max).contains(&it.pose.angle.value());
+        let others = (0..STARTS).filter_map(from).filter(is_held);
+        others.fold(found, |best, it| match best {
+            Ok(best) if best.inconsistency <= it.inconsistency => Ok(best),
+            _ => Ok(it),
+        })
     }
 
     fn newton(&self, wanted: &[f64; 4], start: [f64; 3]) -> Result<Forward, ForwardError> {

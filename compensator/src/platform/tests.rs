@@ -132,6 +132,26 @@ fn a_fourth_actuator_that_contradicts_the_others_is_told_by_how_much() {
     assert!((inconsistency - 2.0).abs() < 0.02, "{inconsistency} um");
 }
 
+/// From a start 27° and 58 mm away Newton's steps end where these four contradict each other by
+/// millimetres; the pose on which they agree is another one.
+#[test]
+fn four_that_agree_somewhere_are_found_there_also_from_afar() {
+    let platform = made(&[
+        (-179.453, 52.537, 338.560),
+        (184.043, 43.006, 134.653),
+        (28.589, 199.479, 226.869),
+        (-50.112, 159.648, 113.277),
+    ]);
+    let platform = platform.unwrap();
+    let wanted = pose(-118.872, -113.231, -17.630_4);
+    let near = pose(-88.872, -163.231, -44.269_8);
+    let found = platform
+        .forward_near(&platform.strokes(wanted), near)
+        .unwrap();
+    check_pose(found.pose, wanted, 1e-13, 1e-12);
+    assert!(found.inconsistency.value() < 1e-13);
+}
+
 #[test]
 fn strokes_that_no_pose_has_are_an_error_not_a_number() {
     // U and V 300 mm apart from each other, on points 200 mm apart.

@@ -11,13 +11,16 @@
 //! about the model, the strokes have an error of their own that repeating does not average out;
 //! tests and uncertainties are then made from the larger scatter, per stroke and not per row.
 //!
-//! Absent: outliers (repeat the measurement), weights.
+//! Rows that do not belong are left out and named (see `outliers`).
+//!
+//! Absent: weights.
 
 use std::collections::BTreeMap;
 
 use units::{Approach, Metres};
 
 use super::observe::observable;
+use super::outliers::{self, StrokeOutlier};
 use super::{BASE, Harmonic, ScrewModel, design_row};
 use crate::least_squares::{self, LeastSquaresError};
 use crate::measurement::Stroke;
@@ -27,7 +30,7 @@ use crate::significance::f_tail;
 const LACK_OF_FIT_LEVEL: f64 = 0.01;
 
 /// The smallest scatter that tests believe in: data without noise have no harmonics by rounding.
-const SCATTER_FLOOR_M: f64 = 1e-10;
+pub(super) const SCATTER_FLOOR_M: f64 = 1e-10;
 
 /// What a fit should do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +41,10 @@ pub struct FitOptions {
     pub harmonics_max: u32,
     /// The chance accepted of finding any periodic term where there is none.
     pub significance: f64,
+    /// How many scatters off a row must be to be left out.
+    pub outlier_threshold: f64,
+    /// The largest share of rows that may be left out, 0 to 1.
+    pub outlier_share_max: f64,
 }
 
 impl Default for FitOptions {
@@ -47,6 +54,8 @@ impl Default for FitOptions {
             lead: None,
             harmonics_max: 4,
             significance: 0.01,
+            outlier_threshold: 6.0,
+            outlier_share_max: 0.2,
         }
     }
 }
@@ -80,6 +89,8 @@ pub struct LackOfFit {
 pub struct Fitted {
     /// The model, with its covariance.
     pub model: ScrewModel,
+    /// Rows that were left out, in the order given.
+    pub outliers: Vec<StrokeOutlier>,
     /// Standard deviation of the rows about the model.
     pub residual: Metres,
     /// Degrees of freedom behind the covariance.
@@ -149,6 +160,19 @@ pub enum FitError {
         /// Parameters wanted.
         parameters: usize,
     },
+    /// So many rows do not belong that nobody can say which do.
+    #[error(
+        "screw: {outliers} of {rows} rows do not fit the others, more than {:.0} %; look for loose \
+         parts, vibration or mixed axes and measure again", share_max * 100.0
+    )]
+    TooManyOutliers {
+        /// Rows that do not fit.
+        outliers: usize,
+        /// Rows given.
+        rows: usize,
+        /// The share allowed, 0 to 1.
+        share_max: f64,
+    },
     /// The numbers cannot be solved.
     #[error("screw: {0}")]
     Solve(#[from] LeastSquaresError),
@@ -160,6 +184,28 @@ pub enum FitError {
 /// When an option is none, or something is not observable in these strokes, by name.
 pub fn fit(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError> {
     check(strokes, options)?;
+    let (candidates, _) = observable(strokes, options.lead, options.harmonics_max)?;
+    let left_out = outliers::find(strokes, &candidates, options)?;
+    let rows = strokes.iter().enumerate();
+    let kept = rows.filter(|(index, _)| !left_out.contains(index));
+    let kept: Vec<Stroke> = kept.map(|(_, it)| *it).collect();
+    let mut fitted = fit_all(&kept, options)?;
+    let model = &fitted.model;
+    let named = |index: usize| {
+        let stroke = strokes[index];
+        let residual = stroke.deviation - model.deviation(stroke.stroke, stroke.approach);
+        StrokeOutlier {
+            index,
+            stroke,
+            residual,
+        }
+    };
+    fitted.outliers = left_out.into_iter().map(named).collect();
+    Ok(fitted)
+}
+
+/// The same with every row.
+fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError> {
     let (mut candidates, mut unobservable) =
         observable(strokes, options.lead, options.harmonics_max)?;
     let problem = Problem::new(strokes, options.lead);
@@ -195,6 +241,7 @@ pub fn fit(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
     };
     Ok(Fitted {
         model,
+        outliers: Vec::new(),
         residual: Metres(final_noise.per_row.sqrt()),
         degrees_of_freedom: final_noise.degrees_of_freedom,
         lack_of_fit: final_noise.lack_of_fit,
@@ -231,7 +278,7 @@ struct Noise {
     lack_of_fit: Option<LackOfFit>,
 }
 
-struct Problem<'a> {
+pub(super) struct Problem<'a> {
     strokes: &'a [Stroke],
     lead: f64,
     deviations: Vec<f64>,
@@ -242,12 +289,13 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(strokes: &'a [Stroke], lead: Option<Metres>) -> Self {
+    pub(super) fn new(strokes: &'a [Stroke], lead: Option<Metres>) -> Self {
         let mut cells: BTreeMap<(Approach, u64), Vec<f64>> = BTreeMap::new();
         for it in strokes {
-            // Adding zero turns -0 into 0, which is the same stroke.
-            let key = (it.approach, (it.stroke.value() + 0.0).to_bits());
-            cells.entry(key).or_default().push(it.deviation.value());
+            cells
+                .entry(it.cell())
+                .or_default()
+                .push(it.deviation.value());
         }
         let spread = |values: &Vec<f64>| -> f64 {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -280,7 +328,7 @@ impl<'a> Problem<'a> {
         )
     }
 
-    fn solve(&self, harmonics: &[u32]) -> Result<least_squares::Fit, LeastSquaresError> {
+    pub(super) fn solve(&self, harmonics: &[u32]) -> Result<least_squares::Fit, LeastSquaresError> {
         let row = |it: &Stroke| design_row(it.stroke.value(), it.approach, self.lead, harmonics);
         let design: Vec<f64> = self.strokes.iter().flat_map(row).collect();
         least_squares::solve(&design, BASE + 2 * harmonics.len(), &self.deviations)

@@ -37,6 +37,7 @@ mod engagement;
 mod fit;
 mod limits;
 mod observe;
+mod outliers;
 pub mod patent;
 
 use core::f64::consts::TAU;
@@ -49,6 +50,7 @@ pub use compensation::{Correction, OutOfRange, Rule, ScrewCompensation};
 pub use engagement::{Engagement, ScrewMemory};
 pub use fit::{FitError, FitOptions, Fitted, HarmonicTest, LackOfFit, fit};
 pub use limits::{LimitName, Limits, ScrewError};
+pub use outliers::StrokeOutlier;
 
 /// Offset, slope and lost motion come before the harmonics' sines and cosines.
 const BASE: usize = 3;

@@ -119,8 +119,10 @@ fn mean<'a>(rows: impl Iterator<Item = &'a Stroke>) -> (Metres, f64) {
 fn scatter(strokes: &[Stroke]) -> Option<(Metres, usize)> {
     let mut cells: BTreeMap<(Approach, u64), Vec<f64>> = BTreeMap::new();
     for it in strokes {
-        let key = (it.approach, (it.stroke.value() + 0.0).to_bits());
-        cells.entry(key).or_default().push(it.deviation.value());
+        cells
+            .entry(it.cell())
+            .or_default()
+            .push(it.deviation.value());
     }
     let degrees_of_freedom = strokes.len() - cells.len();
     let squares: f64 = cells

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 use serde_json::{Value, json};
+use truestage::config::Loaded;
 use truestage::store::{
     CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, Store, short,
 };
@@ -48,7 +49,7 @@ pub(super) enum CalCommand {
     Rollback {
         /// The machine's configuration.
         config: PathBuf,
-        /// Which axis.
+        /// Which axis; `platform` for all screws of one at once.
         #[arg(long)]
         axis: String,
     },
@@ -64,7 +65,7 @@ pub(super) fn run(command: &CalCommand, output: Output) -> Ended {
             after,
         } => diff(&store_of(config)?, before, after, output),
         CalCommand::Activate { config, id } => activate(config, id, output),
-        CalCommand::Rollback { config, axis } => rollback(&store_of(config)?, axis, output),
+        CalCommand::Rollback { config, axis } => rollback(config, axis, output),
     }
 }
 
@@ -153,6 +154,11 @@ fn node_line(node: &NodeRecord) -> String {
 fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
     let (before_id, after_id) = (store.resolve(before)?, store.resolve(after)?);
     let (before, after) = (store.load(&before_id)?, store.load(&after_id)?);
+    let (old_axis, new_axis) = (&before.head.axis, &after.head.axis);
+    if old_axis != new_axis {
+        let what = format!("note: the first is of axis {old_axis}, the second of axis {new_axis}");
+        output.note(&what);
+    }
     let (lines, values) = match &after.content {
         Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
         Content::RotaryErrorTable(new) => rotary::changes(before.rotary(&before_id)?, new),
@@ -208,22 +214,55 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
         ..head.clone()
     };
     head.belongs_to(&id, &here)?;
-    let axes = &loaded.config.axis;
-    let known: Vec<_> = axes.keys().chain(loaded.config.rotary.keys()).collect();
-    if !known.contains(&&head.axis) {
-        let known = known.into_iter().cloned().collect::<Vec<_>>().join(", ");
-        return Err(Failure::NoSuchAxis {
-            axis: head.axis,
-            known,
-        });
-    }
+    known_axis(&loaded, &head.axis)?;
     store.activate(&head.axis, &id)?;
     let text = format!("axis {}: {} is in use", head.axis, short(&id));
     output.result(&text, &json!({"axis": head.axis, "active": id}))
 }
 
-fn rollback(store: &Store, axis: &str, output: Output) -> Ended {
+fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
+    let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
+    let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
+    if known.contains(&axis) {
+        return Ok(());
+    }
+    Err(Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: known.join(", "),
+    })
+}
+
+/// What `--axis` calls all screws of a platform.
+const PLATFORM: &str = "platform";
+
+fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
+    let loaded = config::load(path)?;
+    let section = &loaded.config.machine;
+    let store = Store::new(&section.data_dir, &section.name);
+    if let (PLATFORM, Some(platform)) = (axis, &loaded.config.platform) {
+        let screws = platform.actuator.iter().map(|it| it.axis.as_str());
+        return rollback_all(&store, &screws.collect::<Vec<_>>(), output);
+    }
+    known_axis(&loaded, axis)?;
     let id = store.rollback(axis)?;
     let text = format!("axis {axis}: back to {}", short(&id));
     output.result(&text, &json!({"axis": axis, "active": id}))
+}
+
+/// Every screw goes back, or none: a platform moves by models that were made together.
+fn rollback_all(store: &Store, axes: &[&str], output: Output) -> Ended {
+    for axis in axes {
+        store.earlier(axis)?;
+    }
+    let mut lines = Vec::new();
+    let mut active = serde_json::Map::new();
+    for axis in axes {
+        let id = store.rollback(axis)?;
+        lines.push(format!("axis {axis}: back to {}", short(&id)));
+        active.insert((*axis).to_owned(), json!(id));
+    }
+    output.result(
+        &lines.join("\n"),
+        &json!({"axis": PLATFORM, "active": active}),
+    )
 }

@@ -1,12 +1,13 @@
 //! `truestage report`: a page of one run.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use compensator::iso230::{self, Figures};
 use serde_json::json;
+use truestage::report::platform::PlatformPage;
 use truestage::report::{self, Page, Section};
-use truestage::store::read_journal;
+use truestage::store::{CalibrationRecord, ReadJournal, Store, read_journal};
 use truestage::{Failure, cycle};
 
 use super::output::{Ended, Output};
@@ -22,8 +23,45 @@ pub(super) struct ReportArgs {
 
 pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
     let journal = read_journal(&args.run)?;
+    let is_platform = journal.arrangement.is_some();
+    let html = if is_platform {
+        platform(&args.run, &journal)?
+    } else if journal.plate_plan.is_some() {
+        report::rotary::render(&journal, &made_from(&args.run)?)
+    } else {
+        axis(&journal)?
+    };
+    let path = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.run.with_extension("html"));
+    std::fs::write(&path, html).map_err(|source| Failure::File {
+        path: path.clone(),
+        source,
+    })?;
+    output.result(
+        &format!("report in {}", path.display()),
+        &json!({"report": path}),
+    )
+}
+
+/// The page of a platform's run, with the calibrations that were made from it.
+fn platform(path: &Path, journal: &ReadJournal) -> Result<String, Failure> {
+    let page = PlatformPage::of(journal, made_from(path)?);
+    Ok(report::platform::render(&page))
+}
+
+/// The calibrations that were made from the journal at `path`.
+fn made_from(path: &Path) -> Result<Vec<(String, CalibrationRecord)>, Failure> {
+    Ok(match (Store::of_journal(path), path.file_name()) {
+        (Some(store), Some(name)) => store.made_from(&name.to_string_lossy())?,
+        _ => Vec::new(),
+    })
+}
+
+/// The page of a run of a single axis.
+fn axis(journal: &ReadJournal) -> Result<String, Failure> {
     let figures = figures_of(&journal.points)?;
-    let title = format!("{} of axis {}", journal.header.verb, journal.header.axis);
     let sections = figures
         .iter()
         .map(|figures| Section {
@@ -33,24 +71,13 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
         })
         .collect();
     let page = Page {
-        title,
-        facts: report::facts_of(&journal),
+        title: format!("{} of axis {}", journal.header.verb, journal.header.axis),
+        facts: report::facts_of(journal),
         sections,
         calibration: None,
         zeros: journal.zeros.clone(),
     };
-    let path = args
-        .output
-        .clone()
-        .unwrap_or_else(|| args.run.with_extension("html"));
-    std::fs::write(&path, report::render(&page)).map_err(|source| Failure::File {
-        path: path.clone(),
-        source,
-    })?;
-    output.result(
-        &format!("report in {}", path.display()),
-        &json!({"report": path}),
-    )
+    Ok(report::render(&page))
 }
 
 /// `None` for a run with too few points for figures (a zero, or one that was interrupted).

@@ -9,6 +9,7 @@ use truestage::{Failure, Machine, Store, json as to_json};
 use units::{Metres, Radians};
 
 use super::output::{Ended, Output};
+use super::screw::outlier_lines;
 use super::session::Session;
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 
@@ -126,9 +127,22 @@ fn moved_text(moved: &PoseMoved) -> String {
         .map(|(axis, at)| format!("{axis} {:.6} mm", at.mm()))
         .collect::<Vec<_>>();
     let skew = moved.skew.map_or(String::new(), |it| {
-        format!("; started within {:.1} ms", it.as_secs_f64() * 1e3)
+        format!("; started within {:.3} ms", it.as_secs_f64() * 1e3)
     });
-    format!("\nscrews: {}{skew}", set_points.join(", "))
+    let mut text = format!("\nscrews: {}{skew}", set_points.join(", "));
+    for it in &moved.taken_up {
+        let doubt = it.standard_uncertainty.map_or(String::new(), |u| {
+            format!(" (its place was uncertain by {:.3} µm)", u.um())
+        });
+        text += &format!("\nplay of {} taken up first{doubt}", it.axis);
+    }
+    if let Some(u) = moved.standard_uncertainty {
+        text += &format!(
+            "\nstandard uncertainty of the screws' places {:.3} µm",
+            u.um()
+        );
+    }
+    text
 }
 
 fn moved_value(moved: &PoseMoved) -> Value {
@@ -137,10 +151,19 @@ fn moved_value(moved: &PoseMoved) -> Value {
         .iter()
         .map(|(axis, at)| json!({"axis": axis, "set_point_mm": at.mm()}))
         .collect();
+    let taken_up: Vec<_> = moved
+        .taken_up
+        .iter()
+        .map(|it| {
+            let u = it.standard_uncertainty.map(to_json::um);
+            json!({"axis": it.axis, "standard_uncertainty_um": u})
+        })
+        .collect();
     json!({
         "screws": set_points,
         "skew_ms": moved.skew.map(|it| it.as_secs_f64() * 1e3),
         "standard_uncertainty_um": moved.standard_uncertainty.map(to_json::um),
+        "taken_up": taken_up,
     })
 }
 
@@ -177,6 +200,7 @@ pub(super) fn calibrated_text(calibrated: &PlatformCalibrated) -> String {
             model.harmonics.len(),
             &screw.id[..12]
         );
+        text += &outlier_lines(&screw.outliers, &[]);
     }
     text
 }
@@ -194,6 +218,7 @@ pub(super) fn calibrated_value(calibrated: &PlatformCalibrated) -> Value {
                 "lost_motion_um": to_json::um(screw.model.lost_motion),
                 "lost_motion_um_u": screw.model.u_lost_motion().map(to_json::um),
                 "scatter_um": screw.model.scatter.map(to_json::um),
+                "outliers": to_json::screw::outliers(&screw.outliers, &[]),
                 "harmonics": screw.model.harmonics.iter().map(|it| it.number).collect::<Vec<_>>(),
             })
         })
@@ -207,7 +232,7 @@ pub(super) fn calibrated_value(calibrated: &PlatformCalibrated) -> Value {
 
 pub(super) fn verified_text(title: &str, verified: &PlatformVerified) -> String {
     let skew = verified.skew_max_s.map_or(String::new(), |it| {
-        format!("; screws started within {:.1} ms", it * 1e3)
+        format!("; screws started within {:.3} ms", it * 1e3)
     });
     format!(
         "{title}: largest error {:.3} µm, rms {:.3} µm over {} poses (tolerance {:.3} µm){skew}\n\
@@ -229,6 +254,7 @@ pub(super) fn verified_value(verified: &PlatformVerified) -> Value {
                 "target": pose_value(it.target),
                 "seen": pose_value(it.seen),
                 "error_um": to_json::um(it.error),
+                "skew_ms": it.skew_s.map(|it| it * 1e3),
             })
         })
         .collect();

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use compensator::measurement::{AxisStrokes, StrokeSeries};
-use compensator::screw::{self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel};
+use compensator::screw::{
+    self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
+};
 use serde_json::{Value, json};
 use truestage::json::screw as to_json;
 use truestage::store::{CalibrationRecord, Content, ScrewContent, ScrewMethodName, Store, short};
@@ -51,6 +53,7 @@ struct Estimated<'a> {
     axis: &'a str,
     rows: usize,
     model: ScrewModel,
+    outliers: Vec<StrokeOutlier>,
     text: String,
     value: Value,
 }
@@ -117,6 +120,7 @@ fn patent(strokes: &AxisStrokes) -> Result<Estimated<'_>, FitError> {
         axis: &strokes.axis,
         rows: estimate.rows,
         model: estimate.model(),
+        outliers: Vec::new(),
         text,
         value: to_json::patent(&estimate),
     })
@@ -150,13 +154,31 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
         text += "\n  the strokes scatter more than their repetitions: the screw has errors that \
                  this model does not know; the uncertainties contain them";
     }
+    text += &outlier_lines(&fitted.outliers, &strokes.lines);
     Ok(Estimated {
         axis: &strokes.axis,
         rows,
-        value: to_json::fitted(&fitted, rows),
+        value: to_json::fitted(&fitted, rows, &strokes.lines),
         model: fitted.model,
+        outliers: fitted.outliers,
         text,
     })
+}
+
+/// Each row that was left out, by its line in the file where there is one.
+pub(super) fn outlier_lines(outliers: &[StrokeOutlier], lines: &[usize]) -> String {
+    let named = outliers.iter().map(|it| {
+        let line = lines.get(it.index);
+        format!(
+            "\n  left out: {}approach {}, stroke {} um, deviation {:.3} µm, {:+.3} µm off the others",
+            line.map_or(String::new(), |line| format!("line {line}, ")),
+            it.stroke.approach.symbol(),
+            it.stroke.stroke.um(),
+            it.stroke.deviation.um(),
+            it.residual.um()
+        )
+    });
+    named.collect()
 }
 
 /// One line for each term.
@@ -189,7 +211,8 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
             Failure::ScrewCompensation { axis, source }
         })?;
         let rows = u32::try_from(it.rows).unwrap_or(u32::MAX);
-        let content = Content::ScrewModel(ScrewContent::new(&it.model, method, rows));
+        let content = ScrewContent::new(&it.model, method, rows).without(&it.outliers);
+        let content = Content::ScrewModel(content);
         records.push(CalibrationRecord { head, content });
     }
     let section = &loaded.config.machine;
@@ -215,11 +238,19 @@ fn limits_of(loaded: &config::Loaded, axis: &str) -> Limits {
 
 /// A stored model, for `cal show`.
 pub(super) fn shown(content: &ScrewContent) -> String {
+    let scatter = content.scatter_m.map_or(String::new(), |it| {
+        format!(", a single stop scatters by {:.3} µm", Metres(it).um())
+    });
+    let left_out = match content.outliers.len() {
+        0 => String::new(),
+        count => format!(", {count} of them left out"),
+    };
     format!(
-        "{} strokes from {} to {} mm{}",
+        "{} strokes{left_out} from {} to {} mm by {}{scatter}{}",
         content.rows,
         Metres(content.first_stroke_m).mm(),
         Metres(content.last_stroke_m).mm(),
+        content.method.in_words(),
         model_text(&content.model()),
     )
 }

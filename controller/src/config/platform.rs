@@ -18,6 +18,7 @@ pub struct PlatformConfig {
     pub edge_mm: f64,
     #[serde(default = "condition_max")]
     pub condition_max: f64,
+    pub inconsistency_limit_um: Option<f64>,
     pub actuator: Vec<ActuatorConfig>,
     pub zero: PlatformZeroConfig,
     pub calibrate: Option<PlatformCalibrateConfig>,

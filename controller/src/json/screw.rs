@@ -1,7 +1,7 @@
 //! What a fit of a ball screw prints, lengths in micrometres.
 
 use compensator::screw::patent::PatentEstimate;
-use compensator::screw::{Fitted, ScrewModel};
+use compensator::screw::{Fitted, ScrewModel, StrokeOutlier};
 use serde_json::{Value, json};
 use units::{Metres, Radians};
 
@@ -43,8 +43,22 @@ pub fn patent(estimate: &PatentEstimate) -> Value {
     })
 }
 
-/// A least-squares model, of the deviations as they stand in the file.
-pub fn fitted(fitted: &Fitted, rows: usize) -> Value {
+/// Rows that were left out of a fit; `lines` are those of all rows in their file, if any.
+pub fn outliers(outliers: &[StrokeOutlier], lines: &[usize]) -> Value {
+    let named = outliers.iter().map(|it| {
+        json!({
+            "line": lines.get(it.index),
+            "approach": it.stroke.approach.symbol().to_string(),
+            "stroke_um": um(it.stroke.stroke),
+            "deviation_um": um(it.stroke.deviation),
+            "residual_um": um(it.residual),
+        })
+    });
+    named.collect()
+}
+
+/// A least-squares model of rows in `lines` of a file, of the deviations as they stand there.
+pub fn fitted(fitted: &Fitted, rows: usize, lines: &[usize]) -> Value {
     let model = &fitted.model;
     let tests = fitted.tests.iter().map(|test| {
         json!({
@@ -78,6 +92,7 @@ pub fn fitted(fitted: &Fitted, rows: usize) -> Value {
         "residual_um": um(fitted.residual),
         "degrees_of_freedom": fitted.degrees_of_freedom,
         "lack_of_fit": lack_of_fit,
+        "outliers": outliers(&fitted.outliers, lines),
     })
 }
 

@@ -1,5 +1,8 @@
 //! A self-contained page of a run: facts, plots, figures. No script, no network.
 
+mod chart;
+pub mod platform;
+pub mod rotary;
 mod svg;
 
 use core::fmt::Write as _;
@@ -8,8 +11,8 @@ use compensator::iso230::Figures;
 use units::{Metres, Radians};
 
 use crate::store::{
-    CalibrationRecord, Content, LinearContent, PointEntry, ReadJournal, RotaryContent,
-    ScrewContent, ZeroEntry,
+    CalibrationRecord, Content, IdentityRecord, LinearContent, PointEntry, ReadJournal,
+    RotaryContent, ScrewContent, ZeroEntry,
 };
 use crate::text;
 
@@ -46,17 +49,12 @@ table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem;text-ali
 border-bottom:1px solid #dde3ea}th{color:#566}td:first-child,th:first-child{text-align:left}\
 svg{width:100%;height:auto}.note{color:#566}figure{margin:0}";
 
+/// The fact that names the calibration in use.
+const IN_USE: &str = "calibration in use";
+
 /// The page as HTML.
 pub fn render(page: &Page<'_>) -> String {
-    let mut html = String::new();
-    html += "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">";
-    html += "<meta name=\"viewport\" content=\"width=device-width\">";
-    html += &format!(
-        "<title>{}</title><style>{STYLE}</style></head><body>",
-        escape(&page.title)
-    );
-    html += &format!("<h1>{}</h1>", escape(&page.title));
-    html += &facts(&page.facts);
+    let mut html = facts(&page.facts);
     if !page.sections.is_empty() {
         html += "<h2>ISO 230-2 figures</h2>";
         html += &figures(&page.sections);
@@ -77,15 +75,25 @@ pub fn render(page: &Page<'_>) -> String {
         html += "<h2>Zeros</h2>";
         html += &zeros(&page.zeros);
     }
-    html += "<p class=\"note\">deviation = actual − target. Bars are mean ± 2 s at each target. ";
-    html += "Made by truestage; not a certificate.</p></body></html>\n";
-    html
+    let note = "deviation = actual − target. Bars are mean ± 2 s at each target.";
+    document(&page.title, &html, note)
+}
+
+/// A whole page around `body`; `note` says how to read it.
+fn document(title: &str, body: &str, note: &str) -> String {
+    let title = escape(title);
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\
+         <style>{STYLE}</style></head><body><h1>{title}</h1>{body}\
+         <p class=\"note\">{note} Made by truestage; not a certificate.</p></body></html>\n"
+    )
 }
 
 /// The head of a page for one run.
 pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
     let header = &journal.header;
-    let drive = &header.drive;
+    let points = journal.points.len() + journal.strokes.len() + journal.poses.len();
     let mut facts = vec![
         (
             "machine".to_owned(),
@@ -97,22 +105,24 @@ pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
             format!("{}, started {}", header.verb, header.started),
         ),
         (
-            "drive".to_owned(),
-            format!(
-                "{} {:#X}:{:#X}, serial {}",
-                drive.name, drive.vendor, drive.product, drive.serial
-            ),
-        ),
-        (
-            "calibration in use".to_owned(),
+            IN_USE.to_owned(),
             header.calibration.clone().unwrap_or("none".into()),
         ),
-        ("points".to_owned(), journal.points.len().to_string()),
+        ("points".to_owned(), points.to_string()),
         (
             "complete".to_owned(),
             if journal.complete { "yes" } else { "no" }.to_owned(),
         ),
     ];
+    // What several drives move together names none of them.
+    let drive = &header.drive;
+    if *drive != IdentityRecord::default() {
+        let value = format!(
+            "{} {:#X}:{:#X}, serial {}",
+            drive.name, drive.vendor, drive.product, drive.serial
+        );
+        facts.push(("drive".to_owned(), value));
+    }
     if !header.instrument.name.is_empty() {
         let it = &header.instrument;
         let on = [

@@ -6,27 +6,27 @@ use units::Metres;
 
 use super::Section;
 
-const WIDTH: f64 = 960.0;
-const HEIGHT: f64 = 320.0;
-const LEFT: f64 = 64.0;
-const RIGHT: f64 = 20.0;
-const TOP: f64 = 24.0;
-const BOTTOM: f64 = 44.0;
+pub(super) const WIDTH: f64 = 960.0;
+pub(super) const HEIGHT: f64 = 320.0;
+pub(super) const LEFT: f64 = 64.0;
+pub(super) const RIGHT: f64 = 20.0;
+pub(super) const TOP: f64 = 24.0;
+pub(super) const BOTTOM: f64 = 44.0;
 const FORWARD: &str = "#0b66c3";
 const REVERSE: &str = "#c2410c";
 
 /// From data to the page.
-struct Axes {
-    x: (f64, f64),
-    y: (f64, f64),
+pub(super) struct Axes {
+    pub(super) x: (f64, f64),
+    pub(super) y: (f64, f64),
 }
 
 impl Axes {
-    fn px(&self, x: f64) -> f64 {
+    pub(super) fn px(&self, x: f64) -> f64 {
         LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
     }
 
-    fn py(&self, y: f64) -> f64 {
+    pub(super) fn py(&self, y: f64) -> f64 {
         HEIGHT - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (HEIGHT - TOP - BOTTOM)
     }
 }
@@ -54,7 +54,7 @@ pub(super) fn deviations(section: &Section<'_>) -> String {
     };
     let mut svg = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">");
     svg += &format!("<title>Deviation {}</title>", super::escape(&section.title));
-    svg += &grid(&axes);
+    svg += &grid(&axes, ("target (mm)", "deviation (µm)"));
     svg += &dots(&axes, &points);
     svg += &means(&axes, section);
     svg += &legend();
@@ -74,7 +74,7 @@ fn bar_ends(section: &Section<'_>) -> impl Iterator<Item = f64> {
 }
 
 /// The range of `values`, widened on both sides by `share` of it, and never empty.
-fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
+pub(super) fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     });
@@ -109,7 +109,8 @@ fn label(value: f64, step: f64) -> String {
     format!("{:.digits$}", value + 0.0)
 }
 
-fn grid(axes: &Axes) -> String {
+/// Lines, numbers, and what both axes are.
+pub(super) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
     let mut svg = String::from("<g font-size=\"12\" fill=\"#566\" stroke-width=\"1\">");
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     let y_step = step(axes.y.1 - axes.y.0, 6.0);
@@ -141,9 +142,9 @@ fn grid(axes: &Axes) -> String {
     let (middle, base) = ((LEFT + right) / 2.0, HEIGHT - 6.0);
     let _ = write!(
         svg,
-        "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">target (mm)</text>"
+        "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">{x_label}</text>"
     );
-    let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">deviation (µm)</text></g>");
+    let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">{y_label}</text></g>");
     svg
 }
 

@@ -126,6 +126,27 @@ impl Store {
         Ok(names)
     }
 
+    /// The store that the journal at `path` lies in, by its place; `None` when it lies elsewhere.
+    pub fn of_journal(path: &Path) -> Option<Self> {
+        let runs = path.parent()?;
+        let is_store = runs.file_name()? == "runs";
+        let root = runs.parent()?.to_owned();
+        is_store.then_some(Self { root })
+    }
+
+    /// The calibrations that were made from the journal called `source`, with their names; what
+    /// cannot be read is passed over.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn made_from(&self, source: &str) -> Result<Vec<(String, CalibrationRecord)>, StoreError> {
+        let records = self.list()?.into_iter().filter_map(|id| {
+            let record = self.load(&id).ok()?;
+            (record.head.source == source).then_some((id, record))
+        });
+        Ok(records.collect())
+    }
+
     /// What `axis` uses.
     ///
     /// # Errors
@@ -161,13 +182,24 @@ impl Store {
     /// # Errors
     /// When there is none, or it cannot be loaded.
     pub fn rollback(&self, axis: &str) -> Result<String, StoreError> {
+        let earlier = self.earlier(axis)?;
+        let mut pointer = self.active(axis)?;
+        pointer.history.pop();
+        pointer.current = Some(earlier.clone());
+        self.write_pointer(axis, &pointer)?;
+        Ok(earlier)
+    }
+
+    /// The name of the calibration that [`Store::rollback`] would go back to.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be loaded.
+    pub fn earlier(&self, axis: &str) -> Result<String, StoreError> {
         let mut pointer = self.active(axis)?;
         let earlier = pointer.history.pop().ok_or_else(|| StoreError::NoEarlier {
             axis: axis.to_owned(),
         })?;
         self.load(&earlier)?;
-        pointer.current = Some(earlier.clone());
-        self.write_pointer(axis, &pointer)?;
         Ok(earlier)
     }
 

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
-use super::pose::{PoseEntry, StrokeEntry};
+use super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
 
@@ -108,6 +108,8 @@ pub enum Entry {
     Point(PointEntry),
     /// A zero.
     Zero(ZeroEntry),
+    /// What a platform is made of.
+    Arrangement(ArrangementEntry),
     /// A stroke of one screw of a platform.
     Stroke(StrokeEntry),
     /// A pose of a platform that was looked at.
@@ -118,6 +120,8 @@ pub enum Entry {
     Sweep(SweepEntry),
     /// A placement of a plate was read whole.
     Placed(PlacementEntry),
+    /// What a verification with a plate found.
+    Judged(JudgedEntry),
     /// A placement turned out to be another one than was asked for: it must be read again.
     Misplaced {
         /// By how many lines the plate was to be turned.
@@ -240,6 +244,8 @@ pub struct ReadJournal {
     pub zeros: Vec<ZeroEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
+    /// What the platform is made of, where the run was one of a platform.
+    pub arrangement: Option<ArrangementEntry>,
     /// Strokes of a platform's screws.
     pub strokes: Vec<StrokeEntry>,
     /// Poses of a platform.
@@ -250,6 +256,8 @@ pub struct ReadJournal {
     pub sweeps: Vec<SweepEntry>,
     /// Its placements that were read whole.
     pub placements: Vec<PlacementEntry>,
+    /// What a verification with it found.
+    pub judged: Option<JudgedEntry>,
     /// Whether the run was finished.
     pub complete: bool,
     /// How many bytes are whole lines.
@@ -403,11 +411,13 @@ fn take(
                 points: Vec::new(),
                 zeros: Vec::new(),
                 closures: Vec::new(),
+                arrangement: None,
                 strokes: Vec::new(),
                 poses: Vec::new(),
                 plate_plan: None,
                 sweeps: Vec::new(),
                 placements: Vec::new(),
+                judged: None,
                 complete: false,
                 valid_bytes: 0,
                 torn: false,
@@ -417,11 +427,13 @@ fn take(
         (Entry::Point(point), Some(read)) => read.points.push(point),
         (Entry::Zero(zero), Some(read)) => read.zeros.push(zero),
         (Entry::Closed(closure), Some(read)) => read.closures.push(closure),
+        (Entry::Arrangement(it), Some(read)) => read.arrangement = Some(it),
         (Entry::Stroke(stroke), Some(read)) => read.strokes.push(stroke),
         (Entry::Pose(pose), Some(read)) => read.poses.push(pose),
         (Entry::PlatePlan(plan), Some(read)) => read.plate_plan = Some(plan),
         (Entry::Sweep(sweep), Some(read)) => read.sweeps.push(sweep),
         (Entry::Placed(placement), Some(read)) => read.placements.push(placement),
+        (Entry::Judged(judged), Some(read)) => read.judged = Some(judged),
         (Entry::Misplaced { offset }, Some(read)) => read.forget_placement(offset),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;

@@ -25,12 +25,12 @@ pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
-pub use plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
-pub use pose::{PoseEntry, PoseRecord, StrokeEntry};
+pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
     CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,
     InstrumentRecord, LinearContent, NodeRecord, ReadingName, RecordHead, RotaryContent,
-    ScrewContent, ScrewMethodName,
+    ScrewContent, ScrewMethodName, StrokeRecord,
 };
 
 pub(crate) use atomic::write_new_or_replace;

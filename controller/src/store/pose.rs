@@ -34,6 +34,18 @@ impl From<PoseRecord> for Pose {
     }
 }
 
+/// What the numbers of a platform's run stand for; written right behind the header.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArrangementEntry {
+    /// The screws' axes, in the order in which set-points are given.
+    pub axes: Vec<String>,
+    /// Where errors of the angle count as lengths, metres.
+    pub edge_m: f64,
+    /// How far from its target a pose may be, metres, where that is judged.
+    pub tolerance_m: Option<f64>,
+}
+
 /// A stroke of one screw, seen by the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

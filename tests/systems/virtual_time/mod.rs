@@ -4,6 +4,7 @@
 mod linear;
 mod linear_zero;
 mod platform;
+mod platform_knowledge;
 mod repeatable;
 mod rotary;
 mod rotary_table;

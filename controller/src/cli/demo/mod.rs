@@ -51,6 +51,8 @@ enum Which {
     Linear,
     /// An alignment platform on three screws, seen by an image controller.
     Uvw,
+    /// The same with amplifiers on a serial line in place of drives on CAN.
+    UvwCopley,
     /// A rotary table and a plate of lines, turned from placement to placement.
     Rotary,
 }
@@ -73,6 +75,11 @@ impl Which {
                 "configs/machines/rotary.toml",
                 include_str!("../../../../configs/machines/rotary.toml"),
                 include_str!("../../../../configs/emulated/rotary.toml"),
+            ],
+            Self::UvwCopley => [
+                "configs/machines/uvw-copley.toml",
+                include_str!("../../../../configs/machines/uvw-copley.toml"),
+                include_str!("../../../../configs/emulated/uvw-copley.toml"),
             ],
         }
     }
@@ -122,7 +129,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     };
     let shown = match args.machine {
         Which::Linear => linear::show(&mut stand, args, output),
-        Which::Uvw => uvw::show(&mut stand, args, output),
+        Which::Uvw | Which::UvwCopley => uvw::show(&mut stand, args, output),
         Which::Rotary => rotary::show(&mut stand, args, output),
     }?;
     match shown.bad {

@@ -1,9 +1,15 @@
 //! The alignment platform: index pulses, one model a screw by the camera, poses, alignment.
 
+use std::path::{Path, PathBuf};
+
 use serde_json::json;
-use truestage::cycle::platform::{Aligned, PlatformCalibrated, PlatformVerified, Pose};
+use truestage::cycle::platform::{
+    Aligned, PlatformCalibrated, PlatformVerified, PlatformZeroed, Pose,
+};
 use truestage::emulated::HallDrift;
-use truestage::{Failure, json as to_json};
+use truestage::report::platform::{self as page, PlatformPage};
+use truestage::store::read_journal;
+use truestage::{Failure, Store, json as to_json};
 use units::{Metres, Radians};
 
 use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
@@ -14,6 +20,7 @@ use crate::cli::platform::{
 
 /// Everything the demonstration found.
 struct Story {
+    zeros: [PlatformZeroed; 2],
     found: PlatformVerified,
     calibrated: PlatformCalibrated,
     left: PlatformVerified,
@@ -23,6 +30,7 @@ struct Story {
 
 pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
     let story = tell(stand, args, output)?;
+    let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();
     let bad = [&story.left, &story.after];
     let bad = bad.into_iter().find(|it| !it.is_within_tolerance());
@@ -42,6 +50,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
                 story.aligned.left.um()
             ),
             String::new(),
+            format!("report       {}", report.display()),
             took(wall, args.speed),
         ]
         .join("\n"),
@@ -55,6 +64,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
                 "open_loop_um": to_json::um(story.aligned.open_loop),
                 "left_um": to_json::um(story.aligned.left),
             },
+            "report": report,
             "wall_s": wall.as_secs_f64(),
         }),
         bad: bad.map(out_of_tolerance),
@@ -72,7 +82,7 @@ fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Fai
         output.note("1 start: identities, set-up, supervision");
         machine.start()?;
         output.note("2 zero: every screw on its index pulse, reached forward");
-        machine.zero_platform(store)?;
+        let first = machine.zero_platform(store)?;
         output.note("3 as found: poses all over the work range, seen by the camera");
         let found = machine.verify_platform(store, false)?;
         machine.move_pose(Pose::default())?;
@@ -86,12 +96,13 @@ fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Fai
         let back = machine.now() + POWER_OFF;
         machine.run_until(back)?;
         machine.start()?;
-        machine.zero_platform(store)?;
+        let second = machine.zero_platform(store)?;
         let after = machine.verify_platform(store, true)?;
         output.note("7 align: move until the image agrees");
         let aligned = machine.align_pose(somewhere(args.seed))?;
         machine.shut_down()?;
         Ok(Story {
+            zeros: [first, second],
             found,
             calibrated,
             left,
@@ -99,6 +110,35 @@ fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Fai
             aligned,
         })
     })
+}
+
+fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
+    let read = |path: &Path| read_journal(path).map_err(Failure::from);
+    let found = read(&story.found.journal)?;
+    let left = read(&story.left.journal)?;
+    let after = read(&story.after.journal)?;
+    let measured = read(&story.calibrated.journal)?;
+    let zeros = [
+        read(&story.zeros[0].journal)?,
+        read(&story.zeros[1].journal)?,
+    ];
+    let source = story.calibrated.journal.file_name().unwrap_or_default();
+    let calibrations = store.made_from(&source.to_string_lossy())?;
+    let page = PlatformPage {
+        title: format!("truestage: platform {}", left.header.machine),
+        facts: page::facts_of(&left),
+        visits: vec![
+            ("as found".into(), &found),
+            ("as left".into(), &left),
+            ("after a power cycle".into(), &after),
+        ],
+        calibrated: Some((&measured, calibrations)),
+        zeros: zeros.iter().collect(),
+    };
+    let stamp = left.header.started.replace([':', '-'], "");
+    let path = store.reports().join(format!("{stamp}-demo.html"));
+    store.write_report(&path, &page::render(&page))?;
+    Ok(path)
 }
 
 /// Another pose for each seed.

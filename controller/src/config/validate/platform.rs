@@ -49,6 +49,7 @@ fn check_numbers(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     judge.within("theta_max_deg", platform.theta_max_deg, 0.0, 90.0);
     judge.within("edge_mm", platform.edge_mm, 0.0, 1e4);
     judge.within("condition_max", platform.condition_max, 1.0 + 1e-9, 1e6);
+    check_inconsistency(judge, platform);
     let speed = platform.zero.search_speed_mm_per_s;
     judge.within("zero.search_speed_mm_per_s", speed, 1e-3, 1e3);
     judge.within("zero.time_limit_s", platform.zero.time_limit_s, 0.1, 1e5);
@@ -64,6 +65,25 @@ fn check_numbers(judge: &mut Judge<'_>, platform: &PlatformConfig) {
             1.0,
             1000.0,
         );
+    }
+}
+
+/// Only a screw more than needed can contradict the others.
+fn check_inconsistency(judge: &mut Judge<'_>, platform: &PlatformConfig) {
+    let key = "inconsistency_limit_um";
+    match (platform.inconsistency_limit_um, platform.actuator.len()) {
+        (Some(limit), 4..) => judge.within(key, limit, 1e-3, 1e5),
+        (None, 4..) => judge.say(
+            "",
+            format!("four screws can contradict each other, and `{key}` is missing"),
+            "say by how much they may: what the platform bears without being strained",
+        ),
+        (Some(_), _) => judge.say(
+            key,
+            "three screws cannot contradict each other",
+            "leave it out",
+        ),
+        (None, _) => {}
     }
 }
 

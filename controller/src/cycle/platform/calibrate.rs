@@ -4,7 +4,10 @@
 use std::path::PathBuf;
 
 use compensator::measurement::Stroke;
-use compensator::screw::{self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, patent};
+use compensator::platform::Pose;
+use compensator::screw::{
+    self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier, patent,
+};
 use units::{Approach, Metres};
 
 use super::failure::PlatformFailure;
@@ -17,8 +20,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Content, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader,
-    RecordHead, SCHEMA_VERSION, ScrewContent, ScrewMethodName, Store, StrokeEntry,
+    CalibrationRecord, ClosureEntry, Content, Entry, Journal, RecordHead, ScrewContent,
+    ScrewMethodName, Store, StrokeEntry,
 };
 
 /// A screw that was calibrated.
@@ -32,6 +35,8 @@ pub struct ScrewCalibrated {
     pub model: ScrewModel,
     /// How many strokes were measured.
     pub strokes: usize,
+    /// Those of them that do not fit the others and were left out.
+    pub outliers: Vec<StrokeOutlier>,
 }
 
 /// A platform that was calibrated.
@@ -61,8 +66,8 @@ impl Machine {
             .compensation
             .as_ref()
             .ok_or(missing("compensation"))?;
-        let header = self.platform_header("calibrate", plan.runs, None)?;
-        let mut journal = Journal::create(&store.runs(), &header)?;
+        self.check_single_screws(&plan)?;
+        let mut journal = self.platform_journal(store, "calibrate", plan.runs, None, None)?;
         let measured = self.measure_screws(&plan, &mut journal);
         let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
         let mut fitted = Vec::new();
@@ -75,6 +80,17 @@ impl Machine {
             journal: journal.path().to_owned(),
             closure,
         })
+    }
+
+    /// One screw moves while the others stand: three bear that, four contradict each other.
+    fn check_single_screws(&self, plan: &PlatformCalibrateConfig) -> Result<(), Failure> {
+        let count = self.platform_state()?.screws.len();
+        for at in 0..count {
+            let mut strokes = vec![Metres::ZERO; count];
+            strokes[at] = Metres::from_mm(plan.last_mm);
+            self.check_agreement(Pose::default(), &strokes, "; nothing was moved")?;
+        }
+        Ok(())
     }
 
     fn measure_screws(
@@ -103,6 +119,11 @@ impl Machine {
             self.approach_zero()?;
         }
         let closure = self.platform_closure(plan)?;
+        journal.write(&Entry::Closed(ClosureEntry {
+            run: plan.runs,
+            start_m: 0.0,
+            closure_m: closure.value(),
+        }))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
         Ok((all, closure))
@@ -159,20 +180,20 @@ impl Machine {
         at: usize,
         plan: &PlatformCalibrateConfig,
         strokes: &[Stroke],
-    ) -> Result<ScrewModel, Failure> {
+    ) -> Result<(ScrewModel, Vec<StrokeOutlier>), Failure> {
         let config = self.platform_config()?;
         let axis = config.actuator[at].axis.clone();
-        let model = match plan.method {
+        let (model, outliers) = match plan.method {
             Method::LeastSquares => {
                 let options = FitOptions {
                     lead: Some(Metres::from_mm(config.actuator[at].lead_mm)),
                     harmonics_max: plan.harmonics_max,
                     significance: plan.significance,
+                    ..FitOptions::default()
                 };
                 let fitted = screw::fit(strokes, &options);
-                fitted
-                    .map_err(|source| PlatformFailure::Fit { axis, source })?
-                    .model
+                let fitted = fitted.map_err(|source| PlatformFailure::Fit { axis, source })?;
+                (fitted.model, fitted.outliers)
             }
             Method::Patent => {
                 // The mean over strokes reached in reverse, from a zero set forward, is what the
@@ -180,13 +201,12 @@ impl Machine {
                 let reverse = |it: &&Stroke| it.approach == Approach::Reverse;
                 let strokes: Vec<_> = strokes.iter().filter(reverse).copied().collect();
                 let estimate = patent::estimate(&strokes);
-                estimate
-                    .map_err(|source| PlatformFailure::Fit { axis, source })?
-                    .model()
+                let estimate = estimate.map_err(|source| PlatformFailure::Fit { axis, source })?;
+                (estimate.model(), Vec::new())
             }
         };
         self.prepare_screw(at, model.clone())?;
-        Ok(model)
+        Ok((model, outliers))
     }
 
     /// Proves that a model can be applied within the limits of the configuration.
@@ -211,7 +231,7 @@ impl Machine {
         journal: &Journal,
         plan: &PlatformCalibrateConfig,
         strokes: &[Vec<Stroke>],
-        models: &[ScrewModel],
+        fitted: &[(ScrewModel, Vec<StrokeOutlier>)],
     ) -> Result<Vec<ScrewCalibrated>, Failure> {
         let method = match plan.method {
             Method::LeastSquares => ScrewMethodName::LeastSquares,
@@ -219,7 +239,7 @@ impl Machine {
         };
         let source = journal.path().file_name().unwrap_or_default();
         let mut calibrated = Vec::new();
-        for (at, model) in models.iter().enumerate() {
+        for (at, (model, outliers)) in fitted.iter().enumerate() {
             let axis = self.platform_state()?.screws[at].axis.clone();
             let head = RecordHead {
                 created: utc_now(),
@@ -228,20 +248,24 @@ impl Machine {
                 ..self.this_machine(&axis)
             };
             let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
-            let content = Content::ScrewModel(ScrewContent::new(model, method, rows));
+            let content = ScrewContent::new(model, method, rows).without(outliers);
+            let content = Content::ScrewModel(content);
             let id = store.save(&CalibrationRecord { head, content })?;
             calibrated.push(ScrewCalibrated {
                 axis,
                 id,
                 model: model.clone(),
                 strokes: strokes[at].len(),
+                outliers: outliers.clone(),
             });
         }
         // Only when all of them are on the disk.
         for (at, screw) in calibrated.iter().enumerate() {
             store.activate(&screw.axis, &screw.id)?;
             let compensation = self.prepare_screw(at, screw.model.clone())?;
-            self.platform_state_mut()?.screws[at].compensation = Some(compensation);
+            let state = &mut self.platform_state_mut()?.screws[at];
+            state.compensation = Some(compensation);
+            state.calibration = Some(screw.id.clone());
         }
         Ok(calibrated)
     }
@@ -269,43 +293,13 @@ impl Machine {
                 record.head.belongs_to(id, &self.this_machine(&axis))?;
                 let model = record.screw(id)?.model();
                 let compensation = self.prepare_screw(at, model)?;
-                self.platform_state_mut()?.screws[at].compensation = Some(compensation);
+                let state = &mut self.platform_state_mut()?.screws[at];
+                state.compensation = Some(compensation);
+                state.calibration = Some(id.clone());
             }
             loaded.push((axis, id));
         }
         Ok(loaded)
-    }
-
-    fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
-        let name = self.platform_config()?.camera.clone();
-        let identity = self.identities().remove(&name);
-        Ok(InstrumentRecord {
-            identity: identity.unwrap_or_default().name,
-            name,
-            ..InstrumentRecord::default()
-        })
-    }
-
-    pub(super) fn platform_header(
-        &self,
-        verb: &str,
-        runs: u32,
-        calibration: Option<String>,
-    ) -> Result<JournalHeader, Failure> {
-        Ok(JournalHeader {
-            schema_version: SCHEMA_VERSION,
-            verb: verb.to_owned(),
-            machine: self.config.machine.name.clone(),
-            stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.clone(),
-            axis: "platform".into(),
-            drive: IdentityRecord::default(),
-            instrument: self.camera_record()?,
-            started: utc_now(),
-            calibration,
-            targets_m: Vec::new(),
-            runs,
-        })
     }
 }
 

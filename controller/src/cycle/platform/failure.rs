@@ -1,5 +1,7 @@
 //! What can go wrong with a platform beyond what can go wrong with its axes.
 
+use core::fmt;
+
 use compensator::platform::{ForwardError, OutOfReach, PathError};
 use compensator::screw;
 use units::Metres;
@@ -51,6 +53,22 @@ pub enum PlatformFailure {
     /// Strokes that belong to no pose.
     #[error(transparent)]
     Forward(#[from] ForwardError),
+    /// Screws that stand, or would stand, where no pose has them together.
+    #[error(
+        "platform: the screws contradict each other by {:.3} µm, the limit is {:.3} µm; from the pose \
+         they agree on best, {screws}{consequence}",
+        seen.um(), limit.um()
+    )]
+    Contradiction {
+        /// Each screw, and how far it is from the pose.
+        screws: Contradiction,
+        /// The largest of these.
+        seen: Metres,
+        /// The limit of the configuration.
+        limit: Metres,
+        /// What became of the move.
+        consequence: &'static str,
+    },
     /// The strokes measured give no model.
     #[error("axis {axis}: {source}; nothing was stored")]
     Fit {
@@ -85,6 +103,20 @@ pub enum PlatformFailure {
     },
 }
 
+/// Screws and how far each is from a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contradiction(pub Vec<(String, Metres)>);
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, (axis, off)) in self.0.iter().enumerate() {
+            let comma = if at == 0 { "" } else { ", " };
+            write!(f, "{comma}{axis} {:+.3} µm", off.um())?;
+        }
+        Ok(())
+    }
+}
+
 impl PlatformFailure {
     /// As [`crate::Failure::exit_code`].
     pub const fn exit_code(&self) -> u8 {
@@ -94,6 +126,7 @@ impl PlatformFailure {
             | Self::OutOfReach(_)
             | Self::OutOfRange { .. }
             | Self::Path(_)
+            | Self::Contradiction { .. }
             | Self::OutOfCalibration { .. } => 3,
             Self::Forward(_) => 4,
             Self::Fit { .. } | Self::NotAligned { .. } | Self::OutOfTolerance { .. } => 5,

@@ -5,19 +5,23 @@
 //! turned into strokes by the exact kinematics, counted from the pose in which all screws stand
 //! at their zero, reached forward.
 
+mod agreement;
 mod calibrate;
 mod failure;
 mod look;
 mod moves;
+mod record;
 mod state;
+mod take_up;
 mod verify;
 mod zero;
 
 pub use calibrate::{PlatformCalibrated, ScrewCalibrated};
 pub use compensator::platform::Pose;
-pub use failure::PlatformFailure;
+pub use failure::{Contradiction, PlatformFailure};
 pub use moves::PoseMoved;
+pub use take_up::TakenUp;
 pub use verify::{Aligned, PlatformVerified, PoseChecked};
 pub use zero::PlatformZeroed;
 
-pub(crate) use state::{PlatformState, kinematics};
+pub(crate) use state::{PlatformState, difference, kinematics, largest_error};

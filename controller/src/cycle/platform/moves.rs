@@ -9,6 +9,7 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
 use super::failure::PlatformFailure;
 use super::state::{PlatformState, engaged_by};
+use super::take_up::TakenUp;
 use crate::config::PlatformConfig;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
@@ -28,6 +29,8 @@ pub struct PoseMoved {
     pub skew: Option<Duration>,
     /// The largest standard uncertainty of the screws' places, where calibrated.
     pub standard_uncertainty: Option<Metres>,
+    /// The screws whose play was taken up before, because nobody knew how they stood.
+    pub taken_up: Vec<TakenUp>,
 }
 
 /// What one screw is to do.
@@ -48,8 +51,9 @@ impl Machine {
     pub fn move_pose(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
         self.require_platform_zeroed()?;
         check_work_range(self.platform_config()?, target)?;
-        self.take_up()?;
-        self.go_to_pose(target, Correction::On)
+        let taken_up = self.take_up()?;
+        let moved = self.go_to_pose(target, Correction::On)?;
+        Ok(PoseMoved { taken_up, ..moved })
     }
 
     pub(super) fn go_to_pose(
@@ -66,7 +70,11 @@ impl Machine {
             let path = state.kinematics.check_path(from, target);
             path.map_err(PlatformFailure::from)?;
         }
-        let moved = self.go_to_strokes(&strokes, correction)?;
+        let planned = self.plan(&strokes, correction)?;
+        let after: Vec<_> = planned.iter().map(|it| it.after).collect();
+        self.check_planned(target, &after)?;
+        let moved = self.go(&planned)?;
+        self.check_standing(target)?;
         self.platform_state_mut()?.pose = Some(target);
         Ok(PoseMoved { target, ..moved })
     }
@@ -78,11 +86,15 @@ impl Machine {
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
         let planned = self.plan(strokes, correction)?;
+        self.go(&planned)
+    }
+
+    fn go(&mut self, planned: &[Planned]) -> Result<PoseMoved, Failure> {
         let target = self.platform_state()?.pose.unwrap_or_default();
-        let skew = self.launch(&planned)?;
+        let skew = self.launch(planned)?;
         let state = self.platform_state_mut()?;
         state.pose = None;
-        for (screw, planned) in state.screws.iter_mut().zip(&planned) {
+        for (screw, planned) in state.screws.iter_mut().zip(planned) {
             screw.memory = Some(planned.after);
         }
         let names = state.screws.iter().map(|screw| screw.axis.clone());
@@ -94,6 +106,7 @@ impl Machine {
                 .iter()
                 .filter_map(|it| it.standard_uncertainty)
                 .reduce(Metres::max),
+            taken_up: Vec::new(),
         })
     }
 
@@ -137,7 +150,7 @@ impl Machine {
     }
 
     /// What is remembered of a screw, or that nothing is but where it stands.
-    fn screw_memory(
+    pub(super) fn screw_memory(
         &self,
         axis: &str,
         memory: Option<ScrewMemory>,
@@ -254,28 +267,6 @@ impl Machine {
         Ok(Duration::from_secs_f64(
             self.axis_config(axis)?.move_timeout_s,
         ))
-    }
-
-    /// Settles the engagement of every calibrated screw of which it is not known.
-    fn take_up(&mut self) -> Result<(), Failure> {
-        let state = self.platform_state()?;
-        let mut goals = Vec::new();
-        let mut any = false;
-        for screw in &state.screws {
-            let memory = self.screw_memory(&screw.axis, screw.memory)?;
-            let unknown = memory.engagement == compensator::screw::Engagement::Unknown;
-            let wanted = screw
-                .compensation
-                .as_ref()
-                .filter(|_| unknown)
-                .and_then(|it| it.take_up_move(&memory, units::Approach::Forward));
-            any |= wanted.is_some();
-            goals.push(wanted.unwrap_or(memory.set_point));
-        }
-        if any {
-            self.go_to_strokes(&goals, Correction::Off)?;
-        }
-        Ok(())
     }
 
     /// The travel after which a screw is engaged whatever it was before.

@@ -15,6 +15,8 @@ pub(crate) struct Screw {
     pub(crate) index: Metres,
     /// Its calibration in use.
     pub(crate) compensation: Option<ScrewCompensation>,
+    /// The name of that calibration.
+    pub(crate) calibration: Option<String>,
     /// Where it was commanded to and how its nut stands; `None` when it was out of our hands.
     pub(crate) memory: Option<ScrewMemory>,
 }
@@ -40,6 +42,7 @@ impl PlatformState {
             axis: it.axis.clone(),
             index: Metres::from_mm(it.index_mm),
             compensation: None,
+            calibration: None,
             memory: None,
         });
         Some(Self {

@@ -83,8 +83,14 @@ impl Machine {
             self.require_calibrated_screws()?;
         }
         let targets = self.verification_poses(plan.poses, plan.seed)?;
-        let header = self.platform_header("verify", 1, None)?;
-        let mut journal = Journal::create(&store.runs(), &header)?;
+        let calibrations = if compensated {
+            self.calibrations_in_use()?
+        } else {
+            None
+        };
+        let tolerance = Metres::from_um(plan.tolerance_um);
+        let mut journal =
+            self.platform_journal(store, "verify", 1, calibrations, Some(tolerance))?;
         let checked = self
             .check_poses(&targets, compensated, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
@@ -94,7 +100,7 @@ impl Machine {
             largest: errors.fold(Metres::ZERO, Metres::max),
             rms: Metres((squares / checked.len() as f64).sqrt()),
             skew_max_s: checked.iter().filter_map(|it| it.skew_s).reduce(f64::max),
-            tolerance: Metres::from_um(plan.tolerance_um),
+            tolerance,
             journal: journal.path().to_owned(),
             poses: checked,
         })

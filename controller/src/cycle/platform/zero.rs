@@ -12,7 +12,7 @@ use crate::cycle::travel::Correction;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::{Entry, Journal, PoseEntry, Store};
+use crate::store::{Entry, PoseEntry, Store};
 
 /// The datum is what everything is measured from: it is looked at so many times more often.
 const DATUM_LOOKS: u32 = 8;
@@ -34,7 +34,7 @@ impl Machine {
     /// Whatever stops the machine; the platform is not zeroed then.
     pub fn zero_platform(&mut self, store: &Store) -> Result<PlatformZeroed, Failure> {
         self.platform_state_mut()?.forget();
-        let mut journal = Journal::create(&store.runs(), &self.platform_header("zero", 0, None)?)?;
+        let mut journal = self.platform_journal(store, "zero", 0, None, None)?;
         let datum = self
             .find_platform_zero()
             .inspect_err(|failure| crate::cycle::note_failure(&mut journal, failure))?;

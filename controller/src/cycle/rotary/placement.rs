@@ -74,8 +74,8 @@ impl PlateRun {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Placed {
     pub(super) offset: f64,
-    /// Mean of both directions, in which what the detector is late by cancels; `None` where a
-    /// line was not read in both.
+    /// Mean of both directions, in which what the detector is late by cancels; of one, less what it
+    /// is late by on the others; `None` where a line was not read.
     pub(super) deviations: Vec<Option<Radians>>,
     /// Standard deviation of one line in one pass, by what the directions differ.
     pub(super) scatter: Option<Radians>,
@@ -85,17 +85,31 @@ pub(super) struct Placed {
 impl Placed {
     /// What `sweeps` of one placement, `passes` in each direction, say.
     pub(super) fn of(placement: &PlacementEntry, sweeps: &[SweepEntry], passes: u32) -> Self {
-        let own = |approach: char| {
-            let own = sweeps
-                .iter()
-                .filter(move |it| it.offset == placement.offset && it.pass <= passes);
-            mean_of(own.filter(move |it| it.approach == approach))
+        let own = |approach: char, passes: core::ops::RangeInclusive<u32>| {
+            let own = sweeps.iter().filter(|it| it.offset == placement.offset);
+            let own = own.filter(|it| it.approach == approach && passes.contains(&it.pass));
+            mean_of(own)
         };
-        let (forward, reverse) = (own('+'), own('-'));
-        let both = || forward.iter().zip(&reverse);
-        let deviations = both().map(|(f, r)| Some(Radians(((*f)? + (*r)?) / 2.0)));
-        let apart: Vec<f64> = both().filter_map(|(f, r)| Some((*f)? - (*r)?)).collect();
+        let (mut forward, reverse) = (own('+', 1..=passes), own('-', 1..=passes));
+        let both = |forward: &[Option<f64>]| -> Vec<f64> {
+            let pairs = forward.iter().zip(&reverse);
+            pairs.filter_map(|(f, r)| Some((*f)? - (*r)?)).collect()
+        };
+        let apart = both(&forward);
+        let late = median(&apart).unwrap_or(0.0) / 2.0;
         let scatter = scatter_of(apart).map(|it| it * (f64::from(passes) / 2.0).sqrt());
+        // A line that was missed may have been read in the repeated pass, or in one direction only.
+        let again = own('+', passes + 1..=passes + 1);
+        for (first, again) in forward.iter_mut().zip(again) {
+            *first = first.or(again);
+        }
+        let pairs = forward.iter().zip(&reverse);
+        let deviations = pairs.map(|(forward, reverse)| match (forward, reverse) {
+            (Some(forward), Some(reverse)) => Some(Radians((forward + reverse) / 2.0)),
+            (Some(forward), None) => Some(Radians(forward - late)),
+            (None, Some(reverse)) => Some(Radians(reverse + late)),
+            (None, None) => None,
+        });
         Self {
             offset: placement.offset,
             deviations: deviations.collect(),
@@ -393,12 +407,15 @@ mod tests {
     }
 
     #[test]
-    fn what_the_detector_is_late_by_cancels_and_a_line_seen_from_one_side_only_is_none() {
+    fn what_the_detector_is_late_by_cancels_and_is_known_where_one_direction_is_missing() {
         let sweeps = [
-            sweep(1, '+', &[Some(1.5), Some(2.5), Some(3.5), Some(4.5)]),
-            sweep(1, '-', &[Some(0.5), None, Some(2.5), Some(3.5)]),
-            // The repeated pass is for the closure alone.
-            sweep(2, '+', &[Some(9.0); 4]),
+            sweep(1, '+', &[Some(1.5), Some(2.5), None, Some(4.5), None, None]),
+            sweep(
+                1,
+                '-',
+                &[Some(0.5), None, Some(2.5), Some(3.5), None, Some(5.5)],
+            ),
+            sweep(2, '+', &[Some(9.0), None, None, Some(9.0), None, Some(6.5)]),
         ];
         let placement = PlacementEntry {
             offset: 2.0,
@@ -407,8 +424,10 @@ mod tests {
         };
         let placed = Placed::of(&placement, &sweeps, 1);
         let some = |value| Some(Radians(value));
-        assert_eq!(placed.deviations, [some(1.0), None, some(3.0), some(4.0)]);
-        assert_eq!(placed.by_line(), [some(3.0), some(4.0), some(1.0), None]);
+        let expected = [some(1.0), some(2.0), some(3.0), some(4.0), None, some(6.0)];
+        assert_eq!(placed.deviations, expected);
+        let turned = [some(3.0), some(4.0), None, some(6.0), some(1.0), some(2.0)];
+        assert_eq!(placed.by_line(), turned);
     }
 
     #[test]

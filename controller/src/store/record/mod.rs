@@ -16,7 +16,7 @@ use super::{StoreError, short};
 
 pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
-pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName};
+pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
@@ -89,12 +89,8 @@ impl Content {
     pub fn summary(&self) -> String {
         match self {
             Self::LinearErrorTable(it) => format!("{} nodes", it.nodes.len()),
-            Self::RotaryErrorTable(it) => {
-                format!("{} lines, {} placements", it.lines, it.offsets.len())
-            }
-            Self::ScrewModel(it) => {
-                format!("{} strokes, {} harmonics", it.rows, it.harmonics.len())
-            }
+            Self::RotaryErrorTable(it) => it.summary(),
+            Self::ScrewModel(it) => it.summary(),
         }
     }
 }

@@ -77,6 +77,14 @@ impl RotaryContent {
         }
     }
 
+    /// One line about it, for lists.
+    pub(super) fn summary(&self) -> String {
+        let largest = self.table_error_rad.iter().map(|it| it.abs());
+        let largest = Radians(largest.fold(0.0, f64::max)).arcsec();
+        let (lines, placements) = (self.lines, self.offsets.len());
+        format!("{lines} lines, {placements} placements, errors up to {largest:.3} arcsec")
+    }
+
     /// The deviations that calibration `id` holds, ready to be interpolated.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! What is known of a ball screw (`screw_model`).
 
-use compensator::screw::{Harmonic, ScrewModel};
+use compensator::screw::{Harmonic, ScrewModel, StrokeOutlier};
 use serde::{Deserialize, Serialize};
 use units::Metres;
 
@@ -16,6 +16,16 @@ pub enum ScrewMethodName {
     LeastSquares,
     /// The patent's means; all of the lost motion with every reverse move.
     Patent,
+}
+
+impl ScrewMethodName {
+    /// How a person calls it.
+    pub const fn in_words(self) -> &'static str {
+        match self {
+            Self::LeastSquares => "least squares",
+            Self::Patent => "the patent's means",
+        }
+    }
 }
 
 /// A screw's model as it is stored. Deviation = actual − commanded.
@@ -45,6 +55,19 @@ pub struct ScrewContent {
     pub covariance_si: Option<Vec<f64>>,
     /// Standard deviation of a single move about the model; where anything was repeated.
     pub scatter_m: Option<f64>,
+    /// Strokes that were left out because they do not fit the others.
+    #[serde(default)]
+    pub outliers: Vec<StrokeRecord>,
+}
+
+/// A stroke that was measured, metres; `approach` is `+` or `-`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the names carry quantity and unit")]
+pub struct StrokeRecord {
+    pub approach: char,
+    pub stroke_m: f64,
+    pub deviation_m: f64,
 }
 
 /// A periodic term, metres.
@@ -80,7 +103,32 @@ impl ScrewContent {
             last_stroke_m: model.last.value(),
             covariance_si: model.covariance.clone(),
             scatter_m: model.scatter.map(Metres::value),
+            outliers: Vec::new(),
         }
+    }
+
+    /// With the strokes that were left out of the estimate.
+    #[must_use]
+    pub fn without(mut self, outliers: &[StrokeOutlier]) -> Self {
+        let records = outliers.iter().map(|it| StrokeRecord {
+            approach: it.stroke.approach.symbol(),
+            stroke_m: it.stroke.stroke.value(),
+            deviation_m: it.stroke.deviation.value(),
+        });
+        self.outliers = records.collect();
+        self
+    }
+
+    /// One line about it, for lists.
+    pub(super) fn summary(&self) -> String {
+        format!(
+            "slope {:+.3} µm/mm, lost motion {:.3} µm, {} harmonics, from {} strokes by {}",
+            self.slope_m_per_m * 1e3,
+            Metres(self.lost_motion_m).um(),
+            self.harmonics.len(),
+            self.rows,
+            self.method.in_words()
+        )
     }
 
     /// The model; whether it is sound and can be applied is judged where it becomes a

@@ -1,0 +1,146 @@
+//! What was measured on a platform, seen from the command line: calibrations and pages.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tests::{Bench, UVW};
+use truestage::cycle::platform::Pose;
+
+use crate::programs::truestage;
+
+/// A platform that was calibrated twice, verified before and after, and its runs.
+struct Runs {
+    bench: Bench,
+    found: String,
+    calibrated: String,
+    left: String,
+    zeroed: String,
+}
+
+fn runs() -> Runs {
+    let mut bench = Bench::of(&UVW, 2, |text| {
+        text.replace("step_mm = 0.25", "step_mm = 0.625")
+            .replace("poses = 20", "poses = 6")
+    });
+    let store = bench.store.clone();
+    let machine = &mut bench.machine;
+    machine.start().unwrap();
+    let zeroed = machine.zero_platform(&store).unwrap();
+    let found = machine.verify_platform(&store, false).unwrap();
+    machine.move_pose(Pose::default()).unwrap();
+    machine.calibrate_platform(&store).unwrap();
+    machine.move_pose(Pose::default()).unwrap();
+    let calibrated = machine.calibrate_platform(&store).unwrap();
+    let left = machine.verify_platform(&store, true).unwrap();
+    machine.shut_down().unwrap();
+    let folder = bench.folder.path().display().to_string();
+    let text = UVW.machine.replace("machine-data", &folder);
+    fs::write(bench.folder.path().join("machine.toml"), text).unwrap();
+    let place = |path: &Path| path.display().to_string();
+    Runs {
+        found: place(&found.journal),
+        calibrated: place(&calibrated.journal),
+        left: place(&left.journal),
+        zeroed: place(&zeroed.journal),
+        bench,
+    }
+}
+
+fn in_use(folder: &Path) -> Vec<(String, String)> {
+    let list = truestage(folder, &["cal", "list"]).with_code(0);
+    let all = list["calibrations"].as_array().expect("a list").clone();
+    let text = |value: &Value| value.as_str().expect("a text").to_owned();
+    all.iter()
+        .filter(|it| it["active"] == true)
+        .map(|it| (text(&it["axis"]), text(&it["id"])))
+        .collect()
+}
+
+fn page(folder: &Path, journal: &str) -> String {
+    let made = truestage(folder, &["report", journal]).with_code(0);
+    let path = made["report"].as_str().expect("a path");
+    let html = fs::read_to_string(path).expect("it was written");
+    assert!(
+        !html.contains("<script") && !html.contains("http"),
+        "not self-contained"
+    );
+    assert!(!html.contains("NaN") && html.ends_with("</html>\n"));
+    html
+}
+
+#[track_caller]
+fn check_says(html: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(html.contains(part), "`{part}` is not on the page");
+    }
+}
+
+#[test]
+fn what_a_platform_measured_is_listed_rolled_back_and_made_into_pages() {
+    let runs = runs();
+    let folder = runs.bench.folder.path();
+
+    let newest = in_use(folder);
+    let axes: Vec<&str> = newest.iter().map(|(axis, _)| axis.as_str()).collect();
+    assert_eq!(axes.len(), 3);
+    let shown = truestage(folder, &["cal", "show", "machine.toml", &newest[0].1]).with_code(0);
+    assert_eq!(shown["record"]["method"], "least_squares");
+    let outliers = &shown["record"]["outliers"];
+    assert_eq!(outliers, &serde_json::json!([]));
+
+    // All screws go back together; a second time there is nothing to go back to.
+    let rollback = ["cal", "rollback", "machine.toml", "--axis"];
+    let with = |axis: &'static str| [&rollback[..], &[axis]].concat();
+    let back = truestage(folder, &with("platform")).with_code(0);
+    let earlier = in_use(folder);
+    assert_eq!(earlier.len(), 3);
+    for (axis, id) in &earlier {
+        assert_eq!(back["active"][axis].as_str(), Some(id.as_str()));
+        assert!(newest.iter().all(|(_, other)| other != id));
+    }
+    truestage(folder, &with("platform")).with_code(2);
+    assert_eq!(in_use(folder), earlier);
+    let unknown = truestage(folder, &with("z")).with_code(2);
+    assert!(
+        unknown["error"].to_string().contains("u, v, w"),
+        "{unknown}"
+    );
+    let words = ["cal", "activate", "machine.toml", &newest[1].1];
+    let again = truestage(folder, &words).with_code(0);
+    assert_eq!(again["active"].as_str(), Some(newest[1].1.as_str()));
+
+    let found = page(folder, &runs.found);
+    check_says(
+        &found,
+        &["Error of each pose as found", "tolerance (µm)", "skew"],
+    );
+    assert!(!found.contains("as left"));
+    let left = page(folder, &runs.left);
+    check_says(&left, &["Error of each pose as left", &newest[0].1[..12]]);
+    let calibrated = page(folder, &runs.calibrated);
+    check_says(
+        &calibrated,
+        &["closure", "lost motion", "What the model of screw u leaves"],
+    );
+    for (axis, id) in &newest {
+        check_says(&calibrated, &[&format!("<h2>Screw {axis}</h2>"), &id[..12]]);
+    }
+    check_says(&page(folder, &runs.zeroed), &["<h2>Zero</h2>"]);
+}
+
+#[test]
+fn a_page_of_a_journal_that_was_taken_elsewhere_shows_its_strokes_without_models() {
+    let runs = runs();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let copy = elsewhere.path().join("run.jsonl");
+    fs::copy(&runs.calibrated, &copy).unwrap();
+    let html = page(elsewhere.path(), &copy.display().to_string());
+    check_says(
+        &html,
+        &[
+            "Deviation of screw w",
+            "No calibration was made from this run",
+        ],
+    );
+}

@@ -1,0 +1,233 @@
+//! What a platform does with what it knows and does not know: play after an interruption, images
+//! that never agree, a fourth screw that contradicts the others.
+
+use tests::{Bench, PoseJudge, UVW};
+use truestage::cycle::platform::Pose;
+use truestage::machine::StopRequest;
+use truestage::{Failure, config};
+use units::{Metres, Radians};
+
+fn pose(x_mm: f64, y_mm: f64, arcsec: f64) -> Pose {
+    Pose {
+        x: Metres::from_mm(x_mm),
+        y: Metres::from_mm(y_mm),
+        angle: Radians::from_arcsec(arcsec),
+    }
+}
+
+/// Fewer strokes than it ships with: these are about other things.
+fn shortened(text: String) -> String {
+    text.replace("step_mm = 0.25", "step_mm = 0.625")
+        .replace("runs = 2", "runs = 1")
+}
+
+/// A platform that was zeroed, with a judge of its poses.
+fn zeroed(bench: &mut Bench) -> PoseJudge {
+    bench.machine.start().unwrap();
+    bench.machine.zero_platform(&bench.store).unwrap();
+    PoseJudge::here(&bench.emulated.simulation())
+}
+
+#[test]
+fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
+    let mut bench = Bench::of(&UVW, 5, shortened);
+    let judge = zeroed(&mut bench);
+    bench.machine.calibrate_platform(&bench.store).unwrap();
+    let machine = &mut bench.machine;
+    let known = machine.move_pose(pose(0.5, 0.3, 200.0)).unwrap();
+    assert_eq!(known.taken_up, []);
+
+    machine.stop_request().stop();
+    let stopped = machine.move_pose(pose(0.4, 0.35, -100.0));
+    assert!(matches!(stopped, Err(Failure::Interrupted)), "{stopped:?}");
+    machine.share_stop_request(&StopRequest::default());
+
+    let target = pose(0.45, 0.2, 0.0);
+    let moved = machine.move_pose(target).unwrap();
+    let axes: Vec<&str> = moved.taken_up.iter().map(|it| it.axis.as_str()).collect();
+    assert_eq!(axes, ["u", "v", "w"]);
+    let after = moved.standard_uncertainty.expect("it is calibrated");
+    for it in &moved.taken_up {
+        // Half the play over √3: plays are 1.6 to 2.6 µm.
+        let before = it.standard_uncertainty.expect("it is calibrated");
+        assert!(before > Metres::from_um(0.45), "{} µm", before.um());
+        assert!(after < before / 4.0, "{} µm", after.um());
+    }
+    let error = judge.error(&bench.emulated.simulation(), target);
+    assert!(error < Metres::from_um(1.0), "{} µm", error.um());
+    let next = bench.machine.move_pose(pose(0.1, 0.1, 0.0)).unwrap();
+    assert_eq!(next.taken_up, []);
+}
+
+#[test]
+fn after_a_power_cycle_nothing_moves_before_a_zero_which_settles_the_play() {
+    let mut bench = Bench::of(&UVW, 6, shortened);
+    zeroed(&mut bench);
+    bench.machine.calibrate_platform(&bench.store).unwrap();
+    bench.machine.shut_down().unwrap();
+    bench.power_cycle(truestage::emulated::HallDrift::default());
+    let back = bench.machine.now() + core::time::Duration::from_secs(1);
+    bench.machine.run_until(back).unwrap();
+    bench.machine.start().unwrap();
+    let refused = bench.machine.move_pose(pose(0.1, 0.0, 0.0)).unwrap_err();
+    assert_eq!(refused.exit_code(), 3);
+    assert!(refused.to_string().contains("not zeroed"), "{refused}");
+    bench.machine.zero_platform(&bench.store).unwrap();
+    let judge = PoseJudge::here(&bench.emulated.simulation());
+    for target in [pose(-0.3, 0.2, 100.0), pose(-0.31, 0.19, 105.0)] {
+        let moved = bench.machine.move_pose(target).unwrap();
+        assert_eq!(moved.taken_up, []);
+        let error = judge.error(&bench.emulated.simulation(), target);
+        assert!(error < Metres::from_um(1.0), "{} µm", error.um());
+    }
+}
+
+#[test]
+fn alignment_is_bounded_and_told_apart_from_the_open_loop() {
+    let mut bench = Bench::of(&UVW, 3, |text| text);
+    let judge = zeroed(&mut bench);
+    let target = pose(1.3, -1.2, 900.0);
+    let aligned = bench.machine.align_pose(target).unwrap();
+    // Nothing is calibrated: the first move is off by its screws' errors, the image mends them.
+    assert!(aligned.open_loop > Metres::from_um(1.5), "{aligned:?}");
+    assert!(aligned.left <= Metres::from_um(0.5), "{aligned:?}");
+    assert!((2..=5).contains(&aligned.moves), "{aligned:?}");
+    let truly = judge.error(&bench.emulated.simulation(), target);
+    assert!(truly < Metres::from_um(1.0), "{} µm", truly.um());
+
+    let never = |text: String| {
+        text.replace("tolerance_um = 0.5", "tolerance_um = 0.001")
+            .replace("iterations_max = 5", "iterations_max = 3")
+    };
+    let mut bench = Bench::of(&UVW, 3, never);
+    zeroed(&mut bench);
+    let failure = bench.machine.align_pose(target).unwrap_err();
+    assert_eq!(failure.exit_code(), 5);
+    let text = failure.to_string();
+    assert!(
+        text.contains("after 3 moves the image still differs"),
+        "{text}"
+    );
+}
+
+const FOURTH_AXIS: &str = "[axis.r]
+device = \"cia402\"
+bus = \"can0\"
+node_id = 4
+resolution_nm = 10.0
+soft_min_mm = -4.5
+soft_max_mm = 4.5
+speed_mm_per_s = 5.0
+speed_max_mm_per_s = 20.0
+acceleration_mm_per_s2 = 50.0
+quick_stop_deceleration_mm_per_s2 = 500.0
+following_error_limit_um = 200.0
+following_error_timeout_ms = 20
+position_window_um = 0.1
+position_window_time_ms = 20
+move_timeout_s = 10.0
+heartbeat_producer_ms = 50
+heartbeat_consumer_ms = 150
+watch_master_ms = 500
+synchronous_start = true
+
+[axis.r.identity]
+device_type = 0x0002_0192
+vendor_id = 0x7FF
+product_code = 0x42_0001
+revision = 0x1_0000
+serial_number = 3004
+
+# The job";
+
+const FOURTH_ACTUATOR: &str = "[[platform.actuator]]
+axis = \"r\"
+point_mm = [0.0, 80.0]
+direction = [0.0, 1.0]
+lead_mm = 2.0
+index_mm = -4.0
+
+[platform.zero]";
+
+const FOURTH_NODE: &str = "[[nodes]]
+name = \"drive_r\"
+port = \"can0\"
+[nodes.device]
+kind = \"cia402_drive\"
+node_id = 4
+axis = 3
+encoder_resolution_nm = 10.0
+identity = { vendor_id = 0x7FF, product_code = 0x42_0001, revision = 0x1_0000, serial_number = 3004 }
+has_index = true
+following_error_window_um = 200.0
+homing_search_limit_mm = 20.0
+max_profile_velocity_mm_per_s = 50.0
+
+[[nodes]]
+name = \"image_controller\"";
+
+/// The platform with a second screw along y, and how far its screws may contradict each other.
+fn with_four(text: String, limit_um: Option<f64>) -> String {
+    let limit = limit_um.map_or(String::new(), |um| {
+        format!("inconsistency_limit_um = {um:.3}\n")
+    });
+    text.replace("# The job", FOURTH_AXIS)
+        .replace("[platform.zero]", FOURTH_ACTUATOR)
+        .replace("exposures = 4", &format!("{limit}exposures = 4"))
+}
+
+fn four_screws(limit_um: f64) -> Bench {
+    let emulated = |text: String| {
+        let screw = "[plant.platform.screw]";
+        let place =
+            "[[plant.platform.actuators]]\npoint_mm = [0.0, 80.0]\ndirection = [0.0, 1.0]\n";
+        text.replace("[[nodes]]\nname = \"image_controller\"", FOURTH_NODE)
+            .replace(screw, &format!("{place}\n{screw}"))
+    };
+    Bench::shaped(&UVW, 4, |text| with_four(text, Some(limit_um)), emulated)
+}
+
+#[test]
+fn a_fourth_screw_must_agree_with_the_others_or_nothing_moves() {
+    let mut bench = four_screws(1.0);
+    zeroed(&mut bench);
+    let machine = &mut bench.machine;
+    let target = pose(0.8, -0.6, 700.0);
+    let moved = machine.move_pose(target).unwrap();
+    assert_eq!(moved.set_points.len(), 4);
+    let before = machine.reading("r").unwrap().unwrap().position;
+
+    // A screw alone would pull against the others.
+    let refused = machine.calibrate_platform(&bench.store).unwrap_err();
+    assert_eq!(refused.exit_code(), 3);
+    let text = refused.to_string();
+    for part in ["contradict", "u ", "v ", "w ", "r ", "nothing was moved"] {
+        assert!(text.contains(part), "`{part}` is not in {text}");
+    }
+    let after = machine.reading("r").unwrap().unwrap().position;
+    assert!((after - before).abs() < Metres::from_um(0.1));
+    machine.move_pose(Pose::default()).unwrap();
+}
+
+#[test]
+fn how_far_four_screws_may_contradict_each_other_must_be_said_and_three_cannot() {
+    let judged = |text: &str| match config::parse(text, "machine.toml") {
+        Ok(_) => String::new(),
+        Err(failure) => failure.to_string(),
+    };
+    let text = UVW.machine.to_owned();
+    let missing = judged(&with_four(text.clone(), None));
+    assert!(
+        missing.contains("`inconsistency_limit_um` is missing"),
+        "{missing}"
+    );
+    assert_eq!(judged(&with_four(text.clone(), Some(5.0))), "");
+    let unneeded = text.replace(
+        "exposures = 4",
+        "inconsistency_limit_um = 5.0\nexposures = 4",
+    );
+    let unneeded = judged(&unneeded);
+    assert!(unneeded.contains("three screws cannot"), "{unneeded}");
+    let impossible = judged(&with_four(text, Some(-1.0)));
+    assert!(impossible.contains("-1 is impossible"), "{impossible}");
+}
