@@ -21,6 +21,8 @@ use crate::store::{Entry, Journal, PlacementEntry, PlatePlanEntry, SweepEntry};
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Of the lines of a plate so many may be missing in a pass.
 const MISSING_SHARE: f64 = 0.25;
+/// How often a pass is made again that lost its lines to a busy computer.
+const AGAIN_MAX: u32 = 3;
 /// The parts of a turn in which a plate may have moved.
 const SECTORS: usize = 8;
 /// A part has at least so many lines, where there are as many.
@@ -248,8 +250,7 @@ impl Machine {
                 speed: Some(run.speed),
                 phase: phase.map(Radians),
             };
-            let sweep = self.sweep(axis, &options)?;
-            self.check_lines(axis, run, &sweep)?;
+            let sweep = self.full_sweep(axis, &options)?;
             // A placement lies somewhere; its passes must agree about where.
             phase = phase.or(Some(sweep.phase.value()));
             let entry = entry_of(
@@ -273,13 +274,29 @@ impl Machine {
         Ok(Placed::of(&placement, &sweeps, run.passes))
     }
 
-    fn check_lines(&self, axis: &str, run: &PlateRun, sweep: &Sweep) -> Result<(), RotaryFailure> {
-        let (seen, lines) = (sweep.read(), run.lines);
-        if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
-            return Ok(());
+    /// A pass in which most lines were read. One that a busy computer spoilt is made again; dirt
+    /// would only be the same again.
+    fn full_sweep(&mut self, axis: &str, options: &SweepOptions) -> Result<Sweep, Failure> {
+        let lines = options.lines;
+        let mut again = 0;
+        loop {
+            let sweep = self.sweep(axis, options)?;
+            let seen = sweep.read();
+            if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
+                return Ok(sweep);
+            }
+            let busy = sweep.overwritten.len() > sweep.missing.len();
+            if !busy || again == AGAIN_MAX {
+                let axis = axis.to_owned();
+                return Err(RotaryFailure::TooFewLines { axis, seen, lines }.into());
+            }
+            again += 1;
+            self.observer.warning(&format!(
+                "axis {axis}: {} of {lines} lines were overwritten before they were read; the pass is \
+                 made again",
+                sweep.overwritten.len()
+            ));
         }
-        let axis = axis.to_owned();
-        Err(RotaryFailure::TooFewLines { axis, seen, lines })
     }
 
     fn closed(
