@@ -157,6 +157,40 @@ fn check_refused(rows: &str, words: &[&str], says: &[&str]) {
 }
 
 #[test]
+fn a_table_measured_elsewhere_is_stored_for_the_rotary_axis_it_belongs_to() {
+    let folder = folder();
+    let machine = folder.path().join("machine.toml");
+    fs::write(&machine, tests::ROTARY.machine).expect("a file can be written");
+    let rows = csv(&readings(&[0, 1, 7, 11], 0.05));
+    let save = ["--save", "machine.toml"];
+    let stored = fit(folder.path(), &rows, &save).with_code(0);
+    let id = stored["calibration"].as_str().expect("it was stored");
+    let activated = truestage(
+        folder.path(),
+        &["cal", "activate", "machine.toml", &id[..8]],
+    );
+    assert_eq!(activated.with_code(0)["axis"], "c");
+    let list = truestage(folder.path(), &["cal", "list", "machine.toml"]).with_code(0);
+    assert_eq!(list["calibrations"][0]["kind"], "rotary_error_table");
+    assert_eq!(list["calibrations"][0]["active"], true);
+    let other = [&save[..], &["--axis", "x"]].concat();
+    let refused = fit(folder.path(), &rows, &other).with_code(2);
+    assert!(
+        refused["error"].to_string().contains("known: c"),
+        "{refused}"
+    );
+    // A table beyond the limits of the axis is not stored.
+    let strict = tests::ROTARY
+        .machine
+        .replace("size_limit_arcsec = 60.0", "size_limit_arcsec = 5.0");
+    fs::write(&machine, strict).expect("a file can be written");
+    let refused = fit(folder.path(), &rows, &save).with_code(3);
+    assert!(refused["error"].to_string().contains("axis c"), "{refused}");
+    let list = truestage(folder.path(), &["cal", "list", "machine.toml"]).with_code(0);
+    assert_eq!(list["calibrations"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
 fn what_cannot_be_used_is_told_with_file_line_and_cause_and_nothing_is_stored() {
     let rows = readings(&[0, 1, 7], 0.05);
     let good = csv(&rows);

@@ -221,14 +221,14 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
 }
 
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
-    let config = &loaded.config;
-    let known: Vec<_> = config.axis.keys().chain(config.rotary.keys()).collect();
-    if known.iter().any(|it| *it == axis) {
+    let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
+    let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
+    if known.contains(&axis) {
         return Ok(());
     }
     Err(Failure::NoSuchAxis {
         axis: axis.to_owned(),
-        known: known.into_iter().cloned().collect::<Vec<_>>().join(", "),
+        known: known.join(", "),
     })
 }
 

@@ -7,7 +7,7 @@ use compensator::iso230::{self, Figures};
 use serde_json::json;
 use truestage::report::platform::PlatformPage;
 use truestage::report::{self, Page, Section};
-use truestage::store::{ReadJournal, Store, read_journal};
+use truestage::store::{CalibrationRecord, ReadJournal, Store, read_journal};
 use truestage::{Failure, cycle};
 
 use super::output::{Ended, Output};
@@ -26,6 +26,8 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
     let is_platform = journal.arrangement.is_some();
     let html = if is_platform {
         platform(&args.run, &journal)?
+    } else if journal.plate_plan.is_some() {
+        report::rotary::render(&journal, &made_from(&args.run)?)
     } else {
         axis(&journal)?
     };
@@ -45,12 +47,16 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
 
 /// The page of a platform's run, with the calibrations that were made from it.
 fn platform(path: &Path, journal: &ReadJournal) -> Result<String, Failure> {
-    let calibrations = match (Store::of_journal(path), path.file_name()) {
+    let page = PlatformPage::of(journal, made_from(path)?);
+    Ok(report::platform::render(&page))
+}
+
+/// The calibrations that were made from the journal at `path`.
+fn made_from(path: &Path) -> Result<Vec<(String, CalibrationRecord)>, Failure> {
+    Ok(match (Store::of_journal(path), path.file_name()) {
         (Some(store), Some(name)) => store.made_from(&name.to_string_lossy())?,
         _ => Vec::new(),
-    };
-    let page = PlatformPage::of(journal, calibrations);
-    Ok(report::platform::render(&page))
+    })
 }
 
 /// The page of a run of a single axis.

@@ -341,6 +341,113 @@ mod tests {
         }
     }
 
+    /// What is changed into what, and which key is told what.
+    const REFUSED: &[(&str, &str, &str, &str)] = &[
+        ("\"GP-360-0001\"", "\" \"", "calibrate.plate", "is empty"),
+        (
+            "lines = 360",
+            "lines = 7",
+            "calibrate.lines",
+            "7 is impossible",
+        ),
+        (
+            "placements = 4 ",
+            "# ",
+            "calibrate.offsets",
+            "either `offsets`",
+        ),
+        (
+            "placements = 4 ",
+            "placements = 1 ",
+            "calibrate.placements",
+            "1",
+        ),
+        (
+            "placements = 4 ",
+            "offsets = [0, 1] ",
+            "calibrate.optimise",
+            "nothing to optimise",
+        ),
+        (
+            "placements = 4 ",
+            "offsets = [0, 12] ",
+            "calibrate.offsets",
+            "harmonic",
+        ),
+        (
+            "placements = 4 ",
+            "offsets = [0, 1] ",
+            "calibrate.offsets",
+            "harmonic 1",
+        ),
+        (
+            "placements = 4 ",
+            "offsets = [0, 1, 1] ",
+            "calibrate.offsets",
+            "1",
+        ),
+        (
+            "amplification_limit = 3.0",
+            "amplification_limit = 1.0",
+            "calibrate.placements",
+            "harmonic",
+        ),
+        (
+            "speed_deg_per_s = 60.0\nreading",
+            "speed_deg_per_s = 90.0\nreading",
+            "calibrate.speed_deg_per_s",
+            "SYNC",
+        ),
+        (
+            "reading_noise_arcsec = 0.06",
+            "reading_noise_arcsec = nan",
+            "calibrate.reading_noise_arcsec",
+            "impossible",
+        ),
+        (
+            "[rotary.c.line_detector]",
+            "[rotary.c.option_codes]",
+            "calibrate",
+            "`line_detector`",
+        ),
+        (
+            "offset_lines = 200.5",
+            "offset_lines = 73",
+            "verify.offset_lines",
+            "already",
+        ),
+        (
+            "offset_lines = 200.5",
+            "offset_lines = 360",
+            "verify.offset_lines",
+            "impossible",
+        ),
+        (
+            "offset_lines = 200.5",
+            "offset_lines = 200.3",
+            "verify.offset_lines",
+            "hard to set",
+        ),
+        (
+            "slope_limit = 0.01",
+            "slope_limit = 1.0",
+            "compensation.slope_limit",
+            "impossible",
+        ),
+    ];
+
+    #[test]
+    fn a_rotary_cycle_that_cannot_be_is_refused_before_anybody_turns_a_plate() {
+        for (from, to, key, says) in REFUSED {
+            assert!(ROTARY.contains(from), "{from}");
+            let text = ROTARY.replace(from, to).replace("edge = \"positive\"", "#");
+            let found = findings(&text);
+            let key = format!("rotary.c.{key}");
+            let told = |it: &Diagnostic| it.key == key && it.cause.contains(says);
+            assert!(found.iter().any(told), "{to}: {found:?}");
+        }
+    }
+
     #[test]
     fn an_axis_and_a_rotary_axis_have_two_names() {
         let rotary = ROTARY.find("[rotary.c]").unwrap();

@@ -2,6 +2,7 @@
 
 mod chart;
 pub mod platform;
+pub mod rotary;
 mod svg;
 
 use core::fmt::Write as _;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
+use super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
 use super::{SCHEMA_VERSION, StoreError, io_error};
@@ -120,6 +120,8 @@ pub enum Entry {
     Sweep(SweepEntry),
     /// A placement of a plate was read whole.
     Placed(PlacementEntry),
+    /// What a verification with a plate found.
+    Judged(JudgedEntry),
     /// A placement turned out to be another one than was asked for: it must be read again.
     Misplaced {
         /// By how many lines the plate was to be turned.
@@ -254,6 +256,8 @@ pub struct ReadJournal {
     pub sweeps: Vec<SweepEntry>,
     /// Its placements that were read whole.
     pub placements: Vec<PlacementEntry>,
+    /// What a verification with it found.
+    pub judged: Option<JudgedEntry>,
     /// Whether the run was finished.
     pub complete: bool,
     /// How many bytes are whole lines.
@@ -413,6 +417,7 @@ fn take(
                 plate_plan: None,
                 sweeps: Vec::new(),
                 placements: Vec::new(),
+                judged: None,
                 complete: false,
                 valid_bytes: 0,
                 torn: false,
@@ -428,6 +433,7 @@ fn take(
         (Entry::PlatePlan(plan), Some(read)) => read.plate_plan = Some(plan),
         (Entry::Sweep(sweep), Some(read)) => read.sweeps.push(sweep),
         (Entry::Placed(placement), Some(read)) => read.placements.push(placement),
+        (Entry::Judged(judged), Some(read)) => read.judged = Some(judged),
         (Entry::Misplaced { offset }, Some(read)) => read.forget_placement(offset),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;

@@ -25,7 +25,7 @@ pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
-pub use plate::{PlacementEntry, PlatePlanEntry, SweepEntry};
+pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
     CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,

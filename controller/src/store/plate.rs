@@ -55,3 +55,17 @@ pub struct PlacementEntry {
     /// Monotonic time of the machine, seconds.
     pub at_s: f64,
 }
+
+/// What a verification found. Deviations are actual − target, less their mean, by line of the plate.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JudgedEntry {
+    /// Whether a calibration knew the plate's errors; they are in the deviations otherwise.
+    pub plate_known: bool,
+    /// Of the table without its calibration.
+    pub found_rad: Vec<Option<f64>>,
+    /// Of the table with it, where that was wanted.
+    pub left_rad: Option<Vec<Option<f64>>>,
+    /// The tolerance.
+    pub tolerance_rad: f64,
+}

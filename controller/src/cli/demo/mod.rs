@@ -71,15 +71,15 @@ impl Which {
                 include_str!("../../../../configs/machines/uvw.toml"),
                 include_str!("../../../../configs/emulated/uvw.toml"),
             ],
-            Self::UvwCopley => [
-                "configs/machines/uvw-copley.toml",
-                include_str!("../../../../configs/machines/uvw-copley.toml"),
-                include_str!("../../../../configs/emulated/uvw-copley.toml"),
-            ],
             Self::Rotary => [
                 "configs/machines/rotary.toml",
                 include_str!("../../../../configs/machines/rotary.toml"),
                 include_str!("../../../../configs/emulated/rotary.toml"),
+            ],
+            Self::UvwCopley => [
+                "configs/machines/uvw-copley.toml",
+                include_str!("../../../../configs/machines/uvw-copley.toml"),
+                include_str!("../../../../configs/emulated/uvw-copley.toml"),
             ],
         }
     }

@@ -191,7 +191,7 @@ fn doubt(
     if placed.len() < JUDGED_MIN {
         return Ok(());
     }
-    let read = series(axis, run, placed)?;
+    let read = series(axis, run.lines, placed)?;
     let Some(source) = rotary::misplaced(&read, &SolveOptions::default()) else {
         return Ok(());
     };

@@ -15,7 +15,7 @@ use units::Radians;
 
 use super::failure::RotaryFailure;
 use super::placement::{Placed, PlateRun};
-use crate::failure::Failure;
+use crate::store::ReadJournal;
 
 /// A calibration that scatters more than so many times what is stated is refused.
 const NOISE_FACTOR_MAX: f64 = 2.0;
@@ -30,18 +30,18 @@ const LIMITS: PeriodicLimits = PeriodicLimits {
 
 pub(super) fn series(
     axis: &str,
-    run: &PlateRun,
+    lines: u32,
     placed: &[Placed],
-) -> Result<RotarySeries, Failure> {
+) -> Result<RotarySeries, RotaryFailure> {
     let placements = placed.iter().map(|it| Placement {
         offset: it.offset as usize,
         readings: it.by_line(),
     });
-    let series = RotarySeries::new(run.lines as usize, placements.collect());
-    Ok(series.map_err(|source| RotaryFailure::Series {
+    let series = RotarySeries::new(lines as usize, placements.collect());
+    series.map_err(|source| RotaryFailure::Series {
         axis: axis.to_owned(),
         source,
-    })?)
+    })
 }
 
 /// The table's error.
@@ -50,31 +50,85 @@ pub(super) fn evaluate(
     run: &PlateRun,
     amplification_max: f64,
     placed: &[Placed],
-) -> Result<Solution, Failure> {
+) -> Result<Solution, RotaryFailure> {
     check_passes(axis, run, placed)?;
     let options = SolveOptions {
         reading_noise: Some(run.noise_of_mean()),
         amplification_max,
         ..SolveOptions::default()
     };
-    let read = series(axis, run, placed)?;
-    let mut solution = solve(axis, &read, &options)?;
-    for _ in 0..ROUNDS {
-        let Some(moved) = at_nominal_positions(&read, &solution) else {
-            break;
-        };
-        solution = solve(axis, &moved, &options)?;
-    }
+    let (solution, _) = fit(axis, run.lines, &options, placed)?;
     check_residuals(axis, run, &solution)?;
     Ok(solution)
 }
 
-fn solve(axis: &str, series: &RotarySeries, options: &SolveOptions) -> Result<Solution, Failure> {
-    let solution = rotary::solve(series, options);
-    Ok(solution.map_err(|source| RotaryFailure::Estimate {
-        axis: axis.to_owned(),
-        source,
-    })?)
+/// The solution, and the readings at their nominal positions that it was made from.
+fn fit(
+    axis: &str,
+    lines: u32,
+    options: &SolveOptions,
+    placed: &[Placed],
+) -> Result<(Solution, RotarySeries), RotaryFailure> {
+    let solve = |series: &RotarySeries| {
+        rotary::solve(series, options).map_err(|source| RotaryFailure::Estimate {
+            axis: axis.to_owned(),
+            source,
+        })
+    };
+    let read = series(axis, lines, placed)?;
+    let (mut solution, mut moved) = (solve(&read)?, read.clone());
+    for _ in 0..ROUNDS {
+        let Some(nominal) = at_nominal_positions(&read, &solution) else {
+            break;
+        };
+        solution = solve(&nominal)?;
+        moved = nominal;
+    }
+    Ok((solution, moved))
+}
+
+/// What the placements of a journal say, as far as they were read.
+#[derive(Clone, Debug)]
+pub struct Evaluated {
+    /// Table and plate.
+    pub solution: Solution,
+    /// For each placement, where each reading was made on the table, and what is left of it.
+    pub residuals: Vec<Vec<(Radians, Radians)>>,
+}
+
+/// The evaluation of the placements that `journal` has whole; `None` when they are too few, or do
+/// not part table and plate.
+pub fn evaluated(journal: &ReadJournal) -> Option<Evaluated> {
+    let plan = journal.plate_plan.as_ref()?;
+    let placements = journal.placements.iter();
+    let placed: Vec<Placed> = placements
+        .map(|it| Placed::of(it, &journal.sweeps, plan.passes))
+        .collect();
+    let options = SolveOptions {
+        amplification_max: f64::INFINITY,
+        ..SolveOptions::default()
+    };
+    let (solution, read) = fit(&journal.header.axis, plan.lines, &options, &placed).ok()?;
+    let placements = read.placements().iter();
+    Some(Evaluated {
+        residuals: placements.map(|it| residuals(it, &solution)).collect(),
+        solution,
+    })
+}
+
+fn residuals(placement: &Placement, solution: &Solution) -> Vec<(Radians, Radians)> {
+    let lines = placement.readings.len();
+    let spacing = TAU / lines as f64;
+    let expected = solution.expected(placement.offset);
+    let apart: Vec<(Radians, Radians)> = (0..lines)
+        .filter_map(|line| {
+            let place = Radians(((line + placement.offset) % lines) as f64 * spacing);
+            Some((place, placement.readings[line]? - expected[line]?))
+        })
+        .collect();
+    let mean = apart.iter().map(|it| it.1).sum::<Radians>() / apart.len().max(1) as f64;
+    let left = apart.into_iter();
+    left.map(|(place, apart)| (place, apart - mean)).collect()
 }
 
 /// The readings less what the table's error changes between where a line is and where it should

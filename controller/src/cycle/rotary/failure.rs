@@ -84,7 +84,7 @@ pub enum RotaryFailure {
     #[error(
         "axis {axis}: readings scatter by {:.4} arcsec {about}, {:.4} were expected \
          (reading_noise_arcsec); nothing was stored: look for vibration, a loose plate, a detector \
-         out of focus, or state what it really does",
+         out of focus, a plate turned otherwise than was asked for, or state what it really does",
         seen.arcsec(), expected.arcsec()
     )]
     Noise {

@@ -20,6 +20,7 @@ mod placement;
 mod verify;
 
 pub use calibrate::RotaryCalibrated;
+pub use estimate::{Evaluated, evaluated};
 pub use failure::RotaryFailure;
 pub use moves::RotaryMoved;
 pub use operator::{Operator, PlateMove, PlateTask};

@@ -21,6 +21,8 @@ use crate::store::{Entry, Journal, PlacementEntry, PlatePlanEntry, SweepEntry};
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Of the lines of a plate so many may be missing in a pass.
 const MISSING_SHARE: f64 = 0.25;
+/// How often a pass is made again that lost its lines to a busy computer.
+const AGAIN_MAX: u32 = 3;
 /// The parts of a turn in which a plate may have moved.
 const SECTORS: usize = 8;
 /// A part has at least so many lines, where there are as many.
@@ -74,8 +76,8 @@ impl PlateRun {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Placed {
     pub(super) offset: f64,
-    /// Mean of both directions, in which what the detector is late by cancels; `None` where a
-    /// line was not read in both.
+    /// Mean of both directions, in which what the detector is late by cancels; of one, less what it
+    /// is late by on the others; `None` where a line was not read.
     pub(super) deviations: Vec<Option<Radians>>,
     /// Standard deviation of one line in one pass, by what the directions differ.
     pub(super) scatter: Option<Radians>,
@@ -85,17 +87,31 @@ pub(super) struct Placed {
 impl Placed {
     /// What `sweeps` of one placement, `passes` in each direction, say.
     pub(super) fn of(placement: &PlacementEntry, sweeps: &[SweepEntry], passes: u32) -> Self {
-        let own = |approach: char| {
-            let own = sweeps
-                .iter()
-                .filter(move |it| it.offset == placement.offset && it.pass <= passes);
-            mean_of(own.filter(move |it| it.approach == approach))
+        let own = |approach: char, passes: core::ops::RangeInclusive<u32>| {
+            let own = sweeps.iter().filter(|it| it.offset == placement.offset);
+            let own = own.filter(|it| it.approach == approach && passes.contains(&it.pass));
+            mean_of(own)
         };
-        let (forward, reverse) = (own('+'), own('-'));
-        let both = || forward.iter().zip(&reverse);
-        let deviations = both().map(|(f, r)| Some(Radians(((*f)? + (*r)?) / 2.0)));
-        let apart: Vec<f64> = both().filter_map(|(f, r)| Some((*f)? - (*r)?)).collect();
+        let (mut forward, reverse) = (own('+', 1..=passes), own('-', 1..=passes));
+        let both = |forward: &[Option<f64>]| -> Vec<f64> {
+            let pairs = forward.iter().zip(&reverse);
+            pairs.filter_map(|(f, r)| Some((*f)? - (*r)?)).collect()
+        };
+        let apart = both(&forward);
+        let late = median(&apart).unwrap_or(0.0) / 2.0;
         let scatter = scatter_of(apart).map(|it| it * (f64::from(passes) / 2.0).sqrt());
+        // A line that was missed may have been read in the repeated pass, or in one direction only.
+        let again = own('+', passes + 1..=passes + 1);
+        for (first, again) in forward.iter_mut().zip(again) {
+            *first = first.or(again);
+        }
+        let pairs = forward.iter().zip(&reverse);
+        let deviations = pairs.map(|(forward, reverse)| match (forward, reverse) {
+            (Some(forward), Some(reverse)) => Some(Radians((forward + reverse) / 2.0)),
+            (Some(forward), None) => Some(Radians(forward - late)),
+            (None, Some(reverse)) => Some(Radians(reverse + late)),
+            (None, None) => None,
+        });
         Self {
             offset: placement.offset,
             deviations: deviations.collect(),
@@ -234,8 +250,7 @@ impl Machine {
                 speed: Some(run.speed),
                 phase: phase.map(Radians),
             };
-            let sweep = self.sweep(axis, &options)?;
-            self.check_lines(axis, run, &sweep)?;
+            let sweep = self.full_sweep(axis, &options)?;
             // A placement lies somewhere; its passes must agree about where.
             phase = phase.or(Some(sweep.phase.value()));
             let entry = entry_of(
@@ -259,13 +274,29 @@ impl Machine {
         Ok(Placed::of(&placement, &sweeps, run.passes))
     }
 
-    fn check_lines(&self, axis: &str, run: &PlateRun, sweep: &Sweep) -> Result<(), RotaryFailure> {
-        let (seen, lines) = (sweep.read(), run.lines);
-        if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
-            return Ok(());
+    /// A pass in which most lines were read. One that a busy computer spoilt is made again; dirt
+    /// would only be the same again.
+    fn full_sweep(&mut self, axis: &str, options: &SweepOptions) -> Result<Sweep, Failure> {
+        let lines = options.lines;
+        let mut again = 0;
+        loop {
+            let sweep = self.sweep(axis, options)?;
+            let seen = sweep.read();
+            if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
+                return Ok(sweep);
+            }
+            let busy = sweep.overwritten.len() > sweep.missing.len();
+            if !busy || again == AGAIN_MAX {
+                let axis = axis.to_owned();
+                return Err(RotaryFailure::TooFewLines { axis, seen, lines }.into());
+            }
+            again += 1;
+            self.observer.warning(&format!(
+                "axis {axis}: {} of {lines} lines were overwritten before they were read; the pass is \
+                 made again",
+                sweep.overwritten.len()
+            ));
         }
-        let axis = axis.to_owned();
-        Err(RotaryFailure::TooFewLines { axis, seen, lines })
     }
 
     fn closed(
@@ -393,12 +424,15 @@ mod tests {
     }
 
     #[test]
-    fn what_the_detector_is_late_by_cancels_and_a_line_seen_from_one_side_only_is_none() {
+    fn what_the_detector_is_late_by_cancels_and_is_known_where_one_direction_is_missing() {
         let sweeps = [
-            sweep(1, '+', &[Some(1.5), Some(2.5), Some(3.5), Some(4.5)]),
-            sweep(1, '-', &[Some(0.5), None, Some(2.5), Some(3.5)]),
-            // The repeated pass is for the closure alone.
-            sweep(2, '+', &[Some(9.0); 4]),
+            sweep(1, '+', &[Some(1.5), Some(2.5), None, Some(4.5), None, None]),
+            sweep(
+                1,
+                '-',
+                &[Some(0.5), None, Some(2.5), Some(3.5), None, Some(5.5)],
+            ),
+            sweep(2, '+', &[Some(9.0), None, None, Some(9.0), None, Some(6.5)]),
         ];
         let placement = PlacementEntry {
             offset: 2.0,
@@ -407,8 +441,10 @@ mod tests {
         };
         let placed = Placed::of(&placement, &sweeps, 1);
         let some = |value| Some(Radians(value));
-        assert_eq!(placed.deviations, [some(1.0), None, some(3.0), some(4.0)]);
-        assert_eq!(placed.by_line(), [some(3.0), some(4.0), some(1.0), None]);
+        let expected = [some(1.0), some(2.0), some(3.0), some(4.0), None, some(6.0)];
+        assert_eq!(placed.deviations, expected);
+        let turned = [some(3.0), some(4.0), None, some(6.0), some(1.0), some(2.0)];
+        assert_eq!(placed.by_line(), turned);
     }
 
     #[test]

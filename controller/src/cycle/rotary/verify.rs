@@ -26,7 +26,7 @@ use crate::cycle::note_failure;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::{Entry, Journal, Store, short};
+use crate::store::{Entry, Journal, JudgedEntry, Store, short};
 
 /// How much better another place of the plate must fit.
 const BETTER: f64 = 3.0;
@@ -69,6 +69,21 @@ impl RotaryVerified {
     pub fn is_within_tolerance(&self) -> bool {
         let left = self.left.as_ref();
         left.is_some_and(|it| it.largest <= self.tolerance)
+    }
+}
+
+impl RotaryVerified {
+    fn entry(&self) -> JudgedEntry {
+        let of = |figures: &RotaryFigures| {
+            let values = figures.deviations.iter();
+            values.map(|it| it.map(Radians::value)).collect()
+        };
+        JudgedEntry {
+            plate_known: self.plate_known,
+            found_rad: of(&self.found),
+            left_rad: self.left.as_ref().map(of),
+            tolerance_rad: self.tolerance.value(),
+        }
     }
 }
 
@@ -125,6 +140,7 @@ impl Machine {
             tolerance: Radians::from_arcsec(config.tolerance_arcsec),
             journal: journal.path().to_owned(),
         };
+        journal.write(&Entry::Judged(verified.entry()))?;
         self.judge_table(axis, store, &verified)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.write(&Entry::Complete)?;

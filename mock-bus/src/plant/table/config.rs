@@ -155,7 +155,7 @@ pub struct PlateConfig {
     /// Lines that cannot be seen.
     pub smudged_lines: Vec<u32>,
     /// By how many lines somebody turns it, one after the other, each time that the drive is
-    /// switched off after more than one and a half turns since the time before.
+    /// switched off after more than two and a half turns since the time before.
     pub hand_lines: Vec<f64>,
 }
 

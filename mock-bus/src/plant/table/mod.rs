@@ -161,7 +161,7 @@ impl Table {
     /// Somebody who waits until the plate has been read and the drive is off.
     fn lend_a_hand(&mut self) {
         let read = self.detector.passages() - self.passages_before;
-        if 2 * read > 3 * self.plate.lines() as u64
+        if 2 * read > 5 * self.plate.lines() as u64
             && let Some(lines) = self.hand_lines.pop_front()
         {
             self.turn_plate(lines);

@@ -198,7 +198,15 @@ fn the_hand_turns_the_plate_when_it_was_read_and_the_drive_is_off() {
     let mut plant = plant_of(|table| table.plate.hand_lines = vec![73.0, -2.0], 5);
     let placement = |plant: &Plant| plant.truth().table().unwrap().placement().0;
     let mut now = Time::ZERO;
-    for (angle, expected) in [(TAU, 0), (TAU, 73), (TAU, 73), (-TAU, 71), (2.0 * TAU, 71)] {
+    let twice = 2.0 * TAU;
+    for (angle, expected) in [
+        (TAU, 0),
+        (twice, 73),
+        (TAU, 73),
+        (-twice, 71),
+        (twice, 71),
+        (twice, 71),
+    ] {
         turn(&mut plant, &mut now, angle, 4.0);
         plant.set_servo(0, Servo::Off);
         assert_eq!(placement(&plant), expected);
