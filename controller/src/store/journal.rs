@@ -186,6 +186,7 @@ impl Journal {
         journal.write(&Entry::Resumed {
             at: header.started.clone(),
         })?;
+        read.failure = None;
         read.keep_whole_runs();
         Ok((journal, read))
     }
@@ -238,6 +239,8 @@ pub struct ReadJournal {
     pub poses: Vec<PoseEntry>,
     /// Whether the run was finished.
     pub complete: bool,
+    /// Why it ended before, as the operator was told, unless it was continued.
+    pub failure: Option<String>,
     /// How many bytes are whole lines.
     pub valid_bytes: u64,
     /// Whether a torn line follows them.
@@ -386,6 +389,7 @@ fn take(
                 strokes: Vec::new(),
                 poses: Vec::new(),
                 complete: false,
+                failure: None,
                 valid_bytes: 0,
                 torn: false,
             });
@@ -399,9 +403,13 @@ fn take(
         (Entry::Pose(pose), Some(read)) => read.poses.push(pose),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;
+            read.failure = None;
             read.keep_whole_runs();
         }
-        (Entry::Failed { .. }, Some(read)) => read.complete = false,
+        (Entry::Failed { cause }, Some(read)) => {
+            read.complete = false;
+            read.failure = Some(cause);
+        }
         (Entry::Complete, Some(read)) => read.complete = true,
     }
     Ok(())
@@ -539,6 +547,19 @@ mod tests {
         let runs: Vec<_> = read.points.iter().map(|point| point.run).collect();
         assert_eq!(runs, [1, 1, 1, 1, 2, 2, 2, 2]);
         assert_eq!(read_journal(&path).unwrap().points, read.points);
+    }
+
+    #[test]
+    fn a_run_that_failed_says_why_until_it_is_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        let cause = "the laser beam is blocked".to_owned();
+        journal.write(&Entry::Failed { cause }).unwrap();
+        let path = journal.path().to_owned();
+        let failure = || read_journal(&path).unwrap().failure;
+        assert_eq!(failure().as_deref(), Some("the laser beam is blocked"));
+        Journal::resume(&path, &header()).unwrap();
+        assert_eq!(failure(), None);
     }
 
     #[test]
