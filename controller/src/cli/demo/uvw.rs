@@ -51,6 +51,10 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
             ),
             String::new(),
             format!("report       {}", report.display()),
+            format!(
+                "the times between starts contain this host's delays, times {}",
+                args.speed
+            ),
             took(wall, args.speed),
         ]
         .join("\n"),
