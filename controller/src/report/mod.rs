@@ -114,6 +114,9 @@ pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
             if journal.complete { "yes" } else { "no" }.to_owned(),
         ),
     ];
+    if let Some(cause) = &journal.failure {
+        facts.push(("ended because".to_owned(), cause.clone()));
+    }
     // What several drives move together names none of them.
     let drive = &header.drive;
     if *drive != IdentityRecord::default() {

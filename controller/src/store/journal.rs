@@ -200,6 +200,7 @@ impl Journal {
         journal.write(&Entry::Resumed {
             at: header.started.clone(),
         })?;
+        read.failure = None;
         read.keep_whole_runs();
         Ok((journal, read))
     }
@@ -260,6 +261,8 @@ pub struct ReadJournal {
     pub judged: Option<JudgedEntry>,
     /// Whether the run was finished.
     pub complete: bool,
+    /// Why it ended before, as the operator was told, unless it was continued.
+    pub failure: Option<String>,
     /// How many bytes are whole lines.
     pub valid_bytes: u64,
     /// Whether a torn line follows them.
@@ -419,6 +422,7 @@ fn take(
                 placements: Vec::new(),
                 judged: None,
                 complete: false,
+                failure: None,
                 valid_bytes: 0,
                 torn: false,
             });
@@ -437,9 +441,13 @@ fn take(
         (Entry::Misplaced { offset }, Some(read)) => read.forget_placement(offset),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;
+            read.failure = None;
             read.keep_whole_runs();
         }
-        (Entry::Failed { .. }, Some(read)) => read.complete = false,
+        (Entry::Failed { cause }, Some(read)) => {
+            read.complete = false;
+            read.failure = Some(cause);
+        }
         (Entry::Complete, Some(read)) => read.complete = true,
     }
     Ok(())
@@ -614,6 +622,19 @@ mod tests {
         journal.write(&placed(73.0)).unwrap();
         let read = read_journal(&path).unwrap();
         assert_eq!((read.sweeps.len(), read.placements.len()), (3, 2));
+    }
+
+    #[test]
+    fn a_run_that_failed_says_why_until_it_is_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::create(folder.path(), &header()).unwrap();
+        let cause = "the laser beam is blocked".to_owned();
+        journal.write(&Entry::Failed { cause }).unwrap();
+        let path = journal.path().to_owned();
+        let failure = || read_journal(&path).unwrap().failure;
+        assert_eq!(failure().as_deref(), Some("the laser beam is blocked"));
+        Journal::resume(&path, &header()).unwrap();
+        assert_eq!(failure(), None);
     }
 
     #[test]
