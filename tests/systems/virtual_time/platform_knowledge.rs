@@ -60,6 +60,39 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
 }
 
 #[test]
+fn where_the_soft_limits_leave_no_room_forward_play_is_taken_up_in_reverse() {
+    let narrow = |text: String| {
+        shortened(text)
+            .replace("soft_max_mm = 4.5", "soft_max_mm = 1.5")
+            .replace("theta_max_deg = 0.5", "theta_max_deg = 0.0")
+            .replace("x_max_mm = 1.5", "x_max_mm = 1.4995")
+            .replace("y_max_mm = 1.5", "y_max_mm = 1.0")
+            .replace("first_mm = -2.5", "first_mm = -1.25")
+            .replace("last_mm = 2.5", "last_mm = 1.25")
+            .replace("step_mm = 0.625", "step_mm = 0.25")
+            .replace("extrapolation_mm = 0.2", "extrapolation_mm = 0.3")
+    };
+    let mut bench = Bench::of(&UVW, 5, narrow);
+    let judge = zeroed(&mut bench);
+    bench.machine.calibrate_platform(&bench.store).unwrap();
+    let machine = &mut bench.machine;
+    machine.move_pose(pose(1.4965, 0.3, 0.0)).unwrap();
+    let soft_max = Metres::from_mm(1.5);
+    let here = machine.reading("u").unwrap().unwrap().position;
+    let play = Metres::from_um(1.6);
+    assert!(here + play > soft_max, "{} mm: there is room", here.mm());
+
+    machine.stop_request().stop();
+    machine.move_pose(pose(1.2, 0.3, 0.0)).unwrap_err();
+    machine.share_stop_request(&StopRequest::default());
+    let target = pose(1.4, 0.2, 0.0);
+    let moved = machine.move_pose(target).unwrap();
+    assert_eq!(moved.taken_up.len(), 3, "{moved:?}");
+    let error = judge.error(&bench.emulated.simulation(), target);
+    assert!(error < Metres::from_um(1.0), "{} µm", error.um());
+}
+
+#[test]
 fn after_a_power_cycle_nothing_moves_before_a_zero_which_settles_the_play() {
     let mut bench = Bench::of(&UVW, 6, shortened);
     zeroed(&mut bench);
