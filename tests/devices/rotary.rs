@@ -269,7 +269,7 @@ fn a_smudged_line_is_the_only_one_that_is_missing() {
 
 #[test]
 fn a_scratch_so_near_to_a_line_that_it_overwrites_it_is_counted() {
-    check(|_, table| {
+    check(|rig, table| {
         let scratched = Fault::LineScratched { line: 45 };
         let injected = table
             .emulator
@@ -280,9 +280,13 @@ fn a_scratch_so_near_to_a_line_that_it_overwrites_it_is_counted() {
         let latched = sweep(table, Approach::Forward)?;
         let missed: u32 = latched.iter().map(|it| it.missed).sum();
         assert_eq!(latched.len() + missed as usize, LINES + 1);
-        let doubtful = latched.iter().find(|it| it.missed > 0);
-        let (line, _) = nearest(&expected, doubtful.expect("one was overwritten"));
-        assert_eq!(line, 45);
+        let doubtful = latched.iter().filter(|it| it.missed > 0);
+        let lines: Vec<_> = doubtful.map(|it| nearest(&expected, it).0).collect();
+        // In real time a busy host may let more of them be overwritten.
+        if rig == Rig::InProcess {
+            assert_eq!(lines, [45]);
+        }
+        assert!(lines.contains(&45), "{rig:?}: {lines:?}");
         Ok(())
     });
 }
