@@ -73,7 +73,11 @@ impl Machine {
         let evaluated = self
             .read_placements(axis, &run, &offsets, kept, &mut journal, operator)
             .and_then(|placed| Ok((evaluate(axis, &run, limit, &placed)?, placed)));
-        let (solution, placed) = evaluated.inspect_err(|it| note_failure(&mut journal, it))?;
+        let (solution, placed) = evaluated.inspect_err(|it| {
+            note_failure(&mut journal, it);
+            // Offsets of a run without a calibration mean nothing to a verification.
+            self.remember_table(axis).plate_at = None;
+        })?;
         let stored = self.store_table(axis, store, &run, &journal, &solution);
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.write(&Entry::Complete)?;
@@ -109,7 +113,8 @@ impl Machine {
                 continue;
             }
             let step = (number, offsets.len());
-            self.place_plate(axis, run, *offset, step, operator)?;
+            let known = placed.last().map(|it| it.offset);
+            self.place_plate(axis, run, *offset, step, known, operator)?;
             let done = (run.sweeps() * placed.len() as u32, total);
             placed.push(self.read_placement(axis, run, *offset, done, journal)?);
             doubt(axis, run, &placed, journal)?;

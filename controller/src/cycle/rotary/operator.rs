@@ -10,8 +10,13 @@ pub enum PlateMove {
     Fix,
     /// Turn it by so many lines from where it was read last.
     TurnBy(f64),
-    /// Bring it to the offset of the task; it is not known where it lies.
-    LieAt,
+    /// Turn it by so many lines from where it lay at an offset; it is not known where it lies now.
+    TurnFrom {
+        /// In lines from the first placement.
+        offset: f64,
+        /// By how many lines.
+        lines: f64,
+    },
 }
 
 /// A placement that is asked for.
@@ -34,23 +39,22 @@ pub struct PlateTask {
 impl PlateTask {
     /// For the person.
     pub fn text(&self) -> String {
-        let degrees = |lines: f64| lines * 360.0 / f64::from(self.lines);
+        let turn = |lines: f64, from: &str| {
+            format!(
+                "turn it on the table by {} lines ({:.4}°){from}, so that its lines are read at {} \
+                 angles, and fix it again",
+                lines.abs(),
+                lines.abs() * 360.0 / f64::from(self.lines),
+                if lines < 0.0 { "smaller" } else { "larger" },
+            )
+        };
         let what = match self.by {
             PlateMove::Fix => "fix it on the table, in any position".to_owned(),
             PlateMove::TurnBy(lines) if lines.abs() < 1e-9 => "leave it where it is".to_owned(),
-            PlateMove::TurnBy(lines) => format!(
-                "turn it on the table by {} lines ({:.4}°), so that its lines are read at {} \
-                 angles, and fix it again",
-                lines.abs(),
-                degrees(lines.abs()),
-                if lines > 0.0 { "larger" } else { "smaller" },
-            ),
-            PlateMove::LieAt => format!(
-                "it must lie {} lines ({:.4}°) from the first placement, so that its lines are \
-                 read at so much larger angles than there",
-                self.offset,
-                degrees(self.offset),
-            ),
+            PlateMove::TurnBy(lines) => turn(lines, ""),
+            PlateMove::TurnFrom { offset, lines } => {
+                turn(lines, &format!(" from where it lay at offset {offset}"))
+            }
         };
         let (number, of) = self.step;
         format!(
@@ -103,9 +107,13 @@ mod tests {
         check(PlateMove::TurnBy(-31.5), "by 31.5 lines (31.5000°)");
         check(PlateMove::TurnBy(-31.5), "at smaller angles");
         check(PlateMove::TurnBy(0.0), "leave it where it is");
+        let from = PlateMove::TurnFrom {
+            offset: 73.0,
+            lines: 89.0,
+        };
         check(
-            PlateMove::LieAt,
-            "73 lines (73.0000°) from the first placement",
+            from,
+            "by 89 lines (89.0000°) from where it lay at offset 73",
         );
     }
 }

@@ -21,6 +21,8 @@ use crate::store::{Entry, Journal, PlacementEntry, PlatePlanEntry, SweepEntry};
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Of the lines of a plate so many may be missing in a pass.
 const MISSING_SHARE: f64 = 0.25;
+/// The same where a busy computer lost them: other lines in every pass, so that others have them.
+const UNREAD_SHARE: f64 = 0.5;
 /// How often a pass is made again that lost its lines to a busy computer.
 const AGAIN_MAX: u32 = 3;
 /// The parts of a turn in which a plate may have moved.
@@ -195,29 +197,34 @@ impl Machine {
         Ok((plate, run))
     }
 
-    /// Has the plate brought to `offset`; the axis is off while somebody has his hands in.
+    /// Has the plate brought to `offset`; the axis is off while somebody has his hands in. `known` is
+    /// an offset at which it lay before, in the same run or in that of the calibration; `None` where
+    /// this is the placement that all others are counted from.
     pub(super) fn place_plate(
         &mut self,
         axis: &str,
         run: &PlateRun,
         offset: f64,
         step: (usize, usize),
+        known: Option<f64>,
         operator: &mut dyn Operator,
     ) -> Result<(), Failure> {
         self.rest(axis)?;
         self.disable(axis)?;
         let lies_at = self.remember_table(axis).plate_at.take();
-        let is_first = run.stage == Stage::Calibrate && step.0 == 1;
         operator.ask(&PlateTask {
             axis: axis.to_owned(),
             plate: run.plate.clone(),
             lines: run.lines,
             step,
             offset,
-            by: match lies_at {
-                _ if is_first && offset == 0.0 => PlateMove::Fix,
-                Some(before) => PlateMove::TurnBy(offset - before),
-                None => PlateMove::LieAt,
+            by: match (known, lies_at) {
+                (None, _) => PlateMove::Fix,
+                (Some(_), Some(here)) => PlateMove::TurnBy(offset - here),
+                (Some(known), None) => PlateMove::TurnFrom {
+                    offset: known,
+                    lines: offset - known,
+                },
             },
         })?;
         while !operator.is_done()? {
@@ -282,10 +289,11 @@ impl Machine {
         loop {
             let sweep = self.sweep(axis, options)?;
             let seen = sweep.read();
-            if seen as f64 >= f64::from(lines) * (1.0 - MISSING_SHARE) {
+            let busy = sweep.overwritten.len() > sweep.missing.len();
+            let share = if busy { UNREAD_SHARE } else { MISSING_SHARE };
+            if seen as f64 >= f64::from(lines) * (1.0 - share) {
                 return Ok(sweep);
             }
-            let busy = sweep.overwritten.len() > sweep.missing.len();
             if !busy || again == AGAIN_MAX {
                 let axis = axis.to_owned();
                 return Err(RotaryFailure::TooFewLines { axis, seen, lines }.into());
@@ -352,16 +360,17 @@ impl Machine {
             ));
         }
         let again = seldom(|it| &it.overwritten, sweeps.len());
-        if !again.is_empty() {
+        let unread: usize = sweeps.iter().map(|it| it.overwritten.len()).sum();
+        let unread = unread - again.len() * sweeps.len();
+        let total = first.deviations_rad.len() * sweeps.len();
+        // Of many lost by chance, some are lost in every pass by chance.
+        if !again.is_empty() && unread * 20 < total {
             let names = names(first, &again);
             say(format!(
                 "overwritten unread in every pass (a scratch?): {names}"
             ));
         }
-        let unread: usize = sweeps.iter().map(|it| it.overwritten.len()).sum();
-        let unread = unread - again.len() * sweeps.len();
         if unread > 0 {
-            let total = first.deviations_rad.len() * sweeps.len();
             say(format!(
                 "{unread} of {total} readings were overwritten before they were read: the computer is \
                  busy, or the table too fast"

@@ -119,7 +119,10 @@ impl Machine {
         let header = self.rotary_header("verify", axis, &run, id);
         let mut journal = Journal::create(&store.runs(), &header)?;
         let offset = config.offset_lines;
-        let read = self.read_verification(axis, &run, offset, &mut journal, operator);
+        // Without a calibration any placement is as good as another.
+        let lay_at = known.as_ref().and_then(|it| it.content.offsets.first());
+        let places = (offset, lay_at.map(|it| f64::from(*it)));
+        let read = self.read_verification(axis, &run, places, &mut journal, operator);
         let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
         if let Some(known) = &known {
             lies_there(axis, known, &placed)
@@ -152,12 +155,12 @@ impl Machine {
         &mut self,
         axis: &str,
         run: &PlateRun,
-        offset: f64,
+        (offset, lay_at): (f64, Option<f64>),
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Placed, Failure> {
         journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
-        self.place_plate(axis, run, offset, (1, 1), operator)?;
+        self.place_plate(axis, run, offset, (1, 1), lay_at, operator)?;
         self.read_placement(axis, run, offset, (0, run.sweeps()), journal)
     }
 
