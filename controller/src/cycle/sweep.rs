@@ -112,25 +112,33 @@ impl Machine {
         Ok(core::iter::from_fn(|| device.poll_latched()).collect())
     }
 
-    /// Waits until the rotary axis has stood without a break.
+    /// Waits until the rotary axis has stood without a break, by samples that were taken since:
+    /// the host's clock alone would count old ones.
     pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
         let limit = REST_LIMIT * self.patience;
         let start = self.now();
-        let mut since = start;
-        while self.now().since(since) < REST {
-            if self.now().since(start) > limit {
+        let mut first = None;
+        loop {
+            let reading = self.rotary_reading(axis)?;
+            match reading.filter(|it| it.standing && it.at > start) {
+                Some(reading) => {
+                    let since = *first.get_or_insert(reading.at);
+                    if reading.at.since(since) >= REST {
+                        return Ok(());
+                    }
+                }
+                None => first = None,
+            }
+            let now = self.now();
+            if now.since(start) > limit {
                 return Err(Failure::Overdue {
                     device: axis.to_owned(),
                     step: "standing still",
                     waited: limit,
                 });
             }
-            self.tick(since + REST)?;
-            if !self.rotary_reading(axis)?.is_some_and(|it| it.standing) {
-                since = self.now();
-            }
+            self.tick(now + REST)?;
         }
-        Ok(())
     }
 }
 
