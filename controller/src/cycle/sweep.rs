@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 use core::time::Duration;
 use std::collections::BTreeSet;
 
-use drivers::device::{LatchCommand, Latched, Repeat};
+use drivers::device::{LatchCommand, Latched, Repeat, SYNCS_PER_EDGE};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use super::turn::Way;
@@ -30,7 +30,7 @@ const REST_LIMIT: Duration = Duration::from_secs(3);
 /// The fastest turn at which every line of a plate is read: the drive's latch keeps one position,
 /// which comes with the next SYNC, and that one may be lost or late.
 pub(crate) fn speed_max(lines: u32, sync_period_ms: f64) -> f64 {
-    360.0 / f64::from(lines) * SPACING_SHARE / (2.0 * sync_period_ms * 1e-3)
+    360.0 / f64::from(lines) * SPACING_SHARE / (SYNCS_PER_EDGE * sync_period_ms * 1e-3)
 }
 
 /// How a plate is read.

@@ -5,6 +5,10 @@ use units::{Coordinate, Counts, Metres, Radians, Time};
 
 use super::{Axis, ServoDrive};
 
+/// Between two edges there must be time for so many SYNCs: one that reads the position, and one
+/// that may be lost or late.
+pub const SYNCS_PER_EDGE: f64 = 2.0;
+
 /// A drive that latches its axis's position at the edges of an input.
 ///
 /// The latched position is read at each SYNC, so at most one edge may fall between two SYNCs;

@@ -107,6 +107,8 @@ impl Machine {
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Vec<Placed>, Failure> {
+        // A run that was continued may have been killed between a placement and its judgement.
+        doubt(axis, run, &placed, journal)?;
         let total = run.sweeps() * offsets.len() as u32;
         for (number, offset) in (1..).zip(offsets) {
             if placed.iter().any(|it| it.offset == *offset) {
@@ -119,8 +121,6 @@ impl Machine {
             placed.push(self.read_placement(axis, run, *offset, done, journal)?);
             doubt(axis, run, &placed, journal)?;
         }
-        // A run that was continued may have nothing left to read.
-        doubt(axis, run, &placed, journal)?;
         placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
         Ok(placed)
     }

@@ -23,7 +23,9 @@ use units::{Coordinate, Counts, Quantity, Time};
 use super::convert::out_of_range;
 use super::settings::{Cia402Settings, Edge, LatchSettings};
 use super::{Activity, Cia402Drive};
-use crate::device::{Alarm, DeviceError, LatchCommand, Latched, PositionLatch, Repeat};
+use crate::device::{
+    Alarm, DeviceError, LatchCommand, Latched, PositionLatch, Repeat, SYNCS_PER_EDGE,
+};
 use crate::protocol::script::{Script, Step};
 use crate::wire::canopen::Object;
 use crate::wire::canopen::pdo::{MappedObject, extract};
@@ -39,10 +41,6 @@ const CONTINUOUS: u16 = 1 << 1;
 const CHOSEN_SOURCE: u16 = 1 << 3;
 const AT_POSITIVE_EDGE: u16 = 1 << 4;
 const AT_NEGATIVE_EDGE: u16 = 1 << 5;
-
-/// Between two edges there must be time for so many SYNCs: one that reads the position, and one
-/// that may be lost or late.
-const SYNCS_PER_EDGE: f64 = 2.0;
 
 const fn position_object(edge: Edge) -> MappedObject {
     match edge {
