@@ -303,12 +303,19 @@ impl Machine {
             let seen = sweep.read();
             let busy = sweep.overwritten.len() > sweep.missing.len();
             let share = if busy { UNREAD_SHARE } else { MISSING_SHARE };
-            if seen as f64 >= f64::from(lines) * (1.0 - share) {
+            let wanted = (f64::from(lines) * (1.0 - share)).ceil() as usize;
+            if seen >= wanted {
                 return Ok(sweep);
             }
             if !busy || again == AGAIN_MAX {
-                let axis = axis.to_owned();
-                return Err(RotaryFailure::TooFewLines { axis, seen, lines }.into());
+                return Err(RotaryFailure::TooFewLines {
+                    axis: axis.to_owned(),
+                    seen,
+                    wanted,
+                    overwritten: if busy { sweep.overwritten.len() } else { 0 },
+                    lines,
+                }
+                .into());
             }
             again += 1;
             self.observer.warning(&format!(

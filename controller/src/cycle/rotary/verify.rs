@@ -179,7 +179,9 @@ impl Machine {
                 what: format!("axis {axis} uses no calibration"),
                 help: "load or make one, or verify uncompensated".into(),
             }),
-            Some(known) if known.plate != run.plate || known.content.lines != run.lines => {
+            // Of another plate it says nothing, and of the table as found nothing is wanted.
+            Some(known) if !compensated && !is_of(&known, run) => Ok(None),
+            Some(known) if !is_of(&known, run) => {
                 let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
                 Err(RotaryFailure::OtherPlate {
                     axis: axis.to_owned(),
@@ -217,6 +219,11 @@ impl Machine {
         }
         .into())
     }
+}
+
+/// Whether the calibration was made with the plate that is to be read.
+fn is_of(known: &TableInUse, run: &PlateRun) -> bool {
+    known.plate == run.plate && known.content.lines == run.lines
 }
 
 /// Of each line: its true angle, as the calibration knows the plate, less what the table reads
