@@ -85,9 +85,17 @@ impl Machine {
         let speed = options.speed.unwrap_or(usual);
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
+        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
+        let at = self.rotary_index(axis)?;
+        let device = &self.rotaries[at].device;
+        device
+            .check_latch_speed(spacing, speed)
+            .map_err(|source| Failure::Device {
+                device: axis.to_owned(),
+                source,
+            })?;
         let start = self.turn_to(axis, Radians(-sign * run_up), Way::Shortest)?;
         self.rest(axis)?;
-        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
         let repeat = Repeat::Continuous;
         self.latch(axis, LatchCommand::Arm { repeat, spacing })?;
         let first = start + Radians(sign * run_up);

@@ -119,7 +119,8 @@ impl Machine {
         let offset = config.offset_lines;
         // Without a calibration any placement is as good as another.
         let lay_at = known.as_ref().and_then(|it| it.content.offsets.first());
-        let places = (offset, lay_at.map(|it| f64::from(*it)));
+        let phase = known.as_ref().and_then(|it| it.content.plate_phase_rad);
+        let places = (offset, lay_at.map(|it| f64::from(*it)), phase.map(Radians));
         let read = self.read_verification(axis, &run, places, &mut journal, operator);
         let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
         if let Some(known) = &known {
@@ -153,13 +154,13 @@ impl Machine {
         &mut self,
         axis: &str,
         run: &PlateRun,
-        (offset, lay_at): (f64, Option<f64>),
+        (offset, lay_at, phase): (f64, Option<f64>, Option<Radians>),
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Placed, Failure> {
         journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
         self.place_plate(axis, run, offset, (1, 1), lay_at, operator)?;
-        self.read_placement(axis, run, offset, (0, run.sweeps()), journal)
+        self.read_placement(axis, run, (offset, phase), (0, run.sweeps()), journal)
     }
 
     /// What the calibration in use says of the plate.
@@ -176,7 +177,9 @@ impl Machine {
                 what: format!("axis {axis} uses no calibration"),
                 help: "load or make one, or verify uncompensated".into(),
             }),
-            Some(known) if known.plate != run.plate || known.content.lines != run.lines => {
+            // Of another plate it says nothing, and of the table as found nothing is wanted.
+            Some(known) if !compensated && !is_of(&known, run) => Ok(None),
+            Some(known) if !is_of(&known, run) => {
                 let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
                 Err(RotaryFailure::OtherPlate {
                     axis: axis.to_owned(),
@@ -214,6 +217,11 @@ impl Machine {
         }
         .into())
     }
+}
+
+/// Whether the calibration was made with the plate that is to be read.
+fn is_of(known: &TableInUse, run: &PlateRun) -> bool {
+    known.plate == run.plate && known.content.lines == run.lines
 }
 
 /// Of each line: its true angle, as the calibration knows the plate, less what the table reads
