@@ -14,8 +14,7 @@
 //!     let loaded = config::load("machine.toml".as_ref())?;
 //!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), ports::Use::Motion, 1.0)?;
 //!     let mut machine = Machine::new(&loaded, Box::new(transport));
-//!     let section = &loaded.config.machine;
-//!     let store = Store::new(&section.data_dir, &section.name);
+//!     let store = Store::of(&loaded.config.machine);
 //!     machine.guarded(|machine| {
 //!         machine.start()?;
 //!         machine.zero("x", &store)?;

@@ -58,7 +58,7 @@ mod solve;
 
 pub(crate) use design::gcd;
 pub use design::{Design, DesignError, rms_amplification_of_a_pair, rms_amplification_of_all};
-pub use misplaced::{Misplaced, misplaced};
+pub use misplaced::{Misplaced, misplaced, shift_between};
 pub use periodic::{
     NotAnAngle, PeriodicCompensation, PeriodicError, PeriodicInterpolation, PeriodicLimits,
     PeriodicTable,

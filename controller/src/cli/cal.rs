@@ -71,8 +71,7 @@ pub(super) fn run(command: &CalCommand, output: Output) -> Ended {
 
 fn store_of(config: &std::path::Path) -> Result<Store, Failure> {
     let loaded = config::load(config)?;
-    let section = &loaded.config.machine;
-    Ok(Store::new(&section.data_dir, &section.name))
+    Ok(Store::of(&loaded.config.machine))
 }
 
 fn list(store: &Store, output: Output) -> Ended {
@@ -204,7 +203,7 @@ fn linear_changes(before: &LinearContent, after: &LinearContent) -> (Vec<String>
 fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
+    let store = Store::of(&loaded.config.machine);
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
     let CalibrationRecord { head, .. } = record;
@@ -237,8 +236,7 @@ const PLATFORM: &str = "platform";
 
 fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
-    let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
+    let store = Store::of(&loaded.config.machine);
     if let (PLATFORM, Some(platform)) = (axis, &loaded.config.platform) {
         let screws = platform.actuator.iter().map(|it| it.axis.as_str());
         return rollback_all(&store, &screws.collect::<Vec<_>>(), output);

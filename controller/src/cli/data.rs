@@ -134,13 +134,12 @@ fn store_fit(
     if let Some(limits) = &axes[&name].compensation {
         assemble::compensation(limits, &name, fitted.table.clone())?;
     }
-    let section = &loaded.config.machine;
     let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
     let record = CalibrationRecord {
         head,
         content: Content::LinearErrorTable(content),
     };
-    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
+    Ok(Store::of(&loaded.config.machine).save(&record)?)
 }
 
 /// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be

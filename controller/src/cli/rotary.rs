@@ -263,10 +263,9 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
     if let Some(limits) = &axes[&axis].compensation {
         assemble::periodic_compensation(limits, &axis, content.table("just made")?)?;
     }
-    let section = &loaded.config.machine;
     let content = Content::RotaryErrorTable(content);
     let record = CalibrationRecord { head, content };
-    Ok(Store::new(&section.data_dir, &section.name).save(&record)?)
+    Ok(Store::of(&loaded.config.machine).save(&record)?)
 }
 
 /// A stored table, for `cal show`.

@@ -216,8 +216,7 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
         let content = Content::ScrewModel(content);
         records.push(CalibrationRecord { head, content });
     }
-    let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
+    let store = Store::of(&loaded.config.machine);
     let ids: Result<_, _> = records.iter().map(|record| store.save(record)).collect();
     Ok(ids?)
 }

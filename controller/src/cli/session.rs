@@ -32,8 +32,7 @@ impl Session {
         let mut loaded = config::load(&args.config)?;
         loaded.patience = ports::patience(args.clock_speed);
         let overrides = Overrides::parse(&args.ports, &loaded.config)?;
-        let section = &loaded.config.machine;
-        let store = Store::new(&section.data_dir, &section.name);
+        let store = Store::of(&loaded.config.machine);
         let lease = Lease::take(&store, verb)?;
         let transport = ports::open(&loaded.config, &overrides, purpose, args.clock_speed)?;
         let transport = recorded(transport, args, &loaded)?;

@@ -50,6 +50,8 @@ pub struct ActuatorConfig {
 pub struct PlatformZeroConfig {
     pub search_speed_mm_per_s: f64,
     pub time_limit_s: f64,
+    #[serde(default)]
+    pub lone_homing: bool,
 }
 
 /// How the screws' errors are estimated.

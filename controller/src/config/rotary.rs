@@ -1,5 +1,7 @@
 //! The part of a configuration that is about rotary axes. Each key's suffix is its unit.
 
+use std::sync::OnceLock;
+
 use compensator::rotary::{self, Criterion, Design, PlanError};
 use serde::Deserialize;
 
@@ -128,6 +130,10 @@ pub struct RotaryCalibrateConfig {
     pub reading_noise_arcsec: f64,
     pub amplification_limit: f64,
     pub closure_limit_arcsec: f64,
+    /// Planned once, when the file is judged: of thousands of lines it takes longer than a drive
+    /// waits for a heartbeat.
+    #[serde(skip)]
+    planned: OnceLock<Design>,
 }
 
 impl RotaryCalibrateConfig {
@@ -136,6 +142,14 @@ impl RotaryCalibrateConfig {
     /// # Errors
     /// When there are none that part table and plate within the limit.
     pub fn design(&self) -> Result<Design, PlanError> {
+        if let Some(planned) = self.planned.get() {
+            return Ok(planned.clone());
+        }
+        let planned = self.design_anew()?;
+        Ok(self.planned.get_or_init(|| planned).clone())
+    }
+
+    fn design_anew(&self) -> Result<Design, PlanError> {
         let lines = self.lines as usize;
         let given = self.offsets.as_ref();
         let offsets = match given {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::CalibrationRecord;
 use super::{SCHEMA_VERSION, StoreError, io_error, write_new_or_replace};
+use crate::config::MachineSection;
 
 /// Which calibration an axis uses, and which it used before (oldest first).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +33,11 @@ impl Store {
         Self {
             root: data_dir.join(machine),
         }
+    }
+
+    /// The store of the machine that a configuration describes.
+    pub fn of(machine: &MachineSection) -> Self {
+        Self::new(&machine.data_dir, &machine.name)
     }
 
     /// The machine's folder.

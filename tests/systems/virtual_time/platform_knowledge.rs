@@ -206,6 +206,7 @@ fn with_four(text: String, limit_um: Option<f64>) -> String {
     });
     text.replace("# The job", FOURTH_AXIS)
         .replace("[platform.zero]", FOURTH_ACTUATOR)
+        .replace("[platform.zero]", "[platform.zero]\nlone_homing = true")
         .replace("exposures = 4", &format!("{limit}exposures = 4"))
 }
 
@@ -261,6 +262,15 @@ fn how_far_four_screws_may_contradict_each_other_must_be_said_and_three_cannot()
     );
     let unneeded = judged(&unneeded);
     assert!(unneeded.contains("three screws cannot"), "{unneeded}");
+    let strained = with_four(text.clone(), Some(5.0)).replace("lone_homing = true", "");
+    let strained = judged(&strained);
+    assert!(
+        strained.contains("homes while the others stand"),
+        "{strained}"
+    );
+    let alone = text.replace("[platform.zero]", "[platform.zero]\nlone_homing = true");
+    let alone = judged(&alone);
+    assert!(alone.contains("never strain"), "{alone}");
     let impossible = judged(&with_four(text, Some(-1.0)));
     assert!(impossible.contains("-1 is impossible"), "{impossible}");
 }

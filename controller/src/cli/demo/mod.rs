@@ -117,8 +117,7 @@ struct Shown {
 pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let started = Instant::now();
     let loaded = load(args)?;
-    let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
+    let store = Store::of(&loaded.config.machine);
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = args.machine.files();
     let emulated = EmulatedOnPtys::start(description, args.seed, args.speed)?;

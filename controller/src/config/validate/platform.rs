@@ -85,6 +85,26 @@ fn check_inconsistency(judge: &mut Judge<'_>, platform: &PlatformConfig) {
         ),
         (None, _) => {}
     }
+    check_lone_homing(judge, platform);
+}
+
+/// A screw that looks for its index pushes the platform while the others stand. Nobody can tell
+/// by how far four contradict each other then, since none has a coordinate yet.
+fn check_lone_homing(judge: &mut Judge<'_>, platform: &PlatformConfig) {
+    let key = "zero.lone_homing";
+    match (platform.zero.lone_homing, platform.actuator.len()) {
+        (false, 4..) => judge.say(
+            "",
+            "each of the four screws homes while the others stand, and nothing says that \
+             the platform bears it",
+            format!(
+                "give `{key} = true` if couplings or guides yield over the whole way to the \
+                 index; otherwise build the platform with three screws"
+            ),
+        ),
+        (true, ..4) => judge.say(key, "three screws never strain a platform", "leave it out"),
+        _ => {}
+    }
 }
 
 fn check_references(

@@ -82,12 +82,15 @@ impl Machine {
     }
 
     /// One screw moves while the others stand: three bear that, four contradict each other.
+    /// Refused before the first of them moves, not in the middle of its run.
     fn check_single_screws(&self, plan: &PlatformCalibrateConfig) -> Result<(), Failure> {
         let count = self.platform_state()?.screws.len();
+        let stops = round(&targets(plan), plan);
         for at in 0..count {
-            let mut strokes = vec![Metres::ZERO; count];
-            strokes[at] = Metres::from_mm(plan.last_mm);
-            self.check_agreement(Pose::default(), &strokes, "; nothing was moved")?;
+            for (stroke, _) in &stops {
+                let strokes = alone(at, *stroke, count);
+                self.check_agreement(Pose::default(), &strokes, "; nothing was moved")?;
+            }
         }
         Ok(())
     }
@@ -105,9 +108,7 @@ impl Machine {
         for (at, strokes) in all.iter_mut().enumerate() {
             for run in 1..=plan.runs {
                 for (stroke, approach) in round(&targets, plan) {
-                    let mut wanted = vec![Metres::ZERO; count];
-                    wanted[at] = stroke;
-                    self.go_to_strokes(&wanted, Correction::Off)?;
+                    self.go_to_strokes(&alone(at, stroke, count), Correction::Off)?;
                     let Some(approach) = approach else { continue };
                     strokes.push(self.measure_stroke(at, run, approach, stroke, journal)?);
                     done += 1;
@@ -319,6 +320,13 @@ fn targets(plan: &PlatformCalibrateConfig) -> Vec<Metres> {
     (0..=steps)
         .map(|step| Metres::from_mm(plan.first_mm + f64::from(step) * plan.step_mm))
         .collect()
+}
+
+/// One of `count` screws at `stroke`, the others at zero.
+fn alone(at: usize, stroke: Metres, count: usize) -> Vec<Metres> {
+    let mut strokes = vec![Metres::ZERO; count];
+    strokes[at] = stroke;
+    strokes
 }
 
 /// The stops of one run: below the first target, up through all, beyond the last, and back.

@@ -85,22 +85,34 @@ impl Machine {
             path.map_err(PlatformFailure::from)?;
         }
         let planned = self.plan(&strokes, correction)?;
-        let after: Vec<_> = planned.iter().map(|it| it.after).collect();
-        self.check_planned(target, &after)?;
-        let moved = self.go(&planned)?;
-        self.check_standing(target)?;
+        let moved = self.go_agreed(&planned, target)?;
         self.platform_state_mut()?.pose = Some(target);
         Ok(PoseMoved { target, ..moved })
     }
 
     /// Brings each screw to its stroke, all at once.
+    ///
+    /// # Errors
+    /// Before anything moves: a screw's reach or calibration, four screws that would contradict
+    /// each other there. After it: the same by their encoders. While moving: whatever stops the
+    /// machine.
     pub(super) fn go_to_strokes(
         &mut self,
         strokes: &[Metres],
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
+        let near = self.platform_state()?.pose.unwrap_or_default();
         let planned = self.plan(strokes, correction)?;
-        self.go(&planned)
+        self.go_agreed(&planned, near)
+    }
+
+    /// Moves all screws, which must agree about a pose near `near`, there and then.
+    fn go_agreed(&mut self, planned: &[Planned], near: Pose) -> Result<PoseMoved, Failure> {
+        let after: Vec<_> = planned.iter().map(|it| it.after).collect();
+        self.check_planned(near, &after)?;
+        let moved = self.go(planned)?;
+        self.check_standing(near)?;
+        Ok(moved)
     }
 
     fn go(&mut self, planned: &[Planned]) -> Result<PoseMoved, Failure> {

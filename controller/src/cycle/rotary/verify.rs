@@ -12,7 +12,7 @@
 
 use std::path::PathBuf;
 
-use compensator::rotary::PeriodicCompensation;
+use compensator::rotary::{self, PeriodicCompensation};
 use compensator::uncertainty::rms;
 use core::f64::consts::TAU;
 use units::Radians;
@@ -286,23 +286,22 @@ fn centred(values: Vec<Option<Radians>>) -> RotaryFigures {
 fn lies_there(axis: &str, known: &TableInUse, placed: &Placed) -> Result<(), Failure> {
     let angles = angles(placed, Some(&known.compensation));
     let (lines, whole) = (angles.len(), placed.offset.floor() as usize);
-    // Every line is called so many lines too high.
-    let residual = |turned: usize| centred(deviations(&angles, whole + turned, Some(known))).rms;
-    let residuals: Vec<Radians> = (0..lines).map(residual).collect();
-    let each = residuals.iter().enumerate();
-    let best = each.min_by(|a, b| a.1.value().total_cmp(&b.1.value()));
-    let Some((best, fits)) = best else {
-        return Ok(());
-    };
-    if best == 0 || *fits * BETTER >= residuals[0] {
+    let plate = known.content.plate_error_rad.iter().copied();
+    let read = angles.iter().map(|it| it.map(Radians::value));
+    // Line n lies at position n + shift.
+    let shift = rotary::shift_between(plate, read);
+    let residual = |whole: usize| centred(deviations(&angles, whole, Some(known))).rms;
+    let (fits, expected) = (residual(shift), residual(whole));
+    if shift == whole % lines || fits * BETTER >= expected {
         return Ok(());
     }
+    let turned = (shift + lines - whole % lines) % lines;
     Err(RotaryFailure::LiesElsewhere {
         axis: axis.to_owned(),
         expected: placed.offset,
-        seen: (placed.offset + best as f64) % lines as f64,
-        residual: *fits,
-        residual_expected: residuals[0],
+        seen: (placed.offset + turned as f64) % lines as f64,
+        residual: fits,
+        residual_expected: expected,
     }
     .into())
 }
