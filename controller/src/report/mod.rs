@@ -45,6 +45,7 @@ pub struct Page<'a> {
 const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;\
 color:#1c2430;background:#fff}h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2.2rem}\
+h3{font-size:1rem}\
 table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem;text-align:right;\
 border-bottom:1px solid #dde3ea}th{color:#566}td:first-child,th:first-child{text-align:left}\
 svg{width:100%;height:auto}.note{color:#566}figure{margin:0}";

@@ -256,7 +256,7 @@ fn verification(judged: &JudgedEntry, journal: &ReadJournal) -> String {
         let labels = ("table angle (°)", "deviation (″)");
         let _ = write!(
             html,
-            "<figure>{}</figure>",
+            "<h3>Deviation {name}</h3><figure>{}</figure>",
             chart(name, labels, &dots, limit)
         );
     }
