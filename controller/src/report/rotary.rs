@@ -15,6 +15,15 @@ const NAMED: usize = 20;
 
 /// The page of `journal`, with the calibrations that were made from it.
 pub fn render(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -> String {
+    render_with(journal, calibrations, &[])
+}
+
+/// The same, with verifications that were made later, each under its name.
+pub fn render_with(
+    journal: &ReadJournal,
+    calibrations: &[(String, CalibrationRecord)],
+    later: &[(&str, &ReadJournal)],
+) -> String {
     let header = &journal.header;
     let mut html = facts(&facts_of_run(journal, calibrations));
     html += &placements(journal);
@@ -31,8 +40,11 @@ pub fn render(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)
                 .to_owned(),
         };
     }
-    if let Some(judged) = &journal.judged {
-        html += &verification(judged, journal);
+    let own = core::iter::once(("", journal));
+    for (name, journal) in own.chain(later.iter().copied()) {
+        if let Some(judged) = &journal.judged {
+            html += &verification(name, judged, journal);
+        }
     }
     let note = "deviation = actual − target, table error = reading − true angle: one is the negative \
                 of the other. Angles are those of the table.";
@@ -220,11 +232,11 @@ fn residuals(evaluated: &Evaluated) -> String {
     )
 }
 
-fn verification(judged: &JudgedEntry, journal: &ReadJournal) -> String {
+fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal) -> String {
     let plan = journal.plate_plan.as_ref();
     let offset = plan.and_then(|it| it.offsets.first()).copied();
     let offset = offset.unwrap_or(0.0);
-    let mut html = String::from("<h2>As found and as left</h2>");
+    let mut html = format!("<h2>As found and as left{}</h2>", escape(name));
     if !judged.plate_known {
         html += "<p>No calibration knows the plate: its errors are in these deviations.</p>";
     }

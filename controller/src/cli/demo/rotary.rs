@@ -1,13 +1,17 @@
 //! The rotary table: index mark, a plate in planned placements, one table error, moves.
 
+use std::path::PathBuf;
+
 use compensator::rotary::Design;
 use serde_json::json;
-use truestage::Failure;
 use truestage::cycle::rotary::{
     Operator, PlateTask, RotaryCalibrated, RotaryMoved, RotaryVerified,
 };
 use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
+use truestage::report::rotary as page;
+use truestage::store::read_journal;
+use truestage::{Failure, Store};
 use units::Radians;
 
 use super::{DemoArgs, Shown, Stand, power_cycle, took};
@@ -52,6 +56,7 @@ impl Operator for Hand<'_> {
 
 pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
     let story = tell(stand, output)?;
+    let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();
     let bad = [&story.left, &story.after];
     let bad = bad.into_iter().find_map(|it| out_of_tolerance(AXIS, it));
@@ -67,6 +72,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
             String::new(),
             moved_text(AXIS, &story.moved, id),
             String::new(),
+            format!("report       {}", report.display()),
             took(wall, args.speed),
         ]
         .join("\n"),
@@ -76,6 +82,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
             "verified": verified_value(&story.left),
             "verified_after_power_cycle": verified_value(&story.after),
             "move": moved_value(AXIS, &story.moved, id),
+            "report": report,
             "wall_s": wall.as_secs_f64(),
         }),
         bad,
@@ -122,6 +129,22 @@ fn tell(stand: &mut Stand, output: Output) -> Result<Story, Failure> {
             moved,
         })
     })
+}
+
+/// One page: the calibration, and both verifications under it.
+fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
+    let measured = read_journal(&story.calibrated.journal)?;
+    let (left, after) = (
+        read_journal(&story.left.journal)?,
+        read_journal(&story.after.journal)?,
+    );
+    let source = story.calibrated.journal.file_name().unwrap_or_default();
+    let calibrations = store.made_from(&source.to_string_lossy())?;
+    let later = [("", &left), (", after a power cycle", &after)];
+    let stamp = left.header.started.replace([':', '-'], "");
+    let path = store.reports().join(format!("{stamp}-demo.html"));
+    store.write_report(&path, &page::render_with(&measured, &calibrations, &later))?;
+    Ok(path)
 }
 
 fn planned(machine: &truestage::Machine, output: Output) -> Result<Design, Failure> {
