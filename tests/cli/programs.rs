@@ -16,6 +16,11 @@ use tests::{INTERFACE, LINEAR, Rig, Shipped, rigs};
 /// Machines share the processor, and on SocketCAN the interface: one after the other.
 static ONE_MACHINE: Mutex<()> = Mutex::new(());
 
+/// Waits for its turn on the processor.
+pub(crate) fn one_machine() -> MutexGuard<'static, ()> {
+    ONE_MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The rigs of this run on which other processes find a machine.
 pub(crate) fn live_rigs() -> impl Iterator<Item = Rig> {
     rigs().into_iter().filter(|rig| *rig != Rig::InProcess)
@@ -148,7 +153,7 @@ impl Bench {
     /// The same with any machine that ships, its emulation after `change`.
     pub(crate) fn of(rig: Rig, shipped: Shipped, change: impl Fn(String) -> String) -> Self {
         let emulated = change(shipped.emulated.to_owned());
-        let turn = ONE_MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = one_machine();
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         fs::write(folder.path().join("emulated.toml"), &emulated).expect("a file can be written");
         let mut command = Command::new(program("mock-bus"));
