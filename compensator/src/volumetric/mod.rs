@@ -19,6 +19,8 @@
 //! Absent: rotary axes, elastic and dynamic deformation, storage.
 
 pub mod function;
+pub mod grid;
+pub mod identify;
 mod inverse;
 pub mod model;
 pub mod online;
