@@ -18,7 +18,7 @@ const LAST_STEP: f64 = 1e-8;
 
 /// Finds the interval of strictly increasing `breaks` that a value lies in.
 #[derive(Clone, Debug)]
-pub(crate) struct Grid {
+struct Grid {
     low: f64,
     per_width: f64,
     /// For each bucket edge the interval it lies in; one more than there are buckets.
@@ -27,7 +27,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    pub(crate) fn new(breaks: Vec<f64>) -> Self {
+    fn new(breaks: Vec<f64>) -> Self {
         let pieces = breaks.len() - 1;
         let low = breaks[0];
         let span = breaks[pieces] - low;
@@ -58,7 +58,7 @@ impl Grid {
 
     /// The i with breaks[i] < value <= breaks[i + 1]; the first or last piece outside.
     #[inline]
-    pub(crate) fn find(&self, value: f64) -> usize {
+    fn find(&self, value: f64) -> usize {
         // The cast saturates: below the grid it is bucket 0.
         let bucket = ((value - self.low) * self.per_width) as usize;
         let bucket = bucket.min(self.first.len() - 2);

@@ -27,7 +27,7 @@ mod robust;
 use units::{Approach, Metres};
 
 pub use crate::interpolation::Interpolation;
-pub(crate) use curve::{Curve, Grid};
+pub(crate) use curve::Curve;
 
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};

@@ -10,7 +10,7 @@ use core::marker::PhantomData;
 
 use units::{Metres, Quantity};
 
-use crate::error_table::Grid;
+use super::find::Finder;
 use crate::interpolation::{Segment, monotone_slopes, spline_slopes};
 
 /// How the values between two nodes are found.
@@ -58,7 +58,7 @@ pub enum FunctionError {
 /// Polynomial pieces over increasing nodes, held beyond them. Plain numbers inside.
 #[derive(Clone, Debug)]
 pub(crate) struct Pieces {
-    grid: Grid,
+    finder: Finder,
     segments: Vec<Segment>,
     first: f64,
     last: f64,
@@ -83,7 +83,7 @@ impl Pieces {
         };
         Ok(Self {
             segments: (0..nodes.len() - 1).map(piece).collect(),
-            grid: Grid::new(nodes.to_vec()),
+            finder: Finder::new(nodes.to_vec()),
             first: nodes[0],
             last: nodes[nodes.len() - 1],
         })
@@ -91,8 +91,8 @@ impl Pieces {
 
     #[inline]
     pub(crate) fn at(&self, position: f64) -> f64 {
-        let inside = position.max(self.first).min(self.last);
-        let piece = &self.segments[self.grid.find(inside)];
+        let (inside, at) = self.finder.find(position);
+        let piece = &self.segments[at];
         piece.value(inside - piece.start)
     }
 
@@ -173,7 +173,7 @@ impl<Q: Quantity> Function<Q> {
     /// When there is another number of them than of nodes, or one is negative or not finite.
     pub fn with_uncertainties(mut self, uncertainties: &[Q]) -> Result<Self, FunctionError> {
         let values: Vec<f64> = uncertainties.iter().map(|it| it.value()).collect();
-        if let Some(index) = values.iter().position(|u| !(*u >= 0.0)) {
+        if let Some(index) = values.iter().position(|u| u.is_nan() || *u < 0.0) {
             return Err(FunctionError::NotFinite { index });
         }
         let nodes: Vec<f64> = self.nodes().map(Metres::value).collect();

@@ -6,10 +6,11 @@
 
 use super::point::V3;
 
-/// The iteration ends when what is left is proven smaller than this: a picometre.
-const EXACT_M: f64 = 1e-12;
+/// The iteration ends when what is left is proven smaller than this: ten picometres, a hundredth
+/// of the finest counts of an encoder.
+const EXACT_M: f64 = 1e-11;
 
-/// With L ≤ 0.5, steps halve at least: enough from a millimetre to a picometre.
+/// With L ≤ 0.5, steps halve at least: more than enough from a millimetre.
 const ROUNDS_MAX: usize = 64;
 
 /// Above this the iteration would be slow and the model is hardly right.
@@ -32,7 +33,9 @@ pub(crate) fn deviation_at_target(target: V3, lipschitz: f64, deviation: impl Fn
             .max((next[1] - seen[1]).abs())
             .max((next[2] - seen[2]).abs());
         seen = next;
-        if !(step * lipschitz > EXACT_M * (1.0 - lipschitz)) {
+        // What is no number ends it too.
+        let is_open = step * lipschitz > EXACT_M * (1.0 - lipschitz);
+        if !is_open {
             break;
         }
     }

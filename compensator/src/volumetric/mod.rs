@@ -18,6 +18,7 @@
 //!
 //! Absent: rotary axes, elastic and dynamic deformation, storage.
 
+mod find;
 pub mod function;
 pub mod grid;
 pub mod identify;

@@ -214,6 +214,9 @@ pub(crate) fn check_size(deviation: V3, limit: f64) -> Result<(), super::NoCorre
 /// Metres or radians along x, y, z.
 pub(crate) type V3 = [f64; 3];
 
+/// The same with a lane that is not used: two registers instead of one and a half.
+pub(crate) type V4 = [f64; 4];
+
 #[inline]
 pub(crate) fn add(a: V3, b: V3) -> V3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]

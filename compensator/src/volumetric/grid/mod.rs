@@ -192,7 +192,7 @@ impl GridMap {
     }
 
     /// The command that brings the tool to `target`: command + deviation(command) = target, to
-    /// a picometre.
+    /// ten picometres.
     ///
     /// # Errors
     /// When the target is outside the map or the deviation exceeds its limit.
@@ -265,7 +265,7 @@ fn check(nodes: &[Vec<f64>; 3], deviations: &[Point], limits: &Limits) -> Result
         let components = deviation.array();
         if let Some(seen) = components
             .into_iter()
-            .find(|it| !(it.abs() <= size.value()))
+            .find(|it| it.is_nan() || it.abs() > size.value())
         {
             let line = index / z.len();
             let at = [x[line / y.len()], y[line % y.len()], z[index % z.len()]];
@@ -288,7 +288,7 @@ fn check_slopes(slopes: [V3; 3], limit: f64) -> Result<f64, GridError> {
         .into_iter()
         .max_by(|a, b| most(a).total_cmp(&most(b)));
     let axis = steepest.expect("there are three");
-    if !(seen < 1.0) {
+    if seen.is_nan() || seen >= 1.0 {
         return Err(GridError::NotContracting { seen, axis });
     }
     if seen > limit {

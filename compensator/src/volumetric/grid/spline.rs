@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error_table::Grid;
 use crate::interpolation::{Segment, spline_slopes};
+use crate::volumetric::find::Finder;
 use crate::volumetric::point::V3;
 
 /// A cubic by its powers of the distance from the start of a span.
@@ -12,9 +12,7 @@ type Cubic = [f64; 4];
 /// The B-splines along one axis.
 #[derive(Clone, Debug)]
 struct Line {
-    grid: Grid,
-    first: f64,
-    last: f64,
+    finder: Finder,
     spans: Vec<Span>,
     count: usize,
 }
@@ -49,9 +47,7 @@ impl Line {
             spans: (0..breaks.len() - 1)
                 .map(|at| span(&knots, at + 3))
                 .collect(),
-            grid: Grid::new(breaks),
-            first,
-            last,
+            finder: Finder::new(breaks),
             count,
         };
         (line, knots)
@@ -60,8 +56,7 @@ impl Line {
     /// The number of the first B-spline that is not zero at a position, and the four values.
     #[inline(always)]
     fn weights(&self, position: f64) -> (usize, [f64; 4]) {
-        let inside = position.max(self.first).min(self.last);
-        let at = self.grid.find(inside);
+        let (inside, at) = self.finder.find(position);
         let span = &self.spans[at];
         let t = inside - span.start;
         let [a, b, c, d] = &span.powers;
@@ -178,29 +173,27 @@ impl Splines {
         let (k, of_z) = self.lines[2].weights(position[2]);
         let [along_x, along_y] = self.stride;
         let corner = i * along_x + j * along_y + k;
-        let mut result = [0.0; 3];
-        for (result, coefficients) in result.iter_mut().zip(&self.coefficients) {
-            let mut plane = [0.0; 4];
-            for (a, weight_x) in of_x.into_iter().enumerate() {
-                let begin = corner + a * along_x;
-                let rows = &coefficients[begin..begin + 3 * along_y + 4];
-                let mut line = [0.0; 4];
-                for (b, weight_y) in of_y.into_iter().enumerate() {
-                    let row: &[f64; 4] = rows[b * along_y..b * along_y + 4]
-                        .try_into()
-                        .expect("four of a row");
+        // Row by row along z, all three components: six registers of sums that do not wait for
+        // each other.
+        let mut sums = [[0.0; 4]; 3];
+        for (a, weight_x) in of_x.into_iter().enumerate() {
+            let begin = corner + a * along_x;
+            let end = begin + 3 * along_y + 4;
+            let [p, q, r] = &self.coefficients;
+            let planes = [&p[begin..end], &q[begin..end], &r[begin..end]];
+            for (b, weight_y) in of_y.into_iter().enumerate() {
+                let weight = weight_x * weight_y;
+                for (sum, plane) in sums.iter_mut().zip(planes) {
+                    let row = &plane[b * along_y..b * along_y + 4];
                     for z in 0..4 {
-                        line[z] += weight_y * row[z];
+                        sum[z] += weight * row[z];
                     }
                 }
-                for z in 0..4 {
-                    plane[z] += weight_x * line[z];
-                }
             }
-            *result = (plane[0] * of_z[0] + plane[1] * of_z[1])
-                + (plane[2] * of_z[2] + plane[3] * of_z[3]);
         }
-        result
+        sums.map(|sum| {
+            (sum[0] * of_z[0] + sum[1] * of_z[1]) + (sum[2] * of_z[2] + sum[3] * of_z[3])
+        })
     }
 }
 

@@ -210,7 +210,7 @@ proptest! {
             let target = Point::of([from.0, from.1, from.2]);
             let command = map.command(target).unwrap();
             let back = command + map.deviation(command).unwrap() - target;
-            prop_assert!(back.distance().value() < 2e-12);
+            prop_assert!(back.distance().value() < 1.1e-11);
             let to = Point::of([
                 (from.0 + near * way.0).clamp(0.0, 0.6),
                 (from.1 + near * way.1).clamp(-0.2, 0.3),

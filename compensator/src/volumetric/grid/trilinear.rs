@@ -1,14 +1,12 @@
 //! A trilinear map: eight nodes for a call.
 
-use crate::error_table::Grid;
+use crate::volumetric::find::Finder;
 use crate::volumetric::point::V3;
 
 /// Positions along one axis.
 #[derive(Clone, Debug)]
 struct Line {
-    grid: Grid,
-    first: f64,
-    last: f64,
+    finder: Finder,
     /// Start of each interval and one over its width.
     intervals: Vec<[f64; 2]>,
 }
@@ -17,9 +15,7 @@ impl Line {
     fn new(nodes: &[f64]) -> Self {
         let interval = |ends: &[f64]| [ends[0], 1.0 / (ends[1] - ends[0])];
         Self {
-            grid: Grid::new(nodes.to_vec()),
-            first: nodes[0],
-            last: nodes[nodes.len() - 1],
+            finder: Finder::new(nodes.to_vec()),
             intervals: nodes.windows(2).map(interval).collect(),
         }
     }
@@ -27,8 +23,7 @@ impl Line {
     /// The interval of a position, and how far through it that is, 0 to 1.
     #[inline(always)]
     fn find(&self, position: f64) -> (usize, f64) {
-        let inside = position.max(self.first).min(self.last);
-        let at = self.grid.find(inside);
+        let (inside, at) = self.finder.find(position);
         let [start, per_width] = self.intervals[at];
         (at, (inside - start) * per_width)
     }

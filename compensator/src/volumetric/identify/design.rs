@@ -89,8 +89,8 @@ impl Design {
             }
             Reading::Angle { deviation, u, .. } => deviation.is_finite() && u.value() > 0.0,
         };
-        let numbers = it.at.array().into_iter().chain(it.tool.array());
-        if !(reading && numbers.fold(true, |sound, it| sound && it.is_finite())) {
+        let mut numbers = it.at.array().into_iter().chain(it.tool.array());
+        if !(reading && numbers.all(f64::is_finite)) {
             return Err(IdentifyError::NotUsable { index });
         }
         for block in &self.blocks {

@@ -140,8 +140,8 @@ pub(super) fn axis_bounds(
             on_workpiece: machine.chain.carries_workpiece(axis),
             ..AxisBound::default()
         };
-        for k in 0..3 {
-            let mut per_metre = lean[i][k].abs();
+        for (k, lean) in lean[i].iter().enumerate() {
+            let mut per_metre = lean.abs();
             let mut constant = machine.displacement_max.value();
             if k == i {
                 per_metre += thermal.expansion[i];
@@ -178,7 +178,7 @@ pub(super) fn check_functions(
                 (ErrorName::About(axis, k), about),
             ] {
                 let seen = Metres(seen);
-                if !(seen <= limit) {
+                if seen.value().is_nan() || seen > limit {
                     return Err(ModelError::TooLarge {
                         function,
                         seen,

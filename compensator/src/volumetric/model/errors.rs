@@ -115,10 +115,15 @@ impl ThermalSums {
             if magnitudes { it.abs() } else { it }
         };
         let growth = channel.growth.array();
-        for k in 0..3 {
-            self.expansion[k] += effect(channel.expansion[k]);
-            self.growth[k] += effect(growth[k]);
-            self.squareness[k] += effect(channel.squareness[k].value());
+        let squareness = channel.squareness.map(Radians::value);
+        for (sums, coefficients) in [
+            (&mut self.expansion, channel.expansion),
+            (&mut self.growth, growth),
+            (&mut self.squareness, squareness),
+        ] {
+            for (sum, coefficient) in sums.iter_mut().zip(coefficients) {
+                *sum += effect(coefficient);
+            }
         }
     }
 }

@@ -48,7 +48,7 @@ pub use refusal::{ConditionsError, ModelError};
 
 use super::inverse::deviation_at_target;
 use super::online::MovingState;
-use super::point::{V3, add, check_size, cross};
+use super::point::{V3, V4, add, check_size, cross};
 use super::{Axis, NoCorrection, Point, Volume};
 use crate::error_table::Limits;
 use bound::Bounds;
@@ -80,13 +80,22 @@ pub struct Machine {
 /// Tool, temperatures and detectors of one moment, found to be what the model was proven for.
 #[derive(Clone, Copy, Debug)]
 pub struct Conditions {
-    tool: V3,
+    tool: V4,
     /// By axis: displacements per metre of its position, and constant ones.
-    lean: [V3; 3],
-    shift: [V3; 3],
+    lean: [V4; 3],
+    shift: [V4; 3],
     /// By axis: the roll on top of the table's.
-    turn: [V3; 3],
-    growth: V3,
+    turn: [V4; 3],
+    growth: V4,
+}
+
+/// One axis in its place of the chain.
+#[derive(Clone, Debug)]
+struct Stage {
+    axis: usize,
+    unit: V4,
+    on_workpiece: bool,
+    errors: PackedAxis,
 }
 
 /// A machine's errors made ready to be applied: no allocation and a constant time per call.
@@ -94,9 +103,8 @@ pub struct Conditions {
 pub struct VolumetricModel {
     machine: Machine,
     limits: Limits,
-    axes: [PackedAxis; 3],
-    /// From the tool to the workpiece: index of the axis, and whether it carries the workpiece.
-    order: [(usize, bool); 3],
+    /// From the tool to the workpiece.
+    stages: Vec<Stage>,
     /// Commands that targets within the volume can have.
     commands: Volume,
     bounds: Bounds,
@@ -123,7 +131,7 @@ impl VolumetricModel {
         let bounds = bound::bounds(&each, order, [machine.tool_max.value(); 3]);
         check_functions(&axes, &bounds, limits.size)?;
         let (seen, function, limit) = (bounds.lipschitz, bounds.steepest, limits.slope);
-        if !(seen < 1.0) {
+        if seen.is_nan() || seen >= 1.0 {
             return Err(ModelError::NotContracting { seen, function });
         }
         if seen > limit {
@@ -133,12 +141,17 @@ impl VolumetricModel {
                 function,
             });
         }
-        let order = order.map(|it| (it.index(), machine.chain.carries_workpiece(it)));
+        let stage = |it: Axis| Stage {
+            axis: it.index(),
+            unit: core::array::from_fn(|k| f64::from(u8::from(k == it.index()))),
+            on_workpiece: machine.chain.carries_workpiece(it),
+            errors: axes[it.index()].clone(),
+        };
+        let stages = order.into_iter().map(stage).collect();
         Ok(Self {
             machine,
             limits,
-            axes,
-            order,
+            stages,
             commands,
             bounds,
         })
@@ -170,11 +183,11 @@ impl VolumetricModel {
             turn[k][k] = live.roll[k].value();
         }
         Ok(Conditions {
-            tool: tool.array(),
-            lean,
-            shift,
-            turn,
-            growth: sums.growth,
+            tool: wide(tool.array()),
+            lean: lean.map(wide),
+            shift: shift.map(wide),
+            turn: turn.map(wide),
+            growth: wide(sums.growth),
         })
     }
 
@@ -192,7 +205,7 @@ impl VolumetricModel {
     }
 
     /// The command that brings the tool to `target`: command + deviation(command) = target, to
-    /// a picometre.
+    /// ten picometres.
     ///
     /// # Errors
     /// When the target is outside the volume or the deviation exceeds its limit.
@@ -287,33 +300,34 @@ impl VolumetricModel {
     #[inline(always)]
     fn evaluate(&self, command: V3, now: &Conditions) -> V3 {
         let mut lever = now.tool;
-        let mut off = [0.0; 3];
-        for (i, on_workpiece) in self.order {
+        let mut off = [0.0; 4];
+        for stage in &self.stages {
+            let i = stage.axis;
             let position = command[i];
-            let [ax, ay, az, bx, by, bz] = self.axes[i].at(position);
+            let (along, about) = stage.errors.at(position);
             let (lean, shift, turn) = (&now.lean[i], &now.shift[i], &now.turn[i]);
-            let moved = [
-                ax + (lean[0] * position + shift[0]),
-                ay + (lean[1] * position + shift[1]),
-                az + (lean[2] * position + shift[2]),
-            ];
-            let tilt = [bx + turn[0], by + turn[1], bz + turn[2]];
-            if on_workpiece {
-                lever[i] += position;
-                off = add(off, moved);
-                off = add(off, turned(tilt, add(lever, off)));
+            let moved = core::array::from_fn(|k| along[k] + (lean[k] * position + shift[k]));
+            let tilt = core::array::from_fn(|k| about[k] + turn[k]);
+            // A product instead of one lane: what is stored by lane cannot be read at once.
+            let further = core::array::from_fn(|k| lever[k] + stage.unit[k] * position);
+            if stage.on_workpiece {
+                lever = further;
+                off = sum(off, moved);
+                off = sum(off, turned(tilt, sum(lever, off)));
             } else {
-                off = add(off, turned(tilt, add(lever, off)));
-                off = add(off, moved);
-                lever[i] += position;
+                off = sum(off, turned(tilt, sum(lever, off)));
+                off = sum(off, moved);
+                lever = further;
             }
         }
-        add(off, now.growth)
+        let [x, y, z, _] = sum(off, now.growth);
+        [x, y, z]
     }
 
     /// What a tilt of `axis` acts on, without the errors.
     fn lever(&self, axis: Axis, command: Point, now: &Conditions) -> V3 {
-        let mut lever = now.tool;
+        let [x, y, z, _] = now.tool;
+        let mut lever = [x, y, z];
         for other in Axis::ALL {
             if self.machine.chain.is_on_lever(axis, other) {
                 lever[other.index()] += command.along(other).value();
@@ -326,7 +340,7 @@ impl VolumetricModel {
         let limit = self.machine.tool_max;
         for axis in Axis::ALL {
             let seen = tool.along(axis);
-            if !(seen.abs() <= limit) {
+            if beyond(seen, limit) {
                 return Err(ConditionsError::Tool { axis, seen, limit });
             }
         }
@@ -337,12 +351,12 @@ impl VolumetricModel {
         let (limit, roll_max) = (self.machine.displacement_max, self.machine.roll_max);
         for axis in Axis::ALL {
             for seen in live.sideways[axis.index()] {
-                if !(seen.abs() <= limit) {
+                if beyond(seen, limit) {
                     return Err(ConditionsError::Displacement { axis, seen, limit });
                 }
             }
             let (seen, limit) = (live.roll[axis.index()], roll_max);
-            if !(seen.abs() <= limit) {
+            if beyond(seen, limit) {
                 return Err(ConditionsError::Roll { axis, seen, limit });
             }
         }
@@ -372,16 +386,33 @@ impl VolumetricModel {
     }
 }
 
-/// What a rotation moves a place by, the rotation vector to second order.
+/// What a rotation moves a place by, the rotation vector to second order: ε × (p + ε × p / 2).
 #[inline(always)]
-fn turned(tilt: V3, place: V3) -> V3 {
+fn turned(tilt: V4, place: V4) -> V4 {
+    let cross = |a: V4, b: V4| -> V4 {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+            0.0,
+        ]
+    };
     let once = cross(tilt, place);
-    let twice = cross(tilt, once);
-    [
-        once[0] + 0.5 * twice[0],
-        once[1] + 0.5 * twice[1],
-        once[2] + 0.5 * twice[2],
-    ]
+    cross(tilt, core::array::from_fn(|k| place[k] + 0.5 * once[k]))
+}
+
+#[inline(always)]
+fn sum(a: V4, b: V4) -> V4 {
+    core::array::from_fn(|k| a[k] + b[k])
+}
+
+fn wide([x, y, z]: V3) -> V4 {
+    [x, y, z, 0.0]
+}
+
+/// Whether a magnitude is larger than its limit, or no number.
+fn beyond<Q: Quantity>(seen: Q, limit: Q) -> bool {
+    seen.value().is_nan() || seen.abs() > limit
 }
 
 fn lean_effect(lean: [V3; 3], command: Point) -> V3 {

@@ -1,28 +1,34 @@
 //! The six functions of one axis in one place: one search and one run of six lanes per call.
 
-use crate::error_table::Grid;
 use crate::interpolation::Segment;
+use crate::volumetric::find::Finder;
 use crate::volumetric::function::Pieces;
+use crate::volumetric::point::V4;
 
 /// Nodes nearer together than this are one: no error function changes within a nanometre.
 const SAME_NODE_M: f64 = 1e-9;
 
-/// Six cubics over one interval, by power and lane: displacements along x, y, z, tilts about
-/// them.
+/// Six cubics over one interval by power: displacements along x, y, z and a lane that is not
+/// used, tilts about them and another. The first of the lanes not used says where it starts.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Six {
-    start: f64,
-    powers: [[f64; 6]; 4],
+    along: [V4; 4],
+    about: [V4; 4],
+}
+
+/// Largest magnitudes and slopes of six functions over one interval.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extent {
+    largest: [f64; 6],
+    steepest: [f64; 6],
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct PackedAxis {
-    grid: Grid,
+    finder: Finder,
     pieces: Vec<Six>,
-    low: f64,
-    high: f64,
-    /// Largest magnitude and slope of each lane.
+    /// Largest magnitude and slope of each function.
     pub(crate) largest: [f64; 6],
     pub(crate) steepest: [f64; 6],
 }
@@ -42,46 +48,56 @@ impl PackedAxis {
         breaks.dedup_by(|next, before| *next - *before < SAME_NODE_M);
         let piece = |ends: &[f64]| {
             let mut six = Six {
-                start: ends[0],
-                powers: [[0.0; 6]; 4],
+                along: [[0.0; 4]; 4],
+                about: [[0.0; 4]; 4],
             };
-            let (mut largest, mut steepest) = ([0.0; 6], [0.0; 6]);
+            six.along[0][3] = ends[0];
+            let mut extent = Extent::default();
             for (lane, function) in functions.iter().enumerate() {
                 let Some(function) = function else { continue };
                 let segment = moved(function, ends);
-                largest[lane] = segment.largest();
-                steepest[lane] = segment.steepest();
-                six.powers[0][lane] = segment.constant;
-                six.powers[1][lane] = segment.linear;
-                six.powers[2][lane] = segment.quadratic;
-                six.powers[3][lane] = segment.cubic;
+                extent.largest[lane] = segment.largest();
+                extent.steepest[lane] = segment.steepest();
+                let powers = if lane < 3 {
+                    &mut six.along
+                } else {
+                    &mut six.about
+                };
+                powers[0][lane % 3] = segment.constant;
+                powers[1][lane % 3] = segment.linear;
+                powers[2][lane % 3] = segment.quadratic;
+                powers[3][lane % 3] = segment.cubic;
             }
-            (six, largest, steepest)
+            (six, extent)
         };
         let all: Vec<_> = breaks.windows(2).map(piece).collect();
-        let extreme = |of: fn(&(Six, [f64; 6], [f64; 6])) -> [f64; 6]| {
-            all.iter().map(of).fold([0.0; 6], |a, b| {
+        let extreme = |of: fn(&Extent) -> [f64; 6]| {
+            all.iter().map(|it| of(&it.1)).fold([0.0; 6], |a, b| {
                 core::array::from_fn(|k| f64::max(a[k], b[k]))
             })
         };
         Self {
-            low,
-            high,
-            largest: extreme(|it| it.1),
-            steepest: extreme(|it| it.2),
+            largest: extreme(|it| it.largest),
+            steepest: extreme(|it| it.steepest),
             pieces: all.iter().map(|it| it.0).collect(),
-            grid: Grid::new(breaks),
+            finder: Finder::new(breaks),
         }
     }
 
-    /// The six values at `position`, which holds its ends' beyond the range.
+    /// Displacements and tilts at `position`, which hold their ends' beyond the range. The fourth
+    /// lanes mean nothing.
     #[inline(always)]
-    pub(crate) fn at(&self, position: f64) -> [f64; 6] {
-        let inside = position.max(self.low).min(self.high);
-        let piece = &self.pieces[self.grid.find(inside)];
-        let t = inside - piece.start;
-        let [constant, linear, quadratic, cubic] = &piece.powers;
-        core::array::from_fn(|k| constant[k] + t * (linear[k] + t * (quadratic[k] + t * cubic[k])))
+    pub(crate) fn at(&self, position: f64) -> (V4, V4) {
+        let (inside, at) = self.finder.find(position);
+        let piece = &self.pieces[at];
+        let t = inside - piece.along[0][3];
+        let value = |of: &[V4; 4]| -> V4 {
+            let [constant, linear, quadratic, cubic] = of;
+            core::array::from_fn(|k| {
+                constant[k] + t * (linear[k] + t * (quadratic[k] + t * cubic[k]))
+            })
+        };
+        (value(&piece.along), value(&piece.about))
     }
 }
 

@@ -12,6 +12,7 @@ use core::time::Duration;
 
 use units::{Metres, MetresPerSecond, Time, Volts};
 
+use super::RollError;
 use crate::volumetric::function::{FunctionError, Pieces, Shape};
 
 /// How the four channels belong to the two directions.
@@ -154,6 +155,9 @@ pub enum Trouble {
         /// The highest expected.
         high: f64,
     },
+    /// Two readings that fit no roll.
+    #[error(transparent)]
+    Roll(#[from] RollError),
 }
 
 /// Four voltages taken together.

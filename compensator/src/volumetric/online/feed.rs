@@ -7,6 +7,9 @@
 //! exchanged), the difference between the value given out last and the value wanted now is kept
 //! as an offset that shrinks to nothing over a set time. The value given out has no jump then,
 //! by construction.
+//!
+//! What may fade to zero must be a difference: a temperature goes through a feed as what it is
+//! above its reference.
 
 use core::time::Duration;
 

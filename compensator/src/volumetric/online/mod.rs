@@ -22,6 +22,7 @@
 //! at the end of travel count the *beam's*. So D and E are deviations (actual − target), like
 //! everything in this package, and the compensation is −E.
 //!
+//! [`AxisMonitor`] and [`RollMonitor`] put the parts of one axis together.
 //! [`Feed`] keeps every value that comes from outside without a jump, whatever happens to the
 //! detector; [`Offset`] brings the sum onto the axes within limits of size, rate and slope.
 //!
@@ -32,6 +33,7 @@ mod beam;
 mod feed;
 mod influence;
 mod memory;
+mod monitor;
 mod offset;
 mod reference;
 mod roll;
@@ -43,6 +45,7 @@ pub use beam::{
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
 pub use memory::{Coverage, Memories, MemoryError, RecorderSettings, StateMap, StateRecorder};
+pub use monitor::{AxisMonitor, EndOfTravel, RollMonitor};
 pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
@@ -53,5 +56,7 @@ use units::Metres;
 /// Sideways displacements of one axis, along its two other directions in the order x, y, z.
 pub type Displacement = [Metres; 2];
 
+#[cfg(test)]
+mod day_tests;
 #[cfg(test)]
 mod tests;
