@@ -4,11 +4,12 @@
     measure.py host PROGRAMS   corrections, rotary self-calibration, and SYNC jitter without CAN
 
 PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "rotary": path,
-"sync": path}.
+"volumetric": path, "sync": path}.
 The caller pins this process to one core; what it starts inherits that.
 """
 
 import contextlib
+import importlib.util
 import json
 import os
 import re
@@ -151,6 +152,13 @@ def judge_sync(case, runs):
     }
 
 
+def scipy_grid():
+    """What scipy takes for a point of the same grids; nothing without scipy."""
+    if importlib.util.find_spec("scipy") is None:
+        return []
+    return run([sys.executable, os.path.join(HERE, "scipy_grid.py")])["cases"]
+
+
 def instructions(program):
     """Instructions per call, as the difference of two runs; nothing without valgrind."""
     if not shutil.which("valgrind"):
@@ -186,6 +194,8 @@ def main(place, programs):
         measured = {
             "table": run([programs["table"], "times"]),
             "rotary": run([programs["rotary"], "times"]),
+            "volumetric": run([programs["volumetric"], "times"]),
+            "scipy_grid": scipy_grid(),
             "table_instructions": instructions(programs["table"]),
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
         }
