@@ -7,6 +7,7 @@ mod alarm;
 pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
+pub mod cia404;
 pub mod copley;
 pub mod dcon;
 mod error;
@@ -216,6 +217,25 @@ pub struct AnalogReading {
     pub volts: Vec<Volts>,
     /// Per channel: whether the converter stood at an end of its range.
     pub saturated: Vec<bool>,
+}
+
+/// Temperatures that are read together.
+pub trait TemperatureInput: Device {
+    /// How many sensors are used.
+    fn sensors(&self) -> usize;
+
+    /// The newest sample, `None` before the first; its age is the caller's to judge by `at`.
+    fn temperatures(&self) -> Option<&TemperatureReading>;
+}
+
+/// One sample of all sensors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureReading {
+    /// When it arrived.
+    pub at: Time,
+    /// Each sensor, in the order of the configuration; `None` where the device says that there is
+    /// none, or that it is beyond what can be measured.
+    pub celsius: Vec<Option<Celsius>>,
 }
 
 /// An instrument that measures the change of a length from a datum.

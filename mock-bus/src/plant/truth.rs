@@ -3,7 +3,7 @@
 use units::{Approach, Celsius, Metres};
 
 use super::stage::Stage;
-use super::{Environment, Plant, PlatformTruth, TableTruth};
+use super::{Environment, Plant, PlatformTruth, TableTruth, VolumetricTruth};
 
 /// A look at the truth behind all sensors.
 ///
@@ -65,6 +65,13 @@ impl<'a> Truth<'a> {
         let plant: &'a Plant = self.plant;
         let table = plant.machine.table()?;
         Some(TableTruth::new(table, plant.now))
+    }
+
+    /// The three axes, where the machine has them.
+    pub fn volumetric(&self) -> Option<VolumetricTruth<'a>> {
+        let plant: &'a Plant = self.plant;
+        let volumetric = plant.machine.volumetric()?;
+        Some(VolumetricTruth::new(volumetric, plant.now))
     }
 
     fn stage(&self) -> &Stage {
