@@ -4,11 +4,13 @@ use core::time::Duration;
 
 use drivers::protocol::bus_load::{BusLoad, BusLoadError, BusPlan};
 
-use crate::config::{AxisConfig, MachineConfig};
+use crate::config::MachineConfig;
 
 /// Bytes of the PDOs a CiA 402 drive sends at every SYNC: statusword, position and mode; then
 /// the following error.
 const DRIVE_PDO_BYTES: [u8; 2] = [7, 4];
+/// A drive that follows cyclic set-points hears controlword and target at every SYNC.
+const SET_POINT_PDO_BYTES: u8 = 6;
 /// A touch probe adds its status, a position and a count.
 const LATCH_PDO_BYTES: u8 = 8;
 
@@ -25,8 +27,12 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, sync_period)
         .with_heartbeat(ms(bus.master_heartbeat_ms));
-    let axes = config.axis.values().filter_map(AxisConfig::can);
-    for axis in axes.filter(|axis| axis.bus == name) {
+    let axes = config.axis.values();
+    let axes = axes.filter_map(|axis| Some((axis.can()?, axis.cyclic.is_some())));
+    for (axis, is_cyclic) in axes.filter(|(axis, _)| axis.bus == name) {
+        if is_cyclic {
+            plan = plan.with_pdos(&[SET_POINT_PDO_BYTES]);
+        }
         plan = plan
             .with_pdos(&DRIVE_PDO_BYTES)
             .with_heartbeat(ms(axis.heartbeat_producer_ms));

@@ -12,6 +12,7 @@ use units::Metres;
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
 use crate::emulated::EmulatedError;
+use crate::engine::EngineFailure;
 use crate::store::StoreError;
 
 /// Everything that ends a verb without its result.
@@ -23,6 +24,9 @@ pub enum Failure {
     /// A platform did not do what it was asked.
     #[error(transparent)]
     Platform(#[from] PlatformFailure),
+    /// The cyclic engine refused, or stopped every drive at once.
+    #[error(transparent)]
+    Engine(#[from] EngineFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -429,6 +433,7 @@ impl Failure {
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Platform(failure) => failure.exit_code(),
+            Self::Engine(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }
