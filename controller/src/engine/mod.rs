@@ -1,7 +1,7 @@
 //! The cyclic engine: one set-point for several drives at every SYNC (CiA 402, mode 8), with a
 //! correction computed in the same period from what the machine sees.
 //!
-//! - `core` decides one period: samples judged, path or motion, correction, set-points, and when
+//! - `decide` decides one period: samples judged, path or motion, correction, set-points, and when
 //!   to stop. Sans-io, of fixed size.
 //! - `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
 //!   send. It runs in the thread that calls it (docs/decisions/0011).
@@ -9,45 +9,45 @@
 //!   added, `histogram` counts times.
 //!
 //! Two ways to stop. Trouble with the path or the host: a controlled stop, time-optimal within
-//! jerk, acceleration and speed, all axes at rest at the same moment ([`Cause`]). Trouble with
+//! jerk, acceleration and speed, begun by all axes in the same period ([`Cause`]). Trouble with
 //! the bus or a drive: the quick stop command to every drive in the same period
 //! ([`crate::Failure`]). Nothing is resumed by itself.
 //!
 //! The host holds a [`Desk`], from any thread: a bounded queue of points, orders, and what the
 //! loop did lately. All of it passes through rings without locks. Linear axes only.
 
-mod core;
 mod correction;
-#[cfg(test)]
-mod core_tests;
 mod csv;
+mod decide;
+#[cfg(test)]
+mod decide_tests;
 mod failure;
 mod histogram;
 mod motion;
 mod path;
 mod run;
 
-use ::core::time::Duration;
+use core::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
-pub use self::core::{Cause, Counts, Live, State};
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
     Validity,
 };
 pub use csv::{CsvError, CsvFault, read_path};
+pub use decide::{Cause, Counts, Live, State};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use motion::{Moment, Motion, MotionError};
 pub use path::{PathError, PathFault, PathWriter, PushError};
 pub use run::Timing;
 
-use self::core::{Command, Core, Lines};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use correction::Applied;
+use decide::{Command, Core, Lines};
 
 /// How many axes move together at most.
 pub const AXES_MAX: usize = 8;
@@ -255,7 +255,8 @@ impl Desk {
         self.order(Command::MoveTo(all))
     }
 
-    /// The newest period of the loop, `None` before the first.
+    /// The newest period of the loop, `None` before the first. Who looked less often than every
+    /// 256 periods gets one that old, and the present one at his next look.
     pub fn live(&mut self) -> Option<Live> {
         while let Ok(live) = self.live.pop() {
             self.latest = Some(live);

@@ -6,8 +6,8 @@
 //! rsruckig. It judges positions to 1e-8 of its unit, so it is given millimetres.
 //!
 //! A motion that is planned anew on the fly begins with the position, speed and acceleration of
-//! the moment: nothing steps. A stop brings every axis to rest in the time that the slowest of
-//! them needs. Planning and looking up ask for no memory, except for the text of a refusal.
+//! the moment: nothing steps. A stop brings every axis to rest as soon as its own limits allow;
+//! all begin in the same period. Planning and looking up ask for no memory, except for the text of a refusal.
 
 use core::time::Duration;
 
@@ -158,15 +158,18 @@ impl Motion {
         self.calculate()
     }
 
-    /// Plans the way from `from` to rest as soon as possible, all axes at the same moment;
-    /// returns how long it takes.
+    /// Plans the way from `from` to rest as soon as possible, each axis by itself; returns how
+    /// long the slowest takes.
     ///
     /// # Errors
     /// When there is none, which numbers that are finite and limits above zero do not bring about.
     pub fn plan_stop(&mut self, from: &Moment) -> Result<Duration, MotionError> {
         self.begin_at(from);
         self.input.control_interface = ControlInterface::Velocity;
-        self.input.synchronization = Synchronization::Phase;
+        // Where axes that are made to stop at one moment have a speed near zero and an
+        // acceleration, rsruckig 3.0.1 lets them jerk beyond the limit; and the shortest way is
+        // wanted in any case.
+        self.input.synchronization = Synchronization::None;
         self.target = None;
         self.calculate()
     }
@@ -203,5 +206,105 @@ impl Motion {
     /// Whether the plan is over `after` its beginning.
     pub fn is_over(&self, after: Duration) -> bool {
         after.as_secs_f64() >= self.plan.get_duration()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use units::MetresPerSecondCubed;
+
+    const SPEED: f64 = 0.2;
+    const ACCELERATION: f64 = 2.0;
+    const JERK: f64 = 100.0;
+    const STEP: f64 = 1e-3;
+
+    fn motion() -> Motion {
+        let limits = AxisLimits {
+            min: Metres(-1.0),
+            max: Metres(1.0),
+            speed: MetresPerSecond(SPEED),
+            acceleration: MetresPerSecondSquared(ACCELERATION),
+            jerk: MetresPerSecondCubed(JERK),
+            deviation: Metres::ZERO,
+        };
+        Motion::new(3, [limits; AXES_MAX])
+    }
+
+    /// From what an axis can do: the speed at which its acceleration has gone is within limits.
+    fn begin(shares: [[f64; 3]; 3]) -> Moment {
+        let mut moment = Moment::default();
+        for (axis, [position, speed, acceleration]) in shares.into_iter().enumerate() {
+            let acceleration = acceleration * ACCELERATION;
+            let gained = 0.5 * acceleration * acceleration.abs() / JERK;
+            moment.position[axis] = Metres(0.5 * position);
+            moment.speed[axis] = MetresPerSecond(speed * (SPEED - gained.abs()));
+            moment.acceleration[axis] = MetresPerSecondSquared(acceleration);
+        }
+        moment
+    }
+
+    /// The plan begins as it was told and keeps its limits at every step.
+    fn check(motion: &Motion, from: &Moment, duration: Duration) {
+        let count = (duration.as_secs_f64() / STEP) as u32 + 2;
+        let mut before = *from;
+        for at in 0..=count {
+            let now = motion.at(Duration::from_secs_f64(f64::from(at) * STEP));
+            for axis in 0..3 {
+                let (speed, was) = (now.speed[axis].value(), before.speed[axis].value());
+                let acceleration = now.acceleration[axis].value();
+                let jerked = (acceleration - before.acceleration[axis].value()).abs();
+                let moved = (now.position[axis] - before.position[axis]).value();
+                prop_assert_near(jerked, JERK * STEP, "acceleration", at);
+                prop_assert_near(
+                    acceleration.abs(),
+                    ACCELERATION,
+                    "limit of acceleration",
+                    at,
+                );
+                prop_assert_near(speed.abs(), SPEED, "limit of speed", at);
+                prop_assert_near((speed - was).abs(), ACCELERATION * STEP, "speed", at);
+                prop_assert_near(moved.abs(), SPEED * STEP, "position", at);
+            }
+            before = now;
+        }
+        assert_eq!(before.speed, Moment::default().speed);
+        assert!(motion.is_over(duration + Duration::from_nanos(1)));
+    }
+
+    #[track_caller]
+    fn prop_assert_near(seen: f64, most: f64, what: &str, at: u32) {
+        assert!(
+            seen <= most * 1.0001 + 1e-9,
+            "{what} at step {at}: {seen} > {most}"
+        );
+    }
+
+    fn shares() -> impl Strategy<Value = [[f64; 3]; 3]> {
+        let one = || prop_oneof![3 => -1.0..1.0_f64, 1 => Just(0.0)];
+        let axis = move || [one(), one(), one()];
+        [axis(), axis(), axis()]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        #[test]
+        fn a_stop_keeps_its_limits_from_whatever_the_axes_do(from in shares()) {
+            let (mut motion, from) = (motion(), begin(from));
+            let duration = motion.plan_stop(&from).unwrap();
+            check(&motion, &from, duration);
+        }
+
+        #[test]
+        fn a_move_keeps_its_limits_from_whatever_the_axes_do(from in shares(), to in shares()) {
+            let (mut motion, from) = (motion(), begin(from));
+            let target = begin(to).position;
+            let duration = motion.plan_to(&from, &target).unwrap();
+            check(&motion, &from, duration);
+            prop_assert_eq!(motion.at(duration + Duration::from_secs(1)).position, target);
+        }
     }
 }

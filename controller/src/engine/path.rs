@@ -113,39 +113,52 @@ pub enum PushError {
     Stopped,
 }
 
-/// The last points, and what their differences say.
+/// The last points, and what their differences say: speed, acceleration and jerk are the first,
+/// second and third backward difference over the period.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Differences {
     pub(super) moment: Moment,
+    jerk: PerAxis<MetresPerSecondCubed>,
 }
 
 impl Differences {
     /// At rest at `position`.
     pub(super) fn at_rest(position: PerAxis<Metres>) -> Self {
+        Self::of(Moment::at_rest(position))
+    }
+
+    /// A motion that is known otherwise.
+    pub(super) fn of(moment: Moment) -> Self {
         Self {
-            moment: Moment::at_rest(position),
+            moment,
+            jerk: [MetresPerSecondCubed::ZERO; super::AXES_MAX],
         }
     }
 
-    /// The same after one more point; speed and acceleration are those of the last interval.
+    /// The same after one more point.
     pub(super) fn next(&self, point: &PerAxis<Metres>, axes: usize, period_s: f64) -> Self {
         let mut next = Self::at_rest(*point);
         let before = &self.moment;
         for axis in 0..axes {
             let speed = (point[axis] - before.position[axis]).value() / period_s;
             let acceleration = (speed - before.speed[axis].value()) / period_s;
+            let jerk = (acceleration - before.acceleration[axis].value()) / period_s;
             next.moment.speed[axis] = MetresPerSecond(speed);
             next.moment.acceleration[axis] = MetresPerSecondSquared(acceleration);
+            next.jerk[axis] = MetresPerSecondCubed(jerk);
         }
         next
     }
 
-    /// The motion at the last point itself: a difference is true half a period earlier.
+    /// The motion at the last point itself, by Newton's backward differences: a first difference
+    /// alone is true half a period earlier, a second one a whole period.
     pub(super) fn at_the_point(&self, axes: usize, period_s: f64) -> Moment {
         let mut moment = self.moment;
         for axis in 0..axes {
-            let gained = moment.acceleration[axis].value() * (0.5 * period_s);
-            moment.speed[axis] += MetresPerSecond(gained);
+            let second = moment.acceleration[axis].value() * period_s;
+            let third = self.jerk[axis].value() * period_s * period_s;
+            moment.speed[axis] += MetresPerSecond(second / 2.0 + third / 3.0);
+            moment.acceleration[axis] += MetresPerSecondSquared(third / period_s);
         }
         moment
     }
@@ -255,11 +268,7 @@ impl PathWriter {
         };
         let next = last.next(point, axes, period_s);
         for axis in 0..axes {
-            let before = last.moment.acceleration[axis].value();
-            let now = &next.moment;
-            let jerk = (now.acceleration[axis].value() - before) / period_s;
-            let jerk = MetresPerSecondCubed(jerk);
-            if let Some(fault) = self.judge_motion(axis, now, jerk) {
+            if let Some(fault) = self.judge_motion(axis, &next) {
                 return Err(self.fault(axis, fault));
             }
         }
@@ -267,14 +276,10 @@ impl PathWriter {
         Ok(next)
     }
 
-    fn judge_motion(
-        &self,
-        axis: usize,
-        moment: &Moment,
-        jerk: MetresPerSecondCubed,
-    ) -> Option<PathFault> {
+    fn judge_motion(&self, axis: usize, seen: &Differences) -> Option<PathFault> {
         let limits = &self.limits[axis];
-        let (speed, acceleration) = (moment.speed[axis], moment.acceleration[axis]);
+        let (speed, jerk) = (seen.moment.speed[axis], seen.jerk[axis]);
+        let acceleration = seen.moment.acceleration[axis];
         if speed.abs() > limits.speed * ROUNDING {
             let (seen, limit) = (speed, limits.speed);
             return Some(PathFault::Speed { seen, limit });

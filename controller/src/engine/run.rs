@@ -19,7 +19,7 @@ use drivers::transport::{Payload, Port, SendError};
 use drivers::wire::canopen::sync::emit_sync;
 use units::{Metres, Time};
 
-use super::core::{Heard, Trouble};
+use super::decide::{Heard, Trouble};
 use super::{
     AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
     Histogram, PerAxis,

@@ -379,7 +379,7 @@ impl Core {
         if self.motion.plan_to(&from, target).is_ok() {
             self.drop_path();
             self.elapsed = Duration::ZERO;
-            self.nominal.moment = from;
+            self.nominal = Differences::of(from);
             self.state = State::Moving;
         }
     }
@@ -426,7 +426,7 @@ impl Core {
 
     fn go_along_the_plan(&mut self) {
         self.elapsed += self.period;
-        self.nominal.moment = self.motion.at(self.elapsed);
+        self.nominal = Differences::of(self.motion.at(self.elapsed));
     }
 
     fn follow(&mut self) -> Result<(), Trouble> {
