@@ -59,3 +59,57 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     }
     plan.load()
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::config;
+
+    /// The shipped linear machine with four axes that follow set-points, on a SYNC of `period_ms`.
+    fn four_axes(period_ms: &str) -> Result<config::Loaded, config::ConfigError> {
+        const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
+        let (head, rest) = MACHINE.split_once("[axis.x]").expect("it has an axis");
+        let (axis, rest) = rest.split_once("[analog.hall]").expect("it has a module");
+        let axis = axis.replace(
+            "[axis.x.identity]",
+            "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 1e5\n\
+             deviation_limit_um = 100.0\n[axis.x.identity]",
+        );
+        let mut text = head.replace(
+            "sync_period_ms = 5.0",
+            &format!("sync_period_ms = {period_ms}"),
+        );
+        for (name, node) in [("x", 1), ("y", 3), ("z", 4), ("w", 5)] {
+            let own = format!("[axis.{name}]{axis}").replace("axis.x", &format!("axis.{name}"));
+            text += &own.replace("node_id = 1", &format!("node_id = {node}"));
+        }
+        config::parse(&format!("{text}[analog.hall]{rest}"), "four.toml")
+    }
+
+    /// Bits of the longest frames: SYNC 55; for each axis RPDO of 6 bytes 115, TPDOs of 7 and 4
+    /// bytes 125 and 95; the analog module's 4 bytes 95: 1490 of 1000, and of 2000 with 0.7 % of
+    /// heartbeats.
+    #[test]
+    fn four_axes_at_1_mbit_do_not_fit_one_millisecond_and_the_error_says_what_does() {
+        let error = four_axes("1.0").err().expect("refused").to_string();
+        assert!(error.contains("1.49ms of every 1ms"), "{error}");
+        assert!(error.contains("a SYNC period of 1.8"), "{error}");
+        let loaded = four_axes("2.0").expect("two milliseconds fit");
+        let load = super::load(&loaded.config, "can0").expect("it fits");
+        assert!((load.load - 0.745).abs() < 0.02, "{}", load.load);
+    }
+
+    #[test]
+    fn a_cyclic_axis_needs_its_command_pdo_at_sync() {
+        let text = include_str!("../../configs/machines/linear.toml").replace(
+            "[axis.x.identity]",
+            "[axis.x.cyclic]\njerk_mm_per_s3 = 0.5\ndeviation_limit_um = 100.0\n[axis.x.identity]",
+        );
+        let error = config::parse(&text, "one.toml")
+            .err()
+            .expect("refused")
+            .to_string();
+        for word in ["synchronous_start", "jerk_mm_per_s3", "one.toml:"] {
+            assert!(error.contains(word), "{word}: {error}");
+        }
+    }
+}

@@ -243,7 +243,7 @@ impl Machine {
         }
     }
 
-    fn port_name(&self, port: Port) -> String {
+    pub(crate) fn port_name(&self, port: Port) -> String {
         self.port_names
             .get(&port)
             .cloned()

@@ -96,6 +96,20 @@ impl Machine {
     /// When an axis is not zeroed, a drive refuses the mode, or something made it unsafe to go
     /// on: every drive has been told to quick stop then; see [`Machine::guarded`].
     pub fn follow(&mut self, engine: &mut Engine) -> Result<Cause, Failure> {
+        self.follow_with(engine, &mut || {})
+    }
+
+    /// The same with `host` called once in every period, after the set-points have left: a host
+    /// without a thread of its own. In virtual time there is no other, since it passes as fast as
+    /// the loop runs.
+    ///
+    /// # Errors
+    /// As [`Machine::follow`].
+    pub fn follow_with(
+        &mut self,
+        engine: &mut Engine,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
         for axis in engine.axes.clone() {
             self.require_zeroed(&axis)?;
         }
@@ -107,7 +121,7 @@ impl Machine {
             engine.timing.scheduling = granted
                 .as_ref()
                 .map_or_else(String::new, |it| it.to_string());
-            machine.run_periods(engine, &mut seats)
+            machine.run_periods(engine, &mut seats, host)
         });
         let cause = outcome?;
         for at in &seats.drive[..seats.count] {
@@ -191,7 +205,12 @@ impl Machine {
         given_back.map(|()| result)
     }
 
-    fn run_periods(&mut self, engine: &mut Engine, seats: &mut Seats) -> Result<Cause, Failure> {
+    fn run_periods(
+        &mut self,
+        engine: &mut Engine,
+        seats: &mut Seats,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
         let mut pace = Pace {
             // Between the transport's last SYNC and this one lies at most a period and a half.
             deadline: self.now() + engine.period / 2,
@@ -199,7 +218,7 @@ impl Machine {
         };
         loop {
             match self.one_period(engine, seats, &mut pace) {
-                Ok(None) => {}
+                Ok(None) => host(),
                 Ok(Some(cause)) => return Ok(cause),
                 Err(failure) => {
                     let now = self.now();
@@ -263,7 +282,7 @@ impl Machine {
             pace.deadline += period * missed;
         }
         self.send_syncs(seats)
-            .map_err(|source| not_sent(source, "SYNC"))?;
+            .map_err(|source| self.not_sent(source, "SYNC"))?;
         if let Some(before) = pace.synced {
             engine
                 .timing
@@ -347,11 +366,27 @@ impl Machine {
             return Err(Failure::Device { device, source });
         }
         while let Some(payload) = unit.device.poll_transmit() {
-            self.transport
-                .send(unit.port, &payload)
-                .map_err(|source| not_sent(source, &unit.name))?;
+            if let Err(source) = self.transport.send(unit.port, &payload) {
+                let name = unit.name.clone();
+                return Err(self.not_sent(source, &name));
+            }
         }
         Ok(())
+    }
+
+    fn not_sent(&mut self, source: SendError, what: &str) -> Failure {
+        // What has arrived meanwhile may say why: bus-off, for one.
+        while let Some(arrival) = self.transport.receive(Time::ZERO) {
+            if let Err(failure) = self.take(&arrival) {
+                return failure;
+            }
+        }
+        if let SendError::Unusable { port, state } = source {
+            let port = self.port_name(port);
+            return Failure::Link { port, state };
+        }
+        let why = format!("{what}: {source}");
+        EngineFailure::NotSent { why }.into()
     }
 
     /// The quick stop command to every drive and the SYNC at which it counts, now. What a port
@@ -370,11 +405,6 @@ impl Machine {
 
 fn engine_axes(axes: &[String]) -> impl Fn(usize) -> String + '_ {
     |axis| axes.get(axis).cloned().unwrap_or_default()
-}
-
-fn not_sent(source: SendError, what: &str) -> Failure {
-    let why = format!("{what}: {source}");
-    EngineFailure::NotSent { why }.into()
 }
 
 fn trouble_to_failure(name: impl Fn(usize) -> String, trouble: Trouble) -> Failure {
