@@ -90,7 +90,10 @@ mod tests {
     /// heartbeats.
     #[test]
     fn four_axes_at_1_mbit_do_not_fit_one_millisecond_and_the_error_says_what_does() {
-        let error = four_axes("1.0").err().expect("refused").to_string();
+        let Err(error) = four_axes("1.0") else {
+            panic!("one millisecond was taken")
+        };
+        let error = error.to_string();
         assert!(error.contains("1.49ms of every 1ms"), "{error}");
         assert!(error.contains("a SYNC period of 1.8"), "{error}");
         let loaded = four_axes("2.0").expect("two milliseconds fit");
@@ -104,10 +107,10 @@ mod tests {
             "[axis.x.identity]",
             "[axis.x.cyclic]\njerk_mm_per_s3 = 0.5\ndeviation_limit_um = 100.0\n[axis.x.identity]",
         );
-        let error = config::parse(&text, "one.toml")
-            .err()
-            .expect("refused")
-            .to_string();
+        let Err(error) = config::parse(&text, "one.toml") else {
+            panic!("an axis without synchronous_start was taken")
+        };
+        let error = error.to_string();
         for word in ["synchronous_start", "jerk_mm_per_s3", "one.toml:"] {
             assert!(error.contains(word), "{word}: {error}");
         }

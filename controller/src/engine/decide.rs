@@ -444,11 +444,11 @@ impl Core {
         };
         // Checked when it was written; what is driven is checked where it is driven, too.
         let next = self.nominal.next(&point, self.axes, self.period_s);
-        for axis in 0..self.axes {
+        for (axis, at) in point.iter().enumerate().take(self.axes) {
             let limits = &self.limits[axis];
-            let within = limits.min <= point[axis] && point[axis] <= limits.max;
             let speed = next.moment.speed[axis].abs();
-            if !within || !(speed <= limits.speed * 1.02) {
+            let within = limits.min <= *at && *at <= limits.max && speed <= limits.speed * 1.02;
+            if !within {
                 self.stop(Cause::PathRefused { axis })?;
                 return self.advance();
             }

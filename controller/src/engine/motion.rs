@@ -138,9 +138,8 @@ impl Motion {
         from: &Moment,
         target: &PerAxis<Metres>,
     ) -> Result<Duration, MotionError> {
-        for axis in 0..self.axes {
+        for (axis, wanted) in target.iter().copied().enumerate().take(self.axes) {
             let AxisLimits { min, max, .. } = self.limits[axis];
-            let wanted = target[axis];
             if !(min <= wanted && wanted <= max) {
                 return Err(MotionError::SoftLimit {
                     axis,

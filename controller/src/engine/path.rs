@@ -139,8 +139,8 @@ impl Differences {
     pub(super) fn next(&self, point: &PerAxis<Metres>, axes: usize, period_s: f64) -> Self {
         let mut next = Self::at_rest(*point);
         let before = &self.moment;
-        for axis in 0..axes {
-            let speed = (point[axis] - before.position[axis]).value() / period_s;
+        for (axis, at) in point.iter().enumerate().take(axes) {
+            let speed = (*at - before.position[axis]).value() / period_s;
             let acceleration = (speed - before.speed[axis].value()) / period_s;
             let jerk = (acceleration - before.acceleration[axis].value()) / period_s;
             next.moment.speed[axis] = MetresPerSecond(speed);
@@ -257,8 +257,8 @@ impl PathWriter {
     fn judge(&mut self, point: &PerAxis<Metres>) -> Result<Differences, PathError> {
         let axes = self.names.len();
         let period_s = self.period.as_secs_f64();
-        for axis in 0..axes {
-            if !point[axis].is_finite() {
+        for (axis, at) in point.iter().enumerate().take(axes) {
+            if !at.is_finite() {
                 return Err(self.fault(axis, PathFault::NotANumber));
             }
         }

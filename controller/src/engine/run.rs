@@ -251,8 +251,8 @@ impl Machine {
         }
         let heard = self.heard(seats, answered, synced);
         let set_points = engine.core.step(&heard).map_err(judged)?;
-        for axis in 0..seats.count {
-            self.send_set_point(seats.drive[axis], set_points[axis])?;
+        for (at, set_point) in seats.drive[..seats.count].iter().zip(set_points) {
+            self.send_set_point(*at, set_point)?;
         }
         self.send_pending()?;
         engine.timing.work.note(self.now().since(answered));
@@ -334,9 +334,9 @@ impl Machine {
 
     fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
         let mut actual = [None; AXES_MAX];
-        for axis in 0..seats.count {
-            let reading = self.answer(seats.drive[axis], synced);
-            actual[axis] = reading.map(|it| it.position);
+        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
+            let reading = self.answer(*at, synced);
+            *actual = reading.map(|it| it.position);
         }
         let samples = self.analogs.iter().filter_map(|it| it.device.reading());
         let channels = samples.flat_map(|it| {
