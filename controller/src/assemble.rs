@@ -4,6 +4,7 @@
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
 mod copley;
+mod cyclic;
 mod patience;
 mod rotary;
 
@@ -11,6 +12,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 pub use copley::copley_settings;
+pub(crate) use cyclic::cyclic_settings;
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};

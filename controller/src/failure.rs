@@ -13,6 +13,7 @@ use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
 use crate::cycle::rotary::RotaryFailure;
 use crate::emulated::EmulatedError;
+use crate::engine::EngineFailure;
 use crate::store::StoreError;
 
 /// Everything that ends a verb without its result.
@@ -27,6 +28,9 @@ pub enum Failure {
     /// A rotary table did not do what it was asked.
     #[error(transparent)]
     Table(#[from] RotaryFailure),
+    /// The cyclic engine refused, or stopped every drive at once.
+    #[error(transparent)]
+    Engine(#[from] EngineFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -434,6 +438,7 @@ impl Failure {
         match self {
             Self::Platform(failure) => failure.exit_code(),
             Self::Table(failure) => failure.exit_code(),
+            Self::Engine(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }

@@ -5,6 +5,7 @@
 //! those of the fault classes.
 
 mod bus;
+mod cyclic;
 mod drive;
 mod files;
 mod hall;

@@ -10,6 +10,7 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
 use truestage::emulated::Emulated;
+use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::observer::{Observer, Stage};
 use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
@@ -43,6 +44,8 @@ pub enum Phase {
     Calibrate,
     /// Measuring to judge.
     Verify,
+    /// Following a path of four seconds, a set-point at every SYNC.
+    Follow,
 }
 
 /// Whether something was seen on the emulated machine.
@@ -71,6 +74,51 @@ pub fn shortened(text: String) -> String {
         .replace("jump_limit_um = 5.0", "jump_limit_um = 15.0")
 }
 
+/// The same with an axis that follows cyclic set-points.
+pub fn cyclic(text: String) -> String {
+    replaced(
+        &text,
+        "[axis.x.identity]",
+        "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
+         deviation_limit_um = 1000.0\n[axis.x.identity]",
+    )
+}
+
+/// To and fro over 30 mm, eight times in four seconds, begun and ended at rest.
+fn path(period: Duration) -> Vec<Metres> {
+    let count = (4.0 / period.as_secs_f64()) as u32;
+    let points = (0..=count).map(|at| {
+        let u = f64::from(at) / f64::from(count);
+        let turn = std::f64::consts::TAU;
+        let share = u - (turn * u).sin() / turn;
+        Metres::from_mm(30.0 - 15.0 * (4.0 * turn * share).cos())
+    });
+    points.collect()
+}
+
+/// Follows the path to its end, whatever the host must do for that.
+fn follow(machine: &mut Machine) -> Result<(), Failure> {
+    let (mut engine, mut desk) = Engine::new(machine, &["x"], Box::new(NoCorrection))?;
+    let points = path(engine.period());
+    let mut next = 0;
+    let cause = machine.follow_with(&mut engine, &mut || {
+        while next < points.len() && desk.path.room() > 0 {
+            desk.path
+                .push(&[points[next]])
+                .expect("the path can be driven");
+            next += 1;
+        }
+        if next == points.len() && desk.path.room() > 0 {
+            let _ = desk.path.finish();
+        }
+    })?;
+    match cause {
+        Cause::PathDone => Ok(()),
+        Cause::Asked => Err(Failure::Interrupted),
+        other => panic!("{other}\n{}", engine.timing()),
+    }
+}
+
 impl Scene {
     /// Nothing goes wrong in `phase` yet.
     pub fn during(phase: Phase) -> Self {
@@ -81,7 +129,10 @@ impl Scene {
             faults: Vec::new(),
             deed: None,
             delivered: None,
-            machine: Box::new(shortened),
+            machine: match phase {
+                Phase::Follow => Box::new(|text| cyclic(shortened(text))),
+                _ => Box::new(shortened),
+            },
             emulated: Box::new(|text| text),
             stop: false,
         }
@@ -256,6 +307,7 @@ fn perform(
             let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
             calibrated.replace(Some(done));
         }
+        Phase::Follow => follow(machine)?,
         Phase::Verify => {
             let options = VerifyOptions {
                 compensated: false,

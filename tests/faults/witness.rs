@@ -123,6 +123,17 @@ impl Transport for Witnessed {
         }
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        while self.next_deed() < until {
+            let deed = self.next_deed();
+            self.inner.sleep_until(deed);
+            self.do_what_is_due();
+        }
+        self.inner.sleep_until(until);
+        self.look();
+        self.do_what_is_due();
+    }
+
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
         self.inner.set_sync(port, period)
     }

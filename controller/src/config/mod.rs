@@ -16,9 +16,9 @@ pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
-    CanBus, CanTransport, CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig,
-    InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig, MachineSection,
-    OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+    CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
+    IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
+    MachineSection, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,

@@ -173,10 +173,24 @@ pub struct AxisConfig {
     pub identity: Option<IdentityConfig>,
     pub poll_period_ms: Option<f64>,
     pub amplifier: Option<AmplifierConfig>,
+    pub cyclic: Option<CyclicConfig>,
     pub zero: Option<ZeroConfig>,
     pub calibrate: Option<CalibrateConfig>,
     pub verify: Option<VerifyConfig>,
     pub compensation: Option<CompensationConfig>,
+}
+
+/// An axis that follows cyclic set-points.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct CyclicConfig {
+    pub jerk_mm_per_s3: f64,
+    pub deviation_limit_um: f64,
+    #[serde(default)]
+    pub correction_limit_um: f64,
+    #[serde(default)]
+    pub correction_rate_um_per_s: f64,
 }
 
 /// What only an axis on CAN has.

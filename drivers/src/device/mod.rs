@@ -19,6 +19,8 @@ pub mod serial_line;
 mod shared_line;
 pub mod umd2;
 
+use core::time::Duration;
+
 use units::{
     Approach, Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
 };
@@ -106,6 +108,15 @@ pub enum DriveCommand {
     ResetFault,
     /// Slow down and stand, staying enabled; done when standing.
     Halt,
+    /// Change to cyclic synchronous position with one set-point every `period`; done when the
+    /// drive says that it is in the mode. Nothing moves: the set-point is where the axis stands.
+    /// Refused by a drive that cannot do it, and while the axis moves.
+    EnterCyclic {
+        /// From SYNC to SYNC.
+        period: Duration,
+    },
+    /// Change back to profile position.
+    LeaveCyclic,
 }
 
 /// A controlled direction, linear or rotary: one servo drive that positions in `Q`.
@@ -113,6 +124,17 @@ pub trait Axis<Q: Coordinate = Metres>: ServoDrive {
     /// Begins a command; a command that still runs is superseded.
     /// [`Device::poll_outcome`] says when it is done, and how.
     fn command(&mut self, now: Time, command: AxisCommand<Q>);
+
+    /// The set-point for the next SYNC, in drive coordinates; once in every period after
+    /// [`DriveCommand::EnterCyclic`] and [`DriveCommand::Enable`].
+    ///
+    /// # Errors
+    /// When the drive is not enabled in the cyclic mode, or the set-point is outside its limits;
+    /// nothing is sent then.
+    fn follow(&mut self, now: Time, set_point: Q) -> Result<(), DeviceError>;
+
+    /// The set-point that the drive holds in the cyclic mode, `None` in any other.
+    fn held(&self) -> Option<Q>;
 
     /// The newest sample of the axis, `None` before the first one.
     fn reading(&self) -> Option<AxisReading<Q>>;
