@@ -16,6 +16,8 @@ mod linear_tests;
 mod platform_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod volumetric_tests;
 
 use core::any::Any;
 use std::collections::VecDeque;
