@@ -163,10 +163,10 @@ impl Master {
         self.say(0x80, &[]);
         self.wait(Duration::from_micros(1200));
         for (axis, node) in DRIVES.into_iter().enumerate() {
-            if let Some((_, position)) = self.drive(node) {
-                if controlword != 0x0F {
-                    self.targets[axis] = position;
-                }
+            if let Some((_, position)) = self.drive(node)
+                && controlword != 0x0F
+            {
+                self.targets[axis] = position;
             }
             let mut data = controlword.to_le_bytes().to_vec();
             data.extend(self.targets[axis].to_le_bytes());
@@ -272,12 +272,13 @@ fn three_drives_follow_at_2_ms_beside_all_detectors() {
     let start = master.targets;
     let mut spoken = 0;
     for step in 1..=500 {
-        master.targets = [0, 1, 2].map(|axis: usize| start[axis] + step * 20_000);
+        let share = f64::from(step) / 500.0;
+        let smooth = share * share * share * (10.0 - 15.0 * share + 6.0 * share * share);
+        master.targets = start.map(|start| start + (5e6 * smooth).round() as i32);
         master.cycle(0x0F);
-        spoken += MODULES
-            .iter()
-            .filter(|it| master.module(**it).is_some())
-            .count();
+        for node in MODULES {
+            spoken += usize::from(master.module(node).is_some());
+        }
         for node in DRIVES {
             let (status, _) = master.drive(node).unwrap();
             assert_eq!(status & 0x206F, 0x0027, "drive {node} in cycle {step}");

@@ -239,7 +239,8 @@ impl Cia404Analog {
     }
 
     fn take_part(&mut self, now: Time, part: usize, payload: &[u8]) {
-        if !self.node.is_up() && !(self.starting && self.node.is_operational()) {
+        let begins = self.starting && self.node.is_operational();
+        if !(begins || self.node.is_up()) {
             return;
         }
         let left = self.settings.inputs.len() - part * PER_PDO;

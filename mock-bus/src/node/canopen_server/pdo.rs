@@ -92,7 +92,9 @@ impl Tpdo {
     /// not matter.
     pub(super) fn is_turn(&self) -> bool {
         match self.parameters.transmission {
-            Transmission::Synchronous(every) => self.is_valid() && (self.syncs + 1) % every == 0,
+            Transmission::Synchronous(every) => {
+                self.is_valid() && (self.syncs + 1).is_multiple_of(every)
+            }
             Transmission::SynchronousAcyclic => self.is_valid(),
             Transmission::Event | Transmission::Unknown(_) => false,
         }
