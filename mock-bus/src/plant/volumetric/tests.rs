@@ -296,6 +296,80 @@ fn the_roll_detectors_see_the_roll_that_comes_with_warmth() {
     );
 }
 
+/// All slides on a smooth way to scale positions, standing at the end; what a drive would ask for
+/// every 4 ms.
+fn move_to(plant: &mut Plant, start: Time, targets_mm: [f64; 3]) -> Time {
+    const STEPS: u32 = 150;
+    let from = truth(plant).scales().map(Metres::value);
+    let zeros = [0, 1, 2].map(|axis| truth(plant).count_zero(axis).value());
+    let at = |step: u32| start + core::time::Duration::from_millis(4) * step;
+    for step in 1..=STEPS {
+        plant.advance(at(step));
+        let share = f64::from(step) / f64::from(STEPS);
+        let smooth = share * share * share * (10.0 - 15.0 * share + 6.0 * share * share);
+        for axis in 0..3 {
+            let way = targets_mm[axis] * 1e-3 - from[axis];
+            let demand = from[axis] + smooth * way - zeros[axis];
+            plant.set_servo(axis, crate::plant::Servo::Follow { demand });
+        }
+    }
+    plant.advance(at(STEPS + 50));
+    at(STEPS + 50)
+}
+
+/// The bows, films and rolls of 8 hours as the detectors tell them, at places all over the
+/// volume: the machine's own motions are seen wherever the slides are.
+#[test]
+fn what_warmth_does_sideways_is_seen_at_every_place() {
+    let mut plant = plant(VolumetricConfig::default(), 11);
+    let places = [
+        [20.0, 20.0, 20.0],
+        [250.0, 200.0, 150.0],
+        [480.0, 380.0, 280.0],
+    ];
+    let mut look = |at: f64| {
+        let mut now = hours(at);
+        plant.advance(now);
+        places.map(|place| {
+            now = move_to(&mut plant, now, place);
+            let mut sum = [[0.0; 2]; 6];
+            for _ in 0..50 {
+                now += core::time::Duration::from_millis(16);
+                plant.advance(now);
+                for (place, sum) in sum.iter_mut().enumerate() {
+                    let [first, second] = spot_um(volts(&mut plant, 4 * place));
+                    *sum = [sum[0] + first / 50.0, sum[1] + second / 50.0];
+                }
+            }
+            let scales = truth(&plant).scales();
+            for (scale, wanted) in scales.iter().zip(place) {
+                assert!((scale.mm() - wanted).abs() < 1e-4, "{scale:?} {wanted}");
+            }
+            let shift = |axis| {
+                truth(&plant)
+                    .detector_shift(axis, scales[axis])
+                    .map(Metres::um)
+            };
+            (sum, [0, 1, 2].map(shift))
+        })
+    };
+    let (cold, warm) = (look(0.05), look(7.9));
+    let mut largest = 0.0_f64;
+    for ((cold, warm), place) in cold.iter().zip(&warm).zip(places) {
+        for axis in 0..3 {
+            let share = (100.0 + place[axis]) / ([500.0, 400.0, 300.0][axis] + 200.0);
+            for across in 0..2 {
+                let moved = |place: usize| warm.0[place][across] - cold.0[place][across];
+                let seen = share * moved(2 * axis + 1) - moved(2 * axis);
+                let true_um = warm.1[axis][across] - cold.1[axis][across];
+                assert!((seen - true_um).abs() < 0.35, "{axis} {seen} {true_um}");
+                largest = largest.max(true_um.abs());
+            }
+        }
+    }
+    assert!(largest > 5.0, "{largest} µm: there was something to see");
+}
+
 #[test]
 fn one_seed_is_one_machine() {
     let at = |seed| {
