@@ -8,6 +8,7 @@ mod analog;
 pub mod camera;
 pub mod config;
 mod deviation;
+mod drive_train;
 mod encoder;
 mod hall_field;
 mod index_mark;

@@ -6,9 +6,10 @@ use units::Time;
 use super::Servo;
 use super::config::StageConfig;
 use super::deviation::{Field, Path};
+use super::drive_train::DriveTrain;
 use super::encoder::Encoder;
 use super::limit_switch::LimitSwitch;
-use super::machine::{Actuator, IndexPulse};
+use super::machine::Actuator;
 use super::servo::Mass;
 
 /// Scales are true at this temperature (ISO 1).
@@ -17,11 +18,9 @@ const REFERENCE_C: f64 = 20.0;
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
     config: StageConfig,
-    mass: Mass,
+    train: DriveTrain,
     field: Field,
     path: Path,
-    switches: [LimitSwitch; 2],
-    encoder: Encoder,
     shift: Stream,
 }
 
@@ -30,15 +29,19 @@ impl Stage {
         let mut shift = Stream::new(seed, "start position");
         let start_m = 1e-3 * shift.between(config.motion.start_min_mm, config.motion.start_max_mm);
         let mut stage = Self {
-            mass: Mass::new(
-                config.motion.clone(),
-                start_m,
-                Stream::new(seed, "servo rest"),
-            ),
+            train: DriveTrain {
+                mass: Mass::new(
+                    config.motion.clone(),
+                    start_m,
+                    Stream::new(seed, "servo rest"),
+                ),
+                encoder: Encoder::new(config.encoder.resolution_nm * 1e-9, start_m),
+                // The scale has none.
+                index: None,
+                switches: Some(LimitSwitch::pair(&config.limits, seed, "")),
+            },
             field: Field::new(&config.deviation, seed),
             path: Path::new(&config.deviation, seed),
-            switches: LimitSwitch::pair(&config.limits, seed, ""),
-            encoder: Encoder::new(config.encoder.resolution_nm * 1e-9, start_m),
             shift,
             config,
         };
@@ -47,54 +50,46 @@ impl Stage {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero();
-        while let Some((from, to)) = self.mass.step_until(now, offset_m) {
+        while let Some((from, to)) = self.train.step_until(now) {
             if to != from {
                 self.path.travel(to - from);
                 self.watch_switches();
             }
         }
-        if self.mass.resting() {
-            self.mass.skip_to(now);
-        }
+        self.train.settle(now);
     }
 
     /// The switches' own place varies by more than the scale grows: expansion is left out.
     fn watch_switches(&mut self) {
-        let encoder_m = self.mass.position_at(Time::ZERO);
-        if !self.switches.iter().any(|switch| switch.is_near(encoder_m)) {
-            return;
-        }
-        let true_m = encoder_m + self.field.at(encoder_m);
-        for switch in &mut self.switches {
-            switch.watch(true_m);
-        }
+        let field = &self.field;
+        self.train
+            .watch_switches(|scale_m| scale_m + field.at(scale_m));
     }
 
     /// Without power the stage can be moved; `now` is when the power is off.
     pub(super) fn push_a_little(&mut self) {
         let limit_m = self.config.motion.power_cycle_shift_um * 1e-6;
         let by_m = self.shift.between(-limit_m, limit_m);
-        self.mass.push(by_m);
+        self.train.mass.push(by_m);
         self.path.leave();
         self.path.travel(by_m);
     }
 
     /// Scale position of the encoder's present zero count.
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero()
+        self.train.encoder.count_zero()
     }
 
     pub(super) fn scale_position_m(&self, now: Time) -> f64 {
-        self.mass.position_at(now)
+        self.train.mass.position_at(now)
     }
 
     pub(super) fn speed(&self, now: Time) -> f64 {
-        self.mass.speed_at(now)
+        self.train.mass.speed_at(now)
     }
 
     pub(super) fn true_position_m(&self, now: Time, stage_c: f64) -> f64 {
-        let scale_m = self.mass.position_at(now);
+        let scale_m = self.train.mass.position_at(now);
         self.grown(scale_m, stage_c) + self.field.at(scale_m) + self.path.deviation_m()
     }
 
@@ -110,53 +105,17 @@ impl Stage {
 }
 
 impl Actuator for Stage {
+    fn train(&self) -> &DriveTrain {
+        &self.train
+    }
+
+    fn train_mut(&mut self) -> &mut DriveTrain {
+        &mut self.train
+    }
+
     fn set_servo(&mut self, now: Time, servo: Servo) {
-        let resting = self.mass.resting();
-        self.mass.set_servo(now, servo);
-        if resting && !self.mass.resting() {
+        if self.train.set_servo(now, servo) {
             self.path.leave();
         }
-    }
-
-    fn counts(&self, now: Time) -> i64 {
-        self.encoder.counts(self.mass.position_at(now))
-    }
-
-    fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution()
-    }
-
-    fn resolution(&self) -> f64 {
-        self.encoder.resolution()
-    }
-
-    fn encoder_power(&mut self, on: bool) {
-        self.encoder.power(on, self.mass.position_at(Time::ZERO));
-    }
-
-    /// The scale has no index mark.
-    fn index_pulse(&self) -> Option<IndexPulse> {
-        None
-    }
-
-    fn limit_switches(&self) -> (bool, bool) {
-        let [negative, positive] = &self.switches;
-        (negative.is_pressed(), positive.is_pressed())
-    }
-
-    fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
-        self.switches[usize::from(positive)].forced = forced;
-    }
-
-    fn set_blocked(&mut self, blocked: bool) {
-        self.mass.set_blocked(blocked);
-    }
-
-    fn set_torque_off(&mut self, off: bool) {
-        self.mass.set_torque_off(off);
-    }
-
-    fn torque_off(&self) -> bool {
-        self.mass.torque_off()
     }
 }

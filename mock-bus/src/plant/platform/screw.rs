@@ -11,10 +11,11 @@ use units::Time;
 
 use crate::plant::Servo;
 use crate::plant::deviation::StopError;
+use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
 use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::machine::{Actuator, IndexPulse};
+use crate::plant::machine::Actuator;
 use crate::plant::servo::Mass;
 
 use super::config::ScrewConfig;
@@ -23,15 +24,12 @@ use super::lead_error::LeadError;
 #[derive(Clone, Debug)]
 pub(super) struct Screw {
     config: ScrewConfig,
-    mass: Mass,
-    encoder: Encoder,
-    /// One of the marks is in the middle of the screw.
-    index: IndexMark,
+    /// One of the index marks is in the middle of the screw.
+    train: DriveTrain,
     error: LeadError,
     play: Play,
     /// On top of where the flanks have pushed the table.
     stop_error: StopError,
-    switches: [LimitSwitch; 2],
     shift: Stream,
 }
 
@@ -46,56 +44,48 @@ impl Screw {
         let mut play = Play::new(error.lost_motion_m());
         play.lie_anywhere(start_m + error.at(start_m), &mut shift);
         let mut screw = Self {
-            mass: Mass::new(config.motion(), start_m, stream("servo rest")),
-            encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
-            index: IndexMark::new(
-                config.lead_mm * 1e-3,
-                config.index_repeatability_nm * 1e-9,
-                stream("index"),
-            ),
+            train: DriveTrain {
+                mass: Mass::new(config.motion(), start_m, stream("servo rest")),
+                encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
+                index: Some(IndexMark::new(
+                    config.lead_mm * 1e-3,
+                    config.index_repeatability_nm * 1e-9,
+                    stream("index"),
+                )),
+                switches: Some(LimitSwitch::pair(&config.limits(), seed, &whose)),
+            },
             error,
             play,
             stop_error: StopError::new(config.repeatability_nm * 1e-9, stream("stop error")),
-            switches: LimitSwitch::pair(&config.limits(), seed, &whose),
             shift,
             config: config.clone(),
         };
-        screw.watch_switches(start_m);
+        screw.watch_switches();
         screw
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero();
-        while let Some((from, to)) = self.mass.step_until(now, offset_m) {
+        while let Some((from, to)) = self.train.step_until(now) {
             if to != from {
-                self.travel(from, to);
+                self.play.push(to + self.error.at(to));
+                self.stop_error.travel(to - from);
+                self.watch_switches();
             }
         }
-        if self.mass.resting() {
-            self.mass.skip_to(now);
-        }
+        self.train.settle(now);
     }
 
-    fn travel(&mut self, from: f64, to: f64) {
-        self.play.push(to + self.error.at(to));
-        self.stop_error.travel(to - from);
-        self.index.watch(from, to, &self.encoder);
-        self.watch_switches(to);
-    }
-
-    fn watch_switches(&mut self, screw_m: f64) {
-        for switch in &mut self.switches {
-            if switch.is_near(screw_m) {
-                switch.watch(screw_m + self.error.at(screw_m));
-            }
-        }
+    fn watch_switches(&mut self) {
+        let error = &self.error;
+        let nut_m = |screw_m: f64| screw_m + error.at(screw_m);
+        self.train.watch_switches(nut_m);
     }
 
     /// Without power the screw can be turned, and the table moves within the play.
     pub(super) fn push_a_little(&mut self) {
         let limit_m = self.config.power_cycle_shift_um * 1e-6;
         let by_m = self.shift.between(-limit_m, limit_m);
-        self.mass.push(by_m);
+        self.train.mass.push(by_m);
         self.stop_error.leave();
         self.stop_error.travel(by_m);
         let nut_m = self.nut_m(Time::ZERO);
@@ -103,7 +93,7 @@ impl Screw {
     }
 
     fn nut_m(&self, now: Time) -> f64 {
-        let screw_m = self.mass.position_at(now);
+        let screw_m = self.train.mass.position_at(now);
         screw_m + self.error.at(screw_m)
     }
 
@@ -114,7 +104,7 @@ impl Screw {
 
     /// The stroke that the screw's turns say.
     pub(super) fn screw_m(&self, now: Time) -> f64 {
-        self.mass.position_at(now)
+        self.train.mass.position_at(now)
     }
 
     /// Where within the play the table lies: minus half the play after a forward move.
@@ -134,60 +124,23 @@ impl Screw {
     }
 
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero()
+        self.train.encoder.count_zero()
     }
 }
 
 impl Actuator for Screw {
+    fn train(&self) -> &DriveTrain {
+        &self.train
+    }
+
+    fn train_mut(&mut self) -> &mut DriveTrain {
+        &mut self.train
+    }
+
     fn set_servo(&mut self, now: Time, servo: Servo) {
-        let resting = self.mass.resting();
-        self.mass.set_servo(now, servo);
-        if resting && !self.mass.resting() {
+        if self.train.set_servo(now, servo) {
             self.stop_error.leave();
         }
-    }
-
-    fn counts(&self, now: Time) -> i64 {
-        self.encoder.counts(self.mass.position_at(now))
-    }
-
-    fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution()
-    }
-
-    fn resolution(&self) -> f64 {
-        self.encoder.resolution()
-    }
-
-    fn encoder_power(&mut self, on: bool) {
-        if self.encoder.power(on, self.mass.position_at(Time::ZERO)) {
-            self.index.forget();
-        }
-    }
-
-    fn index_pulse(&self) -> Option<IndexPulse> {
-        self.index.last()
-    }
-
-    fn limit_switches(&self) -> (bool, bool) {
-        let [negative, positive] = &self.switches;
-        (negative.is_pressed(), positive.is_pressed())
-    }
-
-    fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
-        self.switches[usize::from(positive)].forced = forced;
-    }
-
-    fn set_blocked(&mut self, blocked: bool) {
-        self.mass.set_blocked(blocked);
-    }
-
-    fn set_torque_off(&mut self, off: bool) {
-        self.mass.set_torque_off(off);
-    }
-
-    fn torque_off(&self) -> bool {
-        self.mass.torque_off()
     }
 }
 

@@ -31,9 +31,10 @@ use units::{Radians, Time};
 pub use truth::TableTruth;
 
 use crate::plant::Servo;
+use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
-use crate::plant::machine::{Actuator, IndexPulse, ProbeEdge};
+use crate::plant::machine::{Actuator, ProbeEdge};
 use crate::plant::servo::{GRID_NS, Mass};
 use crate::random::Stream;
 use config::TableConfig;
@@ -43,9 +44,7 @@ use plate::Plate;
 
 #[derive(Clone, Debug)]
 pub(super) struct Table {
-    mass: Mass,
-    encoder: Encoder,
-    index: IndexMark,
+    train: DriveTrain,
     error: EncoderError,
     plate: Plate,
     detector: Detector,
@@ -66,13 +65,21 @@ impl Table {
         let encoder = &config.encoder;
         let repeatability = Radians::from_arcsec(encoder.index_repeatability_arcsec).value();
         Self {
-            mass: Mass::new(
-                config.motion.dynamics(),
-                start,
-                Stream::new(seed, "table servo rest"),
-            ),
-            encoder: Encoder::new(TAU / f64::from(encoder.counts_per_turn), start),
-            index: IndexMark::new(TAU, repeatability, Stream::new(seed, "table index")),
+            train: DriveTrain {
+                mass: Mass::new(
+                    config.motion.dynamics(),
+                    start,
+                    Stream::new(seed, "table servo rest"),
+                ),
+                encoder: Encoder::new(TAU / f64::from(encoder.counts_per_turn), start),
+                index: Some(IndexMark::new(
+                    TAU,
+                    repeatability,
+                    Stream::new(seed, "table index"),
+                )),
+                // What turns endlessly has no ends.
+                switches: None,
+            },
             error: EncoderError::new(encoder, &config.bearing, seed),
             plate: Plate::new(&config.plate, seed),
             detector: Detector::new(&config.detector, seed),
@@ -85,16 +92,13 @@ impl Table {
     }
 
     pub(super) fn advance(&mut self, now: Time) {
-        let offset = self.encoder.count_zero();
-        while let Some((from, to)) = self.mass.step_until(now, offset) {
+        while let Some((from, to)) = self.train.step_until(now) {
             self.step += 1;
             if to != from {
-                self.index.watch(from, to, &self.encoder);
                 self.watch_lines(from, to);
             }
         }
-        if self.mass.resting() {
-            self.mass.skip_to(now);
+        if self.train.settle(now) {
             self.step = now.nanos() / GRID_NS;
         }
     }
@@ -142,7 +146,7 @@ impl Table {
             reading,
             speed: (to - from) / (GRID_NS as f64 * 1e-9),
         };
-        let encoder = &self.encoder;
+        let encoder = &self.train.encoder;
         self.detector
             .see(passage, |reading| encoder.counts(reading));
     }
@@ -150,7 +154,7 @@ impl Table {
     /// Without power the table can be turned.
     pub(super) fn push_a_little(&mut self) {
         let limit = self.power_cycle_shift;
-        self.mass.push(self.shift.between(-limit, limit));
+        self.train.mass.push(self.shift.between(-limit, limit));
     }
 
     pub(super) fn turn_plate(&mut self, lines: f64) {
@@ -186,55 +190,22 @@ impl Table {
 }
 
 impl Actuator for Table {
+    fn train(&self) -> &DriveTrain {
+        &self.train
+    }
+
+    fn train_mut(&mut self) -> &mut DriveTrain {
+        &mut self.train
+    }
+
     fn set_servo(&mut self, now: Time, servo: Servo) {
-        self.mass.set_servo(now, servo);
+        self.train.set_servo(now, servo);
         if servo == Servo::Off {
             self.lend_a_hand();
         }
     }
 
-    fn counts(&self, now: Time) -> i64 {
-        self.encoder.counts(self.mass.position_at(now))
-    }
-
-    fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution()
-    }
-
-    fn resolution(&self) -> f64 {
-        self.encoder.resolution()
-    }
-
-    fn encoder_power(&mut self, on: bool) {
-        if self.encoder.power(on, self.mass.position_at(Time::ZERO)) {
-            self.index.forget();
-        }
-    }
-
-    fn index_pulse(&self) -> Option<IndexPulse> {
-        self.index.last()
-    }
-
     fn probe_edge(&mut self, now: Time) -> Option<ProbeEdge> {
         self.detector.take(now)
-    }
-
-    /// What turns endlessly has no ends.
-    fn limit_switches(&self) -> (bool, bool) {
-        (false, false)
-    }
-
-    fn force_switch(&mut self, _positive: bool, _forced: Option<bool>) {}
-
-    fn set_blocked(&mut self, blocked: bool) {
-        self.mass.set_blocked(blocked);
-    }
-
-    fn set_torque_off(&mut self, off: bool) {
-        self.mass.set_torque_off(off);
-    }
-
-    fn torque_off(&self) -> bool {
-        self.mass.torque_off()
     }
 }

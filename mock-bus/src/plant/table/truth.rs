@@ -25,12 +25,12 @@ impl<'a> TableTruth<'a> {
 
     /// What the encoder reads from its own zero (the index mark), not rounded.
     pub fn reading(&self) -> Radians {
-        Radians(self.table.mass.position_at(self.now))
+        Radians(self.table.train.mass.position_at(self.now))
     }
 
     /// What the encoder reads where its present count is 0.
     pub fn count_zero(&self) -> Radians {
-        Radians(self.table.encoder.count_zero())
+        Radians(self.table.train.encoder.count_zero())
     }
 
     /// Reading minus true angle at a reading from the encoder's own zero: the part that repeats

@@ -3,20 +3,17 @@
 use units::Time;
 
 use super::config::VolumetricConfig;
-use crate::plant::Servo;
+use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
 use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::machine::{Actuator, IndexPulse};
+use crate::plant::machine::Actuator;
 use crate::plant::servo::Mass;
 use crate::random::Stream;
 
 #[derive(Clone, Debug)]
 pub(super) struct Slide {
-    mass: Mass,
-    encoder: Encoder,
-    index: IndexMark,
-    switches: [LimitSwitch; 2],
+    train: DriveTrain,
     shift_max_m: f64,
     shift: Stream,
 }
@@ -30,102 +27,53 @@ impl Slide {
         let mut shift = stream("start position");
         let start_m = 1e-3 * shift.between(slide.start_min_mm, slide.start_max_mm);
         Self {
-            mass: Mass::new(slide.motion(travel_mm), start_m, stream("servo rest")),
-            encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
-            index: IndexMark::new(
-                slide.index_spacing_mm * 1e-3,
-                slide.index_repeatability_nm * 1e-9,
-                stream("index"),
-            ),
-            switches: LimitSwitch::pair(&slide.limits(travel_mm), seed, &whose),
+            train: DriveTrain {
+                mass: Mass::new(slide.motion(travel_mm), start_m, stream("servo rest")),
+                encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
+                index: Some(IndexMark::new(
+                    slide.index_spacing_mm * 1e-3,
+                    slide.index_repeatability_nm * 1e-9,
+                    stream("index"),
+                )),
+                switches: Some(LimitSwitch::pair(&slide.limits(travel_mm), seed, &whose)),
+            },
             shift_max_m: slide.power_cycle_shift_um * 1e-6,
             shift,
         }
     }
 
-    pub(super) fn advance(&mut self, now: Time) {
-        let offset_m = self.encoder.count_zero();
-        while let Some((from, to)) = self.mass.step_until(now, offset_m) {
-            if to != from {
-                self.index.watch(from, to, &self.encoder);
-                self.watch_switches(to);
-            }
-        }
-        if self.mass.resting() {
-            self.mass.skip_to(now);
-        }
-    }
-
     /// Where a switch acts varies by more than the errors of the axis: these are left out.
-    fn watch_switches(&mut self, scale_m: f64) {
-        for switch in &mut self.switches {
-            if switch.is_near(scale_m) {
-                switch.watch(scale_m);
+    pub(super) fn advance(&mut self, now: Time) {
+        while let Some((from, to)) = self.train.step_until(now) {
+            if to != from {
+                self.train.watch_switches(|scale_m| scale_m);
             }
         }
+        self.train.settle(now);
     }
 
     /// Without power the slide can be moved.
     pub(super) fn push_a_little(&mut self) {
         let by_m = self.shift.between(-self.shift_max_m, self.shift_max_m);
-        self.mass.push(by_m);
+        self.train.mass.push(by_m);
     }
 
     /// Where the scale is read, from its own zero.
     pub(super) fn scale_m(&self, now: Time) -> f64 {
-        self.mass.position_at(now)
+        self.train.mass.position_at(now)
     }
 
     pub(super) fn count_zero_m(&self) -> f64 {
-        self.encoder.count_zero()
+        self.train.encoder.count_zero()
     }
 }
 
 impl Actuator for Slide {
-    fn set_servo(&mut self, now: Time, servo: Servo) {
-        self.mass.set_servo(now, servo);
+    fn train(&self) -> &DriveTrain {
+        &self.train
     }
 
-    fn counts(&self, now: Time) -> i64 {
-        self.encoder.counts(self.mass.position_at(now))
-    }
-
-    fn counts_per_s(&self, now: Time) -> f64 {
-        self.mass.speed_at(now) / self.encoder.resolution()
-    }
-
-    fn resolution(&self) -> f64 {
-        self.encoder.resolution()
-    }
-
-    fn encoder_power(&mut self, on: bool) {
-        if self.encoder.power(on, self.mass.position_at(Time::ZERO)) {
-            self.index.forget();
-        }
-    }
-
-    fn index_pulse(&self) -> Option<IndexPulse> {
-        self.index.last()
-    }
-
-    fn limit_switches(&self) -> (bool, bool) {
-        let [negative, positive] = &self.switches;
-        (negative.is_pressed(), positive.is_pressed())
-    }
-
-    fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
-        self.switches[usize::from(positive)].forced = forced;
-    }
-
-    fn set_blocked(&mut self, blocked: bool) {
-        self.mass.set_blocked(blocked);
-    }
-
-    fn set_torque_off(&mut self, off: bool) {
-        self.mass.set_torque_off(off);
-    }
-
-    fn torque_off(&self) -> bool {
-        self.mass.torque_off()
+    fn train_mut(&mut self) -> &mut DriveTrain {
+        &mut self.train
     }
 }

@@ -1,0 +1,93 @@
+//! What everything driven is made of: a mass under its servo, the encoder on it, and, where it
+//! has them, an index mark and limit switches.
+
+use units::Time;
+
+use super::Servo;
+use super::encoder::Encoder;
+use super::index_mark::IndexMark;
+use super::limit_switch::LimitSwitch;
+use super::machine::IndexPulse;
+use super::servo::{Mass, Stroke};
+
+/// Metres of a linear one, radians of a rotary one.
+#[derive(Clone, Debug)]
+pub(super) struct DriveTrain {
+    pub(super) mass: Mass,
+    pub(super) encoder: Encoder,
+    pub(super) index: Option<IndexMark>,
+    /// The negative one and the positive one; what turns endlessly has no ends.
+    pub(super) switches: Option<[LimitSwitch; 2]>,
+}
+
+impl DriveTrain {
+    /// Runs the next grid step if it ends by `now`; returns where it led from and to.
+    pub(super) fn step_until(&mut self, now: Time) -> Option<Stroke> {
+        let stroke = self.mass.step_until(now, self.encoder.count_zero());
+        if let (Some((from, to)), Some(index)) = (stroke, &mut self.index)
+            && from != to
+        {
+            index.watch(from, to, &self.encoder);
+        }
+        stroke
+    }
+
+    /// After the last step by `now`: the grid is skipped while the mass rests. Whether it does.
+    pub(super) fn settle(&mut self, now: Time) -> bool {
+        let resting = self.mass.resting();
+        if resting {
+            self.mass.skip_to(now);
+        }
+        resting
+    }
+
+    /// Lets the switches see where the mass is; `true_of` is the place they act by.
+    pub(super) fn watch_switches(&mut self, true_of: impl Fn(f64) -> f64) {
+        let scale = self.mass.position_at(Time::ZERO);
+        let near = self.switches.iter_mut().flatten();
+        for switch in near.filter(|it| it.is_near(scale)) {
+            switch.watch(true_of(scale));
+        }
+    }
+
+    /// Returns whether the servo has taken a mass along that rested.
+    pub(super) fn set_servo(&mut self, now: Time, servo: Servo) -> bool {
+        let rested = self.mass.resting();
+        self.mass.set_servo(now, servo);
+        rested && !self.mass.resting()
+    }
+
+    pub(super) fn encoder_power(&mut self, on: bool) {
+        let scale = self.mass.position_at(Time::ZERO);
+        if self.encoder.power(on, scale)
+            && let Some(index) = &mut self.index
+        {
+            index.forget();
+        }
+    }
+
+    pub(super) fn counts(&self, now: Time) -> i64 {
+        self.encoder.counts(self.mass.position_at(now))
+    }
+
+    pub(super) fn counts_per_s(&self, now: Time) -> f64 {
+        self.mass.speed_at(now) / self.encoder.resolution()
+    }
+
+    pub(super) fn index_pulse(&self) -> Option<IndexPulse> {
+        self.index.as_ref().and_then(IndexMark::last)
+    }
+
+    pub(super) fn limit_switches(&self) -> (bool, bool) {
+        let pressed = |[negative, positive]: &[LimitSwitch; 2]| {
+            (negative.is_pressed(), positive.is_pressed())
+        };
+        self.switches.as_ref().map_or((false, false), pressed)
+    }
+
+    pub(super) fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
+        if let Some(switches) = &mut self.switches {
+            switches[usize::from(positive)].forced = forced;
+        }
+    }
+}
