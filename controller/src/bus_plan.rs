@@ -50,9 +50,12 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
         .values()
         .filter(|analog| analog.bus.as_deref() == Some(name))
     {
-        // Two bytes a channel; four channels fill a PDO, more are refused by the check.
-        let bytes = analog.channels.len().min(4) as u8 * 2;
-        plan = plan.with_pdos(&[bytes]);
+        // Two bytes a channel; four channels fill a PDO.
+        let inputs = analog.channels.len() + analog.temperature_channels.len();
+        let pdos: Vec<u8> = (0..inputs.div_ceil(4))
+            .map(|pdo| (inputs - 4 * pdo).min(4) as u8 * 2)
+            .collect();
+        plan = plan.with_seldom_pdos(&pdos, analog.every_syncs.unwrap_or(1));
         if let Some(period) = analog.heartbeat_producer_ms {
             plan = plan.with_heartbeat(ms(period));
         }

@@ -10,6 +10,7 @@ mod model;
 mod platform;
 mod rotary;
 mod validate;
+mod volumetric;
 
 pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
@@ -28,4 +29,9 @@ pub use rotary::{
     DirectionName, EdgeName, LineDetectorConfig, OptimiseName, PeriodicInterpolationName,
     PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
     RotaryVerifyConfig, RotaryZeroConfig,
+};
+pub use volumetric::{
+    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, FeedConfig,
+    InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName, TemperatureConfig,
+    VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig, VolumetricZeroConfig,
 };

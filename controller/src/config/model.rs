@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use super::camera::CameraConfig;
 use super::platform::PlatformConfig;
 use super::rotary::RotaryConfig;
+use super::volumetric::VolumetricConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -40,6 +41,8 @@ pub struct MachineConfig {
     pub camera: BTreeMap<String, CameraConfig>,
     /// The alignment platform that the axes move, if they move one.
     pub platform: Option<PlatformConfig>,
+    /// The three axes whose errors are corrected throughout the work volume, if there are.
+    pub volumetric: Option<VolumetricConfig>,
 }
 
 /// Who the machine is, and where its records live.
@@ -286,6 +289,8 @@ impl AxisConfig {
 pub enum AnalogDevice {
     /// A CiA 401 module on CAN.
     Cia401,
+    /// A CiA 404 measuring module on CAN.
+    Cia404,
     /// An ADAM/DCON module on a serial line.
     Dcon,
 }
@@ -296,11 +301,15 @@ pub enum AnalogDevice {
 #[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct AnalogConfig {
     pub device: AnalogDevice,
+    #[serde(default)]
     pub channels: Vec<u8>,
     pub bus: Option<String>,
     pub node_id: Option<u8>,
     #[serde(default)]
     pub full_scale_v: Vec<f64>,
+    #[serde(default)]
+    pub temperature_channels: Vec<u8>,
+    pub every_syncs: Option<u8>,
     pub heartbeat_producer_ms: Option<u16>,
     pub heartbeat_consumer_ms: Option<u16>,
     pub watch_master_ms: Option<u16>,

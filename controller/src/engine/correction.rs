@@ -6,12 +6,14 @@
 //! proved where a table is loaded; at run time the rate is its limit times the speed.
 
 use compensator::apply::SlewedCorrection;
-use units::{Metres, MetresPerSecond, Time, Volts};
+use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
 
 use super::{AXES_MAX, PerAxis};
 
 /// Analog channels that a correction sees at most.
 pub const CHANNELS_MAX: usize = 32;
+/// Thermometers that a correction sees at most.
+pub const THERMOMETERS_MAX: usize = 32;
 
 /// One analog channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +24,15 @@ pub struct Channel {
     pub volts: Volts,
     /// Whether the converter stood at an end of its range.
     pub saturated: bool,
+}
+
+/// One thermometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThermometerSample {
+    /// When its sample arrived.
+    pub at: Time,
+    /// What it says; `None` where the module says that there is none, or beyond its range.
+    pub celsius: Option<Celsius>,
 }
 
 /// What a correction is computed from.
@@ -36,6 +47,8 @@ pub struct Observed<'a> {
     /// The analog modules' channels, in the order of the modules' names; `None` before the
     /// first sample.
     pub channels: &'a [Option<Channel>],
+    /// The thermometers of the same modules, likewise.
+    pub temperatures: &'a [Option<ThermometerSample>],
 }
 
 /// How far a correction can be relied upon now.
@@ -112,6 +125,11 @@ impl Applied {
             following: false,
             limited: 0,
         }
+    }
+
+    /// What was added last.
+    pub(super) fn current(&self) -> PerAxis<Metres> {
+        core::array::from_fn(|axis| self.slewed[axis].current())
     }
 
     pub(super) const fn switch(&mut self, on: bool) {

@@ -9,7 +9,7 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer};
 use units::{Metres, Time};
 
-use super::correction::{Applied, Channel, Correction, Observed, Validity};
+use super::correction::{Applied, Channel, Correction, Observed, ThermometerSample, Validity};
 use super::motion::{Moment, Motion};
 use super::path::{Differences, Item};
 use super::{AXES_MAX, AxisLimits, PerAxis};
@@ -108,6 +108,7 @@ pub(super) struct Heard<'a> {
     /// Where each axis was; `None` when it did not answer this SYNC.
     pub(super) actual: PerAxis<Option<Metres>>,
     pub(super) channels: &'a [Option<Channel>],
+    pub(super) temperatures: &'a [Option<ThermometerSample>],
 }
 
 /// One period of the loop, for whoever watches.
@@ -208,9 +209,12 @@ impl Core {
         }
     }
 
-    /// Begins at rest, with the set-points that the drives hold.
+    /// Begins at rest, with the set-points that the drives hold: what was added to them when the
+    /// axes were last moved is in these, and is not added twice.
     pub(super) fn begin(&mut self, held: PerAxis<Metres>) {
-        self.nominal = Differences::at_rest(held);
+        let added = self.applied.current();
+        let nominal = core::array::from_fn(|axis| held[axis] - added[axis]);
+        self.nominal = Differences::at_rest(nominal);
         self.actual = held;
         self.history = [held; ANSWER_PERIODS + 1];
     }
@@ -246,6 +250,7 @@ impl Core {
             nominal: &nominal[..self.axes],
             actual: &self.actual[..self.axes],
             channels: heard.channels,
+            temperatures: heard.temperatures,
         };
         let (offset, refused) = self.applied.advance(&observed);
         if let Some(reason) = refused {

@@ -74,6 +74,7 @@ impl Bench {
             now: self.now,
             actual: self.heard(),
             channels: &[],
+            temperatures: &[],
         };
         let set_point = self.engine.core.step(&heard)?;
         self.sent.push(set_point);

@@ -34,7 +34,7 @@ use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquare
 
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
-    Validity,
+    THERMOMETERS_MAX, ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, read_path};
 pub use decide::{Cause, Counts, Live, State};

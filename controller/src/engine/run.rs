@@ -22,7 +22,7 @@ use units::{Metres, Time};
 use super::decide::{Heard, Trouble};
 use super::{
     AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
-    Histogram, PerAxis,
+    Histogram, PerAxis, THERMOMETERS_MAX, ThermometerSample,
 };
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
@@ -77,6 +77,7 @@ struct Seats {
     /// The buses that carry SYNC.
     buses: Vec<Port>,
     channels: [Option<Channel>; CHANNELS_MAX],
+    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
 }
 
 /// The grid of SYNCs.
@@ -170,6 +171,7 @@ impl Machine {
             drive,
             buses: buses.map(|(port, _)| *port).collect(),
             channels: [None; CHANNELS_MAX],
+            temperatures: [None; THERMOMETERS_MAX],
         })
     }
 
@@ -338,22 +340,48 @@ impl Machine {
             let reading = self.answer(*at, synced);
             *actual = reading.map(|it| it.position);
         }
-        let samples = self.analogs.iter().filter_map(|it| it.device.reading());
-        let channels = samples.flat_map(|it| {
-            let values = it.volts.iter().zip(&it.saturated);
-            values.map(|(volts, saturated)| Channel {
-                at: it.at,
-                volts: *volts,
-                saturated: *saturated,
-            })
-        });
-        for (place, channel) in seats.channels.iter_mut().zip(channels) {
-            *place = Some(channel);
+        // A module without a sample keeps its places: its channels would else be taken for
+        // those of the next one. What it said last stays, as old as it is.
+        let mut first = 0;
+        for analog in &self.analogs {
+            let own = seats.channels.iter_mut().skip(first);
+            first += analog.device.channels();
+            let Some(sample) = analog.device.reading() else {
+                continue;
+            };
+            let values = sample.volts.iter().zip(&sample.saturated);
+            for (place, (volts, saturated)) in own.zip(values) {
+                *place = Some(Channel {
+                    at: sample.at,
+                    volts: *volts,
+                    saturated: *saturated,
+                });
+            }
         }
+        self.hear_temperatures(seats);
         Heard {
             now,
             actual,
             channels: &seats.channels,
+            temperatures: &seats.temperatures,
+        }
+    }
+
+    fn hear_temperatures(&self, seats: &mut Seats) {
+        let modules = self.analogs.iter();
+        let mut first = 0;
+        for module in modules.filter_map(|it| it.device.thermometers()) {
+            let own = seats.temperatures.iter_mut().skip(first);
+            first += module.sensors();
+            let Some(sample) = module.temperatures() else {
+                continue;
+            };
+            for (place, celsius) in own.zip(&sample.celsius) {
+                *place = Some(ThermometerSample {
+                    at: sample.at,
+                    celsius: *celsius,
+                });
+            }
         }
     }
 

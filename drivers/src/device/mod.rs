@@ -228,6 +228,11 @@ pub trait AnalogInput: Device {
 
     /// The newest sample, `None` before the first; its age is the caller's to judge by `at`.
     fn reading(&self) -> Option<&AnalogReading>;
+
+    /// The thermometers on the same module, where it has some.
+    fn thermometers(&self) -> Option<&dyn TemperatureInput> {
+        None
+    }
 }
 
 /// One sample of all channels.

@@ -414,6 +414,10 @@ impl AnalogInput for Cia404Analog {
     fn reading(&self) -> Option<&AnalogReading> {
         self.volts.as_ref()
     }
+
+    fn thermometers(&self) -> Option<&dyn TemperatureInput> {
+        (self.sensors() > 0).then_some(self as &dyn TemperatureInput)
+    }
 }
 
 impl TemperatureInput for Cia404Analog {
