@@ -1,0 +1,376 @@
+//! What the cyclic engine adds to each set-point of three axes (system S4).
+//!
+//! In every period: detectors → displacement from the reference, freed of the beam's drift → less
+//! what the memories keep → feed, so that nothing jumps → model, with roll and temperatures → exact
+//! inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
+//! slews from one correction to the next; that the rate is enough at the axes' full speed is proven
+//! when the correction is made. Nothing is allocated in a period.
+//!
+//! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
+//! old: a reference is wrong by its slope times the way since then.
+
+use compensator::volumetric::function::Function;
+use compensator::volumetric::model::VolumetricModel;
+use compensator::volumetric::model::{AxisErrors, Conditions, Machine as Model, Squareness};
+use compensator::volumetric::online::{
+    AxisMonitor, BeamReference, EndOfTravel, Feed, FeedStatus, Influences, Memories, MovingState,
+};
+use compensator::volumetric::{Axis, NoCorrection, Point};
+use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
+
+use super::VolumetricFailure;
+use super::inputs::{RollReader, Thermometer, confirmed_by_samples, place_of_voltage, sample};
+use crate::assemble::{
+    beam_detector, feed_settings, influences, model_limits, point_of_mm, thermal, volume_axis,
+    volumetric_chain, work_volume,
+};
+use crate::config::{
+    BeamConfig, BeamDetectorConfig, FeedConfig, MachineConfig, ReactionName, RollConfig,
+    VolumetricConfig,
+};
+use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
+
+/// As what a machine was calibrated: its errors, and what its detectors read then.
+#[derive(Clone, Debug, Default)]
+pub struct VolumetricState {
+    /// The error functions of x, y, z.
+    pub axes: [AxisErrors; 3],
+    /// The squarenesses.
+    pub squareness: Squareness,
+    /// What the detectors of each axis read; needed for each beam of the configuration.
+    pub beams: [Option<BeamReference>; 3],
+    /// What the roll detectors read along their axis; needed where there are some.
+    pub roll: Option<Function<Radians>>,
+    /// What the thermometers showed, in the order of the configuration.
+    pub temperatures: Vec<Celsius>,
+    /// What is to be kept although it deviates.
+    pub memories: Memories,
+}
+
+/// One beam, and where its detectors' channels stand.
+#[derive(Clone, Debug)]
+struct WatchedBeam {
+    monitor: AxisMonitor,
+    slider: [usize; 4],
+    end: Option<[usize; 4]>,
+}
+
+/// The roll of one slide.
+#[derive(Clone, Debug)]
+struct WatchedRoll {
+    axis: Axis,
+    reader: RollReader,
+    reference: Function<Radians>,
+    feed: Feed<Radians, 1>,
+}
+
+/// Corrects three axes by what is known of them and seen of them.
+#[derive(Clone, Debug)]
+pub struct VolumetricCorrection {
+    model: VolumetricModel,
+    tool: Point,
+    beams: [Option<WatchedBeam>; 3],
+    roll: Option<WatchedRoll>,
+    thermometers: Vec<Thermometer>,
+    temperatures: Vec<Celsius>,
+    influences: Influences,
+    memories: Memories,
+    /// When what is seen is nothing the model was proven for.
+    reaction: Option<ReactionName>,
+    /// Of a displacement by detectors that are believed.
+    u_displacement: Metres,
+    u_roll: Radians,
+}
+
+impl VolumetricCorrection {
+    /// For the machine of `config`, calibrated as `state`. Its axes x, y, z must be those of the
+    /// engine, in this order.
+    ///
+    /// # Errors
+    /// When the configuration has no work volume, a detector has no reference, or the errors
+    /// cannot be compensated within the limits.
+    pub fn new(config: &MachineConfig, state: VolumetricState) -> Result<Self, VolumetricFailure> {
+        let own = config.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
+        let (expected, seen) = (own.temperature.len(), state.temperatures.len());
+        if seen != expected {
+            return Err(VolumetricFailure::Temperatures { seen, expected });
+        }
+        let model = model(own, &state)?;
+        check_speed(config, own, &model)?;
+        let mut beams = [None, None, None];
+        for (axis, beam) in Axis::ALL.into_iter().zip(own.beam.each()) {
+            if let Some(beam) = beam {
+                let reference = state.beams[axis.index()].clone();
+                let reference = reference.ok_or(VolumetricFailure::NoReference { axis })?;
+                beams[axis.index()] = Some(watched_beam(config, own, axis, beam, reference)?);
+            }
+        }
+        let roll = match &own.roll {
+            Some(roll) => Some(watched_roll(config, own, roll, state.roll)?),
+            None => None,
+        };
+        let mut thermometers = Vec::new();
+        for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
+            thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
+        }
+        Ok(Self {
+            model,
+            tool: point_of_mm(own.tool_offset_mm),
+            beams,
+            roll,
+            thermometers,
+            temperatures: state.temperatures,
+            influences: influences(&own.influence)?,
+            memories: state.memories,
+            reaction: own.feed.as_ref().map(|it| it.reaction),
+            u_displacement: noise(own),
+            u_roll: own.roll.as_ref().map_or(Radians::ZERO, |it| {
+                Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
+            }),
+        })
+    }
+
+    /// The model in use.
+    pub const fn model(&self) -> &VolumetricModel {
+        &self.model
+    }
+
+    /// What the detectors say at `actual`, as it enters the model.
+    fn moving_state(&mut self, observed: &Observed<'_>, actual: Point) -> MovingState {
+        let mut state = MovingState::default();
+        for axis in Axis::ALL {
+            let Some(beam) = &mut self.beams[axis.index()] else {
+                continue;
+            };
+            let slider = sample(observed.channels, &beam.slider);
+            let end = beam.end.and_then(|it| sample(observed.channels, &it));
+            let seen = beam.monitor.advance(
+                observed.now,
+                actual.along(axis),
+                slider.as_ref(),
+                end.as_ref(),
+                &self.memories,
+            );
+            let factors = &self.influences.of[axis.index()];
+            state.sideways[axis.index()] =
+                core::array::from_fn(|k| seen[k] * factors[k].at(actual));
+        }
+        if let Some(roll) = &mut self.roll {
+            let position = actual.along(roll.axis);
+            let seen = roll.reader.read(observed);
+            let beyond = seen.map(|it| [it - roll.reference.at(position)]);
+            state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
+        }
+        state
+    }
+
+    /// What stands behind each value that is used.
+    fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
+        let beams = self.beams.iter().flatten().flat_map(|it| {
+            let (slider, end) = it.monitor.status();
+            core::iter::once(slider).chain(end)
+        });
+        let roll = self.roll.iter().map(|it| it.feed.status());
+        let thermometers = self.thermometers.iter().map(Thermometer::status);
+        beams.chain(roll).chain(thermometers)
+    }
+
+    fn beams_are_good(&self) -> bool {
+        let beams = self.beams.iter().flatten();
+        let mut statuses = beams.flat_map(|it| {
+            let (slider, end) = it.monitor.status();
+            core::iter::once(slider).chain(end)
+        });
+        statuses.all(|it| it == FeedStatus::Good)
+    }
+
+    /// The standard uncertainties at `command`. Of a displacement that nobody sees nothing is
+    /// known but that it is no larger than the largest permitted.
+    fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
+        let machine = self.model.machine();
+        let u_displacement = if self.beams_are_good() {
+            self.u_displacement
+        } else {
+            machine.displacement_max / 3.0_f64.sqrt()
+        };
+        let roll_is_good = self
+            .roll
+            .iter()
+            .all(|it| it.feed.status() == FeedStatus::Good);
+        let u_roll = if roll_is_good {
+            self.u_roll
+        } else {
+            machine.roll_max / 3.0_f64.sqrt()
+        };
+        let u = self
+            .model
+            .standard_uncertainty(command, now, u_displacement, u_roll);
+        u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
+    }
+
+    /// When what is seen is not what the model was proven for.
+    const fn without(&self) -> Corrected {
+        let validity = match self.reaction {
+            Some(ReactionName::Hold) | None => Validity::Hold,
+            Some(ReactionName::FadeOut) => Validity::FadeOut,
+            Some(ReactionName::Stop) => {
+                Validity::Stop("detectors report more than the correction was proven for")
+            }
+        };
+        nothing(validity)
+    }
+}
+
+/// No offset, and why.
+const fn nothing(validity: Validity) -> Corrected {
+    Corrected {
+        offset: [Metres(0.0); AXES_MAX],
+        uncertainty: [Metres(0.0); AXES_MAX],
+        validity,
+    }
+}
+
+impl Correction for VolumetricCorrection {
+    fn correct(&mut self, observed: &Observed<'_>) -> Corrected {
+        let (&[x, y, z], &[x_now, y_now, z_now]) = (observed.nominal, observed.actual) else {
+            return nothing(Validity::Stop("the engine does not move three axes"));
+        };
+        let (target, actual) = (Point::new(x, y, z), Point::new(x_now, y_now, z_now));
+        let state = self.moving_state(observed, actual);
+        for (value, thermometer) in self.temperatures.iter_mut().zip(&mut self.thermometers) {
+            *value = thermometer.advance(observed);
+        }
+        if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
+            return nothing(Validity::Stop("a detector or thermometer is in trouble"));
+        }
+        let Ok(now) = self.model.conditions(self.tool, &self.temperatures, &state) else {
+            return self.without();
+        };
+        match self.model.command(target, &now) {
+            Ok(command) => Corrected {
+                offset: per_axis(command - target),
+                uncertainty: self.uncertainty(command, &now),
+                validity: Validity::Valid,
+            },
+            Err(NoCorrection::Outside { .. }) => {
+                nothing(Validity::Stop("the path leaves the calibrated volume"))
+            }
+            Err(NoCorrection::TooLarge { .. }) => {
+                nothing(Validity::Stop("the deviation exceeds its limit"))
+            }
+        }
+    }
+}
+
+/// `noise_max` is how far two samples can be apart: so many standard deviations.
+const NOISE_RANGE: f64 = 3.0;
+
+fn per_axis(point: Point) -> PerAxis<Metres> {
+    let mut values = [Metres::ZERO; AXES_MAX];
+    for axis in Axis::ALL {
+        values[axis.index()] = point.along(axis);
+    }
+    values
+}
+
+/// The worst standard deviation of a detector on a slide.
+fn noise(config: &VolumetricConfig) -> Metres {
+    let sliders = config.beam.each().into_iter().flatten();
+    let each = sliders.map(|it| Metres::from_um(it.slider.noise_max_um / NOISE_RANGE));
+    each.fold(Metres::ZERO, Quantity::max)
+}
+
+fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {
+    let section = "feed";
+    let missing = VolumetricFailure::NotConfigured { section };
+    config.feed.as_ref().ok_or(missing)
+}
+
+fn model(
+    config: &VolumetricConfig,
+    state: &VolumetricState,
+) -> Result<VolumetricModel, VolumetricFailure> {
+    let machine = Model {
+        chain: volumetric_chain(config)?,
+        volume: work_volume(config)?,
+        axes: state.axes.clone(),
+        squareness: state.squareness,
+        thermal: thermal(config, &state.temperatures),
+        tool_max: Metres::from_mm(config.tool_max_mm),
+        displacement_max: Metres::from_um(config.compensation.displacement_max_um),
+        roll_max: config
+            .roll
+            .as_ref()
+            .map_or(Radians::ZERO, |it| Radians::from_arcsec(it.roll_max_arcsec)),
+    };
+    Ok(VolumetricModel::new(
+        machine,
+        model_limits(&config.compensation),
+    )?)
+}
+
+fn check_speed(
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+    model: &VolumetricModel,
+) -> Result<(), VolumetricFailure> {
+    let axes = volumetric
+        .axes
+        .iter()
+        .map(|it| config.axis[it].speed_max_mm_per_s);
+    let axes = MetresPerSecond(axes.fold(0.0, f64::max) * 1e-3);
+    let seen = model.speed_max();
+    if seen < axes {
+        return Err(VolumetricFailure::TooFast { seen, axes });
+    }
+    Ok(())
+}
+
+fn watched_beam(
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+    axis: Axis,
+    beam: &BeamConfig,
+    reference: BeamReference,
+) -> Result<WatchedBeam, VolumetricFailure> {
+    let common = feed(volumetric)?;
+    let places = |it: &BeamDetectorConfig| {
+        it.channels
+            .map(|channel| place_of_voltage(config, &it.analog, channel))
+    };
+    let detector = |it: &BeamDetectorConfig| {
+        beam_detector(it).map_err(|source| VolumetricFailure::Detector { axis, source })
+    };
+    let feed = |it: &BeamDetectorConfig| {
+        let settings = confirmed_by_samples(config, common, &it.analog);
+        Feed::new(feed_settings(&settings))
+    };
+    let end = match &beam.end {
+        Some(it) => Some(EndOfTravel {
+            detector: detector(it)?,
+            feed: feed(it),
+        }),
+        None => None,
+    };
+    let slider = detector(&beam.slider)?;
+    Ok(WatchedBeam {
+        monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
+        slider: places(&beam.slider),
+        end: beam.end.as_ref().map(places),
+    })
+}
+
+fn watched_roll(
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+    roll: &RollConfig,
+    reference: Option<Function<Radians>>,
+) -> Result<WatchedRoll, VolumetricFailure> {
+    let settings = confirmed_by_samples(config, feed(volumetric)?, &roll.analog);
+    Ok(WatchedRoll {
+        axis: volume_axis(roll.axis),
+        reader: RollReader::new(config, roll)?,
+        reference: reference.ok_or(VolumetricFailure::NoRollReference)?,
+        feed: Feed::new(feed_settings(&settings)),
+    })
+}

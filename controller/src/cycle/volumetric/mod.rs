@@ -1,0 +1,15 @@
+//! The cycle of three axes that are corrected throughout their volume (system S4).
+//!
+//! | file | what |
+//! |---|---|
+//! | `zero` | every axis on its index pulse, one after the other |
+//! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
+//! | `inputs` | where in the engine's channels each detector stands, and whether it is to be believed |
+
+mod correction;
+mod failure;
+mod inputs;
+mod zero;
+
+pub use correction::{VolumetricCorrection, VolumetricState};
+pub use failure::VolumetricFailure;
