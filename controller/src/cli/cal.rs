@@ -12,7 +12,7 @@ use truestage::{Failure, config};
 use units::Metres;
 
 use super::output::{Ended, Output};
-use super::{rotary, screw};
+use super::{rotary, screw, volumetric};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalCommand {
@@ -120,6 +120,8 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
         Content::LinearErrorTable(content) => linear_lines(content),
         Content::RotaryErrorTable(content) => rotary::shown(content),
         Content::ScrewModel(content) => screw::shown(content),
+        Content::VolumetricGeometry(content) => volumetric::shown(content),
+        Content::BeamReferences(_) | Content::StateMemory(_) => record.content.summary(),
     };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
     output.result(&text, &json!({"id": id, "record": value}))
@@ -163,6 +165,14 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
         Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
         Content::RotaryErrorTable(new) => rotary::changes(before.rotary(&before_id)?, new),
         Content::ScrewModel(new) => screw::changes(before.screw(&before_id)?, new),
+        Content::VolumetricGeometry(new) => volumetric::changes(before.geometry(&before_id)?, new),
+        Content::BeamReferences(_) | Content::StateMemory(_) => {
+            let kind = after.content.kind();
+            return Err(Failure::Usage {
+                what: format!("records of the kind {kind} are not compared"),
+                help: "`cal show --json` prints them".into(),
+            });
+        }
     };
     output.result(&lines.join("\n"), &json!({"changes": values}))
 }

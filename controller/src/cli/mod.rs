@@ -15,6 +15,7 @@ mod screw;
 mod session;
 mod table;
 mod verbs;
+mod volumetric;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
