@@ -130,11 +130,11 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             1e-3,
             axis.speed_max_mm_per_s,
         );
-        let below = index_mm < axis.soft_max_mm;
-        if !below {
+        let inside = index_mm >= axis.soft_min_mm && index_mm < axis.soft_max_mm;
+        if !inside {
             judge.say(
                 "zero.index_mm",
-                format!("the index of axis {name} lies beyond its upper soft limit"),
+                format!("the index of axis {name} lies outside its soft limits"),
                 "give the first index pulse off the negative limit switch",
             );
         }

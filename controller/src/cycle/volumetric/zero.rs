@@ -15,9 +15,11 @@ use crate::observer::Stage;
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
+/// How long each axis is seen at rest before the zero is done.
+const REST: Duration = Duration::from_millis(50);
 
 impl Machine {
-    /// Finds the index pulses of all three axes.
+    /// Finds the index pulses of all three axes, and brings each axis back to its pulse.
     ///
     /// # Errors
     /// Whatever stops the machine; axes that were not reached are not zeroed then.
@@ -38,6 +40,11 @@ impl Machine {
             let command = AxisCommand::HomeIndex { position, speed };
             self.command(axis, command, "home on the index", limit)?;
             self.remember(axis).zeroed = true;
+        }
+        // Each ran past its pulse before it stopped: whoever goes on finds all of them at rest.
+        for (axis, index_mm) in config.axes.iter().zip(zero.index_mm) {
+            self.move_to(axis, Metres::from_mm(index_mm))?;
+            self.stand_still(axis, REST)?;
         }
         self.observer.progress(Stage::Zero, WHOLE, steps, steps);
         Ok(())
