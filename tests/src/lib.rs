@@ -21,8 +21,8 @@ pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use rig::{
-    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, machine_config, rigs,
-    shipped_config,
+    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC,
+    machine_config, rigs, shipped_config,
 };
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};

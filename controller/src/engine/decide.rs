@@ -215,6 +215,8 @@ impl Core {
         let added = self.applied.current();
         let nominal = core::array::from_fn(|axis| held[axis] - added[axis]);
         self.nominal = Differences::at_rest(nominal);
+        self.state = State::Holding;
+        (self.missing, self.deviating) = ([0; AXES_MAX], [0; AXES_MAX]);
         self.actual = held;
         self.history = [held; ANSWER_PERIODS + 1];
     }

@@ -9,3 +9,4 @@ mod repeatable;
 mod rotary;
 mod rotary_table;
 mod serial_zero;
+mod volumetric;
