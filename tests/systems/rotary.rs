@@ -1,6 +1,6 @@
 //! The rotary table's whole cycle, the same on every bus.
 
-use tests::{Hand, Setup, Stand, on_every_rig};
+use tests::{Emulator, Hand, Setup, Stand, on_every_rig};
 use truestage::Failure;
 use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::HallDrift;
@@ -8,6 +8,10 @@ use units::Radians;
 
 const AXIS: &str = "c";
 const SEED: u64 = 41;
+
+fn hand_of(emulator: &Emulator) -> Hand<'_> {
+    Hand::new(|lines| emulator.simulation(move |machine| machine.turn_plate(lines)))
+}
 
 /// Zero, calibrate in three placements, as found and as left in a fifth, power cycle, zero, as left
 /// again, moves.
@@ -17,8 +21,7 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
         store,
         emulator,
     } = stand;
-    let turn = |lines: f64| emulator.simulation(move |machine| machine.turn_plate(lines));
-    let mut hand = Hand::new(turn);
+    let mut hand = hand_of(emulator);
     machine.zero_rotary(AXIS)?;
     let options = CalibrateOptions::default();
     let calibrated = machine.calibrate_rotary(AXIS, store, &options, &mut hand)?;
@@ -40,8 +43,7 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
         store,
         emulator,
     } = stand;
-    let turn = |lines: f64| emulator.simulation(move |machine| machine.turn_plate(lines));
-    let mut hand = Hand::new(turn).lies_at(200.5);
+    let mut hand = hand_of(emulator).lies_at(200.5);
     machine.load_active_rotary(AXIS, store)?;
     machine.zero_rotary(AXIS)?;
     let after = machine.verify_rotary(AXIS, store, true, &mut hand)?;

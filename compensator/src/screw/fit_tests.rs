@@ -1,20 +1,8 @@
 use nalgebra::{DMatrix, DVector};
 
-use super::super::rig::{Noise, Screw, UM, every, row};
+use super::super::rig::{Noise, Screw, UM, dense, every, row, with_lead};
 use super::*;
 use crate::uncertainty::reduced_chi_square_limit;
-
-fn with_lead() -> FitOptions {
-    FitOptions {
-        lead: Some(Metres::from_mm(2.0)),
-        ..FitOptions::default()
-    }
-}
-
-/// 24 strokes over six turns, at twelve places of the turn.
-fn dense() -> Vec<f64> {
-    every(-6.0, 0.5 + 1.0 / 12.0, 24)
-}
 
 fn numbers(fitted: &Fitted) -> Vec<u32> {
     fitted.model.harmonics.iter().map(|it| it.number).collect()

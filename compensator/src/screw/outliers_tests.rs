@@ -1,18 +1,6 @@
 use super::super::fit::{Fitted, fit};
-use super::super::rig::{Noise, Screw, every, row};
+use super::super::rig::{Noise, Screw, dense, row, with_lead};
 use super::*;
-
-fn with_lead() -> FitOptions {
-    FitOptions {
-        lead: Some(Metres::from_mm(2.0)),
-        ..FitOptions::default()
-    }
-}
-
-/// 24 strokes over six turns, at twelve places of the turn.
-fn dense() -> Vec<f64> {
-    every(-6.0, 0.5 + 1.0 / 12.0, 24)
-}
 
 fn wavy(repeats: usize, noise: &mut Noise) -> Vec<Stroke> {
     Screw::with_waves(&[(1, 0.6, 0.4)]).measured(&dense(), repeats, 0.1, noise)

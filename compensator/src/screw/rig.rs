@@ -2,6 +2,7 @@
 
 use units::{Approach, Metres};
 
+use super::fit::FitOptions;
 use crate::measurement::Stroke;
 
 pub(super) const UM: f64 = 1e-6;
@@ -137,4 +138,17 @@ impl Nut {
             }
         }
     }
+}
+
+/// A lead of 2 mm, and the usual.
+pub(super) fn with_lead() -> FitOptions {
+    FitOptions {
+        lead: Some(Metres::from_mm(2.0)),
+        ..FitOptions::default()
+    }
+}
+
+/// 24 strokes over six turns, at twelve places of the turn.
+pub(super) fn dense() -> Vec<f64> {
+    every(-6.0, 0.5 + 1.0 / 12.0, 24)
 }

@@ -1,9 +1,11 @@
 //! The person at the terminal, who turns the plate of a rotary table.
 
-use std::io::{BufRead, IsTerminal, stdin};
+use std::fs::File;
+use std::io::{self, IsTerminal, Read, stdin};
 use std::os::fd::AsFd;
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::termios::{FlushArg, tcflush};
 use truestage::Failure;
 use truestage::cycle::rotary::{Operator, PlateTask};
 
@@ -12,8 +14,9 @@ use super::output::Output;
 /// Asks on stderr and waits for Enter on stdin; the machine lives on meanwhile.
 #[derive(Debug)]
 pub(super) struct Terminal {
-    /// Somebody else sees to it that the plate is turned: nothing is waited for.
-    yes: bool,
+    /// Where Enter comes from. `None`: somebody else sees to it that the plate is turned, and
+    /// nothing is waited for.
+    answers: Option<File>,
     output: Output,
 }
 
@@ -21,49 +24,106 @@ impl Terminal {
     /// # Errors
     /// When nobody can answer, before anything moves.
     pub(super) fn new(yes: bool, output: Output) -> Result<Self, Failure> {
-        if yes || stdin().is_terminal() {
-            return Ok(Self { yes, output });
-        }
-        Err(Failure::Usage {
-            what: "somebody must turn the plate, and there is no terminal to ask at; nothing was \
-                   moved"
-                .into(),
-            help: "run it in a terminal, or with --yes where the plate is turned without being \
-                   waited for"
-                .into(),
-        })
+        let answers = match yes {
+            true => None,
+            false if stdin().is_terminal() => {
+                let own = stdin().as_fd().try_clone_to_owned();
+                Some(File::from(own.map_err(|error| gone(&error))?))
+            }
+            false => {
+                return Err(Failure::Usage {
+                    what: "somebody must turn the plate, and there is no terminal to ask at; \
+                           nothing was moved"
+                        .into(),
+                    help: "run it in a terminal, or with --yes where the plate is turned without \
+                           being waited for"
+                        .into(),
+                });
+            }
+        };
+        Ok(Self { answers, output })
     }
 }
 
 impl Operator for Terminal {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
         self.output.note(&format!("> {}", task.text()));
-        if !self.yes {
-            self.output.note(
-                "  the drive is switched off, which is no safe stop: make the machine safe first; \
-                 Enter when it is done, Ctrl-C to stop (what was read is kept)",
-            );
-        }
-        Ok(())
+        let Some(answers) = &self.answers else {
+            return Ok(());
+        };
+        self.output.note(
+            "  the drive is switched off, which is no safe stop: make the machine safe first; \
+             Enter when it is done, Ctrl-C to stop (what was read is kept)",
+        );
+        // What was typed before is no answer to this: a hand may be in the machine.
+        tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
-        if self.yes {
+        let Some(answers) = &mut self.answers else {
             return Ok(true);
-        }
-        let stdin = stdin();
-        let mut fds = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
+        };
+        let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
         // A signal only makes the next look come sooner.
         if poll(&mut fds, PollTimeout::ZERO).unwrap_or(0) == 0 {
             return Ok(false);
         }
-        let mut line = String::new();
-        match stdin.lock().read_line(&mut line) {
-            Ok(0) | Err(_) => Err(Failure::Usage {
-                what: "the terminal is gone; the placements that were read are kept".into(),
-                help: "continue with --resume".into(),
-            }),
-            Ok(_) => Ok(true),
+        // A terminal gives whole lines.
+        let mut line = [0; 256];
+        match answers.read(&mut line) {
+            Ok(0) => Err(gone(&io::ErrorKind::UnexpectedEof.into())),
+            Ok(length) => Ok(line[..length].contains(&b'\n')),
+            Err(error) => Err(gone(&error)),
         }
+    }
+}
+
+fn gone(why: &io::Error) -> Failure {
+    Failure::Usage {
+        what: format!("the terminal is gone ({why}); the placements that were read are kept"),
+        help: "continue with --resume".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nix::pty::openpty;
+    use std::io::Write;
+    use truestage::cycle::rotary::PlateMove;
+
+    const PATIENCE_MS: u16 = 10_000;
+
+    /// Enter, and what the kernel needs to bring it to the other end.
+    fn enter(keyboard: &mut File, terminal: &Terminal) {
+        keyboard.write_all(b"\n").unwrap();
+        let answers = terminal.answers.as_ref().unwrap();
+        let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
+        let ready = poll(&mut fds, PollTimeout::from(PATIENCE_MS));
+        assert_eq!(ready, Ok(1), "Enter did not arrive");
+    }
+
+    #[test]
+    fn what_was_typed_before_it_was_asked_for_is_no_answer() {
+        let pty = openpty(None, None).unwrap();
+        let mut keyboard = File::from(pty.master);
+        let mut terminal = Terminal {
+            answers: Some(File::from(pty.slave)),
+            output: Output::new(true),
+        };
+        let task = PlateTask {
+            axis: "c".into(),
+            plate: "A7".into(),
+            lines: 360,
+            step: (2, 4),
+            offset: 73.0,
+            by: PlateMove::TurnBy(73.0),
+        };
+        enter(&mut keyboard, &terminal);
+        terminal.ask(&task).unwrap();
+        assert!(!terminal.is_done().unwrap(), "an early Enter counted");
+        enter(&mut keyboard, &terminal);
+        assert!(terminal.is_done().unwrap());
+        assert!(!terminal.is_done().unwrap(), "one Enter counted twice");
     }
 }

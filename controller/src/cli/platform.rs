@@ -13,14 +13,17 @@ use super::screw::outlier_lines;
 use super::session::Session;
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 
-/// Starts the platform, zeroes it, runs `procedure`, switches off.
+/// Starts the platform, zeroes it, runs `procedure`, switches off; what `possible` refuses, before
+/// anything is sent.
 fn with_zeroed_platform<R>(
     args: &MachineArgs,
     verb: &str,
     output: Output,
+    possible: impl FnOnce(&Machine) -> Result<(), Failure>,
     procedure: impl FnOnce(&mut Machine, &Store) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     let mut session = Session::open(args, verb, Use::Measurement, output)?;
+    possible(&session.machine)?;
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
@@ -31,7 +34,29 @@ fn with_zeroed_platform<R>(
     })
 }
 
+/// A platform's screws are zeroed, calibrated and verified together.
+fn whole_only(args: &AxisArgs) -> Result<(), Failure> {
+    let Some(axis) = &args.axis else {
+        return Ok(());
+    };
+    Err(Failure::Usage {
+        what: format!("{axis} is part of a platform, whose screws only work together"),
+        help: "leave --axis out: the verb is for all of them".into(),
+    })
+}
+
+fn never_resumed(resume: bool) -> Result<(), Failure> {
+    if !resume {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "a platform's run cannot be resumed".into(),
+        help: "it takes minutes: start it again".into(),
+    })
+}
+
 pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
+    whole_only(args)?;
     let mut session = Session::open(&args.machine, "zero", Use::Measurement, output)?;
     let store = session.store.clone();
     let zeroed = session.machine.guarded(|machine| {
@@ -50,21 +75,26 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    if args.resume.is_some() {
+    whole_only(&args.axis)?;
+    never_resumed(args.resume.is_some())?;
+    if args.accept_drift {
         return Err(Failure::Usage {
-            what: "a platform's calibration cannot be resumed".into(),
-            help: "it takes minutes: start it again".into(),
+            what: "a platform that drifted is not calibrated".into(),
+            help: "leave --accept-drift out; wait for the temperature, or set closure_limit_um"
+                .into(),
         });
     }
     let run = |machine: &mut Machine, store: &Store| machine.calibrate_platform(store);
     let (calibrated, counters) =
-        with_zeroed_platform(&args.axis.machine, "calibrate", output, run)?;
+        with_zeroed_platform(&args.axis.machine, "calibrate", output, |_| Ok(()), run)?;
     let mut value = calibrated_value(&calibrated);
     value["counters"] = counters;
     output.result(&calibrated_text(&calibrated), &value)
 }
 
 pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    whole_only(&args.axis)?;
+    never_resumed(args.resume.is_some())?;
     let compensated = !args.uncompensated;
     let run = |machine: &mut Machine, store: &Store| {
         if compensated {
@@ -72,7 +102,8 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         }
         machine.verify_platform(store, compensated)
     };
-    let (verified, counters) = with_zeroed_platform(&args.axis.machine, "verify", output, run)?;
+    let (verified, counters) =
+        with_zeroed_platform(&args.axis.machine, "verify", output, |_| Ok(()), run)?;
     let title = if compensated { "as left" } else { "as found" };
     let mut value = json!({title.replace(' ', "_"): verified_value(&verified)});
     value["counters"] = counters;
@@ -85,6 +116,13 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 
 pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let target = target_pose(&args.targets)?;
+    let possible = |machine: &Machine| {
+        machine.check_pose(target)?;
+        if args.align {
+            machine.check_alignable()?;
+        }
+        Ok(())
+    };
     let run = |machine: &mut Machine, store: &Store| {
         let calibrations = machine.load_active_screws(store)?;
         let aligned = args.align.then(|| machine.align_pose(target)).transpose()?;
@@ -95,7 +133,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         Ok((calibrations, moved, aligned, machine.measure_pose()?))
     };
     let ((calibrations, moved, aligned, seen), counters) =
-        with_zeroed_platform(&args.machine, "move", output, run)?;
+        with_zeroed_platform(&args.machine, "move", output, possible, run)?;
     let calibrated = calibrations.iter().all(|(_, id)| id.is_some());
     let mut text = format!(
         "platform: told to be at {}, the camera sees it at {}",

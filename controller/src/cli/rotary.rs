@@ -73,6 +73,10 @@ pub(super) struct RotaryArgs {
     /// The rotary axis it belongs to; the only one when there is one.
     #[arg(long)]
     axis: Option<String>,
+    /// With --save: the plate's serial number. Only with that plate the stored table can be
+    /// verified.
+    #[arg(long, value_name = "NAME", requires = "save")]
+    plate: Option<String>,
 }
 
 fn amplification_max() -> f64 {
@@ -251,7 +255,10 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
             });
         }
     };
-    let head = rotary_head_of(&loaded, &axis, &args.data)?;
+    let mut head = rotary_head_of(&loaded, &axis, &args.data)?;
+    if let Some(plate) = &args.plate {
+        head.instrument.identity = core::mem::replace(&mut head.instrument.name, plate.clone());
+    }
     let content = RotaryContent::new(solution);
     if let Some(limits) = &axes[&axis].compensation {
         assemble::periodic_compensation(limits, &axis, content.table("just made")?)?;

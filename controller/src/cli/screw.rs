@@ -8,6 +8,7 @@ use compensator::screw::{
     self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
 use serde_json::{Value, json};
+use truestage::config::PlatformConfig;
 use truestage::json::screw as to_json;
 use truestage::store::{CalibrationRecord, Content, ScrewContent, ScrewMethodName, Store, short};
 use truestage::text::ScrewTerm;
@@ -223,14 +224,19 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
 
 /// The limits of the axis, or, where it has none, those without which no model can be applied.
 fn limits_of(loaded: &config::Loaded, axis: &str) -> Limits {
-    let configured = loaded
-        .config
+    let config = &loaded.config;
+    let own = config
         .axis
         .get(axis)
         .and_then(|it| it.compensation.as_ref());
+    let own = own.map(|it| (it.size_limit_um, it.slope_limit));
+    let pushes = |it: &&PlatformConfig| it.actuator.iter().any(|it| it.axis == axis);
+    let platform = config.platform.as_ref().filter(pushes);
+    let platform = platform.and_then(|it| it.compensation.as_ref());
+    let configured = own.or(platform.map(|it| (it.size_limit_um, it.slope_limit)));
     Limits {
-        size: configured.map_or(Metres(f64::MAX), |it| Metres::from_um(it.size_limit_um)),
-        slope: configured.map_or(1.0_f64.next_down(), |it| it.slope_limit),
+        size: configured.map_or(Metres(f64::MAX), |(size_um, _)| Metres::from_um(size_um)),
+        slope: configured.map_or(1.0_f64.next_down(), |(_, slope)| slope),
         extrapolation: Metres::ZERO,
         resolution: Metres::ZERO,
     }

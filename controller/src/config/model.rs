@@ -112,6 +112,20 @@ pub struct IdentityConfig {
     pub serial_number: Option<u32>,
 }
 
+impl IdentityConfig {
+    /// The same as a driver says it, as far as the configuration does.
+    pub fn configured(&self) -> Identity {
+        Identity {
+            device_type: self.device_type,
+            vendor: self.vendor_id,
+            product: self.product_code,
+            revision: self.revision.unwrap_or(0),
+            serial: self.serial_number.unwrap_or(0),
+            name: String::new(),
+        }
+    }
+}
+
 /// What a drive takes its home offset (0x607C) for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -266,14 +280,7 @@ impl AxisConfig {
 
     /// Who its drive is, as far as the configuration says it.
     pub fn configured_identity(&self) -> Identity {
-        let of_can = self.identity.as_ref().map(|it| Identity {
-            device_type: it.device_type,
-            vendor: it.vendor_id,
-            product: it.product_code,
-            revision: it.revision.unwrap_or(0),
-            serial: it.serial_number.unwrap_or(0),
-            name: String::new(),
-        });
+        let of_can = self.identity.as_ref().map(IdentityConfig::configured);
         let of_line = self.amplifier.as_ref().map(|it| Identity {
             serial: it.serial_number.unwrap_or(0),
             name: it.model.clone().unwrap_or_default(),

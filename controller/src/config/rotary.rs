@@ -1,7 +1,6 @@
 //! The part of a configuration that is about rotary axes. Each key's suffix is its unit.
 
 use compensator::rotary::{self, Criterion, Design, PlanError};
-use drivers::device::Identity;
 use serde::Deserialize;
 
 use super::model::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
@@ -101,21 +100,6 @@ pub struct LineDetectorConfig {
     #[serde(default)]
     pub edge: EdgeName,
     pub input: Option<i16>,
-}
-
-impl RotaryConfig {
-    /// Who its drive must be, as far as the configuration says.
-    pub fn configured_identity(&self) -> Identity {
-        let it = &self.identity;
-        Identity {
-            device_type: it.device_type,
-            vendor: it.vendor_id,
-            product: it.product_code,
-            revision: it.revision.unwrap_or(0),
-            serial: it.serial_number.unwrap_or(0),
-            name: String::new(),
-        }
-    }
 }
 
 /// What planned offsets keep small.

@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 use core::time::Duration;
 use std::collections::BTreeSet;
 
-use drivers::device::{LatchCommand, Latched, Repeat};
+use drivers::device::{LatchCommand, Latched, Repeat, SYNCS_PER_EDGE};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use super::turn::Way;
@@ -30,7 +30,7 @@ const REST_LIMIT: Duration = Duration::from_secs(3);
 /// The fastest turn at which every line of a plate is read: the drive's latch keeps one position,
 /// which comes with the next SYNC, and that one may be lost or late.
 pub(crate) fn speed_max(lines: u32, sync_period_ms: f64) -> f64 {
-    360.0 / f64::from(lines) * SPACING_SHARE / (2.0 * sync_period_ms * 1e-3)
+    360.0 / f64::from(lines) * SPACING_SHARE / (SYNCS_PER_EDGE * sync_period_ms * 1e-3)
 }
 
 /// How a plate is read.
@@ -85,9 +85,17 @@ impl Machine {
         let speed = options.speed.unwrap_or(usual);
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
+        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
+        let at = self.rotary_index(axis)?;
+        let device = &self.rotaries[at].device;
+        device
+            .check_latch_speed(spacing, speed)
+            .map_err(|source| Failure::Device {
+                device: axis.to_owned(),
+                source,
+            })?;
         let start = self.turn_to(axis, Radians(-sign * run_up), Way::Shortest)?;
         self.rest(axis)?;
-        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
         let repeat = Repeat::Continuous;
         self.latch(axis, LatchCommand::Arm { repeat, spacing })?;
         let first = start + Radians(sign * run_up);
@@ -112,25 +120,33 @@ impl Machine {
         Ok(core::iter::from_fn(|| device.poll_latched()).collect())
     }
 
-    /// Waits until the rotary axis has stood without a break.
+    /// Waits until the rotary axis has stood without a break, by samples that were taken since:
+    /// the host's clock alone would count old ones.
     pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
         let limit = REST_LIMIT * self.patience;
         let start = self.now();
-        let mut since = start;
-        while self.now().since(since) < REST {
-            if self.now().since(start) > limit {
+        let mut first = None;
+        loop {
+            let reading = self.rotary_reading(axis)?;
+            match reading.filter(|it| it.standing && it.at > start) {
+                Some(reading) => {
+                    let since = *first.get_or_insert(reading.at);
+                    if reading.at.since(since) >= REST {
+                        return Ok(());
+                    }
+                }
+                None => first = None,
+            }
+            let now = self.now();
+            if now.since(start) > limit {
                 return Err(Failure::Overdue {
                     device: axis.to_owned(),
                     step: "standing still",
                     waited: limit,
                 });
             }
-            self.tick(since + REST)?;
-            if !self.rotary_reading(axis)?.is_some_and(|it| it.standing) {
-                since = self.now();
-            }
+            self.tick(now + REST)?;
         }
-        Ok(())
     }
 }
 

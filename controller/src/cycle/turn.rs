@@ -8,7 +8,7 @@ use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared};
 use crate::assemble;
 use crate::config::{DirectionName, RotaryConfig};
 use crate::failure::Failure;
-use crate::machine::Machine;
+use crate::machine::{Machine, RotaryMemory};
 
 /// Which way round to an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,8 +95,7 @@ impl Machine {
         let limit = assemble::index_limit(config).unwrap_or_default() + Duration::from_secs(5);
         self.enable(axis)?;
         self.turn_command(axis, command, "zero", limit)?;
-        let memory = self.rotary_memory.entry(axis.to_owned()).or_default();
-        memory.zeroed = true;
+        self.remember_table(axis).zeroed = true;
         Ok(())
     }
 
@@ -106,19 +105,11 @@ impl Machine {
     /// # Errors
     /// Before anything moves: not zeroed. While moving: whatever stops the machine.
     pub fn turn_to(&mut self, axis: &str, angle: Radians, way: Way) -> Result<Radians, Failure> {
-        if !self.is_rotary_zeroed(axis) {
-            self.rotary_index(axis)?;
-            return Err(Failure::NotZeroed {
-                axis: axis.to_owned(),
-            });
-        }
+        self.require_table_zeroed(axis)?;
         let config = self.rotary_config(axis)?;
         let near = Radians::from_arcsec(config.position_window_arcsec);
         let speed = RadiansPerSecond(config.speed_deg_per_s.to_radians());
-        let reading = self.rotary_reading(axis)?;
-        let here = reading
-            .expect("an axis that was zeroed has been read")
-            .position;
+        let here = self.table_reading(axis)?;
         let target = way.target(here, angle, near);
         let limit = Duration::from_secs_f64(config.move_timeout_s);
         self.turn(axis, target, speed, limit)?;
@@ -165,6 +156,29 @@ impl Machine {
         self.rotaries[at].device.latch(now, command);
         let limit = Duration::from_secs(5);
         self.await_outcome(self.axes.len() + at, "touch probe", limit)
+    }
+
+    /// Refuses a rotary axis that has no zero, or is none.
+    pub(crate) fn require_table_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        self.rotary_index(axis)?;
+        if self.is_rotary_zeroed(axis) {
+            return Ok(());
+        }
+        Err(Failure::NotZeroed {
+            axis: axis.to_owned(),
+        })
+    }
+
+    /// Where the drive says that the zeroed rotary axis `axis` is.
+    pub(crate) fn table_reading(&self, axis: &str) -> Result<Radians, Failure> {
+        let reading = self.rotary_reading(axis)?;
+        let reading = reading.expect("an axis that was zeroed has been read");
+        Ok(reading.position)
+    }
+
+    /// What is known about the rotary axis `axis`.
+    pub(crate) fn remember_table(&mut self, axis: &str) -> &mut RotaryMemory {
+        self.rotary_memory.entry(axis.to_owned()).or_default()
     }
 
     /// The number of a named rotary axis among those.

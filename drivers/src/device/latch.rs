@@ -3,7 +3,11 @@
 
 use units::{Coordinate, Counts, Metres, Radians, Time};
 
-use super::{Axis, ServoDrive};
+use super::{Axis, DeviceError, ServoDrive};
+
+/// Between two edges there must be time for so many SYNCs: one that reads the position, and one
+/// that may be lost or late.
+pub const SYNCS_PER_EDGE: f64 = 2.0;
 
 /// A drive that latches its axis's position at the edges of an input.
 ///
@@ -20,6 +24,12 @@ pub trait PositionLatch<Q: Coordinate = Metres>: ServoDrive {
     /// The fastest that the axis may move over edges so far apart for every one to be read,
     /// one lost or late frame in between included.
     fn latch_speed_max(&self, spacing: Q) -> Q::Speed;
+
+    /// Whether a move at `speed` would let every edge be read, edges being `spacing` apart.
+    ///
+    /// # Errors
+    /// When it would not, with the speed that would.
+    fn check_latch_speed(&self, spacing: Q, speed: Q::Speed) -> Result<(), DeviceError>;
 
     /// The next latched position, in the order of the edges.
     fn poll_latched(&mut self) -> Option<Latched<Q>>;

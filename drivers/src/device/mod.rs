@@ -27,7 +27,7 @@ use units::{
 
 pub use alarm::{Alarm, AmplifierTrouble};
 pub use error::{DeviceError, DeviceName, Seen};
-pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis};
+pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use shared_line::{LineUse, Urgency};
 
 use crate::transport::Input;

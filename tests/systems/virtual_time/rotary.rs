@@ -217,6 +217,25 @@ fn a_plate_that_is_placed_by_hand_does_as_well() {
     assert!(left.iter().all(|it| *it <= LIMIT_ARCSEC), "{left:?}");
 }
 
+/// A plate fixed "in any position" lies half a line off as often as anywhere else: whichever line
+/// is then taken for the first, it must be the same in all placements.
+#[test]
+fn a_plate_fixed_half_way_between_two_lines_keeps_its_first_line_in_every_placement() {
+    for (seed, off) in [(21, 0.495), (22, -0.495), (23, 0.505)] {
+        let mut bench = bench(seed);
+        bench.emulated.simulation_mut().turn_plate(off);
+        let calibrated = calibrated(&mut bench);
+        assert!(calibrated.solution.outliers.is_empty());
+        let left = residual(&bench, 360, 0.5);
+        assert!(left <= LIMIT_ARCSEC, "{off}: {left}");
+        let mut hand = hand_of(&bench.emulated).lies_at(232.0);
+        let asked = calibrated.solution.design.offsets().last();
+        assert_eq!(asked, Some(&232));
+        let verified = verified(&mut bench, &mut hand).unwrap_or_else(|it| panic!("{off}: {it}"));
+        assert!(verified.is_within_tolerance());
+    }
+}
+
 #[test]
 fn a_further_placement_between_the_lines_sees_the_table_as_found_and_as_left() {
     let mut bench = bench(22);

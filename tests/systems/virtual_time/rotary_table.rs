@@ -156,6 +156,7 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
             speed: Some(RadiansPerSecond(170.0_f64.to_radians())),
             ..options(Approach::Forward)
         };
+        let before = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
         let refused = bench.machine.sweep(AXIS, &fast);
         let Err(Failure::Device {
             source: DeviceError::OutOfRange { limit, unit, .. },
@@ -168,6 +169,8 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
             (limit - 75.0).abs() < 1e-9 && unit == "°/s",
             "{limit} {unit}"
         );
+        let after = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
+        assert!((after.position - before.position).abs().arcsec() < 1.0);
         Ok(())
     });
 }

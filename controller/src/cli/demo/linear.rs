@@ -12,7 +12,7 @@ use truestage::store::{ZeroEntry, read_journal};
 use truestage::{Failure, Machine, Store, json as to_json, text};
 use units::{Metres, Volts};
 
-use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took};
 use crate::cli::output::Output;
 
 const AXIS: &str = "x";
@@ -111,11 +111,7 @@ fn rezero(
     drift: HallDrift,
     first: &Zeroed,
 ) -> Result<Rezero, Failure> {
-    machine.shut_down()?;
-    emulated.power_cycle(drift)?;
-    let back = machine.now() + POWER_OFF;
-    machine.run_until(back)?;
-    machine.start()?;
+    power_cycle(machine, emulated, drift)?;
     let zeroed = machine.zero(AXIS, store)?;
     let shift = machine.displacement_at_zero(AXIS)?;
     let threshold = zeroed.single_threshold(first.estimate.mid_voltage);

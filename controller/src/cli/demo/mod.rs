@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use truestage::config::{self, Loaded};
-use truestage::emulated::EmulatedOnPtys;
+use truestage::emulated::{EmulatedOnPtys, HallDrift};
 use truestage::store::Lease;
 use truestage::{Failure, Machine, Store, ports};
 
@@ -91,6 +91,19 @@ struct Stand {
     store: Store,
     emulated: EmulatedOnPtys,
     started: Instant,
+}
+
+/// Switches the machine off and everything's power off and on, `drift` meanwhile, and starts again.
+fn power_cycle(
+    machine: &mut Machine,
+    emulated: &EmulatedOnPtys,
+    drift: HallDrift,
+) -> Result<(), Failure> {
+    machine.shut_down()?;
+    emulated.power_cycle(drift)?;
+    let back = machine.now() + POWER_OFF;
+    machine.run_until(back)?;
+    machine.start()
 }
 
 /// What was shown.

@@ -10,7 +10,7 @@ use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
 use units::Radians;
 
-use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took};
 use crate::cli::output::Output;
 use crate::cli::table::{
     calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
@@ -107,11 +107,7 @@ fn tell(stand: &mut Stand, output: Output) -> Result<Story, Failure> {
         output.note("5 as found and as left: the plate half a line beside all of these");
         let left = machine.verify_rotary(AXIS, store, true, &mut hand)?;
         output.note("6 power off and on; zero again, as left");
-        machine.shut_down()?;
-        emulated.power_cycle(HallDrift::default())?;
-        let back = machine.now() + POWER_OFF;
-        machine.run_until(back)?;
-        machine.start()?;
+        power_cycle(machine, emulated, HallDrift::default())?;
         machine.zero_rotary(AXIS)?;
         let after = machine.verify_rotary(AXIS, store, true, &mut hand)?;
         output.note("7 move: two turns on, across the seam, compensated");

@@ -12,7 +12,7 @@ use truestage::store::read_journal;
 use truestage::{Failure, Store, json as to_json};
 use units::{Metres, Radians};
 
-use super::{DemoArgs, POWER_OFF, Shown, Stand, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took};
 use crate::cli::output::Output;
 use crate::cli::platform::{
     calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
@@ -95,11 +95,7 @@ fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Fai
         output.note("5 as left: the same poses, compensated, open loop");
         let left = machine.verify_platform(store, true)?;
         output.note("6 power off and on; zero again, as left");
-        machine.shut_down()?;
-        emulated.power_cycle(HallDrift::default())?;
-        let back = machine.now() + POWER_OFF;
-        machine.run_until(back)?;
-        machine.start()?;
+        power_cycle(machine, emulated, HallDrift::default())?;
         let second = machine.zero_platform(store)?;
         let after = machine.verify_platform(store, true)?;
         output.note("7 align: move until the image agrees");

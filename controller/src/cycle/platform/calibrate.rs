@@ -70,11 +70,10 @@ impl Machine {
         let mut journal = self.platform_journal(store, "calibrate", plan.runs, None, None)?;
         let measured = self.measure_screws(&plan, &mut journal);
         let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
-        let mut fitted = Vec::new();
-        for (at, strokes) in strokes.iter().enumerate() {
-            fitted.push(self.fit_screw(at, &plan, strokes)?);
-        }
-        let screws = self.store_screws(store, &journal, &plan, &strokes, &fitted)?;
+        let stored = self.fit_and_store(store, &journal, &plan, &strokes);
+        let screws = stored.inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
         Ok(PlatformCalibrated {
             screws,
             journal: journal.path().to_owned(),
@@ -124,8 +123,6 @@ impl Machine {
             start_m: 0.0,
             closure_m: closure.value(),
         }))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
         Ok((all, closure))
     }
 
@@ -223,6 +220,20 @@ impl Machine {
                 Failure::ScrewCompensation { axis, source }
             },
         )
+    }
+
+    fn fit_and_store(
+        &mut self,
+        store: &Store,
+        journal: &Journal,
+        plan: &PlatformCalibrateConfig,
+        strokes: &[Vec<Stroke>],
+    ) -> Result<Vec<ScrewCalibrated>, Failure> {
+        let mut fitted = Vec::new();
+        for (at, strokes) in strokes.iter().enumerate() {
+            fitted.push(self.fit_screw(at, plan, strokes)?);
+        }
+        self.store_screws(store, journal, plan, strokes, &fitted)
     }
 
     fn store_screws(

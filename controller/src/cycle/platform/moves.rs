@@ -43,6 +43,18 @@ struct Planned {
 }
 
 impl Machine {
+    /// Whether the platform may be told to be at `target`: by its work range and its screws'
+    /// reach, without their calibrations. Asks no device.
+    ///
+    /// # Errors
+    /// When it may not.
+    pub fn check_pose(&self, target: Pose) -> Result<(), Failure> {
+        check_work_range(self.platform_config()?, target)?;
+        let reached = self.platform_state()?.kinematics.check(target);
+        reached.map_err(PlatformFailure::from)?;
+        Ok(())
+    }
+
     /// Moves the platform to `target`, compensated where screws have a calibration.
     ///
     /// # Errors
@@ -50,7 +62,9 @@ impl Machine {
     /// calibration, or a way there that leaves them. While moving: whatever stops the machine.
     pub fn move_pose(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
         self.require_platform_zeroed()?;
-        check_work_range(self.platform_config()?, target)?;
+        self.check_pose(target)?;
+        let strokes = self.platform_state()?.kinematics.check(target);
+        self.plan(&strokes.map_err(PlatformFailure::from)?, Correction::On)?;
         let taken_up = self.take_up()?;
         let moved = self.go_to_pose(target, Correction::On)?;
         Ok(PoseMoved { taken_up, ..moved })

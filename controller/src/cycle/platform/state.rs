@@ -105,7 +105,10 @@ pub(crate) fn kinematics(
 /// The displacement from the pose `datum` to the pose `seen`, as a motion of the platform's own
 /// frame: what lay at p then lies at t + R(angle)·p now.
 pub(crate) fn from_datum(seen: Pose, datum: Pose) -> Pose {
-    let angle = seen.angle - datum.angle;
+    let turn = core::f64::consts::TAU;
+    let angle = (seen.angle - datum.angle).value();
+    // What the camera says jumps by a turn where its angles begin again.
+    let angle = Radians(angle - turn * (angle / turn).round());
     let (sin, cos) = angle.value().sin_cos();
     let (x, y) = (datum.x.value(), datum.y.value());
     Pose {
@@ -180,6 +183,18 @@ mod tests {
         let moved = from_datum(seen, datum);
         assert!((moved.x.mm() - 1.0).abs() < 1e-9 && (moved.y.mm() + 2.0).abs() < 1e-9);
         assert!((moved.angle.value() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_body_seen_across_the_seam_of_the_cameras_angles_has_turned_by_little() {
+        let half = core::f64::consts::PI;
+        let at = |angle| Pose {
+            angle: Radians(angle),
+            ..Pose::default()
+        };
+        let moved = from_datum(at(-half + 0.001), at(half - 0.002));
+        assert!((moved.angle.value() - 0.003).abs() < 1e-12);
+        assert!(moved.x.abs() < Metres(1e-12) && moved.y.abs() < Metres(1e-12));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use units::{Metres, Radians};
 
 use super::failure::PlatformFailure;
 use super::state::{difference, largest_error};
+use crate::config::AlignConfig;
 use crate::cycle::note_failure;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
@@ -144,16 +145,26 @@ impl Machine {
         Ok(checked)
     }
 
+    /// Whether it is configured how the platform is moved until the image agrees.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check_alignable(&self) -> Result<(), Failure> {
+        self.alignment().map(|_| ())
+    }
+
+    fn alignment(&self) -> Result<&AlignConfig, Failure> {
+        let align = self.platform_config()?.align.as_ref();
+        Ok(align.ok_or(PlatformFailure::NotConfigured { section: "align" })?)
+    }
+
     /// Moves to `target`, then on until the image agrees with it.
     ///
     /// # Errors
     /// As [`Machine::move_pose`], and when it does not agree after the moves allowed.
     pub fn align_pose(&mut self, target: Pose) -> Result<Aligned, Failure> {
-        let config = self.platform_config()?;
-        let edge = Metres::from_mm(config.edge_mm);
-        let section = "align";
-        let align = config.align.clone();
-        let align = align.ok_or(PlatformFailure::NotConfigured { section })?;
+        let align = self.alignment()?.clone();
+        let edge = Metres::from_mm(self.platform_config()?.edge_mm);
         let limit = Metres::from_um(align.tolerance_um);
         let mut told = target;
         let mut open_loop = None;

@@ -78,7 +78,11 @@ impl Machine {
             // Offsets of a run without a calibration mean nothing to a verification.
             self.remember_table(axis).plate_at = None;
         })?;
-        let stored = self.store_table(axis, store, &run, &journal, &solution);
+        let content = RotaryContent {
+            plate_phase_rad: placed.first().map(|it| it.phase.value()),
+            ..RotaryContent::new(&solution)
+        };
+        let stored = self.store_table(axis, store, &run, &journal, content);
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
@@ -107,6 +111,8 @@ impl Machine {
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Vec<Placed>, Failure> {
+        // A run that was continued may have been killed between a placement and its judgement.
+        doubt(axis, run, &placed, journal)?;
         let total = run.sweeps() * offsets.len() as u32;
         for (number, offset) in (1..).zip(offsets) {
             if placed.iter().any(|it| it.offset == *offset) {
@@ -116,11 +122,10 @@ impl Machine {
             let known = placed.last().map(|it| it.offset);
             self.place_plate(axis, run, *offset, step, known, operator)?;
             let done = (run.sweeps() * placed.len() as u32, total);
-            placed.push(self.read_placement(axis, run, *offset, done, journal)?);
+            let phase = placed.first().map(|it| it.phase);
+            placed.push(self.read_placement(axis, run, (*offset, phase), done, journal)?);
             doubt(axis, run, &placed, journal)?;
         }
-        // A run that was continued may have nothing left to read.
-        doubt(axis, run, &placed, journal)?;
         placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
         Ok(placed)
     }
@@ -131,9 +136,8 @@ impl Machine {
         store: &Store,
         run: &PlateRun,
         journal: &Journal,
-        solution: &Solution,
+        content: RotaryContent,
     ) -> Result<String, Failure> {
-        let content = RotaryContent::new(solution);
         let source = journal.path().file_name().unwrap_or_default();
         let head = RecordHead {
             created: utc_now(),

@@ -59,7 +59,7 @@ pub(super) fn evaluate(
     };
     let (solution, _) = fit(axis, run.lines, &options, placed)?;
     check_residuals(axis, run, &solution)?;
-    Ok(solution)
+    Ok(at_table_positions(solution, common_phase(placed)))
 }
 
 /// The solution, and the readings at their nominal positions that it was made from.
@@ -77,8 +77,9 @@ fn fit(
     };
     let read = series(axis, lines, placed)?;
     let (mut solution, mut moved) = (solve(&read)?, read.clone());
+    let phase = common_phase(placed);
     for _ in 0..ROUNDS {
-        let Some(nominal) = at_nominal_positions(&read, &solution) else {
+        let Some(nominal) = at_nodes(&read, phase, &solution) else {
             break;
         };
         solution = solve(&nominal)?;
@@ -112,7 +113,7 @@ pub fn evaluated(journal: &ReadJournal) -> Option<Evaluated> {
     let placements = read.placements().iter();
     Some(Evaluated {
         residuals: placements.map(|it| residuals(it, &solution)).collect(),
-        solution,
+        solution: at_table_positions(solution, common_phase(&placed)),
     })
 }
 
@@ -131,16 +132,44 @@ fn residuals(placement: &Placement, solution: &Solution) -> Vec<(Radians, Radian
     left.map(|(place, apart)| (place, apart - mean)).collect()
 }
 
-/// The readings less what the table's error changes between where a line is and where it should
-/// be. `None` when the table is too rough to say that.
-fn at_nominal_positions(read: &RotarySeries, solution: &Solution) -> Option<RotarySeries> {
+/// Where the plate lay from the table positions, of all placements: the nodes at which the table's
+/// error is found. Bringing readings from there to the table positions in the rounds would amplify
+/// the noise of the highest harmonics instead of converging.
+fn common_phase(placed: &[Placed]) -> Radians {
+    let phases = placed.iter().map(|it| it.phase);
+    phases.sum::<Radians>() / placed.len().max(1) as f64
+}
+
+/// The error of `solution` between its nodes. `None` when it is too rough to be told there.
+fn curve_of(solution: &Solution) -> Option<PeriodicCompensation> {
     let table = PeriodicTable::new(solution.deviations(), None).ok()?;
-    let curve =
-        PeriodicCompensation::new(table, PeriodicInterpolation::BandLimited, LIMITS).ok()?;
+    PeriodicCompensation::new(table, PeriodicInterpolation::BandLimited, LIMITS).ok()
+}
+
+/// `solution`, whose nodes lie by `phase` beside the table positions, at these: once, and without
+/// losing anything but the sine of the highest harmonic, which half a spacing hides.
+fn at_table_positions(mut solution: Solution, phase: Radians) -> Solution {
+    let Some(curve) = curve_of(&solution) else {
+        return solution;
+    };
+    let lines = solution.table_error.len();
+    for (at, error) in solution.table_error.iter_mut().enumerate() {
+        let position = Radians(TAU * at as f64 / lines as f64);
+        if let Ok(deviation) = curve.deviation(position - phase) {
+            *error = -deviation;
+        }
+    }
+    solution
+}
+
+/// The readings less what the table's error changes between where a line is and its node. `None`
+/// when the table is too rough to say that.
+fn at_nodes(read: &RotarySeries, phase: Radians, solution: &Solution) -> Option<RotarySeries> {
+    let curve = curve_of(solution)?;
     let lines = read.lines();
     let moved = |offset: usize, line: usize, reading: Radians| {
         let nominal = Radians(TAU * ((line + offset) % lines) as f64 / lines as f64);
-        let there = curve.deviation(nominal + reading).ok()?;
+        let there = curve.deviation(nominal + reading - phase).ok()?;
         // A deviation is the negative of the table's error.
         Some(reading + (there - curve.deviation(nominal).ok()?))
     };

@@ -9,14 +9,23 @@ use units::Radians;
 pub enum RotaryFailure {
     /// Most of the plate cannot be seen.
     #[error(
-        "axis {axis}: only {seen} of {lines} lines were read in one pass, a quarter may be missing; \
-         clean the plate, focus the detector, or turn slower"
+        "axis {axis}: only {seen} of {lines} lines were read in one pass, {wanted} are needed; {}",
+        if *overwritten > 0 {
+            format!("{overwritten} were overwritten before they were read: turn slower \
+                     (speed_deg_per_s), or give the computer less to do")
+        } else {
+            "clean the plate, focus the detector".to_owned()
+        }
     )]
     TooFewLines {
         /// Which axis.
         axis: String,
         /// How many were read.
         seen: usize,
+        /// How many must be.
+        wanted: usize,
+        /// How many were overwritten unread, where that is the cause.
+        overwritten: usize,
         /// The lines of the plate.
         lines: u32,
     },

@@ -8,7 +8,7 @@ use crate::assemble;
 use crate::cycle::Way;
 use crate::cycle::calibrate::missing;
 use crate::failure::Failure;
-use crate::machine::{Machine, RotaryMemory};
+use crate::machine::Machine;
 use crate::store::{CalibrationRecord, RotaryContent, Store, StoreError};
 
 /// A calibration in use.
@@ -136,25 +136,5 @@ impl Machine {
         let config = self.rotary_config(axis)?.compensation.as_ref();
         let config = config.ok_or_else(|| missing(axis, "compensation"))?;
         assemble::periodic_compensation(config, axis, content.table(id)?)
-    }
-
-    pub(super) fn require_table_zeroed(&self, axis: &str) -> Result<(), Failure> {
-        self.rotary_index(axis)?;
-        if self.is_rotary_zeroed(axis) {
-            return Ok(());
-        }
-        Err(Failure::NotZeroed {
-            axis: axis.to_owned(),
-        })
-    }
-
-    fn table_reading(&self, axis: &str) -> Result<Radians, Failure> {
-        let reading = self.rotary_reading(axis)?;
-        let reading = reading.expect("an axis that was zeroed has been read");
-        Ok(reading.position)
-    }
-
-    pub(super) fn remember_table(&mut self, axis: &str) -> &mut RotaryMemory {
-        self.rotary_memory.entry(axis.to_owned()).or_default()
     }
 }

@@ -84,6 +84,8 @@ pub(super) struct Placed {
     /// Standard deviation of one line in one pass, by what the directions differ.
     pub(super) scatter: Option<Radians>,
     pub(super) closure: Radians,
+    /// Where a plate at offset 0 would have its lines, from the table positions.
+    pub(super) phase: Radians,
 }
 
 impl Placed {
@@ -114,11 +116,15 @@ impl Placed {
             (None, Some(reverse)) => Some(Radians(reverse + late)),
             (None, None) => None,
         });
+        let spacing = TAU / reverse.len().max(1) as f64;
+        let first = sweeps.iter().find(|it| it.offset == placement.offset);
+        let phase = first.map_or(0.0, |it| it.phase_rad - it.offset.fract() * spacing);
         Self {
             offset: placement.offset,
             deviations: deviations.collect(),
             scatter: scatter.map(Radians),
             closure: Radians(placement.closure_rad),
+            phase: Radians(phase),
         }
     }
 
@@ -234,16 +240,22 @@ impl Machine {
         self.enable(axis)
     }
 
-    /// Reads the plate as it lies, `done` passes of `total` being read already.
+    /// Reads the plate as it lies, `done` passes of `total` being read already. `phase` is that of
+    /// the placement which all others are counted from: somebody fixed it anywhere within a line
+    /// spacing, and every further one is off by about as much. `None` for that placement itself.
     pub(super) fn read_placement(
         &mut self,
         axis: &str,
         run: &PlateRun,
-        offset: f64,
+        (offset, phase): (f64, Option<Radians>),
         (done, total): (u32, u32),
         journal: &mut Journal,
     ) -> Result<Placed, Failure> {
-        let mut phase = Some(offset.fract() * run.spacing()).filter(|it| *it != 0.0);
+        let of_part = offset.fract() * run.spacing();
+        let mut phase = match phase {
+            Some(phase) => Some(phase.value() + of_part),
+            None => Some(of_part).filter(|it| *it != 0.0),
+        };
         let mut sweeps: Vec<SweepEntry> = Vec::new();
         for number in 0..run.sweeps() {
             let approach = if number % 2 == 0 {
@@ -291,12 +303,19 @@ impl Machine {
             let seen = sweep.read();
             let busy = sweep.overwritten.len() > sweep.missing.len();
             let share = if busy { UNREAD_SHARE } else { MISSING_SHARE };
-            if seen as f64 >= f64::from(lines) * (1.0 - share) {
+            let wanted = (f64::from(lines) * (1.0 - share)).ceil() as usize;
+            if seen >= wanted {
                 return Ok(sweep);
             }
             if !busy || again == AGAIN_MAX {
-                let axis = axis.to_owned();
-                return Err(RotaryFailure::TooFewLines { axis, seen, lines }.into());
+                return Err(RotaryFailure::TooFewLines {
+                    axis: axis.to_owned(),
+                    seen,
+                    wanted,
+                    overwritten: if busy { sweep.overwritten.len() } else { 0 },
+                    lines,
+                }
+                .into());
             }
             again += 1;
             self.observer.warning(&format!(

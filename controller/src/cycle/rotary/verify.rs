@@ -70,9 +70,7 @@ impl RotaryVerified {
         let left = self.left.as_ref();
         left.is_some_and(|it| it.largest <= self.tolerance)
     }
-}
 
-impl RotaryVerified {
     fn entry(&self) -> JudgedEntry {
         let of = |figures: &RotaryFigures| {
             let values = figures.deviations.iter();
@@ -121,7 +119,8 @@ impl Machine {
         let offset = config.offset_lines;
         // Without a calibration any placement is as good as another.
         let lay_at = known.as_ref().and_then(|it| it.content.offsets.first());
-        let places = (offset, lay_at.map(|it| f64::from(*it)));
+        let phase = known.as_ref().and_then(|it| it.content.plate_phase_rad);
+        let places = (offset, lay_at.map(|it| f64::from(*it)), phase.map(Radians));
         let read = self.read_verification(axis, &run, places, &mut journal, operator);
         let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
         if let Some(known) = &known {
@@ -155,13 +154,13 @@ impl Machine {
         &mut self,
         axis: &str,
         run: &PlateRun,
-        (offset, lay_at): (f64, Option<f64>),
+        (offset, lay_at, phase): (f64, Option<f64>, Option<Radians>),
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Placed, Failure> {
         journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
         self.place_plate(axis, run, offset, (1, 1), lay_at, operator)?;
-        self.read_placement(axis, run, offset, (0, run.sweeps()), journal)
+        self.read_placement(axis, run, (offset, phase), (0, run.sweeps()), journal)
     }
 
     /// What the calibration in use says of the plate.
@@ -178,7 +177,9 @@ impl Machine {
                 what: format!("axis {axis} uses no calibration"),
                 help: "load or make one, or verify uncompensated".into(),
             }),
-            Some(known) if known.plate != run.plate || known.content.lines != run.lines => {
+            // Of another plate it says nothing, and of the table as found nothing is wanted.
+            Some(known) if !compensated && !is_of(&known, run) => Ok(None),
+            Some(known) if !is_of(&known, run) => {
                 let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
                 Err(RotaryFailure::OtherPlate {
                     axis: axis.to_owned(),
@@ -218,6 +219,11 @@ impl Machine {
     }
 }
 
+/// Whether the calibration was made with the plate that is to be read.
+fn is_of(known: &TableInUse, run: &PlateRun) -> bool {
+    known.plate == run.plate && known.content.lines == run.lines
+}
+
 /// Of each line: its true angle, as the calibration knows the plate, less what the table reads
 /// (or, with `table`, what it reads corrected), less the mean of that.
 fn figures(
@@ -225,23 +231,42 @@ fn figures(
     known: Option<&TableInUse>,
     table: Option<&PeriodicCompensation>,
 ) -> RotaryFigures {
-    let readings = placed.by_line();
-    let lines = readings.len();
     let whole = placed.offset.floor() as usize;
-    let deviation = |line: usize| {
-        let reading = readings[line]?;
-        let plate = match known {
-            Some(known) => (*known.content.plate_error_rad.get(line)?)?,
-            None => 0.0,
-        };
-        let position = TAU * ((line + whole) % lines) as f64 / lines as f64;
+    centred(deviations(&angles(placed, table), whole, known))
+}
+
+/// Of each table position: what the line there was read at, from the position, corrected with
+/// `table`.
+fn angles(placed: &Placed, table: Option<&PeriodicCompensation>) -> Vec<Option<Radians>> {
+    let lines = placed.deviations.len();
+    let angle = |(at, reading): (usize, &Option<Radians>)| {
+        let reading = (*reading)?;
+        let position = TAU * at as f64 / lines as f64;
         let corrected = match table {
             Some(table) => table.deviation(Radians(position) + reading).ok()?,
             None => Radians::ZERO,
         };
-        Some(Radians(plate) - reading - corrected)
+        Some(reading + corrected)
     };
-    centred((0..lines).map(deviation).collect())
+    placed.deviations.iter().enumerate().map(angle).collect()
+}
+
+/// Of each line, when line n is at position n + `whole`: where it is by the plate, less where it
+/// was found.
+fn deviations(
+    angles: &[Option<Radians>],
+    whole: usize,
+    known: Option<&TableInUse>,
+) -> Vec<Option<Radians>> {
+    let lines = angles.len();
+    let deviation = |line: usize| {
+        let plate = match known {
+            Some(known) => (*known.content.plate_error_rad.get(line)?)?,
+            None => 0.0,
+        };
+        Some(Radians(plate) - angles[(line + whole) % lines]?)
+    };
+    (0..lines).map(deviation).collect()
 }
 
 fn centred(values: Vec<Option<Radians>>) -> RotaryFigures {
@@ -259,14 +284,10 @@ fn centred(values: Vec<Option<Radians>>) -> RotaryFigures {
 /// Whether the lines that were read are those that lie there, by what the calibration knows of the
 /// plate.
 fn lies_there(axis: &str, known: &TableInUse, placed: &Placed) -> Result<(), Failure> {
-    let readings = placed.by_line();
-    let lines = readings.len();
-    let residual = |turned: usize| {
-        // Every line is called so many lines too high.
-        let mut as_placed = placed.clone();
-        as_placed.offset = (placed.offset + turned as f64) % lines as f64;
-        figures(&as_placed, Some(known), Some(&known.compensation)).rms
-    };
+    let angles = angles(placed, Some(&known.compensation));
+    let (lines, whole) = (angles.len(), placed.offset.floor() as usize);
+    // Every line is called so many lines too high.
+    let residual = |turned: usize| centred(deviations(&angles, whole + turned, Some(known))).rms;
     let residuals: Vec<Radians> = (0..lines).map(residual).collect();
     let each = residuals.iter().enumerate();
     let best = each.min_by(|a, b| a.1.value().total_cmp(&b.1.value()));

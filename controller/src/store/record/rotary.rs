@@ -32,6 +32,10 @@ pub struct RotaryContent {
     pub standard_uncertainty_rad: Option<Vec<f64>>,
     /// Error of the plate's lines, radians; `None` for a line that was never read.
     pub plate_error_rad: Vec<Option<f64>>,
+    /// Where lines of the plate at offset 0 were from the table positions, radians: how it was
+    /// fixed. `None` where only deviations are known.
+    #[serde(default)]
+    pub plate_phase_rad: Option<f64>,
     /// Standard uncertainty of one reading as it was stated beforehand, radians.
     pub reading_noise_rad: Option<f64>,
     /// Scatter of the readings about the model, radians.
@@ -68,6 +72,7 @@ impl RotaryContent {
             table_error_rad: radians(&solution.table_error),
             standard_uncertainty_rad: uncertainty.as_deref().map(radians),
             plate_error_rad: plate.map(|it| it.map(Radians::value)).collect(),
+            plate_phase_rad: None,
             reading_noise_rad: solution.reading_noise_given.map(Radians::value),
             residual_rms_rad: solution.residual_rms.value(),
             degrees_of_freedom: small(solution.degrees_of_freedom),

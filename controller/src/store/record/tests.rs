@@ -48,6 +48,7 @@ fn rotary() -> CalibrationRecord {
         table_error_rad: vec![1e-6, -2e-6, 1e-6],
         standard_uncertainty_rad: Some(vec![0.1; 3]),
         plate_error_rad: vec![Some(0.0), None, Some(0.0)],
+        plate_phase_rad: Some(0.01),
         reading_noise_rad: None,
         residual_rms_rad: 0.1,
         degrees_of_freedom: 0,

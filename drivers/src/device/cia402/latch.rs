@@ -23,7 +23,9 @@ use units::{Coordinate, Counts, Quantity, Time};
 use super::convert::out_of_range;
 use super::settings::{Cia402Settings, Edge, LatchSettings};
 use super::{Activity, Cia402Drive};
-use crate::device::{Alarm, DeviceError, LatchCommand, Latched, PositionLatch, Repeat};
+use crate::device::{
+    Alarm, DeviceError, LatchCommand, Latched, PositionLatch, Repeat, SYNCS_PER_EDGE,
+};
 use crate::protocol::script::{Script, Step};
 use crate::wire::canopen::Object;
 use crate::wire::canopen::pdo::{MappedObject, extract};
@@ -39,10 +41,6 @@ const CONTINUOUS: u16 = 1 << 1;
 const CHOSEN_SOURCE: u16 = 1 << 3;
 const AT_POSITIVE_EDGE: u16 = 1 << 4;
 const AT_NEGATIVE_EDGE: u16 = 1 << 5;
-
-/// Between two edges there must be time for so many SYNCs: one that reads the position, and one
-/// that may be lost or late.
-const SYNCS_PER_EDGE: f64 = 2.0;
 
 const fn position_object(edge: Edge) -> MappedObject {
     match edge {
@@ -229,11 +227,15 @@ impl Probe {
 
 impl<Q: Coordinate> Cia402Drive<Q> {
     /// A move over edges that come too fast would lose some.
-    pub(super) fn check_latch_speed(&self, speed: Q::Speed) -> Result<(), DeviceError> {
-        let (Some(armed), Some(latch)) = (self.probe.armed, self.settings.latch) else {
+    pub(super) fn check_armed_speed(&self, speed: Q::Speed) -> Result<(), DeviceError> {
+        let armed = self.probe.armed.as_ref();
+        armed.map_or(Ok(()), |it| self.check_edges(it.arming.speed_max, speed))
+    }
+
+    fn check_edges(&self, limit: f64, speed: Q::Speed) -> Result<(), DeviceError> {
+        let Some(latch) = self.settings.latch else {
             return Ok(());
         };
-        let limit = armed.arming.speed_max;
         if speed.value() <= limit {
             return Ok(());
         }
@@ -390,6 +392,10 @@ impl<Q: Coordinate> PositionLatch<Q> for Cia402Drive<Q> {
     fn latch_speed_max(&self, spacing: Q) -> Q::Speed {
         let period = self.settings.common.sync_period.as_secs_f64();
         Q::Speed::from_value(spacing.value().abs() / (SYNCS_PER_EDGE * period))
+    }
+
+    fn check_latch_speed(&self, spacing: Q, speed: Q::Speed) -> Result<(), DeviceError> {
+        self.check_edges(self.latch_speed_max(spacing).value(), speed)
     }
 
     fn poll_latched(&mut self) -> Option<Latched<Q>> {

@@ -142,7 +142,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             let range = (target.value(), limit.value());
             return Err(out_of_range(settings, object, "target", range, Q::UNIT));
         }
-        self.check_latch_speed(speed)?;
+        self.check_armed_speed(speed)?;
         if let Some((low, high)) = settings.soft_limits {
             let limit = if target < low { low } else { high };
             if target < low || target > high {

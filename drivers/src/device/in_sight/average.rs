@@ -80,11 +80,16 @@ impl Measurement {
     /// Welford's recurrence (B. P. Welford, Technometrics 4, 1962).
     fn add(&mut self, picture: &Inspection, settings: &InSightSettings) {
         self.good += 1;
-        let values = settings.frame.to_machine([
+        let mut values = settings.frame.to_machine([
             picture.x * settings.length_unit.value(),
             picture.y * settings.length_unit.value(),
             picture.angle * settings.angle_unit.value(),
         ]);
+        // An angle near half a turn may be told with either sign.
+        let (turn, angle) = (core::f64::consts::TAU, &mut values[2]);
+        if self.good > 1 {
+            *angle -= turn * ((*angle - self.means[2]) / turn).round();
+        }
         let sums = self.means.iter_mut().zip(&mut self.squares);
         for (value, (mean, square)) in values.into_iter().zip(sums) {
             let step = value - *mean;
