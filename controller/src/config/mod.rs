@@ -32,6 +32,6 @@ pub use rotary::{
 };
 pub use volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, FeedConfig,
-    InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName, TemperatureConfig,
+    InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName, TemperatureConfig,
     VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig, VolumetricZeroConfig,
 };

@@ -25,6 +25,7 @@ pub struct VolumetricConfig {
     #[serde(default)]
     pub influence: Vec<InfluenceConfig>,
     pub feed: Option<FeedConfig>,
+    pub reference: Option<ReferenceConfig>,
     pub compensation: VolumetricCompensationConfig,
 }
 
@@ -214,6 +215,15 @@ pub struct FeedConfig {
     pub confirm: u32,
     #[serde(default)]
     pub smoothing_s: f64,
+}
+
+/// How it is found out what the detectors read when the machine is as its tables say.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct ReferenceConfig {
+    pub step_mm: f64,
+    pub samples: u32,
 }
 
 /// How an error function is drawn between its nodes.

@@ -340,11 +340,24 @@ impl Machine {
             let reading = self.answer(*at, synced);
             *actual = reading.map(|it| it.position);
         }
+        self.hear_channels(&mut seats.channels);
+        self.hear_temperatures(&mut seats.temperatures);
+        Heard {
+            now,
+            actual,
+            channels: &seats.channels,
+            temperatures: &seats.temperatures,
+        }
+    }
+
+    /// Puts the newest sample of each analog channel into its place, in the order of the
+    /// modules' names.
+    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
         // A module without a sample keeps its places: its channels would else be taken for
         // those of the next one. What it said last stays, as old as it is.
         let mut first = 0;
         for analog in &self.analogs {
-            let own = seats.channels.iter_mut().skip(first);
+            let own = channels.iter_mut().skip(first);
             first += analog.device.channels();
             let Some(sample) = analog.device.reading() else {
                 continue;
@@ -358,20 +371,14 @@ impl Machine {
                 });
             }
         }
-        self.hear_temperatures(seats);
-        Heard {
-            now,
-            actual,
-            channels: &seats.channels,
-            temperatures: &seats.temperatures,
-        }
     }
 
-    fn hear_temperatures(&self, seats: &mut Seats) {
+    /// Likewise of the thermometers.
+    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
         let modules = self.analogs.iter();
         let mut first = 0;
         for module in modules.filter_map(|it| it.device.thermometers()) {
-            let own = seats.temperatures.iter_mut().skip(first);
+            let own = temperatures.iter_mut().skip(first);
             first += module.sensors();
             let Some(sample) = module.temperatures() else {
                 continue;

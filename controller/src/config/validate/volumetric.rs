@@ -18,6 +18,7 @@ pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_compensation(judge, config, volumetric);
     check_feed(judge, volumetric);
     check_influences(judge, volumetric);
+    check_reference(judge, volumetric);
     check_room(judge, config);
     check_detectors(findings, config, volumetric);
 }
@@ -232,6 +233,15 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     }
 }
 
+fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let Some(reference) = &volumetric.reference else {
+        return;
+    };
+    judge.within("reference.step_mm", reference.step_mm, 0.1, 1e3);
+    let samples = f64::from(reference.samples);
+    judge.within("reference.samples", samples, 1.0, 1e4);
+}
+
 fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     let mut seen = Vec::new();
     for it in &volumetric.influence {
@@ -405,6 +415,14 @@ mod tests {
             ".temperature[1].channel",
             "has no 1",
         );
+    }
+
+    #[test]
+    fn references_need_stops_and_samples() {
+        let key = ".reference.step_mm";
+        check("step_mm = 25.0", "step_mm = 0.0", key, "0");
+        let key = ".reference.samples";
+        check("samples = 50", "samples = 0", key, "0");
     }
 
     #[test]

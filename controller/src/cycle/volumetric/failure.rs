@@ -1,10 +1,12 @@
 //! What can go wrong with three axes beyond what can go wrong with each.
 
+use core::time::Duration;
+
 use compensator::volumetric::function::FunctionError;
 use compensator::volumetric::model::{ChainError, ModelError};
-use compensator::volumetric::online::RollError;
+use compensator::volumetric::online::{RollError, Trouble};
 use compensator::volumetric::{Axis, VolumeError};
-use units::MetresPerSecond;
+use units::{Metres, MetresPerSecond};
 
 use crate::assemble::BeamDetectorError;
 
@@ -39,6 +41,64 @@ pub enum VolumetricFailure {
         seen: usize,
         /// How many there should be.
         expected: usize,
+    },
+    /// Nothing is known of the errors.
+    #[error("the errors of the three axes were never measured; `truestage calibrate` measures them")]
+    NoGeometry,
+    /// References that were taken with other errors in use.
+    #[error(
+        "the references {references} of the detectors count from the calibration {measured_with}, but          {geometry} is in use; activate what belongs together (`truestage cal activate`), or take          the references again (`truestage reference`)"
+    )]
+    OtherGeometry {
+        /// The references.
+        references: String,
+        /// Which calibration they belong to.
+        measured_with: String,
+        /// Which is in use.
+        geometry: String,
+    },
+    /// A memory that counts from other references.
+    #[error(
+        "the state memory {memory} counts from the references {measured_with}, but `{references}` are          in use; record it again (`truestage memory record`), or clear it (`truestage memory clear`)"
+    )]
+    OtherReferences {
+        /// The memory.
+        memory: String,
+        /// Which references it belongs to.
+        measured_with: String,
+        /// Which are in use.
+        references: String,
+    },
+    /// A detector that says nothing where its reference is to be taken.
+    #[error(
+        "axis {axis} at {:.3} mm: the detector {what} says nothing to be relied upon: {source}; no          references were stored", at.mm()
+    )]
+    Blind {
+        /// Along which axis.
+        axis: Axis,
+        /// Where the axis stands.
+        at: Metres,
+        /// Which detector.
+        what: &'static str,
+        /// What is wrong.
+        source: Trouble,
+    },
+    /// A thermometer that shows nothing.
+    #[error("thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; no references were stored")]
+    NoTemperature {
+        /// Which, from 1.
+        index: usize,
+    },
+    /// Samples that do not come.
+    #[error("the measuring modules sent {seen} of {expected} samples in {:.1} s; do they sample (every_syncs)?",
+        waited.as_secs_f64())]
+    NoSamples {
+        /// How many came.
+        seen: usize,
+        /// How many were awaited.
+        expected: usize,
+        /// How long.
+        waited: Duration,
     },
     /// A detector that cannot be.
     #[error("axis {axis}: {source}")]
@@ -88,7 +148,13 @@ impl VolumetricFailure {
             | Self::Volume(_)
             | Self::Influence(_)
             | Self::Roll(_) => 2,
+            Self::NoSamples { .. } => 4,
             Self::NoReference { .. }
+            | Self::NoGeometry
+            | Self::OtherGeometry { .. }
+            | Self::OtherReferences { .. }
+            | Self::Blind { .. }
+            | Self::NoTemperature { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
             | Self::Model(_)

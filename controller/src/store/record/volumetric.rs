@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
 use super::super::{StoreError, short};
-use super::{CalibrationRecord, Content};
+use super::{CalibrationRecord, Content, IdentityRecord};
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
@@ -104,6 +104,9 @@ pub struct GeometryContent {
     pub squareness_u_rad: [f64; 3],
     /// What the thermometers showed, in the order of the configuration, °C.
     pub temperatures_c: Vec<f64>,
+    /// Who the drives of x, y and z were; empty where the errors were measured elsewhere.
+    #[serde(default)]
+    pub drives: Vec<IdentityRecord>,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -135,6 +138,7 @@ impl GeometryContent {
             squareness_rad: each.map(Radians::value),
             squareness_u_rad: squareness.u.map(Radians::value),
             temperatures_c: temperatures.iter().map(|it| it.value()).collect(),
+            drives: Vec::new(),
         }
     }
 
@@ -292,6 +296,8 @@ pub struct MemoryRecord {
 pub struct StateMemoryContent {
     /// Which memory.
     pub memory: MemoryName,
+    /// The name of the references from which the displacements count.
+    pub references: String,
     /// By axis.
     pub axes: Vec<MemoryRecord>,
 }
@@ -300,8 +306,8 @@ impl StateMemoryContent {
     /// The name of this kind.
     pub const KIND: &'static str = "state_memory";
 
-    /// What `map` keeps.
-    pub fn new(memory: MemoryName, map: &StateMap) -> Self {
+    /// What `map` keeps, counted from the references of the name `references`.
+    pub fn new(memory: MemoryName, references: &str, map: &StateMap) -> Self {
         let axes = AXES.iter().zip(&map.of).filter_map(|(axis, functions)| {
             let [first, second] = functions.as_ref()?;
             Some(MemoryRecord {
@@ -314,6 +320,7 @@ impl StateMemoryContent {
         });
         Self {
             memory,
+            references: references.to_owned(),
             axes: axes.collect(),
         }
     }
@@ -476,7 +483,7 @@ mod tests {
         assert!(content.roll(&id).unwrap().is_none());
         let mut map = StateMap::default();
         map.of[2] = Some([function([0.0, 5e-6, 0.0]), function([0.0; 3])]);
-        let content = StateMemoryContent::new(MemoryName::Second, &map);
+        let content = StateMemoryContent::new(MemoryName::Second, "r", &map);
         let (id, record) = stored(Content::StateMemory(content));
         let content = record.state_memory(&id).unwrap();
         let back = content.map(&id).unwrap();
