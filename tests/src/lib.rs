@@ -13,6 +13,7 @@ mod pose_judge;
 mod rig;
 mod slcan_hub;
 mod stand;
+pub mod volume;
 
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};

@@ -9,6 +9,7 @@ use compensator::volumetric::{Axis, VolumeError};
 use units::{Metres, MetresPerSecond};
 
 use crate::assemble::BeamDetectorError;
+use crate::engine::{Cause, PushError};
 
 /// Why three axes are not corrected, or not zeroed.
 #[derive(Debug, thiserror::Error)]
@@ -100,6 +101,18 @@ pub enum VolumetricFailure {
         /// How long.
         waited: Duration,
     },
+    /// The axes were stopped before they were done.
+    #[error("the move did not end: {cause}")]
+    Stopped {
+        /// Why.
+        cause: Cause,
+    },
+    /// A path that cannot be driven.
+    #[error("the path was not driven to its end: {source}")]
+    Path {
+        /// Why.
+        source: PushError,
+    },
     /// A detector that cannot be.
     #[error("axis {axis}: {source}")]
     Detector {
@@ -147,8 +160,9 @@ impl VolumetricFailure {
             | Self::Chain(_)
             | Self::Volume(_)
             | Self::Influence(_)
+            | Self::Path { .. }
             | Self::Roll(_) => 2,
-            Self::NoSamples { .. } => 4,
+            Self::NoSamples { .. } | Self::Stopped { .. } => 4,
             Self::NoReference { .. }
             | Self::NoGeometry
             | Self::OtherGeometry { .. }
