@@ -177,12 +177,14 @@ pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
         low: Celsius(it.low_c),
         high: Celsius(it.high_c),
         expansion: it.expansion_ppm_per_k.map(|ppm| ppm * 1e-6),
+        u_expansion: [0.0; 3],
         growth: point_of_mm(it.growth_um_per_k.map(|um| um * 1e-3)),
         squareness: it.squareness_arcsec_per_k.map(Radians::from_arcsec),
         u: it.standard_uncertainty_k,
     });
     Thermal {
         channels: channels.collect(),
+        bends: Vec::new(),
         fixed: point_of_mm(config.expansion_fixed_mm),
     }
 }
