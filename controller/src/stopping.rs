@@ -61,7 +61,10 @@ impl Machine {
     /// The first drive or module without a sample newer than `resumed`.
     fn silent_since(&self, resumed: Time) -> Option<String> {
         let is_old = |at: Option<Time>| at.is_none_or(|at| at <= resumed);
-        let axis = self.axes.iter().find(|it| is_old(it.device.reading().map(|it| it.at)));
+        let axis = self
+            .axes
+            .iter()
+            .find(|it| is_old(it.device.reading().map(|it| it.at)));
         let module = || {
             let modules = self.analogs.iter();
             let mut silent = modules.filter(|it| is_old(it.device.reading().map(|it| it.at)));

@@ -9,7 +9,7 @@ use mock_bus::plant::VolumetricTruth;
 use truestage::Failure;
 use truestage::cycle::volumetric::{GEOMETRY, Mover, VolumetricCorrection, VolumetricState};
 use truestage::engine::{Live, Observed};
-use truestage::store::{CalibrationRecord, Content, GeometryContent, RecordHead};
+use truestage::store::{BendRecord, CalibrationRecord, Content, GeometryContent, RecordHead};
 use units::{Celsius, Metres, Radians};
 
 use crate::{Bench, VOLUMETRIC};
@@ -19,7 +19,7 @@ pub const TRAVEL_MM: [f64; 3] = [500.0, 400.0, 300.0];
 /// How far apart what a calibration finds is.
 const NODE_MM: f64 = 25.0;
 /// How long the tool stands before it is judged.
-pub const STAND: Duration = Duration::from_millis(200);
+pub const STAND: Duration = Duration::from_millis(300);
 
 /// An error of the tool: along x, y, z.
 pub type Off = [Metres; 3];
@@ -112,7 +112,8 @@ impl Volume {
 
     /// By how much the tool would be off, were nothing corrected.
     pub fn uncorrected(&self, places: &[[f64; 3]]) -> Vec<Off> {
-        let of = |truth: VolumetricTruth<'_>, mm: &[f64; 3]| truth.deviation_for(each(point_mm(*mm)));
+        let of =
+            |truth: VolumetricTruth<'_>, mm: &[f64; 3]| truth.deviation_for(each(point_mm(*mm)));
         self.truth(|truth| places.iter().map(|mm| of(truth, mm)).collect())
     }
 
@@ -133,7 +134,8 @@ impl Volume {
             });
             each.collect::<Vec<_>>()
         });
-        let content = GeometryContent::new(&axes, &squareness, &temperatures);
+        let mut content = GeometryContent::new(&axes, &squareness, &temperatures);
+        content.bends = self.true_bends();
         let head = RecordHead {
             axis: GEOMETRY.into(),
             ..machine.this_machine("x")
@@ -144,6 +146,42 @@ impl Volume {
         let activated = self.bench.store.activate(GEOMETRY, &id);
         activated.expect("it was just stored");
         id
+    }
+
+    /// How the guides bend per kelvin: what a cold and a warm calibration would find.
+    fn true_bends(&self) -> Vec<BendRecord> {
+        let later = self.bench.machine.now() + Duration::from_secs(3600);
+        let towards = [2, 2, 1];
+        self.truth(|truth| {
+            let each = (0..3).map(|axis| {
+                // The slope at the beginning of the arc is 4 h/L, about the third direction.
+                let about = 3 - axis - towards[axis];
+                let sense = if (axis + 1) % 3 == towards[axis] {
+                    1.0
+                } else {
+                    -1.0
+                };
+                let tilt = |truth: VolumetricTruth<'_>| {
+                    truth.error_motion(axis, Metres::ZERO).turn[about].value()
+                };
+                let warmer = truth.at(later);
+                let kelvin = warmer.gradient_k(axis) - truth.gradient_k(axis);
+                let travel = TRAVEL_MM[axis] * 1e-3;
+                let slope = sense * (tilt(warmer) - tilt(truth)) / kelvin;
+                let letters = ['x', 'y', 'z'];
+                BendRecord {
+                    axis: letters[axis],
+                    towards: letters[towards[axis]],
+                    over: 2 * axis,
+                    under: Some(2 * axis + 1),
+                    low_m: 0.0,
+                    high_m: travel,
+                    bow_m_per_k: slope * travel / 4.0,
+                    standard_uncertainty_m_per_k: 0.0,
+                }
+            });
+            each.collect()
+        })
     }
 
     /// The errors as the plant has them now.

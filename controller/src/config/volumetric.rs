@@ -23,6 +23,8 @@ pub struct VolumetricConfig {
     #[serde(default)]
     pub temperature: Vec<TemperatureConfig>,
     #[serde(default)]
+    pub bend: Vec<BendConfig>,
+    #[serde(default)]
     pub influence: Vec<InfluenceConfig>,
     pub feed: Option<FeedConfig>,
     pub reference: Option<ReferenceConfig>,
@@ -177,6 +179,21 @@ pub struct TemperatureConfig {
     pub growth_um_per_k: [f64; 3],
     #[serde(default)]
     pub squareness_arcsec_per_k: [f64; 3],
+}
+
+/// A guide that bends when it is warmer over its neutral plane than under it; by how much is found
+/// by calibration.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct BendConfig {
+    pub axis: VolumeAxisName,
+    pub towards: VolumeAxisName,
+    pub over: usize,
+    pub under: Option<usize>,
+    pub low_mm: f64,
+    pub high_mm: f64,
+    pub gradient_max_k: f64,
 }
 
 /// How much of a displacement appears as an error at the tool, as a function of one position.

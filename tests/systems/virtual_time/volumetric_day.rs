@@ -14,7 +14,10 @@ const DAY_H: f64 = 8.0;
 fn calm(text: String) -> String {
     text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
         .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace("heartbeat_consumer_ms = 150", "heartbeat_consumer_ms = 7000")
+        .replace(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
         .replace("watch_master_ms = 500", "watch_master_ms = 7000")
 }
 
@@ -33,9 +36,22 @@ struct Day {
 }
 
 fn day(seed: u64, stretches: u32, places: u32) -> Day {
-    let mut volume = Volume::zeroed(seed, calm, |text| text);
+    let mut volume = Volume::zeroed(seed, calm, |text| {
+        text.replace(
+            "bow_um_per_k = 4.0",
+            &format!(
+                "bow_um_per_k = {}",
+                std::env::var("BOW").unwrap_or("4.0".into())
+            ),
+        )
+    });
     volume.know_errors();
-    good(volume.bench.machine.reference_volumetric(&volume.bench.store));
+    good(
+        volume
+            .bench
+            .machine
+            .reference_volumetric(&volume.bench.store),
+    );
     let (mut mover, state) = volume.corrected();
     let everywhere = spread(0, 200);
     let morning = volume.uncorrected(&everywhere);
@@ -50,6 +66,32 @@ fn day(seed: u64, stretches: u32, places: u32) -> Day {
         }
         let here = spread(200 + stretch * places, places);
         let errors = volume.visit(&mut mover, &here, &mut day.along);
+        if std::env::var("LOOK").is_ok() {
+            for mm in [
+                [0.0, 0.0, 100.0],
+                [500.0, 0.0, 100.0],
+                [0.0, 400.0, 100.0],
+                [0.0, 0.0, 300.0],
+                [250.0, 0.0, 100.0],
+            ] {
+                let target = tests::volume::point_mm(mm);
+                let live = good(volume.bench.machine.drive_to(
+                    &mut mover,
+                    target,
+                    tests::volume::STAND,
+                ));
+                let off = volume
+                    .off(target)
+                    .map(|it| (it.um() * 100.0).round() / 100.0);
+                let tables =
+                    volume.by_tables(&[mm], &state)[0].map(|it| (it.um() * 100.0).round() / 100.0);
+                eprintln!(
+                    "  at {mm:?}: off {off:?}, by tables {tables:?}, u {:?} {:?}",
+                    [0, 1, 2].map(|k| live.uncertainty[k].um()),
+                    live.validity
+                );
+            }
+        }
         let found = volume.uncorrected(&everywhere);
         let pairs = found.iter().zip(&morning);
         let drifted: Vec<Off> = pairs
@@ -68,7 +110,9 @@ impl Day {
     fn tell(&self, seed: u64) {
         for (hour, found, tables, live) in &self.curve {
             let [found, tables, live] = [found, tables, live].map(|it| it.um());
-            eprintln!("seed {seed}, {hour:.2} h: {found:.2} found, {tables:.2} by tables, {live:.2} um live");
+            eprintln!(
+                "seed {seed}, {hour:.2} h: {found:.2} found, {tables:.2} by tables, {live:.2} um live"
+            );
         }
         eprintln!(
             "seed {seed}: {:.2} um at rest, {:.2} um on the way ({} places), drifted by {:.2} um",

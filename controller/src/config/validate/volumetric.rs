@@ -19,6 +19,7 @@ pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_feed(judge, volumetric);
     check_influences(judge, volumetric);
     check_reference(judge, volumetric);
+    check_bends(judge, volumetric);
     check_room(judge, config);
     check_detectors(findings, config, volumetric);
 }
@@ -233,6 +234,44 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     }
 }
 
+fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let known = volumetric.temperature.len();
+    for (at, bend) in volumetric.bend.iter().enumerate() {
+        let key = |key: &str| format!("bend.{at}.{key}");
+        let missing = |it: usize| it >= known;
+        if missing(bend.over) || bend.under.is_some_and(missing) || bend.under == Some(bend.over) {
+            judge.say(
+                &key("over"),
+                format!(
+                    "thermometers {} and {:?} are not two of the {known}",
+                    bend.over, bend.under
+                ),
+                "count [[volumetric.temperature]] from 0",
+            );
+        }
+        if bend.axis == bend.towards {
+            judge.say(
+                &key("towards"),
+                "a guide bends across its axis",
+                "name another axis",
+            );
+        }
+        let mut before = volumetric.bend[..at].iter();
+        if before.any(|it| (it.axis, it.towards) == (bend.axis, bend.towards)) {
+            judge.say(
+                &key("axis"),
+                "this guide bends in this direction twice",
+                "keep one",
+            );
+        }
+        judge.below(
+            (&key("low_mm"), bend.low_mm),
+            (&key("high_mm"), bend.high_mm),
+        );
+        judge.within(&key("gradient_max_k"), bend.gradient_max_k, 1e-3, 100.0);
+    }
+}
+
 fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     let Some(reference) = &volumetric.reference else {
         return;
@@ -414,6 +453,29 @@ mod tests {
             "channel = 1\n",
             ".temperature[1].channel",
             "has no 1",
+        );
+    }
+
+    #[test]
+    fn guides_bend_by_thermometers_that_there_are_and_across_their_axes() {
+        check(
+            "over = 0\n",
+            "over = 6\n",
+            ".bend.0.over",
+            "not two of the 6",
+        );
+        check("under = 1\n", "under = 0\n", ".bend.0.over", "not two");
+        check(
+            "towards = \"z\"",
+            "towards = \"x\"",
+            ".bend.0.towards",
+            "across",
+        );
+        check(
+            "gradient_max_k = 4.0",
+            "gradient_max_k = 0.0",
+            ".bend.0.gradient_max_k",
+            "0",
         );
     }
 

@@ -44,7 +44,9 @@ pub enum VolumetricFailure {
         expected: usize,
     },
     /// Nothing is known of the errors.
-    #[error("the errors of the three axes were never measured; `truestage calibrate` measures them")]
+    #[error(
+        "the errors of the three axes were never measured; `truestage calibrate` measures them"
+    )]
     NoGeometry,
     /// References that were taken with other errors in use.
     #[error(
@@ -85,7 +87,9 @@ pub enum VolumetricFailure {
         source: Trouble,
     },
     /// A thermometer that shows nothing.
-    #[error("thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; no references were stored")]
+    #[error(
+        "thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; no references were stored"
+    )]
     NoTemperature {
         /// Which, from 1.
         index: usize,

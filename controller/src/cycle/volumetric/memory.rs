@@ -13,9 +13,7 @@ use super::{REFERENCES, VolumetricFailure, memory_pointer};
 use crate::cycle::utc_now;
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::store::{
-    CalibrationRecord, Content, MemoryName, RecordHead, StateMemoryContent, Store,
-};
+use crate::store::{CalibrationRecord, Content, MemoryName, RecordHead, StateMemoryContent, Store};
 
 /// A state that was recorded, stored and activated.
 #[derive(Clone, Debug)]
@@ -41,7 +39,9 @@ impl Machine {
     ) -> Result<Remembered, Failure> {
         let stored = self.volumetric_state(store)?;
         let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
-        let axis = Axis::ALL.into_iter().find(|it| state.beams[it.index()].is_some());
+        let axis = Axis::ALL
+            .into_iter()
+            .find(|it| state.beams[it.index()].is_some());
         let (Some(references), Some(_)) = (records.references, axis) else {
             let axis = Axis::X;
             return Err(VolumetricFailure::NoReference { axis }.into());

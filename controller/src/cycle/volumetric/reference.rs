@@ -121,10 +121,7 @@ impl Machine {
     /// # Errors
     /// When an axis is not zeroed, the errors were never measured, a detector is in trouble, or
     /// anything stops the machine. What was in use before stays in use then.
-    pub fn reference_volumetric(
-        &mut self,
-        store: &Store,
-    ) -> Result<VolumetricReferenced, Failure> {
+    pub fn reference_volumetric(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
         let geometry = store.active(GEOMETRY)?.current;
         let geometry = geometry.ok_or(VolumetricFailure::NoGeometry)?;
         store.load(&geometry)?.geometry(&geometry)?;
@@ -228,7 +225,8 @@ impl Machine {
             }
             add_temperatures(machine, config, &seen, temperatures)?;
         }
-        self.observer.progress(Stage::Reference, &name, total, total);
+        self.observer
+            .progress(Stage::Reference, &name, total, total);
         Ok(stops)
     }
 

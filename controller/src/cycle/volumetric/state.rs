@@ -89,6 +89,8 @@ impl Machine {
         let mut state = VolumetricState {
             axes: geometry.errors(&id)?,
             squareness: geometry.squareness(),
+            bends: geometry.bends(&id)?,
+            expansions: geometry.expansions(&id)?,
             temperatures: geometry.temperatures(),
             ..VolumetricState::default()
         };
@@ -144,8 +146,7 @@ impl Machine {
         let here = self.volume_drives(config);
         for (expected, seen) in geometry.drives.iter().zip(&here) {
             if expected.serial != seen.serial || expected.product != seen.product {
-                let text =
-                    |it: &IdentityRecord| format!("{:#X} serial {}", it.product, it.serial);
+                let text = |it: &IdentityRecord| format!("{:#X} serial {}", it.product, it.serial);
                 return Err(StoreError::Foreign {
                     id: short(id),
                     what: "a drive of the three axes",
