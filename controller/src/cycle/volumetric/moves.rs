@@ -14,8 +14,6 @@ use crate::machine::Machine;
 
 /// So many time constants of its smoothing after it came, a value is there.
 const SMOOTHINGS: f64 = 3.0;
-/// How long axes that were corrected until now may take to come to rest.
-const REST: Duration = Duration::from_millis(100);
 
 /// Three axes that are moved together, and what is added to their set-points.
 pub struct Mover {
@@ -92,7 +90,6 @@ impl Machine {
         points: Vec<Vec<Metres>>,
         watch: &mut dyn FnMut(&Live),
     ) -> Result<(), Failure> {
-        self.all_at_rest()?;
         let Mover { engine, desk } = mover;
         let mut left: VecDeque<_> = points.into();
         let mut refused = None;
@@ -131,7 +128,6 @@ impl Machine {
         rest: Duration,
         watch: &mut dyn FnMut(&Live),
     ) -> Result<Live, Failure> {
-        self.all_at_rest()?;
         let Mover { engine, desk } = mover;
         if let Some(target) = target {
             desk.move_to(&Axis::ALL.map(|axis| target.along(axis)))?;
@@ -159,12 +155,6 @@ impl Machine {
         }
         expect_cause(cause, Cause::Asked)?;
         last.ok_or_else(|| VolumetricFailure::Stopped { cause }.into())
-    }
-
-    /// The cyclic mode is entered at rest only, and a correction may have moved them until now.
-    fn all_at_rest(&mut self) -> Result<(), Failure> {
-        let until = self.now() + REST;
-        self.run_until(until)
     }
 }
 
