@@ -19,7 +19,8 @@ pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
     CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
     IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
-    MachineSection, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+    MachineSection, OpticsConfig, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig,
+    ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
@@ -33,6 +34,6 @@ pub use rotary::{
 pub use volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
     FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
-    TemperatureConfig, VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig,
+    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig, VolumetricVerifyConfig, VolumetricConfig,
     VolumetricZeroConfig,
 };

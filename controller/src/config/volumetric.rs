@@ -28,6 +28,8 @@ pub struct VolumetricConfig {
     pub influence: Vec<InfluenceConfig>,
     pub feed: Option<FeedConfig>,
     pub reference: Option<ReferenceConfig>,
+    pub calibrate: Option<VolumetricCalibrateConfig>,
+    pub verify: Option<VolumetricVerifyConfig>,
     pub compensation: VolumetricCompensationConfig,
 }
 
@@ -111,6 +113,8 @@ pub enum LayoutName {
 pub struct BeamDetectorConfig {
     pub analog: String,
     pub channels: [u8; 4],
+    #[serde(default)]
+    pub place_mm: [f64; 3],
     pub layout: LayoutName,
     #[serde(default)]
     pub dark_mv: [f64; 4],
@@ -241,6 +245,30 @@ pub struct FeedConfig {
 pub struct ReferenceConfig {
     pub step_mm: f64,
     pub samples: u32,
+}
+
+/// How lines are read to learn the errors.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct VolumetricCalibrateConfig {
+    pub instrument: String,
+    pub step_mm: f64,
+    pub settle_ms: f64,
+    pub average_samples: u32,
+    pub detector_samples: u32,
+    pub second_tool_offset_mm: Option<[f64; 3]>,
+}
+
+/// Which line is read to judge the correction.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct VolumetricVerifyConfig {
+    pub from_mm: [f64; 3],
+    pub to_mm: [f64; 3],
+    pub points: u32,
+    pub limit_um: f64,
 }
 
 /// How an error function is drawn between its nodes.

@@ -19,6 +19,7 @@ pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_feed(judge, volumetric);
     check_influences(judge, volumetric);
     check_reference(judge, volumetric);
+    check_calibrate(judge, config, volumetric);
     check_bends(judge, volumetric);
     check_room(judge, config);
     check_detectors(findings, config, volumetric);
@@ -231,6 +232,43 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
             "remove it, or set reaction = \"fade_out\"",
         ),
         (ReactionName::Hold | ReactionName::Stop, None) => {}
+    }
+}
+
+fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    if let Some(own) = &volumetric.calibrate {
+        let instruments = &config.instrument;
+        judge.known("calibrate.instrument", &own.instrument, instruments, "instrument");
+        judge.within("calibrate.step_mm", own.step_mm, 0.1, 1e3);
+        judge.within("calibrate.settle_ms", own.settle_ms, 0.0, 1e5);
+        let samples = f64::from(own.average_samples);
+        judge.within("calibrate.average_samples", samples, 1.0, 1e5);
+        let samples = f64::from(own.detector_samples);
+        judge.within("calibrate.detector_samples", samples, 1.0, 1e4);
+        let second = own.second_tool_offset_mm.unwrap_or_default();
+        for mm in second {
+            let most = volumetric.tool_max_mm;
+            judge.within("calibrate.second_tool_offset_mm", mm, -most, most);
+        }
+        if volumetric.reference.is_none() {
+            judge.say(
+                "calibrate",
+                "the detectors' references are taken with the errors, but nothing says how",
+                "add [volumetric.reference]",
+            );
+        }
+    }
+    if let Some(own) = &volumetric.verify {
+        judge.within("verify.points", f64::from(own.points), 2.0, 1e4);
+        judge.within("verify.limit_um", own.limit_um, 1e-3, 1e5);
+        for k in 0..3 {
+            let (low, high) = (volumetric.low_mm[k], volumetric.high_mm[k]);
+            judge.within("verify.from_mm", own.from_mm[k], low, high);
+            judge.within("verify.to_mm", own.to_mm[k], low, high);
+        }
+        if volumetric.calibrate.is_none() {
+            judge.say("verify", "nothing says how lines are read", "add [volumetric.calibrate]");
+        }
     }
 }
 
@@ -477,6 +515,14 @@ mod tests {
             ".bend.0.gradient_max_k",
             "0",
         );
+    }
+
+    #[test]
+    fn lines_are_read_by_an_instrument_that_there_is_within_the_volume() {
+        let key = ".calibrate.instrument";
+        check("instrument = \"laser\"", "instrument = \"ruler\"", key, "ruler");
+        check("step_mm = 50.0", "step_mm = 0.0", ".calibrate.step_mm", "0");
+        check("to_mm = [500.0,", "to_mm = [501.0,", ".verify.to_mm", "501");
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use core::time::Duration;
 
 use compensator::volumetric::function::FunctionError;
-use compensator::volumetric::model::{ChainError, ModelError};
+use compensator::volumetric::identify::IdentifyError;
+use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
 use compensator::volumetric::online::{RollError, Trouble};
-use compensator::volumetric::{Axis, VolumeError};
+use compensator::volumetric::{Axis, NoCorrection, VolumeError};
 use units::{Metres, MetresPerSecond};
 
 use crate::assemble::BeamDetectorError;
@@ -105,6 +106,23 @@ pub enum VolumetricFailure {
         /// How long.
         waited: Duration,
     },
+    /// Readings that do not tell the errors.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// What detectors see is more than a correction is proven for.
+    #[error(transparent)]
+    Conditions(#[from] ConditionsError),
+    /// A place for which there is no correction.
+    #[error(transparent)]
+    NoCorrection(#[from] NoCorrection),
+    /// The line of a verification.
+    #[error("deviations along the line range over {:.3} um, the limit is {:.3} um", seen.um(), limit.um())]
+    OutOfTolerance {
+        /// Largest minus smallest.
+        seen: Metres,
+        /// What it may be.
+        limit: Metres,
+    },
     /// The axes were stopped before they were done.
     #[error("the move did not end: {cause}")]
     Stopped {
@@ -166,6 +184,7 @@ impl VolumetricFailure {
             | Self::Influence(_)
             | Self::Path { .. }
             | Self::Roll(_) => 2,
+            Self::OutOfTolerance { .. } => 5,
             Self::NoSamples { .. } | Self::Stopped { .. } => 4,
             Self::NoReference { .. }
             | Self::NoGeometry
@@ -175,6 +194,9 @@ impl VolumetricFailure {
             | Self::NoTemperature { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
+            | Self::Identify(_)
+            | Self::Conditions(_)
+            | Self::NoCorrection(_)
             | Self::Model(_)
             | Self::TooFast { .. } => 3,
         }

@@ -9,7 +9,7 @@ use core::time::Duration;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::online::{BeamDetector, Trouble};
+use compensator::volumetric::online::{BeamDetector, Displacement, Trouble};
 use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use super::inputs::{RollReader, place_of_temperature, place_of_voltage, sample};
@@ -30,6 +30,10 @@ use crate::store::{
 const REST: Duration = Duration::from_millis(50);
 /// How long one sample may take to come.
 const SAMPLE_LIMIT: Duration = Duration::from_millis(500);
+/// Which detector.
+const ON_THE_SLIDE: &str = "on the slide";
+const AT_THE_END: &str = "at the end of the beam";
+const OF_THE_ROLL: &str = "of the roll";
 /// Letters of the axes in files.
 const LETTERS: [char; 3] = ['x', 'y', 'z'];
 
@@ -214,13 +218,13 @@ impl Machine {
                 let place = |it: &BeamDetectorConfig, what| {
                     place_of_beam(machine, axis, it, &seen, |source| blind(what, source))
                 };
-                stops.slider.push(place(&beam.slider, "on the slide")?);
+                stops.slider.push(place(&beam.slider, ON_THE_SLIDE)?);
                 if let Some(end) = &beam.end {
-                    stops.end.push(place(end, "at the end of the beam")?);
+                    stops.end.push(place(end, AT_THE_END)?);
                 }
             }
             if let Some(roll) = roll {
-                let mean = mean_roll(machine, roll, &seen, |it| blind("of the roll", it))?;
+                let mean = mean_roll(machine, roll, &seen, |it| blind(OF_THE_ROLL, it))?;
                 stops.roll.push(mean);
             }
             add_temperatures(machine, config, &seen, temperatures)?;
@@ -228,6 +232,60 @@ impl Machine {
         self.observer
             .progress(Stage::Reference, &name, total, total);
         Ok(stops)
+    }
+
+    /// Where the detectors of a beam saw it at `seen`, with the axis at `at`: that on the slide,
+    /// and that at the beam's end.
+    pub(super) fn places_of_beam(
+        &self,
+        axis: Axis,
+        at: Metres,
+        beam: &BeamConfig,
+        seen: &[Still],
+    ) -> Result<(Displacement, Option<Displacement>), VolumetricFailure> {
+        let place = |it: &BeamDetectorConfig, what| {
+            let blind = |source| VolumetricFailure::Blind {
+                axis,
+                at,
+                what,
+                source,
+            };
+            let means = place_of_beam(self.config(), axis, it, seen, blind)?;
+            Ok(means.map(|it| Metres(it.mean())))
+        };
+        let slider = place(&beam.slider, ON_THE_SLIDE)?;
+        let end = beam.end.as_ref().map(|it| place(it, AT_THE_END));
+        Ok((slider, end.transpose()?))
+    }
+
+    /// Likewise the roll.
+    pub(super) fn roll_of(
+        &self,
+        axis: Axis,
+        at: Metres,
+        config: &RollConfig,
+        seen: &[Still],
+    ) -> Result<Radians, VolumetricFailure> {
+        let what = OF_THE_ROLL;
+        let blind = |source| VolumetricFailure::Blind {
+            axis,
+            at,
+            what,
+            source,
+        };
+        let mean = mean_roll(self.config(), config, seen, blind)?;
+        Ok(Radians(mean.mean()))
+    }
+
+    /// Means of what the thermometers showed at `seen`.
+    pub(super) fn temperatures_of(
+        &self,
+        config: &VolumetricConfig,
+        seen: &[Still],
+    ) -> Result<Vec<Celsius>, VolumetricFailure> {
+        let mut means = vec![Mean::default(); config.temperature.len()];
+        add_temperatures(self.config(), config, seen, &mut means)?;
+        Ok(means.iter().map(|it| Celsius(it.mean())).collect())
     }
 
     /// So many samples of all modules, each newer than the one before, while nothing moves.
