@@ -19,7 +19,8 @@ pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
     CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
     IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
-    MachineSection, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+    MachineSection, OpticsConfig, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig,
+    ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,

@@ -10,3 +10,4 @@ mod rotary;
 mod rotary_table;
 mod serial_zero;
 mod volumetric;
+mod volumetric_line;
