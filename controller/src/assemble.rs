@@ -6,6 +6,7 @@
 mod cia404;
 mod copley;
 mod cyclic;
+mod line;
 mod patience;
 mod rotary;
 mod volumetric;
@@ -17,6 +18,7 @@ pub use cia404::cia404_settings;
 pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
 pub(crate) use cyclic::cyclic_settings;
+pub(crate) use line::{angular_separation, line_corrections};
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};

@@ -45,7 +45,10 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let run = |_: &mut Machine, _: &Store| Ok(());
     let ((), counters) = with_zeroed_volume(&args.machine, "zero", Use::Motion, output, run)?;
     let text = "x, y and z: zero found on their index pulses";
-    output.result(text, &json!({"axes": ["x", "y", "z"], "counters": counters}))
+    output.result(
+        text,
+        &json!({"axes": ["x", "y", "z"], "counters": counters}),
+    )
 }
 
 pub(super) fn reference(args: &MachineArgs, output: Output) -> Ended {
@@ -62,7 +65,11 @@ pub(super) fn referenced_text(taken: &VolumetricReferenced) -> String {
     format!(
         "references {} of the beams of {axes}{} are in use, for the errors {}",
         short(&taken.id),
-        if content.roll.is_some() { " and the roll" } else { "" },
+        if content.roll.is_some() {
+            " and the roll"
+        } else {
+            ""
+        },
         short(&content.geometry)
     )
 }
@@ -100,8 +107,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         machine.calibrate_volumetric(store, warm_up, &mut operator)
     };
     let machine = &args.axis.machine;
-    let (made, counters) =
-        with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
+    let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
     let mut value = calibrated_value(&made);
     value["counters"] = counters;
     output.result(&calibrated_text(&made), &value)
@@ -109,7 +115,9 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 
 pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     let found = &made.found;
-    let birge = found.birge_ratio.map_or("–".into(), |it| format!("{it:.2}"));
+    let birge = found
+        .birge_ratio
+        .map_or("–".into(), |it| format!("{it:.2}"));
     let mut text = format!(
         "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
          of what was stated\n  tool: standard uncertainty {:.3} µm at most",
@@ -121,7 +129,10 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     );
     for it in &found.expansions {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
-        text += &format!("\n  scale of {}: {value:.3} ppm/K, u {u:.3} ppm/K", it.plan.axis);
+        text += &format!(
+            "\n  scale of {}: {value:.3} ppm/K, u {u:.3} ppm/K",
+            it.plan.axis
+        );
     }
     for it in &found.bends {
         let (value, u) = (it.bow.um(), it.u.um());
@@ -168,7 +179,8 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         machine.verify_volumetric(store, !args.uncompensated, &mut operator)
     };
     let machine = &args.axis.machine;
-    let (verified, counters) = with_zeroed_volume(machine, "verify", Use::Measurement, output, run)?;
+    let (verified, counters) =
+        with_zeroed_volume(machine, "verify", Use::Measurement, output, run)?;
     let mut value = verified_value(&verified);
     value["counters"] = counters;
     let text = verified_text(&verified);
@@ -257,7 +269,8 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         let text = "moved without correction: the errors were never measured";
         return output.result(text, &json!({"corrected": false, "counters": counters}));
     };
-    let value = json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
+    let value =
+        json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
     output.result(&live_text(&live), &value)
 }
 
@@ -307,7 +320,12 @@ pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
                 *largest = largest.max(offset.abs());
             }
         })?;
-        Ok((is_corrected, count, largest, mover.engine().timing().to_string()))
+        Ok((
+            is_corrected,
+            count,
+            largest,
+            mover.engine().timing().to_string(),
+        ))
     };
     let ((is_corrected, count, largest, timing), counters) =
         with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
@@ -330,14 +348,19 @@ pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
     let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
     let (kept, counters) =
         with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
-    let axes = Axis::ALL.into_iter().filter(|it| kept.map.of[it.index()].is_some());
+    let axes = Axis::ALL
+        .into_iter()
+        .filter(|it| kept.map.of[it.index()].is_some());
     let axes: Vec<String> = axes.map(|it| it.to_string()).collect();
     let text = format!(
         "{} keeps the present state of {} from now on",
         short(&kept.id),
         axes.join(", ")
     );
-    output.result(&text, &json!({"memory": kept.id, "axes": axes, "counters": counters}))
+    output.result(
+        &text,
+        &json!({"memory": kept.id, "axes": axes, "counters": counters}),
+    )
 }
 
 pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {

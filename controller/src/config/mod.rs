@@ -34,6 +34,6 @@ pub use rotary::{
 pub use volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
     FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
-    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig, VolumetricVerifyConfig, VolumetricConfig,
-    VolumetricZeroConfig,
+    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
+    VolumetricConfig, VolumetricVerifyConfig, VolumetricZeroConfig,
 };

@@ -11,3 +11,4 @@ mod rotary_table;
 mod serial_zero;
 mod volumetric;
 mod volumetric_day;
+mod volumetric_line;

@@ -238,7 +238,12 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
 fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
     if let Some(own) = &volumetric.calibrate {
         let instruments = &config.instrument;
-        judge.known("calibrate.instrument", &own.instrument, instruments, "instrument");
+        judge.known(
+            "calibrate.instrument",
+            &own.instrument,
+            instruments,
+            "instrument",
+        );
         judge.within("calibrate.step_mm", own.step_mm, 0.1, 1e3);
         judge.within("calibrate.settle_ms", own.settle_ms, 0.0, 1e5);
         let samples = f64::from(own.average_samples);
@@ -267,7 +272,11 @@ fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &V
             judge.within("verify.to_mm", own.to_mm[k], low, high);
         }
         if volumetric.calibrate.is_none() {
-            judge.say("verify", "nothing says how lines are read", "add [volumetric.calibrate]");
+            judge.say(
+                "verify",
+                "nothing says how lines are read",
+                "add [volumetric.calibrate]",
+            );
         }
     }
 }
@@ -520,7 +529,12 @@ mod tests {
     #[test]
     fn lines_are_read_by_an_instrument_that_there_is_within_the_volume() {
         let key = ".calibrate.instrument";
-        check("instrument = \"laser\"", "instrument = \"ruler\"", key, "ruler");
+        check(
+            "instrument = \"laser\"",
+            "instrument = \"ruler\"",
+            key,
+            "ruler",
+        );
         check("step_mm = 50.0", "step_mm = 0.0", ".calibrate.step_mm", "0");
         check("to_mm = [500.0,", "to_mm = [501.0,", ".verify.to_mm", "501");
     }

@@ -118,14 +118,17 @@ impl Machine {
         let lines = session.design.lines.clone();
         let warm: Vec<StandardLine> = match warm_up {
             WarmUp::None => Vec::new(),
-            WarmUp::Idle(_) | WarmUp::Travel(_) => {
-                lines.iter().filter(|it| it.is_for_warmth()).copied().collect()
-            }
+            WarmUp::Idle(_) | WarmUp::Travel(_) => lines
+                .iter()
+                .filter(|it| it.is_for_warmth())
+                .copied()
+                .collect(),
         };
         let setups = session.plan_of_cold().runs;
         let total = (lines.len() + warm.len()) as u64;
         for (step, (line, setup)) in lines.iter().zip(setups).enumerate() {
-            self.observer.progress(Stage::Calibrate, WHOLE, step as u64, total);
+            self.observer
+                .progress(Stage::Calibrate, WHOLE, step as u64, total);
             session.runs.setups.push(setup);
             self.run_line(&mut session, line, (step + 1, total as usize))?;
         }
@@ -134,7 +137,8 @@ impl Machine {
         }
         for (at, line) in warm.iter().enumerate() {
             let step = lines.len() + at;
-            self.observer.progress(Stage::Calibrate, WHOLE, step as u64, total);
+            self.observer
+                .progress(Stage::Calibrate, WHOLE, step as u64, total);
             session.runs.setups.push(RunSetup {
                 offset: true,
                 alignment: None,
@@ -142,7 +146,8 @@ impl Machine {
             self.run_line(&mut session, line, (step + 1, total as usize))?;
         }
         self.end_lines(session.operator)?;
-        self.observer.progress(Stage::Calibrate, WHOLE, total, total);
+        self.observer
+            .progress(Stage::Calibrate, WHOLE, total, total);
         self.conclude(store, session, !warm.is_empty())
     }
 
@@ -171,9 +176,10 @@ impl Machine {
                 thermal: Thermal::default(),
                 tool_max: Metres::from_mm(config.tool_max_mm),
                 displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-                roll_max: config.roll.as_ref().map_or(Radians(0.0), |it| {
-                    Radians::from_arcsec(it.roll_max_arcsec)
-                }),
+                roll_max: config
+                    .roll
+                    .as_ref()
+                    .map_or(Radians(0.0), |it| Radians::from_arcsec(it.roll_max_arcsec)),
             },
             model_limits(&config.compensation),
         );
@@ -396,7 +402,9 @@ impl Session<'_> {
     fn points_of(&self, line: &StandardLine) -> usize {
         let nodes = self.nodes();
         let way = line.to - line.from;
-        let moved = Axis::ALL.into_iter().filter(|it| way.along(*it) != Metres(0.0));
+        let moved = Axis::ALL
+            .into_iter()
+            .filter(|it| way.along(*it) != Metres(0.0));
         moved.map(|it| nodes[it.index()]).max().unwrap_or(2)
     }
 
@@ -416,7 +424,9 @@ impl Session<'_> {
         };
         let now = self.live.conditions(observation.tool, &[], state)?;
         let seen = self.live.deviation(observation.at, &now)?;
-        let part = Axis::ALL.into_iter().map(|it| seen.along(it) * along[it.index()]);
+        let part = Axis::ALL
+            .into_iter()
+            .map(|it| seen.along(it) * along[it.index()]);
         let part = part.fold(Metres(0.0), |sum, it| sum + it);
         let deviation = deviation - part;
         Ok(Reading::Length {
@@ -517,8 +527,7 @@ impl Session<'_> {
     /// With the other axes at the low ends of the volume.
     fn on_axis(&self, axis: Axis, position: Metres) -> Point {
         let low = point_of_mm(self.config.low_mm);
-        let [x, y, z] =
-            Axis::ALL.map(|it| if it == axis { position } else { low.along(it) });
+        let [x, y, z] = Axis::ALL.map(|it| if it == axis { position } else { low.along(it) });
         Point::new(x, y, z)
     }
 
@@ -528,7 +537,11 @@ impl Session<'_> {
         let tool = point_of_mm(self.config.tool_offset_mm);
         let mut largest = Metres(0.0);
         for n in 0..(PLACES + 1).pow(3) {
-            let steps = [n % (PLACES + 1), n / (PLACES + 1) % (PLACES + 1), n / (PLACES + 1).pow(2)];
+            let steps = [
+                n % (PLACES + 1),
+                n / (PLACES + 1) % (PLACES + 1),
+                n / (PLACES + 1).pow(2),
+            ];
             let at = core::array::from_fn(|k| {
                 low[k] + (high[k] - low[k]) * f64::from(steps[k]) / f64::from(PLACES)
             });

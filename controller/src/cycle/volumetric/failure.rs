@@ -7,7 +7,7 @@ use compensator::volumetric::identify::IdentifyError;
 use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
 use compensator::volumetric::online::{RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
-use units::{Metres, MetresPerSecond};
+use units::{Metres, MetresPerSecond, Radians};
 
 use crate::assemble::BeamDetectorError;
 use crate::engine::{Cause, PushError};
@@ -123,12 +123,6 @@ pub enum VolumetricFailure {
         /// What it may be.
         limit: Metres,
     },
-    /// The axes were stopped before they were done.
-    #[error("the move did not end: {cause}")]
-    Stopped {
-        /// Why.
-        cause: Cause,
-    },
     /// A path that cannot be driven.
     #[error("the path was not driven to its end: {source}")]
     Path {
@@ -170,6 +164,66 @@ pub enum VolumetricFailure {
         /// What the axes reach.
         axes: MetresPerSecond,
     },
+    /// A line without a direction, or with optics that look along it.
+    #[error(
+        "this line has no direction, or its optics do not look across it; nothing was moved: give \
+         it a length, and a direction across that is square to it"
+    )]
+    NotALine,
+    /// A line is to be measured with something that is not there.
+    #[error("there is no instrument `{instrument}`; add [instrument.{instrument}]")]
+    NoInstrument {
+        /// How it is called.
+        instrument: String,
+    },
+    /// A line is to be measured with optics that nobody has described.
+    #[error(
+        "instrument {instrument}: `{key}` is missing in [instrument.{instrument}.optics]; nothing \
+         was moved"
+    )]
+    NoOptics {
+        /// Which instrument.
+        instrument: String,
+        /// What is missing.
+        key: &'static str,
+    },
+    /// A line was set up, but the interferometer sees nothing.
+    #[error(
+        "instrument {instrument}: no beam comes back along the line that was set up; align laser, \
+         optics and target, and begin again"
+    )]
+    NoLight {
+        /// Which instrument.
+        instrument: String,
+    },
+    /// A straight move ended elsewhere.
+    #[error("the tool did not arrive: {cause}")]
+    NotThere {
+        /// Why it ended.
+        cause: Cause,
+    },
+    /// A reading that is no error of the machine.
+    #[error(
+        "the line reads {:.1} um off, more than {:.1} um that a machine like this can be: check \
+         the optics, `reverse`, and that the tool stays on the line", seen.um(), limit.um()
+    )]
+    ImpossibleReading {
+        /// What was read.
+        seen: Metres,
+        /// What is possible.
+        limit: Metres,
+    },
+    /// A tilt that is no error of the machine.
+    #[error(
+        "the line reads a tilt of {:.1} arcsec, more than {:.1} arcsec that a machine like this \
+         can have: check the optics", seen.arcsec(), limit.arcsec()
+    )]
+    ImpossibleTilt {
+        /// What was read.
+        seen: Radians,
+        /// What is possible.
+        limit: Radians,
+    },
 }
 
 impl VolumetricFailure {
@@ -179,13 +233,15 @@ impl VolumetricFailure {
             Self::None
             | Self::NotConfigured { .. }
             | Self::Detector { .. }
+            | Self::NotALine
+            | Self::NoInstrument { .. }
+            | Self::NoOptics { .. }
             | Self::Chain(_)
             | Self::Volume(_)
             | Self::Influence(_)
             | Self::Path { .. }
             | Self::Roll(_) => 2,
             Self::OutOfTolerance { .. } => 5,
-            Self::NoSamples { .. } | Self::Stopped { .. } => 4,
             Self::NoReference { .. }
             | Self::NoGeometry
             | Self::OtherGeometry { .. }
@@ -199,6 +255,11 @@ impl VolumetricFailure {
             | Self::NoCorrection(_)
             | Self::Model(_)
             | Self::TooFast { .. } => 3,
+            Self::NoSamples { .. }
+            | Self::NoLight { .. }
+            | Self::NotThere { .. }
+            | Self::ImpossibleReading { .. }
+            | Self::ImpossibleTilt { .. } => 4,
         }
     }
 }

@@ -154,7 +154,7 @@ impl Machine {
             stopped?;
         }
         expect_cause(cause, Cause::Asked)?;
-        last.ok_or_else(|| VolumetricFailure::Stopped { cause }.into())
+        last.ok_or_else(|| VolumetricFailure::NotThere { cause }.into())
     }
 }
 
@@ -162,7 +162,7 @@ fn expect_cause(cause: Cause, expected: Cause) -> Result<(), Failure> {
     if cause == expected {
         return Ok(());
     }
-    Err(VolumetricFailure::Stopped { cause }.into())
+    Err(VolumetricFailure::NotThere { cause }.into())
 }
 
 /// From the first sample until a detector's value is given out as it is.
