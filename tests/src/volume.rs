@@ -274,9 +274,11 @@ impl Volume {
         let mut machine = self.bench.loaded.config.clone();
         let own = machine.volumetric.as_mut().expect("it has one");
         own.beam = truestage::config::BeamsConfig::default();
-        (own.roll, own.temperature) = (None, Vec::new());
+        (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
         let state = VolumetricState {
             temperatures: Vec::new(),
+            bends: Vec::new(),
+            expansions: Vec::new(),
             roll: None,
             ..state.clone()
         };

@@ -535,6 +535,7 @@ impl Session<'_> {
     fn largest_u(&self, found: &Identified) -> Metres {
         let (low, high) = (self.config.low_mm, self.config.high_mm);
         let tool = point_of_mm(self.config.tool_offset_mm);
+        let shown = self.references.temperatures.clone();
         let mut largest = Metres(0.0);
         for n in 0..(PLACES + 1).pow(3) {
             let steps = [
@@ -545,7 +546,7 @@ impl Session<'_> {
             let at = core::array::from_fn(|k| {
                 low[k] + (high[k] - low[k]) * f64::from(steps[k]) / f64::from(PLACES)
             });
-            let u = found.standard_uncertainty(point_of_mm(at), tool);
+            let u = found.standard_uncertainty(point_of_mm(at), tool, &shown);
             largest = largest.max(u.map_or(Metres(0.0), |it| it.distance()));
         }
         largest

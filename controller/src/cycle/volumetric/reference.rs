@@ -251,7 +251,7 @@ impl Machine {
                 source,
             };
             let means = place_of_beam(self.config(), axis, it, seen, blind)?;
-            Ok(means.map(|it| Metres(it.mean())))
+            Ok::<_, VolumetricFailure>(means.map(|it| Metres(it.mean())))
         };
         let slider = place(&beam.slider, ON_THE_SLIDE)?;
         let end = beam.end.as_ref().map(|it| place(it, AT_THE_END));

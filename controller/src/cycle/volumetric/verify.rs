@@ -104,7 +104,8 @@ impl Machine {
             let (done, total) = (u64::from(n), u64::from(own.points));
             self.observer.progress(Stage::Verify, WHOLE, done, total);
             let share = f64::from(n) / f64::from(last);
-            let at = from + (to - from) * share;
+            let way = to - from;
+            let at = from + Point::new(way.x * share, way.y * share, way.z * share);
             match &mut mover {
                 Some(mover) => drop(self.drive_to(mover, at, readout.settle)?),
                 None => self.go_straight(at)?,
