@@ -36,6 +36,7 @@ mod design;
 mod diagonals;
 mod observe;
 mod solve;
+mod standard;
 mod straightness;
 mod thermal;
 
@@ -46,6 +47,7 @@ use units::{Metres, Quantity, Radians};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
 pub use solve::{Identified, IdentifiedFunction};
+pub use standard::{Optics, Purpose, StandardDesign, StandardLine, standard_design};
 pub use straightness::{ReferenceLine, Straightness, straightness};
 pub use thermal::{BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion, ThermalPlan};
 
@@ -314,6 +316,8 @@ impl Plan {
     }
 }
 
+#[cfg(test)]
+mod standard_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -197,9 +197,9 @@ impl VolumetricModel {
             gradients: [[0.0; 3]; 3],
             u_expansion: sums.u_expansion,
         };
-        for k in 0..3 {
+        for (k, fixed) in fixed.into_iter().enumerate() {
             now.lean[k][k] += sums.expansion[k];
-            now.shift[k][k] -= sums.expansion[k] * fixed[k];
+            now.shift[k][k] -= sums.expansion[k] * fixed;
             now.turn[k][k] = live.roll[k].value();
         }
         self.bend(&mut now, temperatures)?;
