@@ -93,6 +93,23 @@ impl Volume {
         Self { bench }
     }
 
+    /// Stores what `other` has stored: the same machine on another day.
+    ///
+    /// # Panics
+    /// When files cannot be copied.
+    pub fn inherit(&self, other: &Self) {
+        for folder in ["calibrations", "active"] {
+            let from = other.bench.store.root().join(folder);
+            let to = self.bench.store.root().join(folder);
+            std::fs::create_dir_all(&to).expect("there is room");
+            for file in std::fs::read_dir(from).expect("it is there") {
+                let file = file.expect("it is there");
+                let copied = std::fs::copy(file.path(), to.join(file.file_name()));
+                copied.expect("there is room");
+            }
+        }
+    }
+
     /// A look behind all sensors.
     ///
     /// # Panics
@@ -271,18 +288,8 @@ impl Volume {
     /// # Panics
     /// When these tables cannot be applied.
     pub fn by_tables(&self, places: &[[f64; 3]], state: &VolumetricState) -> Vec<Off> {
-        let mut machine = self.bench.loaded.config.clone();
-        let own = machine.volumetric.as_mut().expect("it has one");
-        own.beam = truestage::config::BeamsConfig::default();
-        (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
-        let state = VolumetricState {
-            temperatures: Vec::new(),
-            bends: Vec::new(),
-            expansions: Vec::new(),
-            roll: None,
-            ..state.clone()
-        };
-        let correction = VolumetricCorrection::new(&machine, state);
+        let machine = &self.bench.loaded.config;
+        let correction = VolumetricCorrection::by_tables(machine, state.clone());
         let mut correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
         self.truth(|truth| {
             let one = |mm: &[f64; 3]| {

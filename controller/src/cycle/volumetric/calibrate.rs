@@ -133,6 +133,7 @@ impl Machine {
             self.run_line(&mut session, line, (step + 1, total as usize))?;
         }
         if !warm.is_empty() {
+            self.end_lines(session.operator)?;
             self.become_warm(warm_up)?;
         }
         for (at, line) in warm.iter().enumerate() {

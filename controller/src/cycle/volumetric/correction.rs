@@ -27,7 +27,7 @@ use crate::assemble::{
     volumetric_chain, work_volume,
 };
 use crate::config::{
-    BeamConfig, BeamDetectorConfig, BendConfig, FeedConfig, MachineConfig, ReactionName,
+    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig, ReactionName,
     RollConfig, VolumetricConfig,
 };
 use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
@@ -134,6 +134,28 @@ impl VolumetricCorrection {
                 Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
             }),
         })
+    }
+
+    /// The same by the tables alone: what the machine would do without its detectors and
+    /// thermometers.
+    ///
+    /// # Errors
+    /// As [`VolumetricCorrection::new`].
+    pub fn by_tables(
+        config: &MachineConfig,
+        state: VolumetricState,
+    ) -> Result<Self, VolumetricFailure> {
+        let mut blind = config.clone();
+        if let Some(own) = &mut blind.volumetric {
+            own.beam = BeamsConfig::default();
+            (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
+        }
+        let state = VolumetricState {
+            axes: state.axes,
+            squareness: state.squareness,
+            ..VolumetricState::default()
+        };
+        Self::new(&blind, state)
     }
 
     /// The model in use.

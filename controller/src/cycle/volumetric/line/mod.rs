@@ -201,6 +201,8 @@ impl Machine {
     /// When nobody can be told.
     pub fn end_lines(&mut self, operator: &mut dyn LineOperator) -> Result<(), Failure> {
         self.instrument_in_use = None;
+        // What is brought again must say again who it is.
+        self.started_instruments.clear();
         operator.pack_up()
     }
 
