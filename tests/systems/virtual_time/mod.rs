@@ -11,4 +11,5 @@ mod rotary_table;
 mod serial_zero;
 mod volumetric;
 mod volumetric_day;
+mod volumetric_kept;
 mod volumetric_line;

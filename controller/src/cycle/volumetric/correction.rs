@@ -27,8 +27,8 @@ use crate::assemble::{
     volumetric_chain, work_volume,
 };
 use crate::config::{
-    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig, ReactionName,
-    RollConfig, VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
+    ReactionName, RollConfig, VolumetricConfig,
 };
 use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
 
@@ -59,6 +59,8 @@ struct WatchedBeam {
     monitor: AxisMonitor,
     slider: [usize; 4],
     end: Option<[usize; 4]>,
+    /// Where the detector sits on the slide: there it sees the slide's tilts too.
+    place: Point,
 }
 
 /// The roll of one slide.
@@ -81,6 +83,9 @@ pub struct VolumetricCorrection {
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
+    bends: Vec<ThermalBend>,
+    /// The temperatures at which no guide bends beyond its tables.
+    references: Vec<Celsius>,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
     /// Of a displacement by detectors that are believed.
@@ -119,12 +124,15 @@ impl VolumetricCorrection {
         for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
             thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
         }
+        let bends = model.machine().thermal.bends.clone();
         Ok(Self {
             model,
             tool: point_of_mm(own.tool_offset_mm),
             beams,
             roll,
             thermometers,
+            bends,
+            references: state.temperatures.clone(),
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
@@ -189,7 +197,41 @@ impl VolumetricCorrection {
             let beyond = seen.map(|it| [it - roll.reference.at(position)]);
             state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
         }
+        for axis in Axis::ALL {
+            self.take_off_tilts(&mut state, axis, actual);
+        }
         state
+    }
+
+    /// A detector that sits beside its slide's zero also sees the slide tilt: by its roll, and
+    /// where the guide bends. That is no displacement of the slide.
+    fn take_off_tilts(&self, state: &mut MovingState, axis: Axis, actual: Point) {
+        let Some(beam) = &self.beams[axis.index()] else {
+            return;
+        };
+        let mut turn = [0.0; 3];
+        turn[axis.index()] = state.roll[axis.index()].value();
+        for bend in self.bends.iter().filter(|it| it.axis == axis) {
+            let above = |at: usize| (self.temperatures[at] - self.references[at]).value();
+            let gradient = above(bend.over) - bend.under.map_or(0.0, above);
+            let (low, high) = (bend.low.value(), bend.high.value());
+            let way = low + high - 2.0 * actual.along(axis).value();
+            let slope = bend.bow.value() * gradient * 4.0 * way / ((high - low) * (high - low));
+            // From the axis towards the bow, about the third direction by the right hand.
+            let (from, to) = (axis.index(), bend.towards.index());
+            let sense = if (from + 1) % 3 == to { 1.0 } else { -1.0 };
+            turn[3 - from - to] += sense * slope;
+        }
+        let [x, y, z] = Axis::ALL.map(|it| beam.place.along(it).value());
+        let seen = [
+            turn[1] * z - turn[2] * y,
+            turn[2] * x - turn[0] * z,
+            turn[0] * y - turn[1] * x,
+        ];
+        let sideways = &mut state.sideways[axis.index()];
+        for (value, direction) in sideways.iter_mut().zip(axis.others()) {
+            *value -= Metres(seen[direction.index()]);
+        }
     }
 
     /// An axis at the end of the volume is some counts beyond it: the end's correction holds there.
@@ -422,6 +464,7 @@ fn watched_beam(
         monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
         slider: places(&beam.slider),
         end: beam.end.as_ref().map(places),
+        place: point_of_mm(beam.slider.place_mm),
     })
 }
 
