@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 use std::sync::mpsc::sync_channel;
+use std::vec::IntoIter;
 
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::BeamReference;
@@ -100,8 +101,7 @@ pub fn diagonal(period: Duration, seconds: f64) -> Vec<Vec<Metres>> {
 /// Writes a path as there is room for it, and keeps what the loop says that it did.
 pub struct Writer {
     desk: Desk,
-    points: Vec<Vec<Metres>>,
-    next: usize,
+    points: IntoIter<Vec<Metres>>,
     /// What the loop did, period by period.
     pub lives: Vec<Live>,
 }
@@ -112,8 +112,7 @@ impl Writer {
         let lives = Vec::with_capacity(2 * points.len());
         let mut writer = Self {
             desk,
-            points,
-            next: 0,
+            points: points.into_iter(),
             lives,
         };
         writer.serve();
@@ -133,15 +132,11 @@ impl Writer {
         while let Some(live) = self.desk.next_live() {
             self.lives.push(live);
         }
-        while let Some(point) = self.points.get(self.next) {
-            match self.desk.path.push(point) {
-                Ok(()) => self.next += 1,
-                Err(PushError::Full | PushError::Stopped) => return,
-                Err(error) => panic!("{error}"),
-            }
+        match self.desk.path.write(&mut self.points) {
+            // Stopped: of no use any more.
+            Ok(_) | Err(PushError::Stopped) => {}
+            Err(error) => panic!("{error}"),
         }
-        // Full, or stopped: tried again, or of no use.
-        let _ = self.desk.path.finish();
     }
 }
 
