@@ -4,6 +4,7 @@
 //! `RIG` unset: in this process (virtual time) and on pseudo-terminals. `RIG=vcan`: on the
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
+pub mod apart;
 mod desk;
 mod emulator;
 mod four_screws;

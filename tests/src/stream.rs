@@ -2,13 +2,18 @@
 
 use core::time::Duration;
 use std::sync::mpsc::sync_channel;
+use std::vec::IntoIter;
 
+use compensator::volumetric::function::{Function, Shape};
+use compensator::volumetric::online::BeamReference;
 use mock_bus::runner::Running;
 use mock_bus::simulation::Simulation;
+use truestage::config::VolumetricConfig;
+use truestage::cycle::volumetric::VolumetricState;
 use truestage::emulated::Emulated;
 use truestage::engine::{AXES_MAX, Cause, Desk, Engine, Live, PushError, State};
-use truestage::{Failure, Machine};
-use units::{Metres, MetresPerSecond};
+use truestage::{Failure, Machine, assemble};
+use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 /// How many set-points an axis may be behind: as many as the engine grants.
 const BEHIND: usize = 4;
@@ -63,11 +68,40 @@ fn smooth(share: f64) -> f64 {
     core::f64::consts::TAU * way / (1.0 - EASE)
 }
 
+/// Nothing is known to deviate and nothing was seen: what detectors and thermometers say from
+/// now on is the correction.
+///
+/// # Panics
+/// When the configuration has become another one.
+pub fn nothing_known(config: &VolumetricConfig) -> VolumetricState {
+    let ends = [Metres(-0.01), Metres(0.51)];
+    let zero = || Function::new(&ends, &[Metres::ZERO; 2], Shape::Linear).expect("it is good");
+    let beams = config.beam.each().map(|beam| {
+        let drift = assemble::beam_drift(beam?).expect("it was checked");
+        BeamReference::new([zero(), zero()], [Metres::ZERO; 2], drift).ok()
+    });
+    let roll = Function::new(&ends, &[Radians(0.0); 2], Shape::Linear);
+    VolumetricState {
+        beams,
+        roll: roll.ok(),
+        temperatures: vec![Celsius(21.0); config.temperature.len()],
+        ..VolumetricState::default()
+    }
+}
+
+/// To and fro along a diagonal of the volume.
+pub fn diagonal(period: Duration, seconds: f64) -> Vec<Vec<Metres>> {
+    let points = circle(period, seconds, seconds / 4.0).into_iter();
+    // The strokes of the first screw go from 0 to 2 mm and back.
+    points
+        .map(|it| vec![it[0] * 6.0, it[0] * 5.0, it[0] * 4.0])
+        .collect()
+}
+
 /// Writes a path as there is room for it, and keeps what the loop says that it did.
 pub struct Writer {
     desk: Desk,
-    points: Vec<Vec<Metres>>,
-    next: usize,
+    points: IntoIter<Vec<Metres>>,
     /// What the loop did, period by period.
     pub lives: Vec<Live>,
 }
@@ -78,8 +112,7 @@ impl Writer {
         let lives = Vec::with_capacity(2 * points.len());
         let mut writer = Self {
             desk,
-            points,
-            next: 0,
+            points: points.into_iter(),
             lives,
         };
         writer.serve();
@@ -99,15 +132,11 @@ impl Writer {
         while let Some(live) = self.desk.next_live() {
             self.lives.push(live);
         }
-        while let Some(point) = self.points.get(self.next) {
-            match self.desk.path.push(point) {
-                Ok(()) => self.next += 1,
-                Err(PushError::Full | PushError::Stopped) => return,
-                Err(error) => panic!("{error}"),
-            }
+        match self.desk.path.write(&mut self.points) {
+            // Stopped: of no use any more.
+            Ok(_) | Err(PushError::Stopped) => {}
+            Err(error) => panic!("{error}"),
         }
-        // Full, or stopped: tried again, or of no use.
-        let _ = self.desk.path.finish();
     }
 }
 

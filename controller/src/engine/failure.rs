@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 use super::AXES_MAX;
 use super::motion::MotionError;
@@ -51,6 +51,21 @@ pub enum EngineFailure {
     NotCyclic {
         /// Which axis.
         axis: String,
+    },
+    /// A calibration's correction would be cut off on the way.
+    #[error(
+        "axis {axis}: its calibration corrects by up to {:.3} um, and by up to {:.3} um/s at full \
+         speed, which is more than [axis.{axis}.cyclic] allows; raise correction_limit_um and \
+         correction_rate_um_per_s, or lower speed_max_mm_per_s",
+        size.um(), rate.value() * 1e6
+    )]
+    CorrectionLimit {
+        /// Which axis.
+        axis: String,
+        /// The largest deviation of its table.
+        size: Metres,
+        /// How fast the correction changes at the axis's full speed.
+        rate: MetresPerSecond,
     },
     /// A target cannot be reached.
     #[error(transparent)]
@@ -112,7 +127,10 @@ impl EngineFailure {
     /// As [`crate::Failure::exit_code`].
     pub const fn exit_code(&self) -> u8 {
         match self {
-            Self::Axes { .. } | Self::NotConfigured { .. } | Self::Periods { .. } => 2,
+            Self::Axes { .. }
+            | Self::NotConfigured { .. }
+            | Self::Periods { .. }
+            | Self::CorrectionLimit { .. } => 2,
             Self::Motion(_) => 3,
             Self::NotAtRest { .. }
             | Self::NotCyclic { .. }

@@ -27,6 +27,7 @@ mod motion;
 mod pace;
 mod path;
 mod run;
+mod tables;
 
 use core::time::Duration;
 
@@ -44,6 +45,7 @@ pub use histogram::Histogram;
 pub use motion::{Moment, Motion, MotionError};
 pub use pace::Timing;
 pub use path::{PathError, PathFault, PathWriter, PushError};
+pub use tables::TableCorrection;
 
 use crate::failure::Failure;
 use crate::machine::Machine;

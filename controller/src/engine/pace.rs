@@ -30,6 +30,19 @@ pub struct Timing {
     pub scheduling: String,
 }
 
+impl Timing {
+    /// Takes over what another loop has noted.
+    pub fn add(&mut self, other: &Self) {
+        self.lateness.add(&other.lateness);
+        self.jitter.add(&other.jitter);
+        self.answers.add(&other.answers);
+        self.work.add(&other.work);
+        self.overruns += other.overruns;
+        self.skipped += other.skipped;
+        self.scheduling.clone_from(&other.scheduling);
+    }
+}
+
 impl fmt::Display for Timing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "lateness  {}", self.lateness)?;
