@@ -5,7 +5,7 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use tests::volume::{Off, Volume, good, percentile_95, spread};
+use tests::volume::{Frame, Off, Volume, good, percentile_95, spread};
 use truestage::cycle::volumetric::WarmUp;
 use units::{Metres, Time};
 
@@ -88,25 +88,32 @@ fn work(volume: &mut Volume, stretches: u32, places: u32) -> Day {
     let (mut mover, state) = volume.corrected();
     let everywhere = spread(0, 200);
     let morning = volume.uncorrected(&everywhere);
+    // The frame that the tables count in, as it is in the morning and stays.
+    let frame = Frame::of(&everywhere, &volume.by_tables(&everywhere, &state));
     let mut day = Day::default();
+    let mut along = Vec::new();
     for stretch in 0..=stretches {
         let hour = DAY_H * f64::from(stretch) / f64::from(stretches);
         if idle_until(volume, hour) {
             good(volume.bench.machine.correct_volume(&mut mover, true));
         }
         let here = spread(200 + stretch * places, places);
-        let errors = volume.visit(&mut mover, &here, &mut day.along);
+        let errors = volume.visit(&mut mover, &here, &mut along);
+        let errors = frame.all_seen(&here, &errors);
         let found = volume.uncorrected(&everywhere);
         let pairs = found.iter().zip(&morning);
         let drifted: Vec<Off> = pairs
             .map(|(now, then)| core::array::from_fn(|k| now[k] - then[k]))
             .collect();
         day.drifted = day.drifted.max(percentile_95(&drifted));
-        let tables = percentile_95(&volume.by_tables(&everywhere, &state));
+        let tables = volume.by_tables(&everywhere, &state);
+        let tables = percentile_95(&frame.all_seen(&everywhere, &tables));
         let live = percentile_95(&errors);
         day.curve.push((hour, percentile_95(&found), tables, live));
         day.at_rest.extend(errors);
     }
+    let along = along.iter().map(|(mm, off)| frame.seen(*mm, *off));
+    day.along = along.collect();
     day
 }
 
