@@ -4,12 +4,18 @@ use core::time::Duration;
 
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
+use compensator::volumetric::online::StateMap;
 use compensator::volumetric::{Axis, Point};
 use mock_bus::plant::VolumetricTruth;
 use truestage::Failure;
-use truestage::cycle::volumetric::{GEOMETRY, Mover, VolumetricCorrection, VolumetricState};
+use truestage::cycle::volumetric::{
+    GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
+};
 use truestage::engine::{Live, Observed};
-use truestage::store::{BendRecord, CalibrationRecord, Content, GeometryContent, RecordHead};
+use truestage::store::{
+    BendRecord, CalibrationRecord, Content, GeometryContent, MemoryName, RecordHead,
+    StateMemoryContent,
+};
 use units::{Celsius, Metres, Radians};
 
 use crate::{Bench, VOLUMETRIC};
@@ -252,7 +258,8 @@ impl Volume {
 
     /// How the guides bend per kelvin: what a cold and a warm calibration would find.
     fn true_bends(&self) -> Vec<BendRecord> {
-        let later = self.bench.machine.now() + Duration::from_secs(3600);
+        // Soon enough that nothing else has begun by then; the plant is exact.
+        let later = self.bench.machine.now() + Duration::from_secs(60);
         let towards = [2, 2, 1];
         self.truth(|truth| {
             let each = (0..3).map(|axis| {
@@ -320,6 +327,41 @@ impl Volume {
             };
             (axes, squareness)
         })
+    }
+
+    /// Stores by design that the x guide bows upwards by so much in its middle, as the first
+    /// memory.
+    ///
+    /// # Panics
+    /// When it cannot be stored.
+    pub fn remember_bow(&self, height: Metres) {
+        let travel = TRAVEL_MM[0];
+        let nodes: Vec<Metres> = (0..=20)
+            .map(|it| Metres::from_mm(f64::from(it) * 25.0))
+            .collect();
+        let bow = |node: &Metres| {
+            let share = node.mm() / travel;
+            height * (4.0 * share * (1.0 - share))
+        };
+        let up: Vec<Metres> = nodes.iter().map(bow).collect();
+        let none = vec![Metres(0.0); nodes.len()];
+        let function = |values: &[Metres]| Function::new(&nodes, values, Shape::Spline);
+        let functions = [function(&none), function(&up)].map(|it| it.expect("sound"));
+        let mut map = StateMap::default();
+        map.of[0] = Some(functions);
+        let store = &self.bench.store;
+        let references = store.active(REFERENCES).expect("it can be read");
+        let references = references.current.expect("they were taken");
+        let content = StateMemoryContent::new(MemoryName::First, &references, &map);
+        let pointer = memory_pointer(MemoryName::First);
+        let head = RecordHead {
+            axis: pointer.into(),
+            ..self.bench.machine.this_machine("x")
+        };
+        let content = Content::StateMemory(content);
+        let id = store.save(&CalibrationRecord { head, content });
+        let activated = store.activate(pointer, &id.expect("there is room"));
+        activated.expect("it was just stored");
     }
 
     /// The machine corrected by all that is stored, and that state.

@@ -89,13 +89,7 @@ fn a_bow_that_a_machine_was_built_with_is_kept() {
     assert!(expected.iter().any(|it| it[2] > Metres::from_um(14.9)));
     let (mut mover, _) = volume.corrected();
     let without = volume.visit(&mut mover, &places, &mut Vec::new());
-    let store = volume.bench.store.clone();
-    good(
-        volume
-            .bench
-            .machine
-            .record_memory(&store, MemoryName::First),
-    );
+    volume.remember_bow(Metres::from_um(15.0));
     let (mut mover, _) = volume.corrected();
     let with = volume.visit(&mut mover, &places, &mut Vec::new());
     let (without, with) = (beyond(&without, &expected), beyond(&with, &expected));
@@ -104,12 +98,6 @@ fn a_bow_that_a_machine_was_built_with_is_kept() {
         largest(&without).um(),
         largest(&with).um()
     );
-    for (mm, off) in places.iter().zip(&with) {
-        eprintln!(
-            "DBG {mm:?} {:?}",
-            off.map(|it| (it.um() * 100.0).round() / 100.0)
-        );
-    }
     assert!(largest(&without) > Metres::from_um(10.0));
     assert!(
         largest(&with) <= Metres::from_um(1.0),
