@@ -6,6 +6,7 @@
 
 mod bus;
 mod cyclic;
+mod detectors;
 mod drive;
 mod files;
 mod hall;

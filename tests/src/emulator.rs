@@ -8,7 +8,9 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, shipped_config};
+use crate::rig::{
+    LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC, shipped_config,
+};
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -56,6 +58,11 @@ impl Setup {
     /// The shipped rotary table with the noise and errors of `seed`.
     pub const fn rotary(seed: u64) -> Self {
         Self::of(ROTARY, seed)
+    }
+
+    /// The shipped three axes with the noise and errors of `seed`.
+    pub const fn volumetric(seed: u64) -> Self {
+        Self::of(VOLUMETRIC, seed)
     }
 
     /// On another SocketCAN interface than the usual one.

@@ -64,7 +64,7 @@ pub struct Line {
 pub struct LineReading {
     /// Where the machine was sent.
     pub at: Point,
-    /// Where the target was mounted.
+    /// Where the moving optic was mounted.
     pub tool: Point,
     /// By how much the tool was off, against the start of the line.
     pub reading: Reading,
