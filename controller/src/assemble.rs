@@ -24,9 +24,9 @@ pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};
 pub(crate) use volumetric::point_of_mm;
 pub use volumetric::{
-    BeamDetectorError, beam_detector, beam_drift, feed_settings, function_shape, influences,
-    model_limits, roll_optics, temperature_settings, thermal, volume_axis, volumetric_chain,
-    work_volume,
+    BeamDetectorError, beam_detector, beam_drift, bend_plans, feed_settings, function_shape,
+    influences, model_limits, roll_optics, temperature_settings, thermal, volume_axis,
+    volumetric_chain, work_volume,
 };
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};

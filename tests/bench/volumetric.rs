@@ -13,7 +13,8 @@ use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::grid::{GridMap, GridShape};
 use compensator::volumetric::model::{
-    AxisErrors, Conditions, Machine, Squareness, Thermal, ThermalChannel, VolumetricModel,
+    AxisErrors, Conditions, Machine, Squareness, Thermal, ThermalBend, ThermalChannel,
+    VolumetricModel,
 };
 use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point, Volume};
@@ -110,9 +111,22 @@ fn model(shape: Shape) -> (VolumetricModel, Conditions) {
         low: Celsius(15.0),
         high: Celsius(35.0),
         expansion: [8e-6, 8e-6, 11e-6],
+        u_expansion: [1e-7; 3],
         growth: point([0.0, 1e-6, 3e-6]),
         squareness: [Radians(1e-6), Radians(0.0), Radians(0.0)],
         u: 0.1,
+    };
+    let bend = |axis: Axis| ThermalBend {
+        axis,
+        towards: axis.others()[1],
+        over: 0,
+        under: Some(1),
+        bow: Metres::from_um(4.0),
+        u: Metres::from_um(0.1),
+        low: Metres(0.0),
+        high: Metres(SPAN_M[axis.index()]),
+        gradient_max: 5.0,
+        is_watched: axis == Axis::X,
     };
     let machine = Machine {
         chain: "XFYZ".parse().unwrap(),
@@ -126,6 +140,7 @@ fn model(shape: Shape) -> (VolumetricModel, Conditions) {
         },
         thermal: Thermal {
             channels: vec![channel; 2],
+            bends: Axis::ALL.map(bend).to_vec(),
             fixed: Point::ZERO,
         },
         tool_max: Metres(0.3),

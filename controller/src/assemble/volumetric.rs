@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, FunctionError, Shape};
+use compensator::volumetric::identify::BendPlan;
 use compensator::volumetric::model::{Chain, ChainError, Thermal, ThermalChannel};
 use compensator::volumetric::online::{
     BeamDetector, BeamDetectorSettings, BeamDrift, FeedSettings, Influences, Layout, RatioCurve,
@@ -177,14 +178,31 @@ pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
         low: Celsius(it.low_c),
         high: Celsius(it.high_c),
         expansion: it.expansion_ppm_per_k.map(|ppm| ppm * 1e-6),
+        u_expansion: [0.0; 3],
         growth: point_of_mm(it.growth_um_per_k.map(|um| um * 1e-3)),
         squareness: it.squareness_arcsec_per_k.map(Radians::from_arcsec),
         u: it.standard_uncertainty_k,
     });
     Thermal {
         channels: channels.collect(),
+        bends: Vec::new(),
         fixed: point_of_mm(config.expansion_fixed_mm),
     }
+}
+
+/// The guides that bend, as identification looks for their bows: from tilts alone, since films and
+/// supports shift a slide sideways too.
+pub fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
+    let each = config.bend.iter().map(|it| BendPlan {
+        axis: volume_axis(it.axis),
+        towards: volume_axis(it.towards),
+        over: it.over,
+        under: it.under,
+        low: Metres::from_mm(it.low_mm),
+        high: Metres::from_mm(it.high_mm),
+        sideways: false,
+    });
+    each.collect()
 }
 
 /// The influence functions; 1 where there is none.

@@ -32,7 +32,8 @@ pub use rotary::{
     RotaryVerifyConfig, RotaryZeroConfig,
 };
 pub use volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, FeedConfig,
-    InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName, TemperatureConfig,
-    VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig, VolumetricZeroConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
+    FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
+    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
+    VolumetricConfig, VolumetricVerifyConfig, VolumetricZeroConfig,
 };

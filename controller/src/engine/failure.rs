@@ -35,6 +35,17 @@ pub enum EngineFailure {
         /// This one's.
         seen: Duration,
     },
+    /// An axis goes on moving although nothing drives it.
+    #[error(
+        "axis {axis}: still moves after {waited:?}; the cyclic mode is entered and left at rest \
+         only; does its servo oscillate, or something push it?"
+    )]
+    NotAtRest {
+        /// Which axis.
+        axis: String,
+        /// How long was waited.
+        waited: Duration,
+    },
     /// A drive does not say what it holds.
     #[error("axis {axis}: its drive is not in the cyclic mode any more")]
     NotCyclic {
@@ -69,6 +80,17 @@ pub enum EngineFailure {
         /// How far it may be.
         limit: Metres,
     },
+    /// SYNCs were missed by so much that the drives took their own measures.
+    #[error(
+        "the loop was late by {periods} periods (the computer was held up), then: {then}; all \
+         drives were stopped at once; free the computer of other work, or allow SCHED_FIFO"
+    )]
+    HeldUp {
+        /// How many SYNCs were missed.
+        periods: u32,
+        /// What came of it.
+        then: String,
+    },
     /// A frame could not leave before its SYNC.
     #[error(
         "set-points could not be sent before their SYNC ({why}); all drives were stopped at \
@@ -92,9 +114,11 @@ impl EngineFailure {
         match self {
             Self::Axes { .. } | Self::NotConfigured { .. } | Self::Periods { .. } => 2,
             Self::Motion(_) => 3,
-            Self::NotCyclic { .. }
+            Self::NotAtRest { .. }
+            | Self::NotCyclic { .. }
             | Self::Missing { .. }
             | Self::Deviates { .. }
+            | Self::HeldUp { .. }
             | Self::NotSent { .. }
             | Self::NoStop
             | Self::NotTaken => 4,

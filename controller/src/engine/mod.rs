@@ -24,6 +24,7 @@ mod decide_tests;
 mod failure;
 mod histogram;
 mod motion;
+mod pace;
 mod path;
 mod run;
 
@@ -41,8 +42,8 @@ pub use decide::{Cause, Counts, Live, State};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use motion::{Moment, Motion, MotionError};
+pub use pace::Timing;
 pub use path::{PathError, PathFault, PathWriter, PushError};
-pub use run::Timing;
 
 use crate::failure::Failure;
 use crate::machine::Machine;

@@ -10,4 +10,5 @@ mod rotary;
 mod rotary_table;
 mod serial_zero;
 mod volumetric;
+mod volumetric_day;
 mod volumetric_line;

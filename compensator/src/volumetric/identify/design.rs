@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use units::Metres;
 
+use super::thermal::ThermalPlan;
 use super::{Axis, FunctionPlan, IdentifyError, Observation, Plan, Reading, Unknown};
 use crate::volumetric::Point;
 use crate::volumetric::model::{ErrorName, Squareness};
@@ -53,7 +54,11 @@ pub(super) struct Design {
 
 impl Design {
     pub(super) fn new(plan: &Plan, observations: &[Observation]) -> Result<Self, IdentifyError> {
+        plan.thermal.check(plan.runs.len())?;
         let (blocks, unknowns) = columns(plan)?;
+        let above: Vec<Vec<f64>> = (0..plan.runs.len())
+            .map(|run| plan.thermal.above_of_run(run))
+            .collect();
         let mut design = Self {
             blocks,
             unknowns,
@@ -64,7 +69,7 @@ impl Design {
         for (index, observation) in observations.iter().enumerate() {
             design.check(plan, index, observation)?;
             let start = *starts[observation.run].get_or_insert(observation.at);
-            design.add(plan, observation, start);
+            design.add(plan, observation, start, &above[observation.run]);
         }
         Ok(design)
     }
@@ -110,18 +115,20 @@ impl Design {
         Ok(())
     }
 
-    fn add(&mut self, plan: &Plan, it: &Observation, start: Point) {
-        let (value, u) = match it.reading {
-            Reading::Length { deviation, u, .. } => (deviation.value(), u.value()),
-            Reading::Angle { deviation, u, .. } => (deviation.value(), u.value()),
+    /// How many of them belong to errors, the rest to the instrument's settings.
+    pub(super) fn errors(&self) -> usize {
+        let open = |it: &&Unknown| matches!(it, Unknown::Offset(_) | Unknown::Angle(_));
+        self.unknowns.len() - self.unknowns.iter().filter(open).count()
+    }
+
+    fn add(&mut self, plan: &Plan, it: &Observation, start: Point, above: &[f64]) {
+        let value = match it.reading {
+            Reading::Length { deviation, .. } => deviation.value(),
+            Reading::Angle { deviation, .. } => deviation.value(),
         };
-        let errors = error_row(plan, &self.blocks, it.at, it.tool, |effect| {
-            match (it.reading, effect) {
-                (Reading::Length { along, .. }, Effect::Displaced(by)) => dot(along, by),
-                (Reading::Length { along, .. }, Effect::Turned(_, by)) => dot(along, by),
-                (Reading::Angle { about, .. }, Effect::Turned(by, _)) => by[about.index()],
-                (Reading::Angle { .. }, Effect::Displaced(_)) => 0.0,
-            }
+        let u = u_of(it.reading);
+        let errors = error_row(plan, &self.blocks, it.at, it.tool, above, |effect| {
+            seen(it.reading, effect)
         });
         let setup = plan.runs[it.run];
         let way = (it.at - start).distance().value();
@@ -133,7 +140,11 @@ impl Design {
                     .alignment
                     .filter(|own| own.angle == *angle)
                     .map_or(0.0, |own| own.factor * way),
-                Unknown::Offset(_) | Unknown::Function(_) | Unknown::Squareness(_) => 0.0,
+                Unknown::Offset(_)
+                | Unknown::Function(_)
+                | Unknown::Squareness(_)
+                | Unknown::Expansion(..)
+                | Unknown::Bend(..) => 0.0,
             });
         self.rows
             .extend(errors.iter().copied().chain(open).map(|it| it / u));
@@ -143,32 +154,60 @@ impl Design {
 
 /// What one unit of an error does to the tool.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Effect {
-    /// A displacement.
-    Displaced(V3),
-    /// A rotation, and the displacement it makes.
-    Turned(V3, V3),
+pub(super) struct Effect {
+    /// A rotation.
+    pub(super) turn: V3,
+    /// A displacement, that by the rotation included.
+    pub(super) moved: V3,
 }
 
-/// What each parameter of functions and squarenesses contributes, as `seen` sees it.
+impl Effect {
+    const fn displaced(moved: V3) -> Self {
+        Self {
+            turn: [0.0; 3],
+            moved,
+        }
+    }
+}
+
+/// What a reading sees of an effect.
+pub(super) fn seen(reading: Reading, effect: &Effect) -> f64 {
+    match reading {
+        Reading::Length { along, .. } => dot(along, effect.moved),
+        Reading::Angle { about, .. } => effect.turn[about.index()],
+    }
+}
+
+/// The standard uncertainty of a reading, in its SI unit.
+pub(super) fn u_of(reading: Reading) -> f64 {
+    match reading {
+        Reading::Length { u, .. } => u.value(),
+        Reading::Angle { u, .. } => u.value(),
+    }
+}
+
+/// What each parameter of functions, squarenesses and warmth contributes, as `seen` sees it;
+/// `above`: how far each thermometer is above its reference.
 pub(super) fn error_row(
     plan: &Plan,
     blocks: &[Block],
     at: Point,
     tool: Point,
-    seen: impl Fn(Effect) -> f64,
+    above: &[f64],
+    seen: impl Fn(&Effect) -> f64,
 ) -> Vec<f64> {
     let unit = |axis: Axis| core::array::from_fn(|k| f64::from(u8::from(k == axis.index())));
     let mut row = Vec::new();
     for block in blocks {
         let effect = match block.name {
-            ErrorName::Along(_, direction) => Effect::Displaced(unit(direction)),
+            ErrorName::Along(_, direction) => Effect::displaced(unit(direction)),
             ErrorName::About(axis, direction) => {
                 let turn = unit(direction);
-                Effect::Turned(turn, cross(turn, lever(plan, axis, at, tool)))
+                let moved = cross(turn, lever(plan, axis, at, tool));
+                Effect { turn, moved }
             }
         };
-        let factor = seen(effect);
+        let factor = seen(&effect);
         let position = at.along(axis_of(block.name)).value();
         row.extend(block.row(position).into_iter().map(|it| it * factor));
     }
@@ -179,12 +218,14 @@ pub(super) fn error_row(
         let q = at.array();
         let moved =
             core::array::from_fn(|k| lean[0][k] * q[0] + lean[1][k] * q[1] + lean[2][k] * q[2]);
-        row.push(seen(Effect::Displaced(moved)));
+        row.push(seen(&Effect::displaced(moved)));
     }
+    let warmth = ThermalPlan::effects(plan, at, above, |axis| lever(plan, axis, at, tool));
+    row.extend(warmth.iter().map(&seen));
     row
 }
 
-fn lever(plan: &Plan, axis: Axis, at: Point, tool: Point) -> V3 {
+pub(super) fn lever(plan: &Plan, axis: Axis, at: Point, tool: Point) -> V3 {
     let mut lever = tool.array();
     for other in Axis::ALL {
         if plan.chain.is_on_lever(axis, other) {
@@ -224,6 +265,7 @@ fn columns(plan: &Plan) -> Result<(Vec<Block>, Vec<Unknown>), IdentifyError> {
         }
         unknowns.push(column);
     }
+    unknowns.extend(plan.thermal.unknowns());
     let offsets = plan.runs.iter().enumerate().filter(|(_, it)| it.offset);
     unknowns.extend(offsets.map(|(run, _)| Unknown::Offset(run)));
     let angles = plan.runs.iter().filter_map(|it| it.alignment);

@@ -10,6 +10,7 @@
 //! | E_XX, E_YX, E_AX … at nodes, straight lines between | [`FunctionPlan`] |
 //! | E_C0Y, E_B0Z, E_A0Z | [`SquarenessName`] |
 //! | what one setting of the instrument leaves open | [`RunSetup`] |
+//! | expansion and bending per kelvin | [`ThermalPlan`] |
 //!
 //! Conventions, without which the errors are not defined:
 //!
@@ -23,14 +24,21 @@
 //! What readings cannot tell is found by singular values of the scaled design, and said by the
 //! names of the errors concerned ([`Observability`]); it is never guessed.
 //!
-//! Absent: outliers, hysteresis, laser tracker lengths from unknown stations, temperatures
-//! (correct the readings first: [`crate::length_correction`]).
+//! Runs at two or more warmths tell the thermal coefficients, with all errors at once: a guide
+//! that bends while the tool is on a lever looks like a scale that grows. Runs too much alike are
+//! refused, and thermometers' uncertainties are in those of the coefficients.
+//!
+//! Absent: outliers, hysteresis, laser tracker lengths from unknown stations, the instrument's own
+//! temperature and air (correct the readings first: [`crate::length_correction`]), temperatures
+//! that change within a run.
 
 mod design;
 mod diagonals;
 mod observe;
 mod solve;
+mod standard;
 mod straightness;
+mod thermal;
 
 use core::fmt;
 
@@ -39,7 +47,9 @@ use units::{Metres, Quantity, Radians};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
 pub use solve::{Identified, IdentifiedFunction};
+pub use standard::{Optics, Purpose, StandardDesign, StandardLine, standard_design};
 pub use straightness::{ReferenceLine, Straightness, straightness};
+pub use thermal::{BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion, ThermalPlan};
 
 use super::model::{Chain, ErrorName};
 use super::{Axis, Point};
@@ -112,6 +122,8 @@ pub struct Plan {
     pub runs: Vec<RunSetup>,
     /// Where positioning errors and tilts are zero.
     pub zero: Point,
+    /// What warmth adds.
+    pub thermal: ThermalPlan,
 }
 
 /// What was read.
@@ -158,6 +170,10 @@ pub enum Unknown {
     Function(ErrorName),
     /// A squareness.
     Squareness(SquarenessName),
+    /// The expansion along an axis, by its first thermometer.
+    Expansion(Axis, usize),
+    /// The bending of an axis's guide towards a direction.
+    Bend(Axis, Axis),
     /// The zero of a run.
     Offset(usize),
     /// An angle of alignment.
@@ -169,6 +185,10 @@ impl fmt::Display for Unknown {
         match self {
             Self::Function(name) => name.fmt(f),
             Self::Squareness(name) => name.fmt(f),
+            Self::Expansion(axis, by) => write!(f, "expansion along {axis} by thermometer {by}"),
+            Self::Bend(axis, towards) => {
+                write!(f, "bending of the guide of {axis} along {towards}")
+            }
             Self::Offset(run) => write!(f, "zero of run {run}"),
             Self::Angle(angle) => write!(f, "alignment angle {angle}"),
         }
@@ -235,6 +255,25 @@ pub enum IdentifyError {
         /// Which function.
         name: ErrorName,
     },
+    /// A thermal plan that does not fit.
+    #[error("identification, thermal plan: {what}")]
+    Thermal {
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// Runs made at nearly the same warmth.
+    #[error(
+        "identification, {unknown}: the runs that tell it are {spread:.2} K apart, at least \
+        {least:.2} K are needed; let the machine warm up and measure again, or plan without it"
+    )]
+    TooAlike {
+        /// What would be found from them.
+        unknown: Unknown,
+        /// How far apart they are, in kelvin.
+        spread: f64,
+        /// How far apart they should be.
+        least: f64,
+    },
     /// Errors that these readings do not tell.
     #[error(
         "identification: these readings do not tell {unseen}; measure with another tool offset \
@@ -268,13 +307,18 @@ impl Plan {
     /// When plan and observations do not fit each other, or do not tell all that is planned.
     pub fn identify(&self, observations: &[Observation]) -> Result<Identified, IdentifyError> {
         let design = design::Design::new(self, observations)?;
+        thermal::check_apart(self, observations)?;
         let unseen = observe::observe(&design);
         if !unseen.is_complete() {
             return Err(IdentifyError::Unobservable { unseen });
         }
-        solve::solve(self, &design)
+        solve::solve(self, &design, observations)
     }
 }
 
 #[cfg(test)]
+mod standard_tests;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod thermal_tests;

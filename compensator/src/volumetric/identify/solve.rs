@@ -1,9 +1,10 @@
 //! The errors by weighted least squares, with their covariance.
 
-use units::{Metres, Radians};
+use units::{Celsius, Metres, Radians};
 
-use super::design::{Block, Design, Effect, error_row};
-use super::{Axis, IdentifyError, Plan, Point, Quantity, SquarenessName};
+use super::design::{Block, Design, error_row};
+use super::thermal::{IdentifiedBend, IdentifiedExpansion, add_heat};
+use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
 use crate::least_squares;
 use crate::volumetric::function::{Function, FunctionError, Shape};
 use crate::volumetric::model::{AxisErrors, ErrorName, Squareness};
@@ -33,6 +34,10 @@ pub struct Identified {
     pub functions: Vec<IdentifiedFunction>,
     /// The squarenesses; zero where not planned.
     pub squareness: Squareness,
+    /// The expansions, in the order of the plan.
+    pub expansions: Vec<IdentifiedExpansion>,
+    /// The bends, in the order of the plan.
+    pub bends: Vec<IdentifiedBend>,
     /// Readings − unknowns.
     pub degrees_of_freedom: usize,
     /// Scatter of the readings in units of their uncertainty; 1 when these are right, `None`
@@ -40,7 +45,7 @@ pub struct Identified {
     pub birge_ratio: Option<f64>,
     /// Reading − model of each reading, in units of its uncertainty.
     pub residuals: Vec<f64>,
-    /// Of the parameters of functions and squarenesses alone.
+    /// Of the parameters of functions, squarenesses and warmth alone.
     covariance: Vec<f64>,
 }
 
@@ -66,8 +71,14 @@ impl Identified {
 
     /// The standard uncertainty of the deviation that the errors found make at a place, their
     /// covariances included: between readings it is far below what the functions' own
-    /// uncertainties would make of it. `None` outside the nodes.
-    pub fn standard_uncertainty(&self, at: Point, tool: Point) -> Option<Point> {
+    /// uncertainties would make of it. `temperatures`: what the thermometers show, as far as it
+    /// is not their references; not how sure that is. `None` outside the nodes.
+    pub fn standard_uncertainty(
+        &self,
+        at: Point,
+        tool: Point,
+        temperatures: &[Celsius],
+    ) -> Option<Point> {
         let inside = |block: &Block| {
             let (ErrorName::Along(axis, _) | ErrorName::About(axis, _)) = block.name;
             let position = at.along(axis).value();
@@ -76,9 +87,10 @@ impl Identified {
         if !self.blocks.iter().all(inside) {
             return None;
         }
+        let above = self.plan.thermal.above(temperatures);
         let u = Axis::ALL.map(|axis| {
-            let row = error_row(&self.plan, &self.blocks, at, tool, |effect| match effect {
-                Effect::Displaced(by) | Effect::Turned(_, by) => by[axis.index()],
+            let row = error_row(&self.plan, &self.blocks, at, tool, &above, |effect| {
+                effect.moved[axis.index()]
             });
             let variance = crate::uncertainty::propagate(&row, &self.covariance);
             Metres(variance.max(0.0).sqrt())
@@ -96,16 +108,21 @@ fn function<Q: Quantity>(
     Function::new(&it.nodes, &of(&it.values), shape)?.with_uncertainties(&of(&it.u))
 }
 
-pub(super) fn solve(plan: &Plan, design: &Design) -> Result<Identified, IdentifyError> {
+pub(super) fn solve(
+    plan: &Plan,
+    design: &Design,
+    observations: &[Observation],
+) -> Result<Identified, IdentifyError> {
     let all = design.columns();
     let fit = least_squares::solve(&design.rows, all, &design.values)?;
     let birge_ratio = fit.residual_sd();
     let enlarged = birge_ratio.unwrap_or(1.0).max(1.0);
     let functions: usize = design.blocks.iter().map(|it| it.basis.ncols()).sum();
-    let count = functions + plan.squarenesses.len();
-    let covariance: Vec<f64> = (0..count * count)
+    let count = design.errors();
+    let mut covariance: Vec<f64> = (0..count * count)
         .map(|at| fit.cofactor[at / count * all + at % count] * enlarged * enlarged)
         .collect();
+    add_heat(plan, design, observations, &fit, &mut covariance);
     let found = design.blocks.iter().map(|block| {
         let mut gradient = vec![0.0; count];
         let (mut values, mut u) = (Vec::new(), Vec::new());
@@ -128,25 +145,63 @@ pub(super) fn solve(plan: &Plan, design: &Design) -> Result<Identified, Identify
             u,
         }
     });
-    let mut squareness = Squareness::default();
-    for (at, name) in plan.squarenesses.iter().enumerate() {
-        let column = functions + at;
-        let value = Radians(fit.coefficients[column]);
-        match name {
-            SquarenessName::YToX => squareness.y_to_x = value,
-            SquarenessName::ZToX => squareness.z_to_x = value,
-            SquarenessName::ZToY => squareness.z_to_y = value,
-        }
-        squareness.u[*name as usize] = Radians(covariance[column * count + column].sqrt());
-    }
+    let known = |column: usize| {
+        let u = covariance[column * count + column].max(0.0).sqrt();
+        (fit.coefficients[column], u)
+    };
+    let warmth = functions + plan.squarenesses.len();
+    let (expansions, bends) = thermal(plan, &|at| known(warmth + at));
     Ok(Identified {
         plan: plan.clone(),
         functions: found.collect(),
         blocks: design.blocks.clone(),
-        squareness,
+        squareness: squareness(plan, &|at| known(functions + at)),
+        expansions,
+        bends,
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio,
         residuals: fit.residuals,
         covariance,
     })
+}
+
+/// By `known` of their number: value and standard uncertainty.
+fn squareness(plan: &Plan, known: &impl Fn(usize) -> (f64, f64)) -> Squareness {
+    let mut squareness = Squareness::default();
+    for (at, name) in plan.squarenesses.iter().enumerate() {
+        let (value, u) = known(at);
+        match name {
+            SquarenessName::YToX => squareness.y_to_x = Radians(value),
+            SquarenessName::ZToX => squareness.z_to_x = Radians(value),
+            SquarenessName::ZToY => squareness.z_to_y = Radians(value),
+        }
+        squareness.u[*name as usize] = Radians(u);
+    }
+    squareness
+}
+
+fn thermal(
+    plan: &Plan,
+    known: &impl Fn(usize) -> (f64, f64),
+) -> (Vec<IdentifiedExpansion>, Vec<IdentifiedBend>) {
+    let expansions = plan.thermal.expansions.iter().enumerate();
+    let expansions = expansions.map(|(at, it)| {
+        let (per_kelvin, u) = known(at);
+        let plan = it.clone();
+        IdentifiedExpansion {
+            plan,
+            per_kelvin,
+            u,
+        }
+    });
+    let bends = plan.thermal.bends.iter().enumerate();
+    let bends = bends.map(|(at, it)| {
+        let (bow, u) = known(plan.thermal.expansions.len() + at);
+        IdentifiedBend {
+            plan: *it,
+            bow: Metres(bow),
+            u: Metres(u),
+        }
+    });
+    (expansions.collect(), bends.collect())
 }

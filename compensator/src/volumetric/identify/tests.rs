@@ -9,15 +9,15 @@ use crate::volumetric::online::MovingState;
 
 const SPAN: [f64; 3] = [0.6, 0.5, 0.4];
 
-fn um(um: f64) -> Metres {
+pub(super) fn um(um: f64) -> Metres {
     Metres::from_um(um)
 }
 
 /// −1 to 1, from a seed.
-struct Chance(u64);
+pub(super) struct Chance(pub(super) u64);
 
 impl Chance {
-    fn even(&mut self) -> f64 {
+    pub(super) fn even(&mut self) -> f64 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -26,16 +26,16 @@ impl Chance {
     }
 
     /// Near enough to a normal distribution of standard deviation 1: twelve even ones.
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.even()).sum::<f64>() / 2.0
     }
 }
 
-fn volume() -> Volume {
+pub(super) fn volume() -> Volume {
     Volume::new(Point::ZERO, Point::of(SPAN)).unwrap()
 }
 
-fn nodes(axis: Axis, count: usize) -> Vec<Metres> {
+pub(super) fn nodes(axis: Axis, count: usize) -> Vec<Metres> {
     let last = (count - 1) as f64;
     (0..count)
         .map(|n| Metres(SPAN[axis.index()] * n as f64 / last))
@@ -53,7 +53,7 @@ fn all_names() -> Vec<ErrorName> {
 }
 
 /// A machine with 18 functions of 4 nodes that keep the conventions, and 3 squarenesses.
-fn machine(chain: &str, chance: &mut Chance) -> Machine {
+pub(super) fn machine(chain: &str, chance: &mut Chance) -> Machine {
     let mut axes: [AxisErrors; 3] = Default::default();
     for axis in Axis::ALL {
         let at = nodes(axis, 4);
@@ -91,7 +91,7 @@ fn machine(chain: &str, chance: &mut Chance) -> Machine {
     }
 }
 
-fn model(machine: Machine) -> VolumetricModel {
+pub(super) fn model(machine: Machine) -> VolumetricModel {
     let limits = Limits {
         size: um(500.0),
         slope: 0.1,
@@ -100,7 +100,7 @@ fn model(machine: Machine) -> VolumetricModel {
     VolumetricModel::new(machine, limits).unwrap()
 }
 
-fn plan(chain: &str, names: &[ErrorName], count: usize, runs: Vec<RunSetup>) -> Plan {
+pub(super) fn plan(chain: &str, names: &[ErrorName], count: usize, runs: Vec<RunSetup>) -> Plan {
     let function = |name: &ErrorName| {
         let (ErrorName::Along(axis, _) | ErrorName::About(axis, _)) = *name;
         FunctionPlan {
@@ -114,10 +114,11 @@ fn plan(chain: &str, names: &[ErrorName], count: usize, runs: Vec<RunSetup>) -> 
         squarenesses: SquarenessName::ALL.to_vec(),
         runs,
         zero: Point::ZERO,
+        thermal: ThermalPlan::default(),
     }
 }
 
-const OFFSET: RunSetup = RunSetup {
+pub(super) const OFFSET: RunSetup = RunSetup {
     offset: true,
     alignment: None,
 };
@@ -295,7 +296,10 @@ fn uncertainties_say_how_far_off_the_errors_found_are() {
             }));
             let deviation = |model: &VolumetricModel| model.deviation(at, &now).unwrap();
             let off = deviation(&own) - deviation(&truth);
-            let u = found.standard_uncertainty(at, tool).unwrap().distance();
+            let u = found
+                .standard_uncertainty(at, tool, &[])
+                .unwrap()
+                .distance();
             at_tool += (off.distance() / u).powi(2);
             places += 1.0;
         }

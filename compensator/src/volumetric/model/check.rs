@@ -3,8 +3,9 @@
 use units::{Metres, MetresPerSecond};
 
 use super::bound::{AxisBound, Bounds};
-use super::errors::{ErrorName, Squareness, ThermalSums};
+use super::errors::{ErrorName, Squareness};
 use super::pack::PackedAxis;
+use super::thermal::{Thermal, ThermalBend, ThermalSums};
 use super::{Machine, ModelError};
 use crate::error_table::Limits;
 use crate::volumetric::function::Pieces;
@@ -47,29 +48,35 @@ pub(super) fn check_numbers(machine: &Machine) -> Result<(), ModelError> {
         let what = "a squareness";
         return Err(ModelError::NotUsable { what });
     }
-    if !machine
-        .thermal
-        .fixed
-        .array()
-        .into_iter()
-        .all(f64::is_finite)
-    {
-        let what = "the fixed point of the scales";
-        return Err(ModelError::NotUsable { what });
+    check_thermal(&machine.thermal)
+}
+
+fn check_thermal(thermal: &Thermal) -> Result<(), ModelError> {
+    let refuse = |what| Err(ModelError::NotUsable { what });
+    if !thermal.fixed.array().into_iter().all(f64::is_finite) {
+        return refuse("the fixed point of the scales");
     }
-    for channel in &machine.thermal.channels {
+    for channel in &thermal.channels {
         if !(channel.low <= channel.reference && channel.reference <= channel.high) {
-            let what = "a temperature range, which must contain its reference,";
-            return Err(ModelError::NotUsable { what });
+            return refuse("a temperature range, which must contain its reference,");
         }
         let mut sums = ThermalSums::default();
         sums.add(channel, 1.0, true);
         let coefficients = sums.expansion.into_iter().chain(sums.growth);
-        let mut coefficients = coefficients.chain(sums.squareness).chain([channel.u]);
+        let coefficients = coefficients.chain(sums.squareness).chain(sums.u_expansion);
+        let mut coefficients = coefficients.chain([channel.u]);
         let range = (channel.high - channel.low).is_finite();
         if !(range && coefficients.all(f64::is_finite)) {
-            let what = "a thermal coefficient or temperature";
-            return Err(ModelError::NotUsable { what });
+            return refuse("a thermal coefficient or temperature");
+        }
+    }
+    for (at, bend) in thermal.bends.iter().enumerate() {
+        if let Some(what) = bend.trouble(thermal.channels.len()) {
+            return refuse(what);
+        }
+        let mut before = thermal.bends[..at].iter();
+        if before.any(|it| (it.axis, it.towards) == (bend.axis, bend.towards)) {
+            return refuse("a guide that bends in one direction twice");
         }
     }
     Ok(())
@@ -157,8 +164,26 @@ pub(super) fn axis_bounds(
             bound.about[k] = packed.largest[3 + k] + roll;
             bound.about_slope[k] = packed.steepest[3 + k];
         }
+        for bend in machine.thermal.bends.iter().filter(|it| it.axis == axis) {
+            add_bend(&mut bound, machine, bend, (low.value(), high.value()));
+        }
         bound
     })
+}
+
+/// What a bending guide adds at most, over positions from `low` to `high`.
+fn add_bend(bound: &mut AxisBound, machine: &Machine, bend: &ThermalBend, (low, high): (f64, f64)) {
+    let arc = bend.arc(machine.chain);
+    let (height, slope) = arc.largest(low, high);
+    let bow = bend.bow.abs().value() * bend.gradient_bound(&machine.thermal.channels);
+    for k in 0..3 {
+        bound.about[k] += arc.turn[k].abs() * slope * bow;
+        bound.about_slope[k] += (arc.turn[k] * 2.0 * arc.powers[2]).abs() * bow;
+        if !bend.is_watched {
+            bound.along[k] += arc.towards[k] * height * bow;
+            bound.along_slope[k] += arc.towards[k] * slope * bow;
+        }
+    }
 }
 
 /// No function may move the tool by more than the limit by itself: then it is in a wrong unit.

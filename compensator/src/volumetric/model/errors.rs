@@ -1,11 +1,11 @@
-//! The 21 errors of three linear axes and what temperatures add to them.
+//! The 21 errors of three linear axes.
 
 use core::fmt;
 
-use units::{Celsius, Metres, Radians};
+use units::{Metres, Radians};
 
+use crate::volumetric::Axis;
 use crate::volumetric::function::Function;
-use crate::volumetric::{Axis, Point};
 
 /// One of the eighteen functions, by the letters of ISO 230-1 in lower case: `e_yx` along y
 /// while x moves, `e_ax` about x (direction A) while x moves.
@@ -67,63 +67,5 @@ impl Squareness {
 
     pub(crate) fn values(&self) -> [f64; 3] {
         [self.y_to_x, self.z_to_x, self.z_to_y].map(Radians::value)
-    }
-}
-
-/// What one temperature does to the machine, per kelvin above its reference.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ThermalChannel {
-    /// The temperature at which it does nothing: that of the calibration.
-    pub reference: Celsius,
-    /// The lowest temperature the coefficients are known for.
-    pub low: Celsius,
-    /// The highest.
-    pub high: Celsius,
-    /// Expansion of x, y, z in 1/K: positive where the scale grows, negative where the
-    /// workpiece does.
-    pub expansion: [f64; 3],
-    /// Growth of the structure: displacement of the tool per kelvin.
-    pub growth: Point,
-    /// Change of the squarenesses per kelvin, in the order of [`Squareness`].
-    pub squareness: [Radians; 3],
-    /// Standard uncertainty of the temperature, in kelvin.
-    pub u: f64,
-}
-
-/// What temperatures do to the machine.
-#[derive(Clone, Debug, Default)]
-pub struct Thermal {
-    /// By the order in which temperatures are given.
-    pub channels: Vec<ThermalChannel>,
-    /// Where the scales are held: they expand from here.
-    pub fixed: Point,
-}
-
-/// The sums of all channels' effects.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ThermalSums {
-    pub(crate) expansion: [f64; 3],
-    pub(crate) growth: [f64; 3],
-    pub(crate) squareness: [f64; 3],
-}
-
-impl ThermalSums {
-    /// Adds `kelvin` times what `channel` does, or does at most when `magnitudes`.
-    pub(crate) fn add(&mut self, channel: &ThermalChannel, kelvin: f64, magnitudes: bool) {
-        let effect = |coefficient: f64| {
-            let it = coefficient * kelvin;
-            if magnitudes { it.abs() } else { it }
-        };
-        let growth = channel.growth.array();
-        let squareness = channel.squareness.map(Radians::value);
-        for (sums, coefficients) in [
-            (&mut self.expansion, channel.expansion),
-            (&mut self.growth, growth),
-            (&mut self.squareness, squareness),
-        ] {
-            for (sum, coefficient) in sums.iter_mut().zip(coefficients) {
-                *sum += effect(coefficient);
-            }
-        }
     }
 }

@@ -23,6 +23,7 @@
 //! | E_XX, E_YX, E_AX … | [`AxisErrors`], [`ErrorName`] |
 //! | E_C0Y, E_B0Z, E_A0Z | [`Squareness`] |
 //! | α, growth | [`ThermalChannel`] |
+//! | bow per kelvin of gradient | [`ThermalBend`] |
 //! | D, α of the detectors | [`MovingState`] |
 //!
 //! Detectors add to the tables: their references must have been taken when the tables were, or
@@ -39,22 +40,26 @@ mod check;
 mod errors;
 mod pack;
 mod refusal;
+mod thermal;
+mod uncertainty;
 
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 pub use chain::{Chain, ChainError};
-pub use errors::{AxisErrors, ErrorName, Squareness, Thermal, ThermalChannel};
+pub use errors::{AxisErrors, ErrorName, Squareness};
 pub use refusal::{ConditionsError, ModelError};
+pub(in crate::volumetric) use thermal::Arc;
+pub use thermal::{Thermal, ThermalBend, ThermalChannel};
 
 use super::inverse::deviation_at_target;
 use super::online::MovingState;
-use super::point::{V3, V4, add, check_size, cross};
+use super::point::{V3, V4, check_size};
 use super::{Axis, NoCorrection, Point, Volume};
 use crate::error_table::Limits;
 use bound::Bounds;
 use check::{axis_bounds, check_functions, check_limits, check_numbers, pack};
-use errors::ThermalSums;
 use pack::PackedAxis;
+use thermal::ThermalSums;
 
 /// Everything that is known of a machine.
 #[derive(Clone, Debug)]
@@ -81,12 +86,19 @@ pub struct Machine {
 #[derive(Clone, Copy, Debug)]
 pub struct Conditions {
     tool: V4,
-    /// By axis: displacements per metre of its position, and constant ones.
-    lean: [V4; 3],
+    /// By axis, on top of the tables: displacements that are constant, per metre of its position
+    /// and per its square.
     shift: [V4; 3],
-    /// By axis: the roll on top of the table's.
+    lean: [V4; 3],
+    bend: [V4; 3],
+    /// By axis, on top of the tables: tilts that are constant and per metre of its position.
     turn: [V4; 3],
+    twist: [V4; 3],
     growth: V4,
+    /// By axis and direction: the temperature difference that bends its guide.
+    gradients: [V3; 3],
+    /// By axis: what the uncertainty of its expansion comes to, by magnitude.
+    u_expansion: V3,
 }
 
 /// One axis in its place of the chain.
@@ -173,22 +185,25 @@ impl VolumetricModel {
         let sums = self.thermal_sums(temperatures)?;
         let own = self.machine.squareness.values();
         let squareness = core::array::from_fn(|k| own[k] + sums.squareness[k]);
-        let mut lean = Squareness::lean(squareness);
         let fixed = self.machine.thermal.fixed.array();
-        let mut shift = Axis::ALL.map(|axis| live.sideways_of(axis));
-        let mut turn = [[0.0; 3]; 3];
-        for k in 0..3 {
-            lean[k][k] += sums.expansion[k];
-            shift[k][k] -= sums.expansion[k] * fixed[k];
-            turn[k][k] = live.roll[k].value();
-        }
-        Ok(Conditions {
+        let mut now = Conditions {
             tool: wide(tool.array()),
-            lean: lean.map(wide),
-            shift: shift.map(wide),
-            turn: turn.map(wide),
+            shift: Axis::ALL.map(|axis| wide(live.sideways_of(axis))),
+            lean: Squareness::lean(squareness).map(wide),
+            bend: [[0.0; 4]; 3],
+            turn: [[0.0; 4]; 3],
+            twist: [[0.0; 4]; 3],
             growth: wide(sums.growth),
-        })
+            gradients: [[0.0; 3]; 3],
+            u_expansion: sums.u_expansion,
+        };
+        for (k, fixed) in fixed.into_iter().enumerate() {
+            now.lean[k][k] += sums.expansion[k];
+            now.shift[k][k] -= sums.expansion[k] * fixed;
+            now.turn[k][k] = live.roll[k].value();
+        }
+        self.bend(&mut now, temperatures)?;
+        Ok(now)
     }
 
     /// The deviation (actual − command) of the tool at a command.
@@ -221,62 +236,6 @@ impl VolumetricModel {
         })))
     }
 
-    /// The standard uncertainty of the deviation at a command: of the functions, squarenesses
-    /// and temperatures as far as they have one, taken as independent of each other; with that
-    /// of the detectors' displacements and rolls.
-    ///
-    /// # Errors
-    /// When the command is outside the volume by more than the limit of size.
-    pub fn standard_uncertainty(
-        &self,
-        command: Point,
-        now: &Conditions,
-        u_displacement: Metres,
-        u_roll: Radians,
-    ) -> Result<Point, NoCorrection> {
-        self.commands.check(command)?;
-        let mut squares = [0.0; 3];
-        let mut combine = |effect: V3, u: f64| {
-            for k in 0..3 {
-                squares[k] += effect[k] * effect[k] * u * u;
-            }
-        };
-        for axis in Axis::ALL {
-            let lever = self.lever(axis, command, now);
-            let errors = &self.machine.axes[axis.index()];
-            let position = command.along(axis);
-            for direction in Axis::ALL {
-                let k = direction.index();
-                let unit: V3 = core::array::from_fn(|i| f64::from(u8::from(i == k)));
-                let sideways = direction != axis;
-                let u_live = if sideways {
-                    u_displacement.value()
-                } else {
-                    u_roll.value()
-                };
-                let along = u_of(errors.along[k].as_ref(), position);
-                let about = u_of(errors.about[k].as_ref(), position);
-                combine(unit, along);
-                combine(cross(unit, lever), about);
-                combine(if sideways { unit } else { cross(unit, lever) }, u_live);
-            }
-        }
-        for (k, u) in self.machine.squareness.u.iter().enumerate() {
-            let mut one = [0.0; 3];
-            one[k] = 1.0;
-            combine(lean_effect(Squareness::lean(one), command), u.value());
-        }
-        for channel in &self.machine.thermal.channels {
-            let mut one = ThermalSums::default();
-            one.add(channel, 1.0, false);
-            let way = (command - self.machine.thermal.fixed).array();
-            let lean = lean_effect(Squareness::lean(one.squareness), command);
-            let scale: V3 = core::array::from_fn(|k| one.expansion[k] * way[k]);
-            combine(add(add(lean, scale), one.growth), channel.u);
-        }
-        Ok(Point::of(squares.map(f64::sqrt)))
-    }
-
     /// The machine this was made from.
     pub fn machine(&self) -> &Machine {
         &self.machine
@@ -305,9 +264,12 @@ impl VolumetricModel {
             let i = stage.axis;
             let position = command[i];
             let (along, about) = stage.errors.at(position);
-            let (lean, shift, turn) = (&now.lean[i], &now.shift[i], &now.turn[i]);
-            let moved = core::array::from_fn(|k| along[k] + (lean[k] * position + shift[k]));
-            let tilt = core::array::from_fn(|k| about[k] + turn[k]);
+            let (shift, lean, bend) = (&now.shift[i], &now.lean[i], &now.bend[i]);
+            let (turn, twist) = (&now.turn[i], &now.twist[i]);
+            let moved = core::array::from_fn(|k| {
+                along[k] + (shift[k] + position * (lean[k] + position * bend[k]))
+            });
+            let tilt = core::array::from_fn(|k| about[k] + (turn[k] + position * twist[k]));
             // A product instead of one lane: what is stored by lane cannot be read at once.
             let further = core::array::from_fn(|k| lever[k] + stage.unit[k] * position);
             if stage.on_workpiece {
@@ -334,6 +296,35 @@ impl VolumetricModel {
             }
         }
         lever
+    }
+
+    /// Adds what the guides' arcs do: their tilts, and where no detector sees it the rest.
+    fn bend(&self, now: &mut Conditions, temperatures: &[Celsius]) -> Result<(), ConditionsError> {
+        let Thermal {
+            channels, bends, ..
+        } = &self.machine.thermal;
+        for it in bends {
+            let kelvin = |at: usize| (temperatures[at] - channels[at].reference).value();
+            let (seen, limit) = (it.gradient(kelvin), it.gradient_max);
+            let (axis, i) = (it.axis, it.axis.index());
+            if seen.abs() > limit {
+                return Err(ConditionsError::Gradient { axis, seen, limit });
+            }
+            let arc = it.arc(self.machine.chain);
+            let bow = it.bow.value() * seen;
+            let [constant, linear, quadratic] = arc.powers.map(|power| power * bow);
+            for k in 0..3 {
+                now.turn[i][k] += arc.turn[k] * linear;
+                now.twist[i][k] += arc.turn[k] * 2.0 * quadratic;
+                if !it.is_watched {
+                    now.shift[i][k] += arc.towards[k] * constant;
+                    now.lean[i][k] += arc.towards[k] * linear;
+                    now.bend[i][k] += arc.towards[k] * quadratic;
+                }
+            }
+            now.gradients[i][it.towards.index()] = seen;
+        }
+        Ok(())
     }
 
     fn check_tool(&self, tool: Point) -> Result<(), ConditionsError> {
@@ -413,16 +404,6 @@ fn wide([x, y, z]: V3) -> V4 {
 /// Whether a magnitude is larger than its limit, or no number.
 fn beyond<Q: Quantity>(seen: Q, limit: Q) -> bool {
     seen.value().is_nan() || seen.abs() > limit
-}
-
-fn lean_effect(lean: [V3; 3], command: Point) -> V3 {
-    let q = command.array();
-    core::array::from_fn(|k| lean[0][k] * q[0] + lean[1][k] * q[1] + lean[2][k] * q[2])
-}
-
-fn u_of<Q: Quantity>(function: Option<&super::function::Function<Q>>, position: Metres) -> f64 {
-    let u = function.and_then(|it| it.standard_uncertainty(position));
-    u.map_or(0.0, Q::value)
 }
 
 #[cfg(test)]

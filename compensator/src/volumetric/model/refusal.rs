@@ -111,6 +111,19 @@ pub enum ConditionsError {
         /// The highest known.
         high: Celsius,
     },
+    /// A temperature difference across a guide that its bend is not known for.
+    #[error(
+        "axis {axis}: {seen:.2} K across its guide beyond the calibration's, its bend is known \
+        up to {limit:.2} K; a thermometer out of order?"
+    )]
+    Gradient {
+        /// Whose guide.
+        axis: Axis,
+        /// The difference, in kelvin.
+        seen: f64,
+        /// The largest known.
+        limit: f64,
+    },
     /// A displacement of a slider larger than believed.
     #[error("axis {axis}: the detectors report {:.3} um, at most {:.3} um are believed",
         seen.um(), limit.um())]

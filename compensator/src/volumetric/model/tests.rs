@@ -147,6 +147,7 @@ fn temperatures_expand_grow_and_lean() {
         low: Celsius(15.0),
         high: Celsius(30.0),
         expansion: [10e-6, 0.0, 0.0],
+        u_expansion: [0.0; 3],
         growth: Point::new(Metres(0.0), Metres(0.0), um(3.0)),
         squareness: [Radians(0.0), Radians(1e-6), Radians(0.0)],
         u: 0.1,
@@ -173,6 +174,150 @@ fn temperatures_expand_grow_and_lean() {
         matches!(none, Err(ConditionsError::Temperatures { .. })),
         "{none:?}"
     );
+}
+
+/// Coefficients of zero, 15 to 30 °C.
+fn channel(u: f64) -> ThermalChannel {
+    ThermalChannel {
+        reference: Celsius(20.0),
+        low: Celsius(15.0),
+        high: Celsius(30.0),
+        expansion: [0.0; 3],
+        u_expansion: [0.0; 3],
+        growth: Point::ZERO,
+        squareness: [Radians::ZERO; 3],
+        u,
+    }
+}
+
+/// x's guide bows by 4 µm/K up, over 500 mm.
+fn bend(is_watched: bool) -> ThermalBend {
+    ThermalBend {
+        axis: Axis::X,
+        towards: Axis::Z,
+        over: 0,
+        under: Some(1),
+        bow: um(4.0),
+        u: um(0.1),
+        low: Metres(0.0),
+        high: Metres(0.5),
+        gradient_max: 3.0,
+        is_watched,
+    }
+}
+
+fn bending(chain: &str, is_watched: bool) -> VolumetricModel {
+    let mut machine = machine(chain);
+    machine.thermal.channels = vec![channel(0.05); 2];
+    machine.thermal.bends = vec![bend(is_watched)];
+    VolumetricModel::new(machine, limits()).unwrap()
+}
+
+/// 2 K make 8 µm in the middle and 4·8 µm/0.5 m = 64 µrad at the ends, x towards z: at its low end
+/// the nose is up and a tool 100 mm below goes forward by 6.4 µm; a metre further up on y nothing.
+#[test]
+fn a_bent_guide_lifts_in_the_middle_and_pitches_at_its_ends() {
+    let warm = [Celsius(23.0), Celsius(21.0)];
+    let live = MovingState::default();
+    let tool = Point::from_mm(0.0, 0.0, -100.0);
+    for (chain, is_watched, x, expected) in [
+        ("FXYZ", false, 0.0, [6.4, 0.0, 0.0]),
+        ("FXYZ", false, 250.0, [0.0, 0.0, 8.0]),
+        ("FXYZ", false, 500.0, [-6.4, 0.0, 0.0]),
+        ("FXYZ", true, 0.0, [6.4, 0.0, 0.0]),
+        ("FXYZ", true, 250.0, [0.0, 0.0, 0.0]),
+        // A table from which the tool is seen 8 µm too high in the middle sags there itself, and
+        // its top rises towards +x before it is there: by 32 µrad 125 mm from the middle. The tool
+        // then stands 125 mm up that slope, which takes 4 of the arc's 6 µm.
+        ("XFYZ", false, 0.0, [-6.4, 0.0, 0.0]),
+        ("XFYZ", false, 125.0, [-3.2, 0.0, 6.0 - 4.0]),
+    ] {
+        let model = bending(chain, is_watched);
+        let now = model.conditions(tool, &warm, &live).unwrap();
+        let at = Point::from_mm(x, 300.0, 0.0);
+        let seen = model.deviation(at, &now).unwrap();
+        // The second order of 64 µrad on 0.1 m is 0.2 nm.
+        let off = seen - Point::of(expected.map(|um| um * 1e-6));
+        assert!(off.distance().um() < 1e-3, "{chain} {x}: {seen:?}");
+    }
+}
+
+/// At the low end of x, 100 mm over the tool: 6.4 µm for 2 K and 4 µm/K. 0.1 µm/K of the bow are
+/// 0.16 µm; 0.05 K each of two thermometers 0.16·√2 µm. Without a gradient the bow is of no account.
+#[test]
+fn a_bends_uncertainty_is_that_of_its_bow_and_of_both_thermometers() {
+    let model = bending("FXYZ", true);
+    let tool = Point::from_mm(0.0, 0.0, -100.0);
+    for (over, expected) in [(22.0, 0.16 * 3.0_f64.sqrt()), (20.0, 0.16 * 2.0_f64.sqrt())] {
+        let temperatures = [Celsius(over), Celsius(20.0)];
+        let now = model
+            .conditions(tool, &temperatures, &MovingState::default())
+            .unwrap();
+        let u = model
+            .standard_uncertainty(Point::ZERO, &now, Metres::ZERO, Radians::ZERO)
+            .unwrap();
+        check_um(u, [expected, 0.0, 0.0]);
+    }
+}
+
+/// 3 K and 1 ppm/K of uncertainty shared by two thermometers of half a coefficient each: 0.4 m · 3 ppm.
+#[test]
+fn an_uncertain_expansion_makes_a_warm_machine_uncertain() {
+    let mut machine = machine("FXYZ");
+    let mut half = channel(0.0);
+    (half.expansion[0], half.u_expansion[0]) = (5e-6, 0.5e-6);
+    machine.thermal.channels = vec![half; 2];
+    let model = VolumetricModel::new(machine, limits()).unwrap();
+    let at = Point::from_mm(400.0, 0.0, 0.0);
+    for (warm, expected) in [([22.0, 24.0], 1.2), ([22.0, 18.0], 0.0)] {
+        let now = model.conditions(Point::ZERO, &warm.map(Celsius), &MovingState::default());
+        let u = model
+            .standard_uncertainty(at, &now.unwrap(), Metres::ZERO, Radians::ZERO)
+            .unwrap();
+        check_um(u, [expected, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn a_gradient_that_nobody_measured_and_a_guide_that_cannot_bend_so_are_refused() {
+    let model = bending("FXYZ", false);
+    let temperatures = [Celsius(24.0), Celsius(20.5)];
+    let now = model.conditions(Point::ZERO, &temperatures, &MovingState::default());
+    let limit = 3.0;
+    assert!(
+        matches!(now, Err(ConditionsError::Gradient { axis: Axis::X, limit: it, .. }) if it == limit),
+        "{now:?}"
+    );
+    let refused = |change: &dyn Fn(&mut ThermalBend)| {
+        refusal(|it| {
+            it.thermal.channels = vec![channel(0.05); 2];
+            let mut bend = bend(false);
+            change(&mut bend);
+            it.thermal.bends = vec![bend];
+        })
+    };
+    for (change, text) in [
+        (
+            (&|it: &mut ThermalBend| it.over = 2) as &dyn Fn(&mut ThermalBend),
+            "a channel of a bending guide",
+        ),
+        (&|it| it.under = Some(0), "a channel of a bending guide"),
+        (&|it| it.towards = Axis::X, "the direction of a bending"),
+        (&|it| it.high = it.low, "where it ends"),
+        (&|it| it.bow = Metres(f64::NAN), "the bow of a bending"),
+        (&|it| it.gradient_max = -1.0, "the bow of a bending"),
+    ] {
+        let seen = refused(change).to_string();
+        assert!(seen.contains(text), "{seen}");
+    }
+    let twice = refusal(|it| {
+        it.thermal.channels = vec![channel(0.05); 2];
+        it.thermal.bends = vec![bend(false); 2];
+    });
+    assert!(twice.to_string().contains("twice"), "{twice}");
+    // 1 mm per kelvin, 3 K: 3 mm in the middle of half a metre, a slope of 2.4 %.
+    let steep = refused(&|it| it.bow = Metres(1e-3));
+    assert!(matches!(steep, ModelError::TooSteep { .. }), "{steep}");
 }
 
 /// Along y: 0.3 µm of e_yx and 1 µrad of e_cx on x levers of a table, 0.4 m: root of squares.
@@ -328,7 +473,29 @@ fn full(chain: &str, seed: u64) -> Machine {
     machine.squareness.y_to_x = Radians(40e-6 * random());
     machine.squareness.z_to_x = Radians(40e-6 * random());
     machine.squareness.z_to_y = Radians(40e-6 * random());
+    machine.thermal.channels = vec![channel(0.05); 2];
+    let mut warm = |axis: Axis, towards: usize| ThermalBend {
+        axis,
+        towards: axis.others()[towards],
+        bow: um(5.0 * random()),
+        high: Metres(0.6),
+        ..bend(false)
+    };
+    machine.thermal.bends = vec![
+        warm(Axis::X, 0),
+        warm(Axis::X, 1),
+        warm(Axis::Y, 0),
+        warm(Axis::Z, 1),
+    ];
     machine
+}
+
+/// A gradient of −2.2 K.
+const WARM: [Celsius; 2] = [Celsius(21.5), Celsius(23.7)];
+
+fn warm(model: &VolumetricModel, tool: Point) -> Conditions {
+    let live = MovingState::default();
+    model.conditions(tool, &WARM, &live).unwrap()
 }
 
 /// The same by matrices: exact rotations, the whole chain multiplied out.
@@ -346,6 +513,19 @@ fn by_matrices(machine: &Machine, tool: Point, at: Point) -> Vector3<f64> {
             shift[k] += errors.along[k].as_ref().unwrap().at(q).value();
             tilt[k] = errors.about[k].as_ref().unwrap().at(q).value();
         }
+        let carries_workpiece = machine.chain.carries_workpiece(axis);
+        for bend in machine.thermal.bends.iter().filter(|it| it.axis == axis) {
+            let bow = bend.bow.value() * (WARM[0] - WARM[1]).value();
+            let share = q.value() / 0.6;
+            shift[bend.towards.index()] += 4.0 * bow * share * (1.0 - share);
+            let slope = 4.0 * bow * (1.0 - 2.0 * share) / 0.6;
+            let (mut ahead, mut aside) = (Vector3::zeros(), Vector3::zeros());
+            (ahead[i], aside[bend.towards.index()]) = (1.0, 1.0);
+            // The tool's frame from the table's is turned against the table's own turn, and runs
+            // against it: the sign is that of ahead-to-aside for a slide of the tool only.
+            let turn: Vector3<f64> = ahead.cross(&aside) * slope;
+            tilt += if carries_workpiece { -turn } else { turn };
+        }
         let s = &machine.squareness;
         match axis {
             Axis::X => {}
@@ -357,7 +537,7 @@ fn by_matrices(machine: &Machine, tool: Point, at: Point) -> Vector3<f64> {
         }
         let rotation: Matrix4<f64> = Rotation3::new(tilt).to_homogeneous();
         let translation = Translation3::from(shift).to_homogeneous();
-        let joint = if machine.chain.carries_workpiece(axis) {
+        let joint = if carries_workpiece {
             rotation * translation
         } else {
             translation * rotation
@@ -383,7 +563,7 @@ proptest! {
         let at = Point::of([x, y, z]);
         let expected = by_matrices(&machine, tool, at);
         let model = VolumetricModel::new(machine, limits()).unwrap();
-        let seen = model.deviation(at, &still(&model, tool)).unwrap();
+        let seen = model.deviation(at, &warm(&model, tool)).unwrap();
         for axis in Axis::ALL {
             let difference = seen.along(axis).value() - expected[axis.index()];
             prop_assert!(difference.abs() < 1e-12, "{axis}: {difference:e}");
@@ -399,7 +579,7 @@ proptest! {
         tool in (-0.3_f64..0.3, -0.3_f64..0.3, -0.3_f64..0.3),
     ) {
         let model = VolumetricModel::new(full(CHAINS[chain], seed), limits()).unwrap();
-        let now = still(&model, Point::of([tool.0, tool.1, tool.2]));
+        let now = warm(&model, Point::of([tool.0, tool.1, tool.2]));
         let a = Point::of([a.0, a.1, a.2]);
         let b = Point::of(core::array::from_fn(|k| {
             let (from, to) = (a.array()[k], [b.0, b.1, b.2][k]);

@@ -10,8 +10,10 @@
 //! old: a reference is wrong by its slope times the way since then.
 
 use compensator::volumetric::function::Function;
-use compensator::volumetric::model::VolumetricModel;
-use compensator::volumetric::model::{AxisErrors, Conditions, Machine as Model, Squareness};
+use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
+use compensator::volumetric::model::{
+    AxisErrors, Conditions, Machine as Model, Squareness, ThermalBend, VolumetricModel,
+};
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, EndOfTravel, Feed, FeedStatus, Influences, Memories, MovingState,
 };
@@ -25,8 +27,8 @@ use crate::assemble::{
     volumetric_chain, work_volume,
 };
 use crate::config::{
-    BeamConfig, BeamDetectorConfig, FeedConfig, MachineConfig, ReactionName, RollConfig,
-    VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
+    ReactionName, RollConfig, VolumetricConfig,
 };
 use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
 
@@ -37,6 +39,10 @@ pub struct VolumetricState {
     pub axes: [AxisErrors; 3],
     /// The squarenesses.
     pub squareness: Squareness,
+    /// Guides that bend, of those in the configuration.
+    pub bends: Vec<IdentifiedBend>,
+    /// Expansions of scales, in place of those in the configuration.
+    pub expansions: Vec<IdentifiedExpansion>,
     /// What the detectors of each axis read; needed for each beam of the configuration.
     pub beams: [Option<BeamReference>; 3],
     /// What the roll detectors read along their axis; needed where there are some.
@@ -128,6 +134,28 @@ impl VolumetricCorrection {
                 Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
             }),
         })
+    }
+
+    /// The same by the tables alone: what the machine would do without its detectors and
+    /// thermometers.
+    ///
+    /// # Errors
+    /// As [`VolumetricCorrection::new`].
+    pub fn by_tables(
+        config: &MachineConfig,
+        state: VolumetricState,
+    ) -> Result<Self, VolumetricFailure> {
+        let mut blind = config.clone();
+        if let Some(own) = &mut blind.volumetric {
+            own.beam = BeamsConfig::default();
+            (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
+        }
+        let state = VolumetricState {
+            axes: state.axes,
+            squareness: state.squareness,
+            ..VolumetricState::default()
+        };
+        Self::new(&blind, state)
     }
 
     /// The model in use.
@@ -304,12 +332,17 @@ fn model(
     config: &VolumetricConfig,
     state: &VolumetricState,
 ) -> Result<VolumetricModel, VolumetricFailure> {
+    let mut thermal = thermal(config, &state.temperatures);
+    for expansion in &state.expansions {
+        expansion.apply(&mut thermal.channels);
+    }
+    thermal.bends = bends(config, state)?;
     let machine = Model {
         chain: volumetric_chain(config)?,
         volume: work_volume(config)?,
         axes: state.axes.clone(),
         squareness: state.squareness,
-        thermal: thermal(config, &state.temperatures),
+        thermal,
         tool_max: Metres::from_mm(config.tool_max_mm),
         displacement_max: Metres::from_um(config.compensation.displacement_max_um),
         roll_max: config
@@ -321,6 +354,24 @@ fn model(
         machine,
         model_limits(&config.compensation),
     )?)
+}
+
+/// The bends found, within what the configuration permits.
+fn bends(
+    config: &VolumetricConfig,
+    state: &VolumetricState,
+) -> Result<Vec<ThermalBend>, VolumetricFailure> {
+    let section = "bend";
+    let bend = |found: &IdentifiedBend| {
+        let (axis, towards) = (found.plan.axis, found.plan.towards);
+        let is_this =
+            |it: &&BendConfig| (volume_axis(it.axis), volume_axis(it.towards)) == (axis, towards);
+        let own = config.bend.iter().find(is_this);
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let is_watched = config.beam.each()[axis.index()].is_some();
+        Ok(found.thermal_bend(own.gradient_max_k, is_watched))
+    };
+    state.bends.iter().map(bend).collect()
 }
 
 fn check_speed(

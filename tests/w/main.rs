@@ -1,0 +1,2 @@
+#[path = "../systems/virtual_time/volumetric_day.rs"]
+mod volumetric_day;
