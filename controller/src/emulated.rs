@@ -220,7 +220,7 @@ impl EmulatedOnPtys {
         Ok(self.running.turn_plate(lines)?)
     }
 
-    /// Somebody mounts the target of `task` and sets the laser up along its line, from where the
+    /// Somebody mounts the moving optic of `task` and sets the laser up along its line, from where the
     /// machine stands.
     ///
     /// # Errors
@@ -229,7 +229,7 @@ impl EmulatedOnPtys {
         Ok(self.running.set_up_line(line_set_up(task))?)
     }
 
-    /// Somebody packs laser and target up again.
+    /// Somebody packs laser and optics up again.
     ///
     /// # Errors
     /// When the machine's thread has ended.

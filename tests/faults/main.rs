@@ -7,6 +7,7 @@
 mod bus;
 mod cyclic;
 mod cyclic_host;
+mod detectors;
 mod drive;
 mod files;
 mod hall;

@@ -252,7 +252,7 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
     for pair in lives.windows(2) {
         let cycles = pair[1].cycle - pair[0].cycle;
         let (before, after) = (set_points(&pair[0]), set_points(&pair[1]));
-        for axis in 0..bounds.axes {
+        for (axis, away) in away.iter_mut().enumerate().take(bounds.axes) {
             let step = (after[axis] - before[axis]).abs().value();
             assert!(step <= reach * cycles as f64, "axis {axis}, {pair:?}");
         }
@@ -270,12 +270,8 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
                 (l.min(it), h.max(it))
             });
             let lag = (low - now.actual[axis]).max(now.actual[axis] - high);
-            away[axis] = if lag > bounds.deviation {
-                away[axis] + 1
-            } else {
-                0
-            };
-            assert!(away[axis] < 2, "axis {axis}: {} um away, {now:?}", lag.um());
+            *away = if lag > bounds.deviation { *away + 1 } else { 0 };
+            assert!(*away < 2, "axis {axis}: {} um away, {now:?}", lag.um());
         }
     }
 }

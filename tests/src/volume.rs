@@ -130,8 +130,9 @@ fn solved(mut matrix: [[f64; 6]; 6], mut right: [f64; 6]) -> [f64; 6] {
         assert!(matrix[i][i].abs() > 1e-12, "the places span no volume");
         for row in i + 1..6 {
             let factor = matrix[row][i] / matrix[i][i];
-            for k in i..6 {
-                matrix[row][k] -= factor * matrix[i][k];
+            let own = matrix[i];
+            for (value, own) in matrix[row].iter_mut().zip(own) {
+                *value -= factor * own;
             }
             right[row] -= factor * right[i];
         }

@@ -189,8 +189,8 @@ pub enum VolumetricFailure {
     },
     /// A line was set up, but the interferometer sees nothing.
     #[error(
-        "instrument {instrument}: no beam comes back along the line that was set up; align laser, \
-         optics and target, and begin again"
+        "instrument {instrument}: no beam comes back along the line that was set up; align \
+         laser and optics, and begin again"
     )]
     NoLight {
         /// Which instrument.

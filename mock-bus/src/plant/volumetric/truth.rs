@@ -69,8 +69,9 @@ impl<'a> VolumetricTruth<'a> {
         metres(self.machine.tool_point_m(values(scales), self.now))
     }
 
-    /// Where a target would be now at other scale positions, by its place with all axes at 0.
-    pub fn target_for(&self, tool_offset: Point, scales: Point) -> Point {
+    /// Where a point of the tool would be now at other scale positions, by its place with all axes
+    /// at 0.
+    pub fn point_for(&self, tool_offset: Point, scales: Point) -> Point {
         let scales_m = values(scales);
         let motions = self.machine.motions(scales_m, self.now);
         let chain = &self.machine.chain;

@@ -25,7 +25,7 @@ pub use task::{LineOperator, LineOptics, LineTask};
 
 use super::VolumetricFailure;
 use crate::assemble;
-use crate::engine::{Cause, Engine, NoCorrection, State};
+use crate::engine::NoCorrection;
 use crate::failure::Failure;
 use crate::machine::Machine;
 
@@ -33,8 +33,10 @@ use crate::machine::Machine;
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// How long the light of a line that was set up may be away.
 const LIGHT_LIMIT: Duration = Duration::from_secs(10);
-/// How long every axis is seen at rest before a motion begins.
+/// How long every axis rests before it is switched off, or left to whoever reads.
 const REST: Duration = Duration::from_millis(50);
+/// How long axes may take to come to rest.
+const SETTLING_LIMIT: Duration = Duration::from_secs(2);
 
 /// How lines are read.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +66,7 @@ pub struct Line {
 pub struct LineReading {
     /// Where the machine was sent.
     pub at: Point,
-    /// Where the target was mounted.
+    /// Where the moving optic was mounted.
     pub tool: Point,
     /// By how much the tool was off, against the start of the line.
     pub reading: Reading,
@@ -213,43 +215,32 @@ impl Machine {
     /// When an axis is not zeroed, `target` is outside the soft limits, or something stops the
     /// machine on the way.
     pub fn go_straight(&mut self, target: Point) -> Result<(), Failure> {
-        let axes = self.volumetric_config()?.axes.clone();
-        let target = [target.x, target.y, target.z];
-        let names = axes.each_ref().map(String::as_str);
-        let (mut engine, mut desk) = Engine::new(self, &names, Box::new(NoCorrection))?;
-        desk.move_to(&target)?;
-        let mut refused = None;
-        let mut limit = self.time_to_move(&axes)? * self.patience;
-        let period = engine.period();
-        let mut is_there = false;
-        let cause = self.follow_with(&mut engine, &mut || {
-            limit = limit.saturating_sub(period);
-            let live = desk.live();
-            is_there |=
-                live.is_some_and(|it| it.state == State::Holding && it.nominal[..3] == target);
-            if (is_there || limit.is_zero()) && refused.is_none() {
-                refused = desk.stop().err();
-            }
-        })?;
-        match (refused, cause) {
-            (Some(failure), _) => Err(failure.into()),
-            (None, Cause::Asked) if is_there => Ok(()),
-            (None, cause) => Err(VolumetricFailure::NotThere { cause }.into()),
-        }
+        let mut mover = self.volumetric_mover(Box::new(NoCorrection))?;
+        self.drive_to(&mut mover, target, REST).map(|_| ())
     }
 
-    fn time_to_move(&self, axes: &[String; 3]) -> Result<Duration, Failure> {
-        let mut longest = Duration::ZERO;
-        for axis in axes {
-            let seconds = self.axis_config(axis)?.move_timeout_s;
-            longest = longest.max(Duration::from_secs_f64(seconds));
-        }
-        Ok(longest)
-    }
-
+    /// Waits until all axes have stood for `span` without a break, by their encoders: after a
+    /// cyclic motion no drive has a target that it could report as reached.
     fn rest_all(&mut self, span: Duration) -> Result<(), Failure> {
-        for axis in self.volumetric_config()?.axes.clone() {
-            self.stand_still(&axis, span)?;
+        let axes = self.volumetric_config()?.axes.clone();
+        let limit = SETTLING_LIMIT * self.patience + span;
+        let begin = self.now();
+        let mut since = begin;
+        while self.now().since(since) < span {
+            self.tick(since + span)?;
+            for axis in &axes {
+                if self.reading(axis)?.is_some_and(|it| it.at_rest) {
+                    continue;
+                }
+                since = self.now();
+                if since.since(begin) > limit {
+                    return Err(Failure::Overdue {
+                        device: axis.clone(),
+                        step: "standing still",
+                        waited: limit,
+                    });
+                }
+            }
         }
         Ok(())
     }

@@ -42,7 +42,7 @@ pub struct LineTask {
     pub start: Point,
     /// Where it ends.
     pub end: Point,
-    /// The place of the target with all axes at 0, from the machine's zero: as the tool's.
+    /// The place of the moving optic with all axes at 0, from the machine's zero: as the tool's.
     pub tool: Point,
     /// Which line, from 1, of how many.
     pub step: (usize, usize),
