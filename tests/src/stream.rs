@@ -252,7 +252,7 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
     for pair in lives.windows(2) {
         let cycles = pair[1].cycle - pair[0].cycle;
         let (before, after) = (set_points(&pair[0]), set_points(&pair[1]));
-        for (axis, away) in away.iter_mut().enumerate().take(bounds.axes) {
+        for axis in 0..bounds.axes {
             let step = (after[axis] - before[axis]).abs().value();
             assert!(step <= reach * cycles as f64, "axis {axis}, {pair:?}");
         }
@@ -264,7 +264,7 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
             continue;
         }
         let now = &window[BEHIND];
-        for axis in 0..bounds.axes {
+        for (axis, away) in away.iter_mut().enumerate().take(bounds.axes) {
             let recent = window[..BEHIND].iter().map(|it| set_points(it)[axis]);
             let (low, high) = recent.fold((Metres(f64::MAX), Metres(f64::MIN)), |(l, h), it| {
                 (l.min(it), h.max(it))
