@@ -5,7 +5,8 @@ use core::time::Duration;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified, WarmUp,
+    VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified,
+    WarmUp,
 };
 use truestage::engine::{CsvError, Live, read_path};
 use truestage::ports::Use;
@@ -176,7 +177,11 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     }
     let mut operator = Terminal::new(args.yes, output)?;
     let run = |machine: &mut Machine, store: &Store| {
-        machine.verify_volumetric(store, !args.uncompensated, &mut operator)
+        let by = match args.uncompensated {
+            true => VerifyBy::AsFound,
+            false => VerifyBy::Everything,
+        };
+        machine.verify_volumetric(store, by, &mut operator)
     };
     let machine = &args.axis.machine;
     let (verified, counters) =

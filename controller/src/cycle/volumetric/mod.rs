@@ -33,4 +33,4 @@ pub use memory::Remembered;
 pub use moves::Mover;
 pub use reference::{References, VolumetricReferenced};
 pub use state::{GEOMETRY, REFERENCES, VolumetricRecords, memory_pointer};
-pub use verify::{VolumetricVerified, VolumetricVerifiedPoint};
+pub use verify::{VerifyBy, VolumetricVerified, VolumetricVerifiedPoint};

@@ -17,6 +17,17 @@ use crate::store::Store;
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
 
+/// What corrects the machine while it is verified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VerifyBy {
+    /// Nothing: the machine as found.
+    AsFound,
+    /// Its tables alone, without detectors and thermometers.
+    Tables,
+    /// Everything that is stored and seen.
+    Everything,
+}
+
 /// One place of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumetricVerifiedPoint {
@@ -60,27 +71,36 @@ impl Machine {
         self.volumetric_mover(Box::new(correction)).map(Some)
     }
 
-    /// Reads the line of `[volumetric.verify]` by interferometer, corrected by all that is stored
-    /// or, for the machine as found, not at all.
+    fn mover_by(&self, store: &Store, by: VerifyBy) -> Result<Option<Mover>, Failure> {
+        if by == VerifyBy::AsFound {
+            return Ok(None);
+        }
+        let stored = self.volumetric_state(store)?;
+        let (state, _) = stored.ok_or(VolumetricFailure::NoGeometry)?;
+        let correction = match by {
+            VerifyBy::Tables => VolumetricCorrection::by_tables(self.config(), state)?,
+            VerifyBy::AsFound | VerifyBy::Everything => {
+                VolumetricCorrection::new(self.config(), state)?
+            }
+        };
+        self.volumetric_mover(Box::new(correction)).map(Some)
+    }
+
+    /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
     ///
     /// # Errors
     /// When nothing is stored, the line cannot be set up or read, or anything stops the machine.
     pub fn verify_volumetric(
         &mut self,
         store: &Store,
-        corrected: bool,
+        by: VerifyBy,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricVerified, Failure> {
         let config = self.volumetric_config()?.clone();
         let missing = |section| VolumetricFailure::NotConfigured { section };
         let own = config.verify.ok_or(missing("verify"))?;
         let calibrate = config.calibrate.ok_or(missing("calibrate"))?;
-        let mover = self.stored_mover(store)?;
-        let mut mover = match (corrected, mover) {
-            (true, Some(mover)) => Some(mover),
-            (true, None) => return Err(VolumetricFailure::NoGeometry.into()),
-            (false, _) => None,
-        };
+        let mut mover = self.mover_by(store, by)?;
         let (from, to) = (point_of_mm(own.from_mm), point_of_mm(own.to_mm));
         let task = LineTask {
             optics: LineOptics::Linear,
