@@ -18,7 +18,11 @@ pub(crate) const LIPSCHITZ_MAX: f64 = 0.5;
 
 /// The deviation at the command for `target`: command = target − that. `lipschitz` ≤ 0.5.
 #[inline]
-pub(crate) fn deviation_at_target(target: V3, lipschitz: f64, deviation: impl Fn(V3) -> V3) -> V3 {
+pub(crate) fn deviation_at_target(
+    target: V3,
+    lipschitz: f64,
+    mut deviation: impl FnMut(V3) -> V3,
+) -> V3 {
     let mut seen = deviation(target);
     // The first step is the whole deviation; what is left after it is L times that at most.
     for _ in 0..ROUNDS_MAX {

@@ -9,7 +9,7 @@ use crate::volumetric::point::V4;
 const SAME_NODE_M: f64 = 1e-9;
 
 /// Six cubics over one interval by power: displacements along x, y, z and a lane that is not
-/// used, tilts about them and another. The first of the lanes not used says where it starts.
+/// used, tilts about them and another. The first lanes not used say where it starts and ends.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Six {
@@ -51,7 +51,7 @@ impl PackedAxis {
                 along: [[0.0; 4]; 4],
                 about: [[0.0; 4]; 4],
             };
-            six.along[0][3] = ends[0];
+            (six.along[0][3], six.along[1][3]) = (ends[0], ends[1]);
             let mut extent = Extent::default();
             for (lane, function) in functions.iter().enumerate() {
                 let Some(function) = function else { continue };
@@ -84,12 +84,28 @@ impl PackedAxis {
         }
     }
 
-    /// Displacements and tilts at `position`, which hold their ends' beyond the range. The fourth
-    /// lanes mean nothing.
+    /// The position within the range, beyond which the ends' values hold, and its piece.
     #[inline(always)]
-    pub(crate) fn at(&self, position: f64) -> (V4, V4) {
-        let (inside, at) = self.finder.find(position);
-        let piece = &self.pieces[at];
+    pub(crate) fn find(&self, position: f64) -> (f64, usize) {
+        self.finder.find(position)
+    }
+
+    /// The same, looking at one piece first.
+    #[inline(always)]
+    pub(crate) fn find_near(&self, position: f64, piece: usize) -> (f64, usize) {
+        let own = &self.pieces[piece].along;
+        if own[0][3] <= position && position <= own[1][3] {
+            (position, piece)
+        } else {
+            self.finder.find(position)
+        }
+    }
+
+    /// Displacements and tilts as [`find`](Self::find) gives their place. The fourth lanes mean
+    /// nothing.
+    #[inline(always)]
+    pub(crate) fn at(&self, inside: f64, piece: usize) -> (V4, V4) {
+        let piece = &self.pieces[piece];
         let t = inside - piece.along[0][3];
         let value = |of: &[V4; 4]| -> V4 {
             let [constant, linear, quadratic, cubic] = of;
