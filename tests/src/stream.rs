@@ -264,18 +264,14 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
             continue;
         }
         let now = &window[BEHIND];
-        for axis in 0..bounds.axes {
+        for (axis, away) in away.iter_mut().enumerate().take(bounds.axes) {
             let recent = window[..BEHIND].iter().map(|it| set_points(it)[axis]);
             let (low, high) = recent.fold((Metres(f64::MAX), Metres(f64::MIN)), |(l, h), it| {
                 (l.min(it), h.max(it))
             });
             let lag = (low - now.actual[axis]).max(now.actual[axis] - high);
-            away[axis] = if lag > bounds.deviation {
-                away[axis] + 1
-            } else {
-                0
-            };
-            assert!(away[axis] < 2, "axis {axis}: {} um away, {now:?}", lag.um());
+            *away = if lag > bounds.deviation { *away + 1 } else { 0 };
+            assert!(*away < 2, "axis {axis}: {} um away, {now:?}", lag.um());
         }
     }
 }
