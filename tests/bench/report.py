@@ -110,17 +110,19 @@ def show_cycle(title, cases):
     print(f"\nThe cyclic engine, four axes, {title}: lateness in us beside a tokio interval")
     columns = ("p50", "p99", "p999", "max")
     heads = [(name, 9) for name in columns]
-    line(("", 16), ("load", 7), *heads, ("followed", 11), ("overruns", 10), ("stops", 0))
+    line(("", 8), ("load", 12), *heads, ("followed", 11), ("overruns", 10), ("stops", 0))
     for case in cases:
         load = "busy" if case["busy"] else "idle"
         for name, key in (("ours", "lateness"), ("tokio", "tokio")):
+            if name == "ours":
+                load += f" {case['period_us'] / 1000:.0f} ms"
             cells = [(f"{case[key][column + '_us']:.0f}", 9) for column in columns]
             counted = [
                 (f"{case['followed_s']:.0f} s", 11),
                 (case["overruns"], 10),
                 (sum(case["stops"].values()), 0),
             ]
-            line((name, 16), (load, 7), *cells, *(counted if name == "ours" else []))
+            line((name, 8), (load, 12), *cells, *(counted if name == "ours" else []))
         line((f"  {case['scheduling']}", 0))
         for stop, count in case["stops"].items():
             line((f"  {count} times: {stop}", 0))
