@@ -25,6 +25,9 @@ fn a_machine_calibrated_just_now_puts_its_tool_where_the_path_says() {
     let places = spread(0, 20);
     let found = percentile_95(&volume.uncorrected(&places));
     let (mut mover, _) = volume.corrected();
+    // One axis alone reaches its full speed.
+    let corners = [[0.0; 3], [500.0, 0.0, 0.0], [500.0, 400.0, 0.0], [0.0; 3]];
+    volume.visit(&mut mover, &corners, &mut Vec::new());
     let left = percentile_95(&volume.visit(&mut mover, &places, &mut Vec::new()));
     eprintln!("{} um found, {} um left", found.um(), left.um());
     assert!(found > Metres::from_um(15.0), "{} um", found.um());
