@@ -49,6 +49,7 @@ enum Phase {
 pub struct SlewedCorrection {
     size: Metres,
     rate: MetresPerSecond,
+    slope: f64,
     enabled: bool,
     phase: Phase,
     current: Metres,
@@ -62,12 +63,20 @@ impl SlewedCorrection {
         Self {
             size: size.abs().max(Metres::ZERO),
             rate: rate.abs().max(MetresPerSecond::ZERO),
+            slope: 0.0,
             enabled: false,
             phase: Phase::Tracking,
             current: Metres::ZERO,
             last: None,
             alarm: None,
         }
+    }
+
+    /// The same, which may in addition change by `slope` (a magnitude, dimensionless) times the
+    /// way the axes make: what depends on position changes as fast as the axes move.
+    pub fn with_slope(mut self, slope: f64) -> Self {
+        self.slope = slope.abs().max(0.0);
+        self
     }
 
     /// Starts to follow what is wanted, from where the correction is now.
@@ -90,6 +99,13 @@ impl SlewedCorrection {
     /// The correction to apply at `now` when `wanted` is right; nothing changes on the first
     /// call, because no time has passed.
     pub fn advance(&mut self, now: Time, wanted: Metres) -> Metres {
+        self.advance_along(now, wanted, Metres::ZERO)
+    }
+
+    /// The same after the axes made a way of `moved` (a magnitude) since the last call: the
+    /// correction may change by the slope times that on top of what the rate allows.
+    pub fn advance_along(&mut self, now: Time, wanted: Metres, moved: Metres) -> Metres {
+        let started = self.last.is_some();
         let elapsed = self.last.map_or(0.0, |last| now.since(last).as_secs_f64());
         self.last = Some(now);
         self.alarm = None;
@@ -105,7 +121,12 @@ impl SlewedCorrection {
                 limit: self.size,
             });
         }
-        let step = Metres(self.rate.value() * elapsed);
+        let way = if started && moved.is_finite() {
+            moved.abs().value() * self.slope
+        } else {
+            0.0
+        };
+        let step = Metres(self.rate.value() * elapsed + way);
         let lag = goal - self.current;
         if lag.abs() <= step {
             self.current = goal;
@@ -260,6 +281,25 @@ mod tests {
         c.expect_jump();
         check_um(c.advance(ms(201), Metres(-5.0 * UM)), 4.0);
         assert_eq!(c.alarm(), None);
+    }
+
+    /// Slope 1e-3: a way of 2 mm allows 2 µm on top of the 1 µm of a millisecond.
+    #[test]
+    fn a_way_of_the_axes_allows_its_slope_on_top_of_the_rate() {
+        let mut c =
+            SlewedCorrection::new(Metres(10.0 * UM), MetresPerSecond(1e-3)).with_slope(1e-3);
+        c.enable();
+        check_um(c.advance_along(ms(0), Metres(9.0 * UM), Metres(1.0)), 0.0);
+        check_um(c.advance_along(ms(1), Metres(9.0 * UM), Metres(2e-3)), 3.0);
+        check_um(
+            c.advance_along(ms(2), Metres(9.0 * UM), Metres(f64::NAN)),
+            4.0,
+        );
+        check_um(
+            c.advance_along(ms(3), Metres(9.0 * UM), Metres(f64::INFINITY)),
+            5.0,
+        );
+        check_um(c.advance_along(ms(4), Metres(9.0 * UM), Metres(-3e-3)), 9.0);
     }
 
     #[test]

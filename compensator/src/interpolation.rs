@@ -9,7 +9,7 @@
 //! |---|---|
 //! | x_i, f_i | `nodes`, `values` |
 //! | h_i, Δ_i | widths, secant slopes |
-//! | d_i | [`monotone_slopes`] |
+//! | d_i | [`monotone_slopes`], [`spline_slopes`] |
 //!
 //! Absent: extrapolation; who calls decides what lies outside the nodes.
 
@@ -158,6 +158,56 @@ pub fn monotone_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// The slope at each node that makes the curvature continuous too, with no knot at the second
+/// and last but one node ("not-a-knot"): a cubic is reproduced exactly.
+///
+/// Source: C. de Boor, A Practical Guide to Splines (1978), chapter IV. Two nodes give a line,
+/// three a parabola. Unlike the monotone cubic it may leave the interval of its nodes' values.
+pub fn spline_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
+    let last = nodes.len() - 1;
+    let width = |i: usize| nodes[i + 1] - nodes[i];
+    let secant = |i: usize| (values[i + 1] - values[i]) / width(i);
+    if last == 1 {
+        return vec![secant(0); 2];
+    }
+    if last == 2 {
+        let bend = (secant(1) - secant(0)) / (width(0) + width(1));
+        let inner = secant(0) + bend * width(0);
+        return vec![
+            secant(0) - bend * width(0),
+            inner,
+            secant(1) + bend * width(1),
+        ];
+    }
+    let end = |near: usize, far: usize| {
+        let (h, g) = (width(near), width(far));
+        let right = ((h + 2.0 * (h + g)) * g * secant(near) + h * h * secant(far)) / (h + g);
+        (g, h + g, right)
+    };
+    // Rows (below, diagonal, above, right side), eliminated downwards.
+    let (diagonal, above, right) = end(0, 1);
+    let mut rows = vec![(above / diagonal, right / diagonal)];
+    for i in 1..=last {
+        let (below, diagonal, above, right) = if i < last {
+            let (before, after) = (width(i - 1), width(i));
+            let right = 3.0 * (after * secant(i - 1) + before * secant(i));
+            (after, 2.0 * (before + after), before, right)
+        } else {
+            let (diagonal, below, right) = end(last - 1, last - 2);
+            (below, diagonal, 0.0, right)
+        };
+        let (above_before, right_before) = rows[i - 1];
+        let pivot = diagonal - below * above_before;
+        rows.push((above / pivot, (right - below * right_before) / pivot));
+    }
+    let mut slopes = vec![0.0; last + 1];
+    slopes[last] = rows[last].1;
+    for i in (0..last).rev() {
+        slopes[i] = rows[i].1 - rows[i].0 * slopes[i + 1];
+    }
+    slopes
+}
+
 fn inner_slope(width_before: f64, width_after: f64, before: f64, after: f64) -> f64 {
     if before * after <= 0.0 {
         return 0.0;
@@ -226,7 +276,50 @@ mod tests {
         assert!((piece.steepest() - 1.5).abs() < 1e-15);
     }
 
+    /// x³ − 2x² + 3 at uneven nodes: the slopes are 3x² − 4x, whatever the nodes.
+    #[test]
+    fn a_spline_reproduces_a_cubic_and_its_ends() {
+        let nodes = [-1.0, 0.0, 0.5, 2.0, 2.25];
+        let values = nodes.map(|x: f64| x * x * x - 2.0 * x * x + 3.0);
+        for (x, seen) in nodes.iter().zip(spline_slopes(&nodes, &values)) {
+            assert!(
+                (seen - (3.0 * x * x - 4.0 * x)).abs() < 1e-13,
+                "{x}: {seen}"
+            );
+        }
+        // Through (0, 0), (1, 1), (3, 9): x², slopes 0, 2, 6.
+        let parabola = spline_slopes(&[0.0, 1.0, 3.0], &[0.0, 1.0, 9.0]);
+        for (seen, expected) in parabola.iter().zip([0.0, 2.0, 6.0]) {
+            assert!((seen - expected).abs() < 1e-14, "{parabola:?}");
+        }
+        assert_eq!(spline_slopes(&[0.0, 2.0], &[1.0, 2.0]), [0.5, 0.5]);
+    }
+
     proptest! {
+        #[test]
+        fn a_spline_has_no_jump_in_its_curvature(
+            steps in prop::collection::vec((0.3_f64..2.0, -5.0_f64..5.0), 4..12),
+        ) {
+            let (mut x, mut nodes, mut values) = (0.0, vec![], vec![]);
+            for (step, value) in steps {
+                x += step;
+                nodes.push(x);
+                values.push(value);
+            }
+            let slopes = spline_slopes(&nodes, &values);
+            let piece = |i: usize| {
+                Segment::hermite(
+                    nodes[i], values[i], slopes[i], nodes[i + 1], values[i + 1], slopes[i + 1],
+                )
+            };
+            for i in 0..nodes.len() - 2 {
+                let (before, after) = (piece(i), piece(i + 1));
+                let bend = 2.0 * before.quadratic + 6.0 * before.cubic * before.width;
+                prop_assert!((bend - 2.0 * after.quadratic).abs() < 1e-8 * (1.0 + bend.abs()));
+            }
+            prop_assert!((piece(0).cubic - piece(1).cubic).abs() < 1e-8 * (1.0 + piece(0).cubic.abs()));
+        }
+
         #[test]
         fn monotone_cubics_stay_between_their_nodes_and_meet_them(
             steps in prop::collection::vec((0.1_f64..3.0, -5.0_f64..5.0), 2..12),

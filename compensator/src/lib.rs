@@ -13,6 +13,7 @@
 //! | [`screw`] | what does a ball screw do to a stroke, and which command undoes it (system S1)? |
 //! | [`iso230`] | how good is the axis, in the figures of ISO 230-2? |
 //! | [`platform`] | which strokes bring an alignment platform into a pose, and back (system S1)? |
+//! | [`volumetric`] | where is the tool of three axes really, now, and which command puts it right (system S4)? |
 //! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
 //! | [`apply`] | how does a correction get onto a moving axis without a bump? |
 //! | [`interpolation`], [`least_squares`], [`significance`], [`uncertainty`] | the numerics under them |
@@ -36,3 +37,4 @@ pub mod rotary;
 pub mod screw;
 pub mod significance;
 pub mod uncertainty;
+pub mod volumetric;

@@ -3,17 +3,31 @@
 //! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
+mod cia404;
 mod copley;
+mod cyclic;
+mod line;
 mod patience;
 mod rotary;
+mod volumetric;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
 
+pub use cia404::cia404_settings;
+pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
+pub(crate) use cyclic::cyclic_settings;
+pub(crate) use line::{angular_separation, line_corrections};
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};
+pub(crate) use volumetric::point_of_mm;
+pub use volumetric::{
+    BeamDetectorError, beam_detector, beam_drift, bend_plans, feed_settings, function_shape,
+    influences, model_limits, roll_optics, temperature_settings, thermal, volume_axis,
+    volumetric_chain, work_volume,
+};
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use compensator::hall_zero;
@@ -25,6 +39,7 @@ use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
 };
+use drivers::device::cia404::Cia404Analog;
 use drivers::device::copley::CopleyAxis;
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
@@ -107,6 +122,11 @@ pub(crate) fn analogs(
                     let bus = analog.bus.as_ref().expect(CHECKED);
                     let settings = cia401_settings(analog, &config.can[bus], patience);
                     (bus, Box::new(Cia401Analog::new(settings)))
+                }
+                AnalogDevice::Cia404 => {
+                    let bus = analog.bus.as_ref().expect(CHECKED);
+                    let settings = cia404_settings(analog, &config.can[bus], patience);
+                    (bus, Box::new(Cia404Analog::new(settings)))
                 }
                 AnalogDevice::Dcon => {
                     let line = analog.line.as_ref().expect(CHECKED);

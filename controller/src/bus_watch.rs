@@ -6,7 +6,7 @@
 //! the bus is looked up only when something failed to come: a full bus alone hurts nobody.
 
 use core::time::Duration;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use drivers::device::{Alarm, DeviceError};
 use drivers::transport::{Arrival, Input, Payload, Port, SendError};
@@ -16,6 +16,7 @@ use drivers::wire::canopen::{Function, NodeId};
 use units::Time;
 
 use crate::config::{AxisConfig, MachineConfig};
+use crate::engine::EngineFailure;
 use crate::failure::Failure;
 
 /// The identifier of SYNC.
@@ -42,10 +43,23 @@ struct Bus {
     now: Load,
 }
 
-#[derive(Debug, Default)]
+/// Identifiers of standard frames.
+const IDENTIFIERS: usize = 0x800;
+
+/// One place for each identifier: counting asks for no memory, the cyclic engine counts too.
+#[derive(Debug)]
 struct Load {
     since: Time,
-    busy: BTreeMap<u16, Duration>,
+    busy: Box<[Duration; IDENTIFIERS]>,
+}
+
+impl Default for Load {
+    fn default() -> Self {
+        Self {
+            since: Time::ZERO,
+            busy: Box::new([Duration::ZERO; IDENTIFIERS]),
+        }
+    }
 }
 
 impl BusWatch {
@@ -112,15 +126,15 @@ impl BusWatch {
 impl Bus {
     fn count(&mut self, at: Time, cob_id: u16, frame: &CanFrame) {
         if at.since(self.now.since) >= self.window {
-            let fresh = Load {
-                since: at,
-                busy: BTreeMap::new(),
-            };
-            self.before = core::mem::replace(&mut self.now, fresh);
+            core::mem::swap(&mut self.before, &mut self.now);
+            self.now.since = at;
+            self.now.busy.fill(Duration::ZERO);
         }
         // Between the shortest form and the longest, with every stuff bit there may be.
         let bits = (47 + 8 * frame.data().len()) as u32;
-        *self.now.busy.entry(cob_id).or_default() += self.bit * bits;
+        if let Some(busy) = self.now.busy.get_mut(usize::from(cob_id)) {
+            *busy += self.bit * bits;
+        }
     }
 
     /// Who took the largest share lately.
@@ -131,8 +145,8 @@ impl Bus {
         }
         // Since when the talker talks is not known: the shorter of both spans favours him.
         let recent = now.since(self.now.since).as_secs_f64();
-        let share = |cob_id: &u16| {
-            let of = |load: &Load| load.busy.get(cob_id).copied().unwrap_or_default();
+        let share = |cob_id: u16| {
+            let of = |load: &Load| load.busy[usize::from(cob_id)];
             let (late, all) = (of(&self.now), of(&self.now) + of(&self.before));
             let late = if recent > 0.25 * self.window.as_secs_f64() {
                 late.as_secs_f64() / recent
@@ -141,16 +155,10 @@ impl Bus {
             };
             late.max(all.as_secs_f64() / span)
         };
-        let ids: BTreeSet<u16> = self
-            .now
-            .busy
-            .keys()
-            .chain(self.before.busy.keys())
-            .copied()
-            .collect();
-        ids.iter()
-            .map(|cob_id| (self.name.clone(), *cob_id, share(cob_id)))
-            .max_by(|a, b| a.2.total_cmp(&b.2))
+        let loudest = (0..IDENTIFIERS as u16)
+            .map(|cob_id| (cob_id, share(cob_id)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (loudest.1 > 0.0).then(|| (self.name.clone(), loudest.0, loudest.1))
     }
 }
 
@@ -182,6 +190,7 @@ const fn is_absence(failure: &Failure) -> bool {
     matches!(
         failure,
         Failure::Overdue { .. }
+            | Failure::Engine(EngineFailure::Missing { .. } | EngineFailure::NotSent { .. })
             | Failure::Send {
                 source: SendError::QueueFull { .. },
                 ..

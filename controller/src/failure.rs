@@ -12,8 +12,11 @@ use units::Metres;
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
 use crate::cycle::rotary::RotaryFailure;
+use crate::cycle::volumetric::VolumetricFailure;
 use crate::emulated::EmulatedError;
+use crate::engine::EngineFailure;
 use crate::store::StoreError;
+use crate::text::link_text;
 
 /// Everything that ends a verb without its result.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +30,12 @@ pub enum Failure {
     /// A rotary table did not do what it was asked.
     #[error(transparent)]
     Table(#[from] RotaryFailure),
+    /// The cyclic engine refused, or stopped every drive at once.
+    #[error(transparent)]
+    Engine(#[from] EngineFailure),
+    /// Three axes cannot be zeroed or corrected together.
+    #[error(transparent)]
+    Volumetric(#[from] VolumetricFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -416,17 +425,6 @@ fn in_use_text(in_use: Option<&str>) -> String {
     )
 }
 
-fn link_text(state: LinkState) -> &'static str {
-    match state {
-        LinkState::Up => "came back; the machine must be started anew",
-        LinkState::Down => {
-            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
-             set it up and start again"
-        }
-        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
-    }
-}
-
 impl Failure {
     /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus,
     /// 5 the result is out of tolerance.
@@ -434,6 +432,8 @@ impl Failure {
         match self {
             Self::Platform(failure) => failure.exit_code(),
             Self::Table(failure) => failure.exit_code(),
+            Self::Engine(failure) => failure.exit_code(),
+            Self::Volumetric(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::NoSuchAxis { .. }

@@ -35,6 +35,7 @@ pub mod config;
 pub mod cycle;
 mod devices;
 pub mod emulated;
+pub mod engine;
 pub mod failure;
 pub mod json;
 pub mod machine;

@@ -128,6 +128,10 @@ mod tests {
             None
         }
 
+        fn sleep_until(&mut self, until: Time) {
+            self.now = until;
+        }
+
         fn set_sync(&mut self, _port: Port, _period: Option<Duration>) -> Result<(), SendError> {
             Ok(())
         }

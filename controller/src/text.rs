@@ -2,6 +2,7 @@
 
 use compensator::iso230::{Directional, Figures};
 use compensator::screw::ScrewModel;
+use drivers::transport::LinkState;
 use units::Metres;
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
@@ -105,4 +106,16 @@ pub fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
         terms.push(term(&name, harmonic.amplitude().um(), um(u), "µm"));
     }
     terms
+}
+
+/// What became of a bus or line.
+pub(crate) fn link_text(state: LinkState) -> &'static str {
+    match state {
+        LinkState::Up => "came back; the machine must be started anew",
+        LinkState::Down => {
+            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
+             set it up and start again"
+        }
+        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
+    }
 }

@@ -79,7 +79,7 @@ impl Machine {
             .fold(first, Time::min)
     }
 
-    fn take(&mut self, arrival: &Arrival) -> Result<(), Failure> {
+    pub(crate) fn take(&mut self, arrival: &Arrival) -> Result<(), Failure> {
         for at in 0..self.device_count() {
             let unit = self.device_mut(at);
             if unit.port == arrival.port {
@@ -129,7 +129,7 @@ impl Machine {
         self.observer.warning(&text);
     }
 
-    fn fire_deadlines(&mut self, now: Time) {
+    pub(crate) fn fire_deadlines(&mut self, now: Time) {
         for at in 0..self.device_count() {
             let device = self.device_mut(at).device;
             if device.poll_timeout() <= now {
@@ -138,7 +138,7 @@ impl Machine {
         }
     }
 
-    fn send_pending(&mut self) -> Result<(), Failure> {
+    pub(crate) fn send_pending(&mut self) -> Result<(), Failure> {
         let flushed = self.outbox.flush(&mut *self.transport, self.patience);
         flushed.or_else(|refusal| self.judge_refusal(refusal))?;
         let now = self.transport.now();
@@ -200,7 +200,7 @@ impl Machine {
         }
     }
 
-    fn judge_alarms(&mut self) -> Result<(), Failure> {
+    pub(crate) fn judge_alarms(&mut self) -> Result<(), Failure> {
         let mut first = None;
         for at in 0..self.device_count() {
             while let Some(alarm) = self.device_mut(at).device.poll_alarm() {
@@ -243,7 +243,7 @@ impl Machine {
         }
     }
 
-    fn port_name(&self, port: Port) -> String {
+    pub(crate) fn port_name(&self, port: Port) -> String {
         self.port_names
             .get(&port)
             .cloned()

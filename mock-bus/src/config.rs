@@ -1,5 +1,7 @@
 //! What an emulated machine is made of: TOML, every key ending in its unit, unknown keys refused.
 
+mod checks;
+
 use core::time::Duration;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -9,12 +11,12 @@ use crate::fault::FaultConfig;
 use crate::node::Node;
 use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
 use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
-use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode, addresses_fit};
+use crate::node::cia404_analog::{Cia404AnalogConfig, Cia404AnalogNode};
+use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode};
 use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
 use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
 use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
 use crate::plant::config::PlantConfig;
-use crate::plant::platform::config::PlatformConfig;
 
 /// One emulated machine.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -111,6 +113,10 @@ pub struct NodeConfig {
     /// Not on the machine's mains: a power cycle of the machine leaves it running.
     #[serde(default)]
     pub own_mains: bool,
+    /// Brought along for a calibration: it has no power, from its own mains, until somebody sets
+    /// a line up with it.
+    #[serde(default)]
+    pub brought_along: bool,
     /// What it is.
     pub device: DeviceConfig,
 }
@@ -123,6 +129,8 @@ pub enum DeviceConfig {
     Cia402Drive(Cia402DriveConfig),
     /// CiA 401 analog inputs, on a CAN bus.
     Cia401Analog(Cia401AnalogConfig),
+    /// CiA 404 measuring module, on a CAN bus.
+    Cia404Analog(Cia404AnalogConfig),
     /// µMD2 laser interferometer, on a serial line.
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
@@ -139,6 +147,7 @@ impl DeviceConfig {
         match self {
             Self::Cia402Drive(config) => Box::new(Cia402DriveNode::new(config.clone())),
             Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
+            Self::Cia404Analog(config) => Box::new(Cia404AnalogNode::new(config.clone())),
             Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
             Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
             Self::InSightController(config) => {
@@ -150,7 +159,7 @@ impl DeviceConfig {
 
     const fn wants_can(&self) -> bool {
         match self {
-            Self::Cia402Drive(_) | Self::Cia401Analog(_) => true,
+            Self::Cia402Drive(_) | Self::Cia401Analog(_) | Self::Cia404Analog(_) => true,
             Self::Umd2Interferometer(_)
             | Self::DconModule(_)
             | Self::InSightController(_)
@@ -295,171 +304,6 @@ impl MachineConfig {
             })
         }
     }
-
-    fn check_numbers(&self) -> Result<(), ConfigError> {
-        let (stage, hall) = (&self.plant.stage, &self.plant.hall);
-        let (motion, deviation) = (&stage.motion, &stage.deviation);
-        for (key, seen) in [
-            ("power_off_ms", self.power_off_ms),
-            ("resolution_nm", stage.encoder.resolution_nm),
-            ("cyclic_period_um", deviation.cyclic_period_um),
-            ("lost_motion_take_up_um", deviation.lost_motion_take_up_um),
-            ("servo_bandwidth_hz", motion.servo_bandwidth_hz),
-            (
-                "acceleration_max_m_per_s2",
-                motion.acceleration_max_m_per_s2,
-            ),
-            (
-                "friction_deceleration_m_per_s2",
-                motion.friction_deceleration_m_per_s2,
-            ),
-            ("swing_period_min", self.plant.climate.swing_period_min),
-            ("gap_mm", hall.gap_mm),
-            ("magnet_width_mm", hall.magnet_width_mm),
-            ("magnet_height_mm", hall.magnet_height_mm),
-            ("magnet_spacing_mm", hall.magnet_spacing_mm),
-            ("rail_v", hall.rail_v),
-            (
-                "work_max_mm - work_min_mm",
-                deviation.work_max_mm - deviation.work_min_mm,
-            ),
-            (
-                "hard_stop_max_mm - start_max_mm",
-                motion.hard_stop_max_mm - motion.start_max_mm,
-            ),
-            (
-                "start_min_mm - hard_stop_min_mm",
-                motion.start_min_mm - motion.hard_stop_min_mm,
-            ),
-        ] {
-            positive(key, seen)?;
-        }
-        for port in &self.ports {
-            if let PortConfig::Can(can) = port {
-                positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
-            }
-        }
-        if let Some(platform) = &self.plant.platform {
-            check_platform(platform)?;
-            positive("field_mm", self.plant.camera.field_mm)?;
-        }
-        let plant = &self.plant;
-        if let Some(table) = &plant.table {
-            for (key, seen) in table.positive_numbers() {
-                positive(key, seen)?;
-            }
-            // A machine is one thing or the other.
-            positive("platform and table", f64::from(plant.platform.is_none()))?;
-        }
-        self.nodes
-            .iter()
-            .try_for_each(|node| node.device.check(plant))
-    }
-}
-
-fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
-    let screw = &platform.screw;
-    for (key, seen) in [
-        ("lead_mm", screw.lead_mm),
-        ("resolution_nm", screw.resolution_nm),
-        ("work_range_mm", screw.work_range_mm),
-        ("servo_bandwidth_hz", screw.servo_bandwidth_hz),
-        ("acceleration_max_m_per_s2", screw.acceleration_max_m_per_s2),
-        (
-            "friction_deceleration_m_per_s2",
-            screw.friction_deceleration_m_per_s2,
-        ),
-        (
-            "hard_stop_mm - work_range_mm",
-            screw.hard_stop_mm - screw.work_range_mm,
-        ),
-        (
-            "hard_stop_mm - start_mm",
-            screw.hard_stop_mm - screw.start_mm,
-        ),
-    ] {
-        positive(key, seen)?;
-    }
-    if platform.holds_the_platform() {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key: "actuators",
-        seen: platform.actuators.len() as f64,
-        expected: "three or four screws that hold x, y and angle",
-    })
-}
-
-impl DeviceConfig {
-    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
-        match self {
-            Self::Cia402Drive(Cia402DriveConfig {
-                rotary: Some(rotary),
-                ..
-            }) => {
-                let turn = plant.table.as_ref().map(|it| it.encoder.counts_per_turn);
-                if turn == Some(rotary.counts_per_turn) {
-                    return Ok(());
-                }
-                Err(ConfigError::Value {
-                    key: "counts_per_turn",
-                    seen: rotary.counts_per_turn.into(),
-                    expected: "the plant's table's counts_per_turn",
-                })
-            }
-            Self::Cia402Drive(config) if config.encoder_resolution_nm != plant.resolution_nm() => {
-                Err(ConfigError::Value {
-                    key: "encoder_resolution_nm",
-                    seen: config.encoder_resolution_nm,
-                    expected: "the plant's resolution_nm",
-                })
-            }
-            Self::Cia402Drive(_) | Self::Cia401Analog(_) => Ok(()),
-            Self::Umd2Interferometer(config) => {
-                positive("sample_rate_hz", config.sample_rate_hz)?;
-                positive("batch_samples", f64::from(config.batch_samples))
-            }
-            Self::DconModule(config) => positive("channels", config.channels as f64),
-            Self::InSightController(config) => {
-                positive("length_unit_um", config.length_unit_um)?;
-                positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
-                positive("exposure_ms", config.exposure_ms)
-            }
-            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
-        }
-    }
-}
-
-fn check_amps(config: &CopleyAmpsConfig, resolution_nm: f64) -> Result<(), ConfigError> {
-    if !addresses_fit(config) {
-        return Err(ConfigError::Value {
-            key: "amps",
-            seen: config.amps.len() as f64,
-            expected: "amplifiers with different addresses up to 127, one of them 0",
-        });
-    }
-    let odd = config
-        .amps
-        .iter()
-        .find(|amp| amp.encoder_resolution_nm != resolution_nm);
-    odd.map_or(Ok(()), |amp| {
-        Err(ConfigError::Value {
-            key: "encoder_resolution_nm",
-            seen: amp.encoder_resolution_nm,
-            expected: "the plant's resolution_nm",
-        })
-    })
-}
-
-fn positive(key: &'static str, seen: f64) -> Result<(), ConfigError> {
-    if seen.is_finite() && seen > 0.0 {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key,
-        seen,
-        expected: "a positive number",
-    })
 }
 
 fn no_port(user: &str, port: &str) -> ConfigError {

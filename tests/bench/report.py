@@ -13,6 +13,13 @@ import sys
 # The table that others would write, for comparison.
 OTHER = "(bisected)"
 
+POINT_GOALS_NS = {
+    "model of splines": 80.0,
+    "model of splines, inverse": 250.0,
+    "trilinear, 13 x 11 x 9": 45.0,
+    "tricubic, 13 x 11 x 9": 85.0,
+}
+
 
 def line(*cells):
     print("  " + "".join(f"{cell:<{width}}" for cell, width in cells).rstrip())
@@ -80,6 +87,53 @@ def show_rotary(rotary):
         line((f"set-point of 3600 lines, {case['interpolation']}: {time}", 0))
 
 
+def show_volumetric(volumetric, scipy):
+    print("\nCorrection of a point of three axes: ns per point, median (least)")
+    line(("case", 46), ("in a row", 18), ("alone", 0))
+    for case in volumetric["cases"]:
+        line(
+            (case["case"], 46),
+            *(
+                (f"{case[key]:.1f} ({case[key + '_min']:.1f})", 18)
+                for key in ("in_a_row_ns", "alone_ns")
+            ),
+        )
+    for case in scipy:
+        line(
+            (case["case"], 46),
+            (f"array {case['array_ns']:.0f}", 18),
+            (f"single {case['single_ns']:.0f}", 0),
+        )
+
+
+def show_cycle(title, cases):
+    print(f"\nThe cyclic engine, four axes, {title}: lateness in us beside a tokio interval")
+    columns = ("p50", "p99", "p999", "max")
+    heads = [(name, 9) for name in columns]
+    line(("", 8), ("load", 12), *heads, ("followed", 11), ("overruns", 10), ("stops", 0))
+    for case in cases:
+        load = "busy" if case["busy"] else "idle"
+        for name, key in (("ours", "lateness"), ("tokio", "tokio")):
+            if name == "ours":
+                load += f" {case['period_us'] / 1000:.0f} ms"
+            cells = [(f"{case[key][column + '_us']:.0f}", 9) for column in columns]
+            counted = [
+                (f"{case['followed_s']:.0f} s", 11),
+                (case["overruns"], 10),
+                (sum(case["stops"].values()), 0),
+            ]
+            line((name, 8), (load, 12), *cells, *(counted if name == "ours" else []))
+        line((f"  {case['scheduling']}", 0))
+        for stop, count in case["stops"].items():
+            line((f"  {count} times: {stop}", 0))
+
+
+def show_cycle_cost(cases):
+    print("\nA period of the cyclic engine apart from its bus: us, median (least)")
+    for case in cases:
+        line((case["case"], 46), (f"{case['us']:.1f} ({case['us_min']:.1f})", 0))
+
+
 def growth_of(table):
     """How much longer a call takes in the longest table than in the shortest, in a row."""
     least = {}
@@ -96,6 +150,9 @@ def goals_of(measured):
         "set_point_ns": {"measured": slowest, "at_most": 40.0},
         "rotary_solve_us": {"measured": largest["solve_us"], "at_most": 1000.0},
     }
+    points = {case["case"]: case["in_a_row_ns"] for case in measured["host"]["volumetric"]["cases"]}
+    for name, at_most in POINT_GOALS_NS.items():
+        goals[name] = {"measured": points[name], "at_most": at_most}
     if "bus" in measured:
         ratio = measured["bus"]["sdo"]["ours_to_python"]["median"]
         goals["ours_to_python"] = {"measured": ratio, "at_least": 5.0}
@@ -116,12 +173,16 @@ def main(vcan_host, host_file, bus_file=None):
         measured["host"]["table"], measured["host"]["table_instructions"], measured["growth"]
     )
     show_rotary(measured["host"]["rotary"])
+    show_volumetric(measured["host"]["volumetric"], measured["host"]["scipy_grid"])
     show_sync("on the host, without CAN", measured["host"]["sync"])
+    show_cycle("on a pseudo-terminal", measured["host"]["cycle"])
+    show_cycle_cost(measured["host"]["cycle_cost"])
     if bus_file:
         with open(bus_file, encoding="utf-8") as file:
             measured["bus"] = json.load(file)
         show_sdo(measured["bus"]["sdo"])
         show_sync(f"vcan0 ({vcan_host})", measured["bus"]["sync"])
+        show_cycle(f"vcan0 ({vcan_host})", measured["bus"]["cycle"])
     measured["goals"] = goals_of(measured)
     print()
     print(json.dumps(measured))

@@ -1,6 +1,7 @@
 //! The commands as a user runs them: `mock-bus` in one process, `truestage` in others.
 
 mod demo;
+mod example;
 mod interrupted;
 mod platform;
 mod programs;

@@ -5,6 +5,9 @@
 //! those of the fault classes.
 
 mod bus;
+mod cyclic;
+mod cyclic_host;
+mod detectors;
 mod drive;
 mod files;
 mod hall;

@@ -1,6 +1,7 @@
 //! A scene: a machine in some phase of its work, and what goes wrong with it there.
 
-use std::cell::{Ref, RefCell};
+use std::cell::{Cell, Ref, RefCell};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
 use truestage::emulated::Emulated;
+use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::observer::{Observer, Stage};
 use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
@@ -43,6 +45,8 @@ pub enum Phase {
     Calibrate,
     /// Measuring to judge.
     Verify,
+    /// Following a path of four seconds, a set-point at every SYNC.
+    Follow,
 }
 
 /// Whether something was seen on the emulated machine.
@@ -61,7 +65,13 @@ pub struct Scene {
     machine: Change,
     emulated: Change,
     stop: bool,
+    stall: Option<Duration>,
+    full: Option<u16>,
+    killed: bool,
 }
+
+/// What a controller that is killed panics with: nobody is told, nothing is done.
+struct Killed;
 
 /// The shipped machine with fewer points: the same procedures in less time.
 pub fn shortened(text: String) -> String {
@@ -69,6 +79,51 @@ pub fn shortened(text: String) -> String {
         .replace("targets = 8", "targets = 4")
         .replace("runs = 5", "runs = 2")
         .replace("jump_limit_um = 5.0", "jump_limit_um = 15.0")
+}
+
+/// The same with an axis that follows cyclic set-points.
+pub fn cyclic(text: String) -> String {
+    replaced(
+        &text,
+        "[axis.x.identity]",
+        "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
+         deviation_limit_um = 1000.0\n[axis.x.identity]",
+    )
+}
+
+/// To and fro over 30 mm, eight times in four seconds, begun and ended at rest.
+fn path(period: Duration) -> Vec<Metres> {
+    let count = (4.0 / period.as_secs_f64()) as u32;
+    let points = (0..=count).map(|at| {
+        let u = f64::from(at) / f64::from(count);
+        let turn = std::f64::consts::TAU;
+        let share = u - (turn * u).sin() / turn;
+        Metres::from_mm(30.0 - 15.0 * (4.0 * turn * share).cos())
+    });
+    points.collect()
+}
+
+/// Follows the path to its end or to a stop, whatever the host must do for that.
+pub fn follow(machine: &mut Machine) -> Result<Cause, Failure> {
+    let (mut engine, mut desk) = Engine::new(machine, &["x"], Box::new(NoCorrection))?;
+    let points = path(engine.period());
+    let mut next = 0;
+    let cause = machine.follow_with(&mut engine, &mut || {
+        while next < points.len() && desk.path.room() > 0 {
+            desk.path
+                .push(&[points[next]])
+                .expect("the path can be driven");
+            next += 1;
+        }
+        if next == points.len() && desk.path.room() > 0 {
+            let _ = desk.path.finish();
+        }
+    })?;
+    match cause {
+        Cause::PathDone | Cause::Overrun { .. } => Ok(cause),
+        Cause::Asked => Err(Failure::Interrupted),
+        other => panic!("{other}\n{}", engine.timing()),
+    }
 }
 
 impl Scene {
@@ -81,9 +136,15 @@ impl Scene {
             faults: Vec::new(),
             deed: None,
             delivered: None,
-            machine: Box::new(shortened),
+            machine: match phase {
+                Phase::Follow => Box::new(|text| cyclic(shortened(text))),
+                _ => Box::new(shortened),
+            },
             emulated: Box::new(|text| text),
             stop: false,
+            stall: None,
+            full: None,
+            killed: false,
         }
     }
 
@@ -142,6 +203,24 @@ impl Scene {
         self
     }
 
+    /// The controller is held up for so long when the fault is due, right after a SYNC.
+    pub const fn stall(mut self, span: Duration) -> Self {
+        self.stall = Some(span);
+        self
+    }
+
+    /// The controller's port has no more room for frames with this identifier.
+    pub const fn full(mut self, cob_id: u16) -> Self {
+        self.full = Some(cob_id);
+        self
+    }
+
+    /// The controller is killed when the fault is due: it does nothing any more.
+    pub fn killed(mut self) -> Self {
+        self.killed = true;
+        self.deed(|_| resume_unwind(Box::new(Killed)), |_| true)
+    }
+
     /// Plays the scene.
     #[track_caller]
     pub fn play(mut self) -> Played {
@@ -162,11 +241,19 @@ impl Scene {
         let due = bench.machine.now() + self.after;
         let ids = self.schedule(&bench, due, &seen);
         let mut ended = due;
-        let calibrated = RefCell::new(None);
-        let result = bench.machine.guarded(|machine| {
-            let result = perform(machine, self.phase, &store, &calibrated);
-            ended = machine.now();
-            result
+        let (calibrated, cause) = (RefCell::new(None), Cell::new(None));
+        let guarded = AssertUnwindSafe(|| {
+            bench.machine.guarded(|machine| {
+                let result = perform(machine, self.phase, &store, &calibrated, &cause);
+                ended = machine.now();
+                result
+            })
+        });
+        let result = catch_unwind(guarded).unwrap_or_else(|panic| {
+            if self.killed && panic.is::<Killed>() {
+                return Err(Failure::Interrupted);
+            }
+            resume_unwind(panic)
         });
         let played = Played {
             bench,
@@ -177,6 +264,7 @@ impl Scene {
             ended,
             warnings,
             calibrated,
+            cause: cause.get(),
         };
         played.rest();
         if let Some(delivered) = &self.delivered {
@@ -192,6 +280,12 @@ impl Scene {
         let mut seen = seen.borrow_mut();
         if let Some(deed) = self.deed.take() {
             seen.plan(due, deed);
+        }
+        if let Some(span) = self.stall {
+            seen.stall(due, span);
+        }
+        if let Some(cob_id) = self.full {
+            seen.fill(due, cob_id);
         }
         if self.stop {
             let request = bench.machine.stop_request();
@@ -232,6 +326,7 @@ fn perform(
     phase: Phase,
     store: &Store,
     calibrated: &RefCell<Option<Calibrated>>,
+    cause: &Cell<Option<Cause>>,
 ) -> Result<(), Failure> {
     match phase {
         Phase::Start => machine.start()?,
@@ -256,6 +351,7 @@ fn perform(
             let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
             calibrated.replace(Some(done));
         }
+        Phase::Follow => cause.set(Some(follow(machine)?)),
         Phase::Verify => {
             let options = VerifyOptions {
                 compensated: false,
@@ -288,6 +384,8 @@ pub struct Played {
     warnings: Rc<RefCell<Vec<String>>>,
     /// What a calibration gave.
     pub calibrated: RefCell<Option<Calibrated>>,
+    /// How following a path came to its end.
+    pub cause: Option<Cause>,
     /// When the fault was due.
     pub due: Time,
     /// When the phase ended.

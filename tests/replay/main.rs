@@ -128,6 +128,10 @@ impl Transport for Watched {
         self.0.borrow_mut().receive(until)
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        self.0.borrow_mut().sleep_until(until);
+    }
+
     fn set_sync(
         &mut self,
         port: Port,

@@ -46,6 +46,12 @@ pub const UVW_COPLEY: Shipped = Shipped {
     emulated: include_str!("../../configs/emulated/uvw-copley.toml"),
 };
 
+/// Three axes corrected throughout their volume.
+pub const VOLUMETRIC: Shipped = Shipped {
+    machine: include_str!("../../configs/machines/volumetric.toml"),
+    emulated: include_str!("../../configs/emulated/volumetric.toml"),
+};
+
 /// Which bus a test runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {

@@ -33,6 +33,10 @@ impl Transport for Meddling {
         self.inner.receive(until)
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        self.inner.sleep_until(until);
+    }
+
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
         self.inner.set_sync(port, period)
     }

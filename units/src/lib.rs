@@ -12,8 +12,8 @@ mod time;
 pub use coordinate::{Coordinate, LengthOrAngle};
 pub use counts::{Counts, Scale};
 pub use quantity::{
-    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Quantity, Radians,
-    RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
+    Celsius, Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Pascals,
+    Quantity, Radians, RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
 };
 pub use time::Time;
 

@@ -205,6 +205,11 @@ quantity!(
     "m/s²"
 );
 quantity!(
+    /// Jerk in metres per second cubed.
+    MetresPerSecondCubed,
+    "m/s³"
+);
+quantity!(
     /// Angular speed in radians per second.
     RadiansPerSecond,
     "rad/s"

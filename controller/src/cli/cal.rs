@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use serde_json::{Value, json};
 use truestage::config::Loaded;
+use truestage::cycle::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
+use truestage::store::MemoryName;
 use truestage::store::{
     CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, Store, short,
 };
@@ -12,7 +14,7 @@ use truestage::{Failure, config};
 use units::Metres;
 
 use super::output::{Ended, Output};
-use super::{rotary, screw};
+use super::{rotary, screw, volumetric};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalCommand {
@@ -119,6 +121,8 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
         Content::LinearErrorTable(content) => linear_lines(content),
         Content::RotaryErrorTable(content) => rotary::shown(content),
         Content::ScrewModel(content) => screw::shown(content),
+        Content::VolumetricGeometry(content) => volumetric::shown(content),
+        Content::BeamReferences(_) | Content::StateMemory(_) => record.content.summary(),
     };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
     output.result(&text, &json!({"id": id, "record": value}))
@@ -162,6 +166,14 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
         Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
         Content::RotaryErrorTable(new) => rotary::changes(before.rotary(&before_id)?, new),
         Content::ScrewModel(new) => screw::changes(before.screw(&before_id)?, new),
+        Content::VolumetricGeometry(new) => volumetric::changes(before.geometry(&before_id)?, new),
+        Content::BeamReferences(_) | Content::StateMemory(_) => {
+            let kind = after.content.kind();
+            return Err(Failure::Usage {
+                what: format!("records of the kind {kind} are not compared"),
+                help: "`cal show --json` prints them".into(),
+            });
+        }
     };
     output.result(&lines.join("\n"), &json!({"changes": values}))
 }
@@ -222,7 +234,11 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
     let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
-    if known.contains(&axis) {
+    let volume = [GEOMETRY, REFERENCES]
+        .into_iter()
+        .chain([MemoryName::First, MemoryName::Second].map(memory_pointer));
+    let mut volume = volume.filter(|_| loaded.config.volumetric.is_some());
+    if known.contains(&axis) || volume.any(|it| it == axis) {
         return Ok(());
     }
     Err(Failure::NoSuchAxis {

@@ -7,6 +7,7 @@ use toml::de::{DeTable, DeValue};
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
 use super::validate::{Finding, validate};
+use super::volumetric::{BeamDetectorConfig, VolumetricConfig};
 
 /// A configuration that was read and judged sound.
 #[derive(Clone, Debug)]
@@ -103,7 +104,55 @@ fn calibration_hash(config: &MachineConfig) -> String {
         let place = (it.point_mm, it.direction, it.lead_mm, it.index_mm);
         text += &format!("\n{} {place:?}", it.axis);
     }
+    if let Some(volumetric) = &config.volumetric {
+        text += &volumetric_dependence(config, volumetric);
+    }
     blake3::hash(text.as_bytes()).to_hex().to_string()
+}
+
+/// Tables and references of three axes hold for the same axes in the same order, the same zero, and
+/// detectors that are wired and read in the same way.
+fn volumetric_dependence(config: &MachineConfig, volumetric: &VolumetricConfig) -> String {
+    let detector = |it: &BeamDetectorConfig| {
+        let wired = (module(config, &it.analog), &it.channels, it.layout);
+        let read = (it.dark_mv, it.gain, it.um_per_one, &it.curve);
+        format!("{wired:?} {read:?}")
+    };
+    let mut text = format!(
+        "\nvolumetric {:?} {} {:?}",
+        volumetric.axes, volumetric.chain, volumetric.zero.index_mm
+    );
+    for beam in volumetric.beam.each() {
+        text += &match beam {
+            Some(it) => {
+                let drift = (it.drift, it.source_mm, it.end_mm, it.translation_share);
+                let end = it.end.as_ref().map(detector);
+                format!("\nbeam {drift:?} {} {end:?}", detector(&it.slider))
+            }
+            None => "\nno beam".into(),
+        };
+    }
+    if let Some(it) = &volumetric.roll {
+        let wired = (
+            it.axis,
+            module(config, &it.analog),
+            it.channels,
+            it.mm_per_v,
+        );
+        let optics = (it.height_mm, it.base_mm, it.inclination_deg);
+        text += &format!("\nroll {wired:?} {optics:?}");
+    }
+    for it in &volumetric.temperature {
+        let wired = (module(config, &it.analog), it.channel);
+        text += &format!("\ntemperature {wired:?}");
+    }
+    text
+}
+
+/// Which module a name stands for: where it is, and who it must be.
+fn module<'a>(config: &'a MachineConfig, name: &str) -> impl core::fmt::Debug + use<'a> {
+    let analog = config.analog.get(name);
+    analog.map(|it| (&it.bus, it.node_id, &it.identity))
 }
 
 fn structural(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {

@@ -10,15 +10,17 @@ mod model;
 mod platform;
 mod rotary;
 mod validate;
+mod volumetric;
 
 pub use camera::{CameraConfig, CameraDevice};
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
-    CanBus, CanTransport, CompensationConfig, EndPolicyName, HomeOffsetName, IdentityConfig,
-    InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig, MachineSection,
-    OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+    CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
+    IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
+    MachineSection, OpticsConfig, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig,
+    ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
@@ -28,4 +30,10 @@ pub use rotary::{
     DirectionName, EdgeName, LineDetectorConfig, OptimiseName, PeriodicInterpolationName,
     PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
     RotaryVerifyConfig, RotaryZeroConfig,
+};
+pub use volumetric::{
+    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
+    FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
+    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
+    VolumetricConfig, VolumetricVerifyConfig, VolumetricZeroConfig,
 };

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use super::camera::CameraConfig;
 use super::platform::PlatformConfig;
 use super::rotary::RotaryConfig;
+use super::volumetric::VolumetricConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -40,6 +41,8 @@ pub struct MachineConfig {
     pub camera: BTreeMap<String, CameraConfig>,
     /// The alignment platform that the axes move, if they move one.
     pub platform: Option<PlatformConfig>,
+    /// The three axes whose errors are corrected throughout the work volume, if there are.
+    pub volumetric: Option<VolumetricConfig>,
 }
 
 /// Who the machine is, and where its records live.
@@ -187,10 +190,24 @@ pub struct AxisConfig {
     pub identity: Option<IdentityConfig>,
     pub poll_period_ms: Option<f64>,
     pub amplifier: Option<AmplifierConfig>,
+    pub cyclic: Option<CyclicConfig>,
     pub zero: Option<ZeroConfig>,
     pub calibrate: Option<CalibrateConfig>,
     pub verify: Option<VerifyConfig>,
     pub compensation: Option<CompensationConfig>,
+}
+
+/// An axis that follows cyclic set-points.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct CyclicConfig {
+    pub jerk_mm_per_s3: f64,
+    pub deviation_limit_um: f64,
+    #[serde(default)]
+    pub correction_limit_um: f64,
+    #[serde(default)]
+    pub correction_rate_um_per_s: f64,
 }
 
 /// What only an axis on CAN has.
@@ -279,6 +296,8 @@ impl AxisConfig {
 pub enum AnalogDevice {
     /// A CiA 401 module on CAN.
     Cia401,
+    /// A CiA 404 measuring module on CAN.
+    Cia404,
     /// An ADAM/DCON module on a serial line.
     Dcon,
 }
@@ -289,11 +308,15 @@ pub enum AnalogDevice {
 #[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct AnalogConfig {
     pub device: AnalogDevice,
+    #[serde(default)]
     pub channels: Vec<u8>,
     pub bus: Option<String>,
     pub node_id: Option<u8>,
     #[serde(default)]
     pub full_scale_v: Vec<f64>,
+    #[serde(default)]
+    pub temperature_channels: Vec<u8>,
+    pub every_syncs: Option<u8>,
     pub heartbeat_producer_ms: Option<u16>,
     pub heartbeat_consumer_ms: Option<u16>,
     pub watch_master_ms: Option<u16>,
@@ -333,6 +356,17 @@ pub struct InstrumentConfig {
     pub instrument_standard_uncertainty_nm: f64,
     #[serde(default = "half_an_hour")]
     pub environment_frozen_s: f64,
+    #[serde(default)]
+    pub optics: OpticsConfig,
+}
+
+/// What an instrument can be set up with besides linear optics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct OpticsConfig {
+    pub straightness_factor: Option<f64>,
+    pub angular_separation_mm: Option<f64>,
 }
 
 /// The last digit of a good sensor moves with the air of a good hall.

@@ -13,6 +13,7 @@ pub(crate) mod sweep;
 mod travel;
 mod turn;
 mod verify;
+pub mod volumetric;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};

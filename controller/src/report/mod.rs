@@ -70,6 +70,11 @@ pub fn render(page: &Page<'_>) -> String {
             Content::LinearErrorTable(content) => linear_table(content),
             Content::RotaryErrorTable(content) => rotary_table(content),
             Content::ScrewModel(content) => screw_table(content),
+            Content::VolumetricGeometry(_)
+            | Content::BeamReferences(_)
+            | Content::StateMemory(_) => {
+                format!("<p>{}</p>", escape(&calibration.content.summary()))
+            }
         };
     }
     if !page.zeros.is_empty() {

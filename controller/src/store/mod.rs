@@ -28,9 +28,11 @@ pub use lease::Lease;
 pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
-    CalibrationRecord, Content, EnvironmentRecord, HarmonicRecord, IdentityRecord,
-    InstrumentRecord, LinearContent, NodeRecord, ReadingName, RecordHead, RotaryContent,
-    ScrewContent, ScrewMethodName, StrokeRecord,
+    BeamRecord, BeamReferencesContent, BendRecord, CalibrationRecord, Content, EnvironmentRecord,
+    ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
+    IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
+    ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
+    StrokeRecord,
 };
 
 pub(crate) use atomic::write_new_or_replace;
@@ -151,6 +153,32 @@ pub enum StoreError {
         id: String,
         /// Why.
         source: compensator::rotary::PeriodicError,
+    },
+    /// The nodes of the record make no function of a position.
+    #[error("calibration {id}, {name}: {source}")]
+    Function {
+        /// The calibration.
+        id: String,
+        /// Which function.
+        name: String,
+        /// Why.
+        source: compensator::volumetric::function::FunctionError,
+    },
+    /// The record has a part that three axes do not have, or has it twice.
+    #[error("calibration {id}: `{name}` is no error of three axes, or is there twice")]
+    ErrorName {
+        /// The calibration.
+        id: String,
+        /// What it is called.
+        name: String,
+    },
+    /// The record's references belong to no beam.
+    #[error("calibration {id}: {source}")]
+    Beam {
+        /// The calibration.
+        id: String,
+        /// Why.
+        source: compensator::volumetric::online::DriftError,
     },
     /// Nothing is left of the run to be done.
     #[error("{}: this run is complete; start a new one without --resume", path.display())]

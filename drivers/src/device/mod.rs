@@ -7,6 +7,7 @@ mod alarm;
 pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
+pub mod cia404;
 pub mod copley;
 pub mod dcon;
 mod error;
@@ -17,6 +18,8 @@ mod latch;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;
+
+use core::time::Duration;
 
 use units::{
     Approach, Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
@@ -105,6 +108,15 @@ pub enum DriveCommand {
     ResetFault,
     /// Slow down and stand, staying enabled; done when standing.
     Halt,
+    /// Change to cyclic synchronous position with one set-point every `period`; done when the
+    /// drive says that it is in the mode. Nothing moves: the set-point is where the axis stands.
+    /// Refused by a drive that cannot do it, and while the axis moves.
+    EnterCyclic {
+        /// From SYNC to SYNC.
+        period: Duration,
+    },
+    /// Change back to profile position.
+    LeaveCyclic,
 }
 
 /// A controlled direction, linear or rotary: one servo drive that positions in `Q`.
@@ -112,6 +124,17 @@ pub trait Axis<Q: Coordinate = Metres>: ServoDrive {
     /// Begins a command; a command that still runs is superseded.
     /// [`Device::poll_outcome`] says when it is done, and how.
     fn command(&mut self, now: Time, command: AxisCommand<Q>);
+
+    /// The set-point for the next SYNC, in drive coordinates; once in every period after
+    /// [`DriveCommand::EnterCyclic`] and [`DriveCommand::Enable`].
+    ///
+    /// # Errors
+    /// When the drive is not enabled in the cyclic mode, or the set-point is outside its limits;
+    /// nothing is sent then.
+    fn follow(&mut self, now: Time, set_point: Q) -> Result<(), DeviceError>;
+
+    /// The set-point that the drive holds in the cyclic mode, `None` in any other.
+    fn held(&self) -> Option<Q>;
 
     /// The newest sample of the axis, `None` before the first one.
     fn reading(&self) -> Option<AxisReading<Q>>;
@@ -196,6 +219,8 @@ pub struct AxisReading<Q: Coordinate = Metres> {
     pub following_error: Option<Q>,
     /// Whether the drive reports its target reached and no motion pending.
     pub standing: bool,
+    /// Whether the last samples lie together: it does not move, whatever the drive says.
+    pub at_rest: bool,
 }
 
 /// Voltages that are read together.
@@ -205,6 +230,11 @@ pub trait AnalogInput: Device {
 
     /// The newest sample, `None` before the first; its age is the caller's to judge by `at`.
     fn reading(&self) -> Option<&AnalogReading>;
+
+    /// The thermometers on the same module, where it has some.
+    fn thermometers(&self) -> Option<&dyn TemperatureInput> {
+        None
+    }
 }
 
 /// One sample of all channels.
@@ -216,6 +246,25 @@ pub struct AnalogReading {
     pub volts: Vec<Volts>,
     /// Per channel: whether the converter stood at an end of its range.
     pub saturated: Vec<bool>,
+}
+
+/// Temperatures that are read together.
+pub trait TemperatureInput: Device {
+    /// How many sensors are used.
+    fn sensors(&self) -> usize;
+
+    /// The newest sample, `None` before the first; its age is the caller's to judge by `at`.
+    fn temperatures(&self) -> Option<&TemperatureReading>;
+}
+
+/// One sample of all sensors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureReading {
+    /// When it arrived.
+    pub at: Time,
+    /// Each sensor, in the order of the configuration; `None` where the device says that there is
+    /// none, or that it is beyond what can be measured.
+    pub celsius: Vec<Option<Celsius>>,
 }
 
 /// An instrument that measures the change of a length from a datum.

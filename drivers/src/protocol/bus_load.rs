@@ -3,7 +3,8 @@
 //! Every frame is counted with the most stuff bits it can need and the interframe space
 //! (ISO 11898-1). Within one SYNC period the SYNC, all synchronous PDOs, and the shares of
 //! heartbeats and SDO must fit, with a reserve for emergencies and repetitions: by default
-//! 20 %. Absent: the order of frames within the period.
+//! 20 %. A PDO that comes at every n-th SYNC counts with its n-th part: its frames must yield to the
+//! others, by their identifiers. Absent: the order of frames within the period.
 
 use core::time::Duration;
 
@@ -20,6 +21,8 @@ pub struct BusPlan {
     pub sync_counter: bool,
     /// Bytes of each PDO that is sent in every SYNC period.
     pub pdo_bytes: Vec<u8>,
+    /// Bytes of each PDO that is sent at every n-th SYNC only, and n.
+    pub seldom_pdos: Vec<(u8, u8)>,
     /// Period of each heartbeat, ours included.
     pub heartbeats: Vec<Duration>,
     /// Share of the bus kept for SDO, 0 to 1.
@@ -36,6 +39,7 @@ impl BusPlan {
             sync_period,
             sync_counter: false,
             pdo_bytes: Vec::new(),
+            seldom_pdos: Vec::new(),
             heartbeats: Vec::new(),
             sdo_share: 0.0,
             load_limit: 0.8,
@@ -46,6 +50,14 @@ impl BusPlan {
     #[must_use]
     pub fn with_pdos(mut self, bytes: &[u8]) -> Self {
         self.pdo_bytes.extend(bytes.iter().map(|len| (*len).min(8)));
+        self
+    }
+
+    /// Adds PDOs of one node that come at every `every`-th SYNC; 0 counts as 1.
+    #[must_use]
+    pub fn with_seldom_pdos(mut self, bytes: &[u8], every: u8) -> Self {
+        let each = bytes.iter().map(|len| ((*len).min(8), every.max(1)));
+        self.seldom_pdos.extend(each);
         self
     }
 
@@ -64,8 +76,7 @@ impl BusPlan {
     pub fn load(&self) -> Result<BusLoad, BusLoadError> {
         self.validate()?;
         let rate = f64::from(self.bit_rate);
-        let bits = self.cyclic_bits();
-        let cyclic_s = f64::from(bits) / rate;
+        let cyclic_s = (f64::from(self.cyclic_bits()) + self.seldom_bits()) / rate;
         let heartbeat_bits = f64::from(worst_case_bits(8, false));
         let beats_per_s: f64 = self
             .heartbeats
@@ -106,6 +117,15 @@ impl BusPlan {
         })
     }
 
+    /// On the average of the periods.
+    fn seldom_bits(&self) -> f64 {
+        let part = |(len, every): &(u8, u8)| {
+            let bits = worst_case_bits(u32::from((*len).min(8)) * 8, false);
+            f64::from(bits) / f64::from((*every).max(1))
+        };
+        self.seldom_pdos.iter().map(part).sum()
+    }
+
     fn validate(&self) -> Result<(), BusLoadError> {
         let share = |value: f64| (0.0..=1.0).contains(&value);
         let what = if self.bit_rate == 0 {
@@ -132,7 +152,7 @@ fn ceil_to_microseconds(seconds: f64) -> Duration {
 pub struct BusLoad {
     /// Share of the bus that is used, 0 to 1.
     pub load: f64,
-    /// How long SYNC and the PDOs of one period take on the wire.
+    /// How long SYNC and the PDOs of one period take on the wire; of seldom ones their part.
     pub cyclic: Duration,
     /// The shortest SYNC period that would still fit.
     pub shortest_period: Duration,
@@ -169,6 +189,16 @@ pub enum BusLoadError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Eight bytes are 135 bits: two of them in every SYNC, or a fifth of ten.
+    #[test]
+    fn what_comes_at_every_fifth_sync_counts_a_fifth() {
+        let bus = || BusPlan::new(1_000_000, Duration::from_millis(2));
+        let seldom = bus().with_seldom_pdos(&[8; 10], 5).load().unwrap();
+        let often = bus().with_pdos(&[8; 2]).load().unwrap();
+        assert_eq!(seldom.cyclic, often.cyclic);
+        assert_eq!(often.cyclic, Duration::from_micros(55 + 2 * 135));
+    }
 
     fn four_axes(period_ms: u64) -> BusPlan {
         BusPlan::new(1_000_000, Duration::from_millis(period_ms)).with_pdos(&[8; 8])

@@ -127,6 +127,15 @@ impl<W: World> Transport for InProcess<W> {
         }
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        self.now = self.now.max(self.world.now());
+        while self.now < until {
+            self.now = until.min(self.next_sync()).max(self.now);
+            self.send_due_syncs();
+            self.world.advance(self.now);
+        }
+    }
+
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
         match period {
             None => {

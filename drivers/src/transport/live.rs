@@ -11,6 +11,7 @@ use core::time::Duration;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::path::Path;
@@ -23,11 +24,13 @@ use super::serial::{SerialError, SerialLine};
 use super::slcan::SlcanPort;
 pub use super::slcan::{SlcanFailure, SlcanSettings};
 use super::socketcan::{self, CanPort};
-use super::sync_thread::{SyncSink, SyncStatistics, SyncThread};
+use super::sync_thread::{SyncSink, SyncStatistics, SyncThread, monotonic};
 use super::{Arrival, Input, Payload, Port, SendError, Transport};
 
 /// Until the clock has been read, a wait is no longer than this, or half of what is left.
 const COARSE_WAIT: Duration = Duration::from_millis(1);
+/// Ports that can be waited for without memory being asked for: the cyclic engine waits here.
+const WAITED_MAX: usize = 16;
 /// The longest single wait, so that a deadline of "never" needs no special case.
 const WAIT_MAX: Duration = Duration::from_secs(3_600);
 
@@ -119,6 +122,12 @@ pub enum OpenError {
         /// What went wrong.
         failure: SlcanFailure,
     },
+    /// More ports than one thread waits for.
+    #[error("more than {limit} CAN buses and serial lines: give some to another process")]
+    TooManyPorts {
+        /// How many there may be.
+        limit: usize,
+    },
     /// Two ports have the same number.
     #[error("port {}: given twice", port.0)]
     DuplicatePort {
@@ -180,6 +189,9 @@ impl LiveBuilder {
         let mut ports = Vec::with_capacity(self.plans.len());
         let mut index = BTreeMap::new();
         for (port, plan) in self.plans {
+            if ports.len() == WAITED_MAX {
+                return Err(OpenError::TooManyPorts { limit: WAITED_MAX });
+            }
             if index.insert(port, ports.len()).is_some() {
                 return Err(OpenError::DuplicatePort { port });
             }
@@ -335,25 +347,35 @@ impl Live {
 
     /// Waits until a port is ready, and marks the ready ones; whether there are any.
     fn wait(&mut self, timeout: Duration) -> bool {
-        let mut waited = Vec::with_capacity(self.ports.len());
-        let mut descriptors = Vec::with_capacity(self.ports.len());
-        for (at, slot) in self.ports.iter().enumerate() {
-            if let Some(descriptor) = slot.live.descriptor() {
-                waited.push(at);
-                descriptors.push(PollFd::new(descriptor, interest(&*slot.live)));
-            }
+        let limit = Some(TimeSpec::from(timeout));
+        let mut waited = [0; WAITED_MAX];
+        let mut ready = [false; WAITED_MAX];
+        let mut open = self.ports.iter().enumerate().filter_map(|(at, slot)| {
+            let descriptor = slot.live.descriptor()?;
+            Some((at, descriptor, interest(&*slot.live)))
+        });
+        let Some((at, first, interest)) = open.next() else {
+            let _ = ppoll(&mut [], limit, None);
+            return false;
+        };
+        waited[0] = at;
+        let mut descriptors: [PollFd; WAITED_MAX] =
+            core::array::from_fn(|_| PollFd::new(first, interest));
+        let mut count = 1;
+        for (at, descriptor, interest) in open {
+            waited[count] = at;
+            descriptors[count] = PollFd::new(descriptor, interest);
+            count += 1;
         }
         // A signal ends the wait early, as if nothing had come.
-        let count = ppoll(&mut descriptors, Some(TimeSpec::from(timeout)), None);
-        let ready: Vec<bool> = match count {
-            Ok(count) if count > 0 => descriptors
-                .iter()
-                .map(|descriptor| descriptor.any().unwrap_or(true))
-                .collect(),
-            _ => return false,
-        };
-        for (at, ready) in waited.into_iter().zip(ready) {
-            self.ports[at].ready = ready;
+        if !matches!(ppoll(&mut descriptors[..count], limit, None), Ok(1..)) {
+            return false;
+        }
+        for (ready, descriptor) in ready.iter_mut().zip(&descriptors[..count]) {
+            *ready = descriptor.any().unwrap_or(true);
+        }
+        for (at, ready) in waited[..count].iter().zip(ready) {
+            self.ports[*at].ready = ready;
         }
         true
     }
@@ -400,6 +422,19 @@ impl Transport for Live {
             self.now();
             fresh = true;
         }
+    }
+
+    fn sleep_until(&mut self, until: Time) {
+        let deadline = monotonic() + self.clock.until(until);
+        while monotonic() < deadline {
+            // EINTR ends the sleep early; the loop then sleeps on.
+            let _ = clock_nanosleep(
+                ClockId::CLOCK_MONOTONIC,
+                ClockNanosleepFlags::TIMER_ABSTIME,
+                &TimeSpec::from(deadline),
+            );
+        }
+        self.now();
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {

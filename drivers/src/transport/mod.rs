@@ -8,6 +8,7 @@ pub mod clock;
 pub mod in_process;
 pub mod live;
 mod os;
+pub mod real_time;
 pub mod record;
 pub mod replay;
 mod serial;
@@ -104,6 +105,11 @@ pub trait Transport {
     /// Waits until something arrives or the clock reaches `until`; in simulation, lets
     /// virtual time pass instead. Arrivals that wait already are returned at once.
     fn receive(&mut self, until: Time) -> Option<Arrival>;
+
+    /// Waits until the clock has reached `until`, as exactly as it can, and listens to nothing:
+    /// what arrives meanwhile waits for [`Transport::receive`]. For the moment of a SYNC; in
+    /// simulation virtual time passes.
+    fn sleep_until(&mut self, until: Time);
 
     /// Starts, changes or (with `None`) stops the SYNC producer of a CAN port.
     ///

@@ -1,4 +1,4 @@
-//! The three system calls that no safe library offers.
+//! The system calls that no safe library offers.
 
 #![expect(
     unsafe_code,
@@ -26,6 +26,13 @@ pub(super) fn schedule_fifo(priority: i32) -> Result<(), Errno> {
     // SAFETY: the call reads one `sched_param`; 0 is the calling thread.
     let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) };
     Errno::result(result).map(drop)
+}
+
+/// Puts the calling thread back under the ordinary scheduler.
+pub(super) fn schedule_ordinary() {
+    let parameter = libc::sched_param { sched_priority: 0 };
+    // SAFETY: as above. Giving up a priority is never refused.
+    let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameter) };
 }
 
 /// Holds a serial line low, or lets go of it. `tcsendbreak` would wait until the end.

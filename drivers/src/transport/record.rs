@@ -184,6 +184,10 @@ impl<T: Transport, W: io::Write> Transport for Recorder<T, W> {
         Some(arrival)
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        self.inner.sleep_until(rounded(until));
+    }
+
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
         let at = self.now();
         let result = self.inner.set_sync(port, period);

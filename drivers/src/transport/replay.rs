@@ -181,6 +181,10 @@ impl Transport for Replay {
         }
     }
 
+    fn sleep_until(&mut self, until: Time) {
+        self.now = self.now.max(rounded(until));
+    }
+
     fn set_sync(&mut self, _port: Port, _period: Option<Duration>) -> Result<(), SendError> {
         Ok(())
     }

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::os;
 
 /// Below the kernel's own threads (50), above everything ordinary.
-const FIFO_PRIORITY: i32 = 40;
+pub(super) const FIFO_PRIORITY: i32 = 40;
 /// Longer sleeps are cut into these, so that a thread told to stop does.
 const SLEEP_MAX: Duration = Duration::from_millis(50);
 /// How many classes [`SyncStatistics::histogram`] has.
@@ -199,7 +199,7 @@ impl Shared {
 }
 
 /// CLOCK_MONOTONIC.
-fn monotonic() -> Duration {
+pub(super) fn monotonic() -> Duration {
     clock_gettime(ClockId::CLOCK_MONOTONIC)
         .map(Duration::from)
         .expect("CLOCK_MONOTONIC exists on every Linux")

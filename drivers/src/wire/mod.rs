@@ -8,6 +8,7 @@ pub mod can;
 pub mod candump;
 pub mod canopen;
 pub mod cia402;
+pub mod cia404;
 pub mod copley;
 pub mod dcon;
 pub mod in_sight;

@@ -110,6 +110,8 @@ pub enum Fault {
         code: u16,
         register: u8,
     },
+    /// A CANopen device repeats its last process data for ever.
+    StaleData { node: String },
     /// The device loses its power, and boots when the fault ends.
     PowerLoss { node: String },
     /// The host's controller goes error-passive.
@@ -138,6 +140,17 @@ pub enum Fault {
     BeamBlocked,
     /// Too little of the beam comes back.
     BeamWeak,
+    /// The reference beam along an axis is interrupted: before its slide both detectors are
+    /// dark, behind it the one at the end.
+    ReferenceBeamBlocked {
+        axis: usize,
+        #[serde(default)]
+        behind_slide: bool,
+    },
+    /// The reference beam along an axis is twice as bright: its detectors saturate.
+    ReferenceBeamBright { axis: usize },
+    /// Somebody has knocked the source of a reference beam aside.
+    ReferenceBeamKnocked { axis: usize, by_um: f64 },
     /// The fringe counter slips.
     FringeJump { half_wavelengths: i64 },
     /// The cameras' marks are not there.
@@ -214,6 +227,7 @@ impl Fault {
             Self::Mute { node }
             | Self::StopHeartbeat { node }
             | Self::StopPdos { node }
+            | Self::StaleData { node }
             | Self::PowerLoss { node } => Some(node),
             _ => None,
         }
@@ -263,6 +277,7 @@ impl Fault {
                 | Self::Corrupt { .. }
                 | Self::Delay { .. }
                 | Self::Mute { .. }
+                | Self::StaleData { .. }
                 | Self::StopHeartbeat { .. }
                 | Self::StopPdos { .. }
                 | Self::Garbage { .. }

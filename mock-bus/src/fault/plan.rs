@@ -46,6 +46,8 @@ struct Planned {
     phase: Phase,
     next_frame: Time,
     delivered: u64,
+    /// What a device that repeats itself says, per identifier.
+    last_words: Vec<CanFrame>,
     stream: Stream,
 }
 
@@ -102,6 +104,7 @@ impl Plan {
             phase: Phase::Waiting,
             next_frame: Time::NEVER,
             delivered: 0,
+            last_words: Vec::new(),
             stream: Stream::new(self.seed, &format!("fault {}", id.0)),
             config,
         });
@@ -240,7 +243,21 @@ impl Planned {
         Edge::Sends(port.to_owned(), frame)
     }
 
+    /// The first frame of each identifier passes; after it every one is the same.
+    fn repeat(&mut self, fate: &mut FrameFate) {
+        let known = self.last_words.iter();
+        let known = known.copied().find(|known| known.id() == fate.frame.id());
+        match known {
+            Some(known) if self.strikes() => fate.frame = known,
+            Some(_) => {}
+            None => self.last_words.push(fate.frame),
+        }
+    }
+
     fn tamper(&mut self, fate: &mut FrameFate) {
+        if let Fault::StaleData { .. } = self.config.fault {
+            return self.repeat(fate);
+        }
         if !self.strikes() {
             return;
         }
@@ -320,7 +337,7 @@ fn concerns(fault: &Fault, port: &str, node: Option<&str>, frame: &CanFrame) -> 
         Fault::StopHeartbeat { node: of } => {
             Some(of.as_str()) == node && id.is_some_and(|id| (0x701..=0x77F).contains(&id))
         }
-        Fault::StopPdos { node: of } => {
+        Fault::StopPdos { node: of } | Fault::StaleData { node: of } => {
             Some(of.as_str()) == node && id.is_some_and(|id| (0x181..=0x57F).contains(&id))
         }
         _ => false,

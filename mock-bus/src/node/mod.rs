@@ -5,6 +5,7 @@
 pub mod canopen_server;
 pub mod cia401_analog;
 pub mod cia402_drive;
+pub mod cia404_analog;
 pub mod copley_amp;
 pub mod dcon_module;
 pub mod in_sight_controller;

@@ -1,4 +1,5 @@
-//! The analog inputs: which sensor is wired where, noise, and broken wires.
+//! The analog inputs: noise, rails, and broken wires. What is said of volts holds for the degrees
+//! of a temperature sensor's input too.
 
 use crate::random::Stream;
 
@@ -22,22 +23,25 @@ const OPEN_V: f64 = 0.0137;
 pub(super) struct Input {
     pub(super) fault: Option<InputFault>,
     noise_v: f64,
+    rail_v: f64,
     last_v: f64,
     stream: Stream,
 }
 
 impl Input {
-    pub(super) fn new(noise_v: f64, seed: u64, channel: usize) -> Self {
+    pub(super) fn new(noise_v: f64, rail_v: f64, seed: u64, channel: usize) -> Self {
         Self {
             fault: None,
             noise_v,
+            rail_v,
             last_v: 0.0,
             stream: Stream::new(seed, &format!("analog input {channel}")),
         }
     }
 
     /// The reading of a sensor at `sensor_v`, within the rails.
-    pub(super) fn read(&mut self, sensor_v: f64, rail_v: f64) -> f64 {
+    pub(super) fn read(&mut self, sensor_v: f64) -> f64 {
+        let rail_v = self.rail_v;
         let seen_v = match self.fault {
             Some(InputFault::Stuck) => return self.last_v,
             Some(InputFault::Rail) => return rail_v,

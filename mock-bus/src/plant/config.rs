@@ -5,6 +5,7 @@ use serde::Deserialize;
 use super::camera::CameraConfig;
 use super::platform::config::PlatformConfig;
 use super::table::config::TableConfig;
+use super::volumetric::config::VolumetricConfig;
 
 /// The physics of one machine.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -16,6 +17,8 @@ pub struct PlantConfig {
     pub platform: Option<PlatformConfig>,
     /// A rotary table in place of the stage.
     pub table: Option<TableConfig>,
+    /// Three linear axes in place of the stage.
+    pub volumetric: Option<VolumetricConfig>,
     /// The cameras over the platform.
     pub camera: CameraConfig,
     /// The magnets and sensors of the absolute zero.
@@ -29,9 +32,10 @@ pub struct PlantConfig {
 impl PlantConfig {
     /// Travel of one encoder count of the machine's axes.
     pub fn resolution_nm(&self) -> f64 {
-        match &self.platform {
-            Some(platform) => platform.screw.resolution_nm,
-            None => self.stage.encoder.resolution_nm,
+        match (&self.platform, &self.volumetric) {
+            (Some(platform), _) => platform.screw.resolution_nm,
+            (None, Some(volumetric)) => volumetric.resolution_nm,
+            (None, None) => self.stage.encoder.resolution_nm,
         }
     }
 }

@@ -11,6 +11,7 @@ use super::drive_train::DriveTrain;
 use super::platform::Platform;
 use super::stage::Stage;
 use super::table::Table;
+use super::volumetric::Volumetric;
 
 /// One driven direction as its drive is wired to it.
 pub(super) trait Actuator {
@@ -92,14 +93,21 @@ pub(super) enum Machine {
     Platform(Box<Platform>),
     /// A rotary table.
     Table(Box<Table>),
+    /// Three linear axes.
+    Volumetric(Box<Volumetric>),
 }
 
 impl Machine {
     pub(super) fn new(config: &PlantConfig, seed: u64) -> Self {
-        match (&config.platform, &config.table) {
-            (Some(platform), _) => Self::Platform(Box::new(Platform::new(platform, seed))),
-            (None, Some(table)) => Self::Table(Box::new(Table::new(table, seed))),
-            (None, None) => Self::Stage(Box::new(Stage::new(config.stage.clone(), seed))),
+        if let Some(platform) = &config.platform {
+            Self::Platform(Box::new(Platform::new(platform, seed)))
+        } else if let Some(table) = &config.table {
+            Self::Table(Box::new(Table::new(table, seed)))
+        } else if let Some(volumetric) = &config.volumetric {
+            let dead_path_m = config.interferometer.dead_path_mm * 1e-3;
+            Self::Volumetric(Box::new(Volumetric::new(volumetric, dead_path_m, seed)))
+        } else {
+            Self::Stage(Box::new(Stage::new(config.stage.clone(), seed)))
         }
     }
 
@@ -108,6 +116,7 @@ impl Machine {
             Self::Stage(stage) => stage.advance(now),
             Self::Platform(platform) => platform.advance(now),
             Self::Table(table) => table.advance(now),
+            Self::Volumetric(volumetric) => volumetric.advance(now),
         }
     }
 
@@ -116,6 +125,7 @@ impl Machine {
             Self::Stage(stage) => (number == 0).then_some(&**stage as &dyn Actuator),
             Self::Platform(platform) => platform.actuator(number),
             Self::Table(table) => (number == 0).then_some(&**table as &dyn Actuator),
+            Self::Volumetric(volumetric) => volumetric.actuator(number),
         }
     }
 
@@ -124,6 +134,7 @@ impl Machine {
             Self::Stage(stage) => (number == 0).then_some(&mut **stage as &mut dyn Actuator),
             Self::Platform(platform) => platform.actuator_mut(number),
             Self::Table(table) => (number == 0).then_some(&mut **table as &mut dyn Actuator),
+            Self::Volumetric(volumetric) => volumetric.actuator_mut(number),
         }
     }
 
@@ -142,6 +153,7 @@ impl Machine {
             Self::Stage(stage) => stage.push_a_little(),
             Self::Platform(platform) => platform.power_cycle(),
             Self::Table(table) => table.push_a_little(),
+            Self::Volumetric(volumetric) => volumetric.power_cycle(),
         }
     }
 
@@ -149,7 +161,7 @@ impl Machine {
     pub(super) const fn stage(&self) -> Option<&Stage> {
         match self {
             Self::Stage(stage) => Some(stage),
-            Self::Platform(_) | Self::Table(_) => None,
+            Self::Platform(_) | Self::Table(_) | Self::Volumetric(_) => None,
         }
     }
 
@@ -157,7 +169,7 @@ impl Machine {
     pub(super) const fn platform(&self) -> Option<&Platform> {
         match self {
             Self::Platform(platform) => Some(platform),
-            Self::Stage(_) | Self::Table(_) => None,
+            Self::Stage(_) | Self::Table(_) | Self::Volumetric(_) => None,
         }
     }
 
@@ -165,7 +177,7 @@ impl Machine {
     pub(super) const fn table(&self) -> Option<&Table> {
         match self {
             Self::Table(table) => Some(table),
-            Self::Stage(_) | Self::Platform(_) => None,
+            Self::Stage(_) | Self::Platform(_) | Self::Volumetric(_) => None,
         }
     }
 
@@ -173,7 +185,23 @@ impl Machine {
     pub(super) const fn table_mut(&mut self) -> Option<&mut Table> {
         match self {
             Self::Table(table) => Some(table),
-            Self::Stage(_) | Self::Platform(_) => None,
+            Self::Stage(_) | Self::Platform(_) | Self::Volumetric(_) => None,
+        }
+    }
+
+    /// The three axes, where the machine has them.
+    pub(super) const fn volumetric(&self) -> Option<&Volumetric> {
+        match self {
+            Self::Volumetric(volumetric) => Some(volumetric),
+            Self::Stage(_) | Self::Platform(_) | Self::Table(_) => None,
+        }
+    }
+
+    /// The same, to be read and spoilt.
+    pub(super) const fn volumetric_mut(&mut self) -> Option<&mut Volumetric> {
+        match self {
+            Self::Volumetric(volumetric) => Some(volumetric),
+            Self::Stage(_) | Self::Platform(_) | Self::Table(_) => None,
         }
     }
 }

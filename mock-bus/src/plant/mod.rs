@@ -21,11 +21,12 @@ mod stage;
 pub mod table;
 mod thermal;
 mod truth;
+pub mod volumetric;
 
 #[cfg(test)]
 mod tests;
 
-use units::{Metres, Radians, Time};
+use units::{Celsius, Metres, Radians, Time};
 
 pub use analog::InputFault;
 pub use camera::{Mark, Target};
@@ -36,6 +37,7 @@ pub use platform::{PlatformTruth, Pose};
 pub use table::TableTruth;
 pub use thermal::Environment;
 pub use truth::Truth;
+pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 
 use analog::Input;
 use camera::Camera;
@@ -44,9 +46,12 @@ use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
 use machine::{Actuator, Machine};
 use thermal::Climate;
+use volumetric::{BeamTrouble, Signal, TERMINALS};
 
-/// Inputs 0 and 1 are the Hall sensors; the others are spare.
+/// Inputs 0 and 1 are the Hall sensors; the others are spare. Three axes have their own.
 const ANALOG_INPUTS: usize = 8;
+/// What a resistance thermometer's input can show.
+const TEMPERATURE_RAIL_C: f64 = 850.0;
 
 /// How a servo drive acts on its axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +71,6 @@ pub enum Servo {
 #[derive(Clone, Debug)]
 pub struct Plant {
     now: Time,
-    rail_v: f64,
     machine: Machine,
     hall: HallField,
     inputs: Vec<Input>,
@@ -85,15 +89,11 @@ impl Default for Plant {
 impl Plant {
     /// A machine as configured, with the errors and the noise of `seed`.
     pub fn new(config: &PlantConfig, seed: u64) -> Self {
-        let noise_v = config.hall.noise_mv * 1e-3;
         Self {
             now: Time::ZERO,
-            rail_v: config.hall.rail_v,
             machine: Machine::new(config, seed),
             hall: HallField::new(config.hall.clone()),
-            inputs: (0..ANALOG_INPUTS)
-                .map(|channel| Input::new(noise_v, seed, channel))
-                .collect(),
+            inputs: inputs(config, seed),
             inputs_swapped: false,
             climate: Climate::new(config.climate.clone(), seed),
             interferometer: Interferometer::new(config.interferometer.clone(), seed),
@@ -153,17 +153,41 @@ impl Plant {
         self.machine.actuator(axis).map_or_else(T::default, what)
     }
 
-    /// The voltage at analog input `channel` now, noise included.
+    /// The voltage at analog input `channel` now, noise included; a temperature sensor gives
+    /// none.
     pub fn analog_volts(&mut self, channel: usize) -> f64 {
-        let wired = match (channel, self.inputs_swapped) {
-            (0, false) | (1, true) => Some(Sensor::Even),
-            (1, false) | (0, true) => Some(Sensor::Odd),
-            _ => None,
+        let sensor_v = match self.signal(channel) {
+            Some(Signal::Voltage(volts)) => volts,
+            Some(Signal::Temperature(_)) | None => 0.0,
         };
-        let sensor_v = wired.map_or(0.0, |sensor| self.hall.volts(sensor, self.true_position()));
-        self.inputs
-            .get_mut(channel)
-            .map_or(0.0, |input| input.read(sensor_v, self.rail_v))
+        let input = self.inputs.get_mut(channel);
+        input.map_or(0.0, |input| input.read(sensor_v))
+    }
+
+    /// The temperature that the sensor at analog input `channel` shows now, noise included;
+    /// `None` where none is wired to it, or the wire is open.
+    pub fn analog_temperature(&mut self, channel: usize) -> Option<Celsius> {
+        let Some(Signal::Temperature(celsius)) = self.signal(channel) else {
+            return None;
+        };
+        let input = self.inputs.get_mut(channel)?;
+        let open = input.fault == Some(InputFault::Open);
+        (!open).then(|| Celsius(input.read(celsius)))
+    }
+
+    /// What is wired to analog input `channel`.
+    fn signal(&mut self, channel: usize) -> Option<Signal> {
+        if let Some(volumetric) = self.machine.volumetric_mut() {
+            return volumetric.signal(channel, self.now);
+        }
+        let sensor = match (channel, self.inputs_swapped) {
+            (0, false) | (1, true) => Sensor::Even,
+            (1, false) | (0, true) => Sensor::Odd,
+            _ => return None,
+        };
+        Some(Signal::Voltage(
+            self.hall.volts(sensor, self.true_position()),
+        ))
     }
 
     /// The encoder of `axis` loses or gets power: its count starts again from 0.
@@ -180,16 +204,36 @@ impl Plant {
 
     /// The interferometer's signal now, noise included.
     pub fn fringes(&mut self) -> Fringes {
-        let air = self.climate.at(self.now);
-        let position_m = self.true_position().value();
-        let stage = self.machine.stage();
-        let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
-        self.interferometer.fringes(position_m, speed, &air)
+        let air = self.environment();
+        let seen = match self.machine.volumetric() {
+            Some(volumetric) => volumetric.sighting(self.now),
+            None => {
+                let position_m = self.true_position().value();
+                let stage = self.machine.stage();
+                let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
+                Some(self.interferometer.reflector(position_m, speed))
+            }
+        };
+        self.interferometer.fringes(seen, &air)
     }
 
     /// What the interferometer's own sensors say about air and stage now.
     pub fn sensed_environment(&self) -> Environment {
-        self.interferometer.sensed(self.climate.at(self.now))
+        self.interferometer.sensed(self.environment())
+    }
+
+    /// Air and machine. Three axes have their own warmth, in the air that makes it.
+    fn environment(&self) -> Environment {
+        let climate = self.climate.at(self.now);
+        let Some(volumetric) = self.machine.volumetric() else {
+            return climate;
+        };
+        let (air_c, machine_c) = volumetric.temperatures_c(self.now);
+        Environment {
+            air_temperature: Celsius(air_c),
+            stage_temperature: Celsius(machine_c),
+            ..climate
+        }
     }
 
     /// The cameras over the platform begin to take their pictures.
@@ -229,6 +273,22 @@ impl Plant {
     pub fn turn_plate(&mut self, lines: f64) {
         if let Some(table) = self.machine.table_mut() {
             table.turn_plate(lines);
+        }
+    }
+
+    /// Somebody mounts a target on the tool of three axes and sets a laser up along a line that
+    /// begins where the machine stands, a little off as ever.
+    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
+        let now = self.now;
+        if let Some(volumetric) = self.machine.volumetric_mut() {
+            volumetric.set_up_line(set_up, now);
+        }
+    }
+
+    /// Somebody takes laser and target away again.
+    pub fn take_line_away(&mut self) {
+        if let Some(volumetric) = self.machine.volumetric_mut() {
+            volumetric.take_line_away();
         }
     }
 
@@ -291,6 +351,14 @@ impl Plant {
         self.inputs_swapped = swapped;
     }
 
+    /// What goes wrong with the reference beam along `axis`, or is mended.
+    pub(crate) fn trouble_beam(&mut self, axis: usize, change: impl FnOnce(&mut BeamTrouble)) {
+        let volumetric = self.machine.volumetric_mut();
+        if let Some(trouble) = volumetric.and_then(|it| it.trouble_mut(axis)) {
+            change(trouble);
+        }
+    }
+
     /// What becomes of the interferometer's beam.
     pub fn set_beam(&mut self, beam: Beam) {
         self.interferometer.beam = beam;
@@ -321,4 +389,22 @@ impl Plant {
     pub const fn truth(&self) -> Truth<'_> {
         Truth::new(self)
     }
+}
+
+/// The channels' own noise and rails.
+fn inputs(config: &PlantConfig, seed: u64) -> Vec<Input> {
+    let Some(volumetric) = &config.volumetric else {
+        let noise_v = config.hall.noise_mv * 1e-3;
+        let hall = |channel| Input::new(noise_v, config.hall.rail_v, seed, channel);
+        return (0..ANALOG_INPUTS).map(hall).collect();
+    };
+    let (beams, noise_k) = (&volumetric.beams, volumetric.temperatures.noise_k);
+    let input = |channel| {
+        if volumetric::is_temperature(channel) {
+            Input::new(noise_k, TEMPERATURE_RAIL_C, seed, channel)
+        } else {
+            Input::new(beams.noise_mv * 1e-3, beams.rail_v, seed, channel)
+        }
+    };
+    (0..TERMINALS).map(input).collect()
 }

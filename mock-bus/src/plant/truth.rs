@@ -3,7 +3,7 @@
 use units::{Approach, Celsius, Metres};
 
 use super::stage::Stage;
-use super::{Environment, Plant, PlatformTruth, TableTruth};
+use super::{Environment, Plant, PlatformTruth, TableTruth, VolumetricTruth};
 
 /// A look at the truth behind all sensors.
 ///
@@ -67,6 +67,13 @@ impl<'a> Truth<'a> {
         Some(TableTruth::new(table, plant.now))
     }
 
+    /// The three axes, where the machine has them.
+    pub fn volumetric(&self) -> Option<VolumetricTruth<'a>> {
+        let plant: &'a Plant = self.plant;
+        let volumetric = plant.machine.volumetric()?;
+        Some(VolumetricTruth::new(volumetric, plant.now))
+    }
+
     fn stage(&self) -> &Stage {
         let stage = self.plant.machine.stage();
         stage.expect("the judged machine has a linear stage")
@@ -74,7 +81,7 @@ impl<'a> Truth<'a> {
 
     /// Air and machine as they are.
     pub fn environment(&self) -> Environment {
-        self.plant.climate.at(self.plant.now)
+        self.plant.environment()
     }
 
     /// Path in air between optic and reflector when the stage is at its true origin.

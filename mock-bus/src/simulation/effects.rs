@@ -67,6 +67,19 @@ impl Simulation {
             } => plant.force_limit_switch(axis, positive, on.then_some(pressed)),
             Fault::BeamBlocked => plant.set_beam(if on { Beam::Blocked } else { Beam::Good }),
             Fault::BeamWeak => plant.set_beam(if on { Beam::Weak } else { Beam::Good }),
+            Fault::ReferenceBeamBlocked { axis, behind_slide } => {
+                plant.trouble_beam(axis, |beam| match behind_slide {
+                    true => beam.behind_slide = on,
+                    false => beam.before_slide = on,
+                });
+            }
+            Fault::ReferenceBeamBright { axis } => {
+                plant.trouble_beam(axis, |beam| beam.bright = on);
+            }
+            Fault::ReferenceBeamKnocked { axis, by_um } => {
+                let by_m = if on { by_um * 1e-6 } else { 0.0 };
+                plant.trouble_beam(axis, |beam| beam.knocked_m = by_m);
+            }
             Fault::TargetAbsent => plant.set_target(if on { Target::Absent } else { Target::Good }),
             Fault::TargetCovered => {
                 plant.set_target(if on { Target::Covered } else { Target::Good });

@@ -9,3 +9,7 @@ mod repeatable;
 mod rotary;
 mod rotary_table;
 mod serial_zero;
+mod volumetric;
+mod volumetric_day;
+mod volumetric_kept;
+mod volumetric_line;

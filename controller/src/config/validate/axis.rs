@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::judge::{Finding, Judge};
 use super::{check_heartbeat, check_watch};
-use crate::config::model::{AxisConfig, AxisDevice, MachineConfig};
+use crate::config::model::{AxisConfig, AxisDevice, CyclicConfig, MachineConfig};
 
 /// The rates that both amplifiers and serial ports have.
 const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
@@ -67,7 +67,7 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
 }
 
 /// Keys that only drives on CAN have, and whether each is there; the first ones are needed.
-fn can_keys(axis: &AxisConfig) -> [(&'static str, bool); 10] {
+fn can_keys(axis: &AxisConfig) -> [(&'static str, bool); 11] {
     [
         ("bus", axis.bus.is_some()),
         ("node_id", axis.node_id.is_some()),
@@ -88,6 +88,7 @@ fn can_keys(axis: &AxisConfig) -> [(&'static str, bool); 10] {
         ("home_offset", axis.home_offset.is_some()),
         ("option_codes", axis.option_codes.is_some()),
         ("synchronous_start", axis.synchronous_start.is_some()),
+        ("cyclic", axis.cyclic.is_some()),
     ]
 }
 
@@ -133,8 +134,40 @@ fn check_strangers(judge: &mut Judge<'_>, axis: &AxisConfig) {
     }
 }
 
+fn check_cyclic(judge: &mut Judge<'_>, axis: &AxisConfig, cyclic: &CyclicConfig) {
+    judge.within("cyclic.jerk_mm_per_s3", cyclic.jerk_mm_per_s3, 1.0, 1e9);
+    judge.within(
+        "cyclic.deviation_limit_um",
+        cyclic.deviation_limit_um,
+        1e-2,
+        1e5,
+    );
+    judge.within(
+        "cyclic.correction_limit_um",
+        cyclic.correction_limit_um,
+        0.0,
+        1e4,
+    );
+    judge.within(
+        "cyclic.correction_rate_um_per_s",
+        cyclic.correction_rate_um_per_s,
+        0.0,
+        1e6,
+    );
+    if axis.synchronous_start != Some(true) {
+        judge.say(
+            "synchronous_start",
+            "is not true, but the axis follows cyclic set-points",
+            "set `synchronous_start = true`: all axes must take their set-points at one SYNC",
+        );
+    }
+}
+
 fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
     check_needed(judge, "cia402", &can_keys(axis)[..CAN_KEYS_NEEDED]);
+    if let Some(cyclic) = &axis.cyclic {
+        check_cyclic(judge, axis, cyclic);
+    }
     if let Some(bus) = &axis.bus {
         judge.known("bus", bus, &config.can, "CAN bus");
     }

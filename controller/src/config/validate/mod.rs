@@ -1,14 +1,18 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
+mod analog;
 mod axis;
 mod camera;
 mod cycle;
+mod detectors;
 mod judge;
 mod platform;
 mod rotary;
+mod volumetric;
 
 use std::collections::BTreeMap;
 
+use self::analog::check_analog;
 use self::axis::{check_axis, check_axis_name, check_lines};
 use self::camera::check_cameras;
 use self::cycle::check_cycle;
@@ -17,10 +21,7 @@ use self::judge::Judge;
 use self::rotary::check_rotaries;
 use drivers::protocol::bus_load::BusLoadError;
 
-use super::model::{
-    AnalogConfig, AnalogDevice, CanBus, CanTransport, InstrumentConfig, MachineConfig,
-};
-use crate::assemble;
+use super::model::{CanBus, CanTransport, InstrumentConfig, MachineConfig};
 use crate::bus_plan;
 
 /// The version of the file format this program reads.
@@ -74,6 +75,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     }
     check_cameras(config, &mut findings);
     platform::check(config, &mut findings);
+    volumetric::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
@@ -171,129 +173,6 @@ fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_m
     }
 }
 
-fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {
-    let mut seen = analog.channels.clone();
-    seen.sort_unstable();
-    seen.dedup();
-    if seen.len() != analog.channels.len() || seen.is_empty() {
-        judge.say(
-            "channels",
-            "is empty or names a channel twice",
-            "list each used channel once",
-        );
-    }
-    if analog.full_scale_v.len() != analog.channels.len() {
-        judge.say(
-            "full_scale_v",
-            "must have one value per channel",
-            "list as many as `channels`",
-        );
-    }
-    match analog.device {
-        AnalogDevice::Cia401 => check_cia401(judge, config, analog),
-        AnalogDevice::Dcon => check_dcon(judge, config, analog),
-    }
-    check_strangers(judge, analog);
-}
-
-/// A key of another kind of module would be believed to do something.
-fn check_strangers(judge: &mut Judge<'_>, analog: &AnalogConfig) {
-    let can = [
-        ("bus", analog.bus.is_some()),
-        ("node_id", analog.node_id.is_some()),
-        (
-            "heartbeat_producer_ms",
-            analog.heartbeat_producer_ms.is_some(),
-        ),
-        (
-            "heartbeat_consumer_ms",
-            analog.heartbeat_consumer_ms.is_some(),
-        ),
-        ("watch_master_ms", analog.watch_master_ms.is_some()),
-        ("identity", analog.identity.is_some()),
-    ];
-    let line = [
-        ("line", analog.line.is_some()),
-        ("address", analog.address.is_some()),
-        ("checksum", analog.checksum),
-        ("poll_period_ms", analog.poll_period_ms.is_some()),
-    ];
-    let (name, strangers) = match analog.device {
-        AnalogDevice::Cia401 => ("cia401", line.as_slice()),
-        AnalogDevice::Dcon => ("dcon", can.as_slice()),
-    };
-    for (key, _) in strangers.iter().filter(|(_, is_there)| *is_there) {
-        judge.say(key, format!("a {name} module has no such key"), "remove it");
-    }
-}
-
-fn check_cia401(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {
-    match (&analog.bus, analog.node_id) {
-        (Some(bus), Some(node_id)) => {
-            judge.known("bus", bus, &config.can, "CAN bus");
-            judge.within("node_id", node_id.into(), 1.0, 127.0);
-        }
-        _ => judge.say(
-            "device",
-            "a cia401 module needs `bus` and `node_id`",
-            "add them",
-        ),
-    }
-    if analog.channels.iter().any(|channel| *channel >= 4) {
-        judge.say(
-            "channels",
-            "one process data object carries channels 0 to 3",
-            "use those",
-        );
-    }
-    for value in &analog.full_scale_v {
-        judge.within("full_scale_v", *value, 1e-3, 1e3);
-    }
-    match (analog.heartbeat_producer_ms, analog.heartbeat_consumer_ms, analog.watch_master_ms) {
-        (Some(producer), Some(consumer), Some(watch)) => {
-            check_heartbeat(judge, producer, consumer);
-            check_watch(judge, config, analog.bus.as_deref().unwrap_or(""), watch);
-        }
-        _ => judge.say(
-            "device",
-            "a cia401 module needs `heartbeat_producer_ms`, `heartbeat_consumer_ms`, `watch_master_ms`",
-            "add them",
-        ),
-    }
-    if analog.identity.is_none() {
-        judge.say(
-            "device",
-            "a cia401 module needs an `identity` section",
-            "add it",
-        );
-    }
-}
-
-fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig) {
-    match (&analog.line, analog.address) {
-        (Some(line), Some(_)) => judge.known("line", line, &config.serial, "serial line"),
-        _ => judge.say(
-            "device",
-            "a dcon module needs `line` and `address`",
-            "add them",
-        ),
-    }
-    if analog.channels.iter().any(|channel| *channel >= 8) {
-        judge.say("channels", "a dcon module has channels 0 to 7", "use those");
-    }
-    if assemble::dcon_range(&analog.full_scale_v).is_none() {
-        judge.say(
-            "full_scale_v",
-            "a dcon module has one input range for all channels",
-            "give each channel the same: 10.0, 5.0, 1.0, 0.5 or 0.15",
-        );
-    }
-    match analog.poll_period_ms {
-        Some(period) => judge.within("poll_period_ms", period, 1.0, 60_000.0),
-        None => judge.say("device", "a dcon module needs `poll_period_ms`", "add it"),
-    }
-}
-
 fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &InstrumentConfig) {
     judge.known("line", &instrument.line, &config.serial, "serial line");
     judge.within("optics_factor", instrument.optics_factor.into(), 1.0, 16.0);
@@ -319,6 +198,22 @@ fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &
     );
     let uncertainty = instrument.instrument_standard_uncertainty_nm;
     judge.within("instrument_standard_uncertainty_nm", uncertainty, 0.0, 1e6);
+    for (key, value, high) in [
+        (
+            "optics.straightness_factor",
+            instrument.optics.straightness_factor,
+            1e4,
+        ),
+        (
+            "optics.angular_separation_mm",
+            instrument.optics.angular_separation_mm,
+            1e3,
+        ),
+    ] {
+        if let Some(value) = value {
+            judge.within(key, value, 1.0, high);
+        }
+    }
 }
 
 /// Node ids by bus: the master's, the drives', the modules'.

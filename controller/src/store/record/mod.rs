@@ -8,6 +8,7 @@
 mod linear;
 mod rotary;
 mod screw;
+mod volumetric;
 
 use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,10 @@ use super::{StoreError, short};
 pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
 pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
+pub use volumetric::{
+    BeamRecord, BeamReferencesContent, BendRecord, ExpansionRecord, FunctionRecord, FunctionShape,
+    GeometryContent, MemoryName, MemoryRecord, StateMemoryContent,
+};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
@@ -73,6 +78,12 @@ pub enum Content {
     RotaryErrorTable(RotaryContent),
     /// Lead error, periodic error and lost motion of a ball screw.
     ScrewModel(ScrewContent),
+    /// The 21 errors of three axes.
+    VolumetricGeometry(GeometryContent),
+    /// What the detectors of three axes read when their errors were measured.
+    BeamReferences(BeamReferencesContent),
+    /// Displacements of three axes that are to be kept.
+    StateMemory(StateMemoryContent),
 }
 
 impl Content {
@@ -82,6 +93,9 @@ impl Content {
             Self::LinearErrorTable(_) => LinearContent::KIND,
             Self::RotaryErrorTable(_) => RotaryContent::KIND,
             Self::ScrewModel(_) => ScrewContent::KIND,
+            Self::VolumetricGeometry(_) => GeometryContent::KIND,
+            Self::BeamReferences(_) => BeamReferencesContent::KIND,
+            Self::StateMemory(_) => StateMemoryContent::KIND,
         }
     }
 
@@ -91,6 +105,9 @@ impl Content {
             Self::LinearErrorTable(it) => format!("{} nodes", it.nodes.len()),
             Self::RotaryErrorTable(it) => it.summary(),
             Self::ScrewModel(it) => it.summary(),
+            Self::VolumetricGeometry(it) => it.summary(),
+            Self::BeamReferences(it) => it.summary(),
+            Self::StateMemory(it) => it.summary(),
         }
     }
 }

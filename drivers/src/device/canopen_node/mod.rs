@@ -83,6 +83,8 @@ enum Phase {
 pub(super) struct CanopenNode {
     settings: NodeSettings,
     profile: u16,
+    /// The TPDO that carries the sample that the device lives by.
+    life_pdo: u8,
     client: SdoClient,
     twins: twins::Twins,
     consumer: HeartbeatConsumer,
@@ -108,6 +110,7 @@ impl CanopenNode {
             twins: twins::Twins::new(settings.node),
             settings,
             profile,
+            life_pdo: 1,
             phase: Phase::Off,
             description: Vec::new(),
             script: None,
@@ -120,6 +123,13 @@ impl CanopenNode {
             heartbeats_lost: 0,
             boot_ups: 0,
         }
+    }
+
+    /// The device lives by another TPDO than the first.
+    #[must_use]
+    pub(super) const fn living_by(mut self, number: u8) -> Self {
+        self.life_pdo = number;
+        self
     }
 
     pub(super) const fn id(&self) -> NodeId {
@@ -288,8 +298,7 @@ impl CanopenNode {
                 self.take_emergency(emergency);
             }
         } else if let Some(number) = self.pdo_number(frame) {
-            // TPDO 1 carries the sample that the device lives by.
-            if number == 1 {
+            if number == self.life_pdo {
                 self.last_pdo = now;
                 self.pdo_silent = false;
                 self.take_pdo_of_twin();

@@ -182,22 +182,26 @@ impl Cia401Analog {
         }
         self.told_short = false;
         let rail = self.settings.upper_rail();
-        let raws: Vec<i16> = (0..self.settings.channels.len())
-            .filter_map(|channel| extract(payload, channel * 16, 16))
-            .map(|raw| (raw as u16).cast_signed())
-            .collect();
-        self.reading = Some(AnalogReading {
+        let channels = &self.settings.channels;
+        // The last sample's memory serves again: a cyclic loop asks for none.
+        let mut reading = self.reading.take().unwrap_or_else(|| AnalogReading {
             at: now,
-            volts: raws
-                .iter()
-                .zip(&self.settings.channels)
-                .map(|(raw, channel)| channel.full_scale * (f64::from(*raw) / FULL_SCALE))
-                .collect(),
-            saturated: raws
-                .iter()
-                .map(|raw| *raw >= rail || *raw == i16::MIN)
-                .collect(),
+            volts: Vec::with_capacity(channels.len()),
+            saturated: Vec::with_capacity(channels.len()),
         });
+        reading.at = now;
+        reading.volts.clear();
+        reading.saturated.clear();
+        for (at, channel) in channels.iter().enumerate() {
+            let Some(raw) = extract(payload, at * 16, 16) else {
+                break;
+            };
+            let raw = (raw as u16).cast_signed();
+            let volts = channel.full_scale * (f64::from(raw) / FULL_SCALE);
+            reading.volts.push(volts);
+            reading.saturated.push(raw >= rail || raw == i16::MIN);
+        }
+        self.reading = Some(reading);
     }
 }
 

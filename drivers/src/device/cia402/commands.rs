@@ -4,7 +4,7 @@ use units::{Coordinate, Time};
 
 use super::homing::HomingPlace;
 use super::{Activity, Cia402Drive};
-use crate::device::{Axis, AxisCommand, AxisReading, DriveCommand, ServoDrive};
+use crate::device::{Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, ServoDrive};
 use crate::wire::cia402::{OperationMode, PowerState, Statusword};
 
 impl<Q: Coordinate> Cia402Drive<Q> {
@@ -32,6 +32,8 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
             // A drive that is not enabled does not move: nothing is left to do.
             DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
             DriveCommand::Halt => self.begin_halt(now),
+            DriveCommand::EnterCyclic { period } => self.begin_cyclic(now, period),
+            DriveCommand::LeaveCyclic => self.end_cyclic(now),
         }
     }
 
@@ -91,9 +93,22 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
         }
     }
 
+    fn follow(&mut self, now: Time, set_point: Q) -> Result<(), DeviceError> {
+        self.send_set_point(now, set_point)
+    }
+
+    fn held(&self) -> Option<Q> {
+        self.held_set_point()
+    }
+
     fn reading(&self) -> Option<AxisReading<Q>> {
         let sample = self.image.sample()?;
         let scale = self.settings.scale;
+        // In the cyclic mode bit 10 says nothing: the axis stands when it stands.
+        let reached = match sample.mode {
+            OperationMode::CyclicSynchronousPosition => self.image.stands(),
+            _ => sample.status.contains(Statusword::TARGET_REACHED),
+        };
         let pending = sample.mode == OperationMode::ProfilePosition
             && sample.status.contains(Statusword::MODE_12);
         Some(AxisReading {
@@ -104,9 +119,10 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
                 .image
                 .following_error()
                 .map(|counts| scale.to_coordinate(counts)),
-            standing: sample.status.contains(Statusword::TARGET_REACHED)
+            standing: reached
                 && !pending
                 && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
+            at_rest: self.image.stands(),
         })
     }
 }

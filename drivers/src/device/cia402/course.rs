@@ -26,7 +26,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             | Activity::Starting
             | Activity::Power(_)
             | Activity::Halt(_)
-            | Activity::Latch(_) => {
+            | Activity::Latch(_)
+            | Activity::Mode(_) => {
                 self.course = None;
                 return;
             }

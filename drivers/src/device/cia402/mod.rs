@@ -14,11 +14,12 @@
 //! and a controlword that seems to be without effect is sent again. All levels, no edge but the
 //! fault reset's: a repetition is harmless.
 //!
-//! Absent: cyclic synchronous modes, interpolated position, the second touch probe, torque.
+//! Absent: cyclic synchronous velocity and torque, interpolated position, the second touch probe.
 
 mod commands;
 mod convert;
 mod course;
+mod cyclic;
 mod homing;
 mod image;
 mod latch;
@@ -29,6 +30,8 @@ mod settings;
 mod start;
 mod supervision;
 
+#[cfg(test)]
+mod cyclic_tests;
 #[cfg(test)]
 mod rotary_tests;
 #[cfg(test)]
@@ -51,6 +54,7 @@ use crate::wire::Payload;
 use crate::wire::can::CanFrame;
 use crate::wire::canopen::Function;
 use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
+use cyclic::ModeChange;
 use homing::Homing;
 use image::{Image, Sample};
 use latch::{LatchChange, Probe};
@@ -70,6 +74,7 @@ enum Activity {
     Halt(Halt),
     Homing(Homing),
     Latch(LatchChange),
+    Mode(ModeChange),
 }
 
 impl Activity {
@@ -82,6 +87,7 @@ impl Activity {
             Self::Halt(_) => "the halt",
             Self::Homing(_) => "homing",
             Self::Latch(_) => "setting the touch probe",
+            Self::Mode(_) => "the change of mode",
         }
     }
 }
@@ -101,6 +107,8 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     lowered_at: Time,
     /// The mode that was written last, as far as that is certain.
     commanded_mode: Option<OperationMode>,
+    /// 0x6502, where the drive has it.
+    supported_modes: Option<u32>,
     /// Velocity and acceleration that the drive confirmed.
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
@@ -148,6 +156,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             repeat_at: Time::NEVER,
             lowered_at: Time::ZERO,
             commanded_mode: None,
+            supported_modes: None,
             profile: None,
             reached: None,
             prepared: None,
@@ -241,7 +250,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             // has nothing left to stop.
             (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
             (Activity::Power(_) | Activity::Halt(_), _) => false,
-            (Activity::Move(_) | Activity::Homing(_) | Activity::Latch(_), _) => true,
+            (
+                Activity::Move(_) | Activity::Homing(_) | Activity::Latch(_) | Activity::Mode(_),
+                _,
+            ) => true,
         };
         if ends_it {
             let step = self.activity.name();
@@ -275,6 +287,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     fn take_description(&mut self, now: Time, script: &Script) {
         self.probe.counts_edges = latch::counts_edges(&self.settings, script);
+        self.supported_modes = start::supported_modes(script);
         let steps = start::check_description(&self.settings, script)
             .and_then(|()| start::configuration(&self.settings, self.probe.counts_edges));
         match steps {
@@ -292,6 +305,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Activity::Move(_) => self.move_prepared(now),
             Activity::Homing(_) => self.homing_prepared(now),
             Activity::Latch(_) => self.latch_written(now),
+            Activity::Mode(_) => self.mode_written(now),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -303,7 +317,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.profile = None;
                 self.finish(Err(error));
             }
-            Activity::Latch(_) => self.finish(Err(error)),
+            Activity::Latch(_) | Activity::Mode(_) => self.finish(Err(error)),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -347,6 +361,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Halt(_) => self.halt_timeout(now),
             Activity::Homing(_) => self.homing_timeout(now),
             Activity::Latch(_) => self.latch_timeout(now),
+            Activity::Mode(_) => self.mode_timeout(now),
         }
         self.repeat_control(now);
     }
@@ -359,6 +374,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
             Activity::Halt(halt) => halt.deadline(),
             Activity::Homing(homing) => homing.deadline(),
             Activity::Latch(change) => change.deadline(),
+            Activity::Mode(change) => change.deadline(),
         };
         activity.min(self.repeat_at).min(self.node.poll_timeout())
     }

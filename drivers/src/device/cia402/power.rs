@@ -40,7 +40,8 @@ const fn stops(goal: Goal) -> bool {
 
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time) {
-        if let Some(sample) = self.image.sample() {
+        let follows = self.is_cyclic() && self.state() == Some(PowerState::OperationEnabled);
+        if let Some(sample) = self.image.sample().filter(|_| !follows) {
             // The target in RPDO 1 counts only at an edge, but a true one is the better company.
             self.target = sample.shown;
         }
@@ -84,6 +85,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     pub(super) fn advance_power(&mut self, now: Time) {
         let standing = self.image.stands();
+        self.keep_target_at_axis();
         let (Activity::Power(power), Some(sample)) = (&mut self.activity, self.image.sample())
         else {
             return;

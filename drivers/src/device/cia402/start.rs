@@ -56,6 +56,11 @@ pub(super) fn description<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Vec<St
     steps
 }
 
+/// The modes the drive supports (0x6502), where it says so.
+pub(super) fn supported_modes(script: &Script) -> Option<u32> {
+    script.value(SUPPORTED_MODES)
+}
+
 /// Whether the drive can do what is asked of it, in the units of the configuration.
 pub(super) fn check_description<Q: Coordinate>(
     settings: &Cia402Settings<Q>,

@@ -82,6 +82,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Activity::Move(_) => self.advance_move(now),
             Activity::Halt(_) => self.advance_halt(now),
             Activity::Homing(_) => self.advance_homing(now),
+            Activity::Mode(_) => self.advance_mode(),
         }
     }
 
@@ -139,7 +140,11 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Some(_) => {}
             None => self.told_state = false,
         }
-        let lagging = sample.mode == OperationMode::ProfilePosition
+        let positions = matches!(
+            sample.mode,
+            OperationMode::ProfilePosition | OperationMode::CyclicSynchronousPosition
+        );
+        let lagging = positions
             && seen == PowerState::OperationEnabled
             && sample.status.contains(Statusword::MODE_13);
         self.watch_course(lagging);

@@ -11,13 +11,13 @@ use crate::device::{Axis, AxisCommand, DriveCommand, ServoDrive};
 use crate::wire::canopen::sdo::AbortCode;
 use crate::wire::canopen::{NodeId, Object};
 
-const SYNC_MS: u64 = 2;
+pub(super) const SYNC_MS: u64 = 2;
 const COUNT: Metres = Metres(10e-9);
 
 /// A drive's behaviour over the fake node's objects; moves 200 µm per SYNC at most.
 #[derive(Debug)]
-struct FakeDrive {
-    node: FakeNode,
+pub(super) struct FakeDrive {
+    pub(super) node: FakeNode,
     /// Statusword bits of the power state.
     state: u16,
     target: i64,
@@ -27,7 +27,7 @@ struct FakeDrive {
     homing_samples: u32,
     last_control: u16,
     /// SYNCs until 0x6061 follows 0x6060.
-    mode_lag: u32,
+    pub(super) mode_lag: u32,
     mode_countdown: u32,
     stays_in_quick_stop: bool,
     stuck: bool,
@@ -41,7 +41,7 @@ struct FakeDrive {
     offset_leads_to_zero: bool,
     fault_remains: bool,
     fault_edges: u32,
-    following_error: bool,
+    pub(super) following_error: bool,
 }
 
 impl FakeDrive {
@@ -101,11 +101,11 @@ impl FakeDrive {
         }
     }
 
-    fn position(&self) -> i64 {
+    pub(super) fn position(&self) -> i64 {
         self.node.get(0x6064, 0)
     }
 
-    fn set_position(&mut self, counts: i64) {
+    pub(super) fn set_position(&mut self, counts: i64) {
         self.node.set(0x6064, 0, &(counts as i32).to_le_bytes());
     }
 
@@ -232,16 +232,16 @@ impl FakeDrive {
     }
 }
 
-struct Rig {
-    drive: Cia402Drive,
-    fake: FakeDrive,
-    now: Time,
+pub(super) struct Rig {
+    pub(super) drive: Cia402Drive,
+    pub(super) fake: FakeDrive,
+    pub(super) now: Time,
     /// Every frame the driver sent, as candump writes it.
-    sent: Vec<String>,
-    alarms: Vec<Alarm>,
+    pub(super) sent: Vec<String>,
+    pub(super) alarms: Vec<Alarm>,
 }
 
-fn settings() -> Cia402Settings {
+pub(super) fn settings() -> Cia402Settings {
     let node = NodeId::new(5).unwrap();
     let master = NodeId::new(0x7F).unwrap();
     let common = NodeSettings::new(node, master, Duration::from_millis(SYNC_MS));
@@ -258,7 +258,7 @@ impl Rig {
         Self::with(settings())
     }
 
-    fn with(settings: Cia402Settings) -> Self {
+    pub(super) fn with(settings: Cia402Settings) -> Self {
         Self {
             drive: Cia402Drive::new(settings),
             fake: FakeDrive::new(),
@@ -295,7 +295,7 @@ impl Rig {
     }
 
     /// One millisecond.
-    fn tick(&mut self) {
+    pub(super) fn tick(&mut self) {
         self.exchange();
         self.now += Duration::from_millis(1);
         let ms = self.now.nanos() / 1_000_000;
@@ -310,7 +310,7 @@ impl Rig {
         self.exchange();
     }
 
-    fn passes_ms(&mut self, ms: u64) {
+    pub(super) fn passes_ms(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.tick());
     }
 
@@ -324,12 +324,12 @@ impl Rig {
         panic!("no outcome")
     }
 
-    fn start(&mut self) -> Result<(), DeviceError> {
+    pub(super) fn start(&mut self) -> Result<(), DeviceError> {
         self.drive.start(self.now);
         self.outcome()
     }
 
-    fn does(&mut self, command: impl Into<AxisCommand>) -> Result<(), DeviceError> {
+    pub(super) fn does(&mut self, command: impl Into<AxisCommand>) -> Result<(), DeviceError> {
         self.drive.command(self.now, command.into());
         self.outcome()
     }
@@ -350,7 +350,7 @@ impl Rig {
     }
 }
 
-fn move_to(um: f64) -> AxisCommand {
+pub(super) fn move_to(um: f64) -> AxisCommand {
     AxisCommand::MoveTo {
         target: Metres::from_um(um),
         speed: MetresPerSecond(0.1),
@@ -591,7 +591,7 @@ fn a_move_shakes_hands_and_ends_at_the_target() {
     assert_eq!(rig.fake.position(), 150_000);
     assert_eq!(rig.controlwords(), ["3F00", "0F00"]);
     let reading = rig.drive.reading().unwrap();
-    assert!(reading.standing);
+    assert!(reading.standing && reading.at_rest);
     assert!((reading.position.um() - 1500.0).abs() < 1e-6);
     // Speed and acceleration were read back before; a second move needs no SDO.
     rig.sent.clear();

@@ -384,6 +384,9 @@ impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
             // An amplifier that is not enabled does not move: nothing is left to do.
             DriveCommand::Halt if !self.is_enabled() => self.finish(Ok(())),
             DriveCommand::Halt => self.begin_halt(now),
+            DriveCommand::EnterCyclic { .. } | DriveCommand::LeaveCyclic => {
+                self.refuse("following cyclic set-points", "a drive on CAN");
+            }
         }
         self.pump(now);
     }
@@ -446,6 +449,18 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
         self.pump(now);
     }
 
+    fn follow(&mut self, _now: Time, _set_point: Q) -> Result<(), DeviceError> {
+        Err(DeviceError::NotPossible {
+            device: self.name(),
+            step: "following cyclic set-points",
+            needs: "a drive on CAN",
+        })
+    }
+
+    fn held(&self) -> Option<Q> {
+        None
+    }
+
     fn reading(&self) -> Option<AxisReading<Q>> {
         let (at, position) = self.image.position()?;
         let scale = self.settings.scale;
@@ -461,6 +476,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 .following_error
                 .map(|counts| scale.to_coordinate(counts)),
             standing: !moving,
+            at_rest: self.image.stands(),
         })
     }
 }

@@ -88,6 +88,18 @@ impl Tpdo {
         self.is_valid() && matches!(kind, Synchronous(_) | SynchronousAcyclic)
     }
 
+    /// Whether the SYNC that has just come is one at which it is sent, as far as its values do
+    /// not matter.
+    pub(super) fn is_turn(&self) -> bool {
+        match self.parameters.transmission {
+            Transmission::Synchronous(every) => {
+                self.is_valid() && (self.syncs + 1).is_multiple_of(every)
+            }
+            Transmission::SynchronousAcyclic => self.is_valid(),
+            Transmission::Event | Transmission::Unknown(_) => false,
+        }
+    }
+
     pub(super) fn maps(&self, object: Object) -> bool {
         self.parameters.mapping.iter().any(|m| m.object == object)
     }

@@ -97,6 +97,11 @@ impl CanopenServer {
         self.tpdos.iter().any(Tpdo::is_synchronous)
     }
 
+    /// Whether a TPDO is sent at the SYNC that has just come.
+    pub fn is_tpdo_turn(&self) -> bool {
+        self.phase.is_operational() && self.tpdos.iter().any(Tpdo::is_turn)
+    }
+
     /// Whether a TPDO in use is sent at changes: only then must the device look for them.
     pub fn reports_changes(&self) -> bool {
         self.phase.is_operational() && self.tpdos.iter().any(Tpdo::is_event_driven)

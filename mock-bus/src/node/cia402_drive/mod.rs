@@ -1,7 +1,7 @@
 //! An emulated CiA 402 servo drive over one axis of the plant.
 //!
 //! Purpose: the drive as a master meets it: power state machine, profile position with its
-//! set-point handshake, homing, quick stop, limits, following error, heartbeat reaction, and
+//! set-point handshake, cyclic synchronous position, homing, quick stop, limits, following error, heartbeat reaction, and
 //! the default PDOs of a real drive. Its position loop is the plant's; the drive gives it a
 //! demand at the servo rate while something moves, and none while nothing does.
 //!
@@ -15,6 +15,7 @@
 //! | 0x60F4 | following error = demand − actual |
 
 mod config;
+mod cyclic;
 mod homing;
 mod mechanism;
 mod motion;
@@ -46,6 +47,7 @@ use super::Node;
 use super::canopen_server::{CanopenServer, Deliveries, Manners, ServerEvent};
 use super::profile::Profile;
 use crate::plant::Plant;
+use cyclic::Cyclic;
 use mechanism::{Mechanism, PlantAxis};
 use motion::Activity;
 use positioning::Positioning;
@@ -178,6 +180,7 @@ struct Drive {
     activity: Activity,
     positioning: Positioning,
     homing: HomingStatus,
+    cyclic: Cyclic,
     /// Whether the power stage controls the motor.
     servo_on: bool,
     /// The last demand given to the plant, in metres or radians.
@@ -221,6 +224,7 @@ impl Drive {
             activity: Activity::Standing,
             positioning: Positioning::default(),
             homing: HomingStatus::NotStarted,
+            cyclic: Cyclic::IDLE,
             servo_on: false,
             sent_demand: None,
             enabled_at: 0.0,
@@ -314,7 +318,8 @@ impl Drive {
             Some(_) => self.power_free,
             None => Time::NEVER,
         };
-        self.servo_due.min(self.mode_due).min(transition)
+        let own = self.servo_due.min(self.mode_due);
+        own.min(transition).min(self.cyclic.sync_due)
     }
 
     /// One round of the drive's own work.

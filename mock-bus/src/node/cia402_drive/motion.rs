@@ -1,13 +1,11 @@
 //! The demand: coordinates, ramps, what the motor is doing and why.
 
-use std::time::Duration;
-
 use units::Time;
 
 use super::homing::HomingRun;
 use super::mechanism::Mechanism;
 use super::power::Power;
-use super::{CYCLIC_POSITION, Drive, PROFILE_POSITION};
+use super::{Drive, PROFILE_POSITION};
 use crate::node::profile::{MotionState, Profile};
 use crate::plant::Servo;
 
@@ -175,28 +173,5 @@ impl Drive {
         } else {
             target
         }
-    }
-
-    /// SYNC in cyclic synchronous position: 0x607A + 0x60B0, reached after one period (0x60C2).
-    pub(super) fn on_sync(&mut self, now: Time, m: &mut impl Mechanism) {
-        let enabled = self.power == Power::OperationEnabled && self.servo_on;
-        let ramping = matches!(self.activity, Activity::Ramp(_));
-        if !enabled || ramping || self.mode() != CYCLIC_POSITION {
-            return;
-        }
-        let wanted = self.unwrapped(self.get(0x607A), m) + self.get(0x60B0) as f64;
-        let target = self.within_soft_limits(wanted);
-        self.internal_limit = target != wanted;
-        let from = self.demand(now).position;
-        self.profile = Profile::interpolating(now, from, target, self.interpolation_time());
-        self.activity = Activity::Cyclic;
-        self.command_servo(now, m);
-        self.schedule(now);
-    }
-
-    fn interpolation_time(&self) -> Duration {
-        let units = self.server.get(0x60C2, 1) as f64;
-        let exponent = self.server.get(0x60C2, 2) as i32;
-        Duration::from_secs_f64(units * 10.0_f64.powi(exponent))
     }
 }

@@ -61,7 +61,7 @@ impl Drive {
                 status
             }
             CYCLIC_POSITION if enabled => {
-                let follows = !matches!(self.activity, Activity::Ramp(_));
+                let follows = self.activity == Activity::Cyclic;
                 status.set(Statusword::MODE_12, follows);
                 status.set(Statusword::MODE_13, self.following_since.is_some());
                 status

@@ -21,6 +21,7 @@ impl Drive {
     pub(super) fn supervise(&mut self, now: Time, m: &mut impl Mechanism) {
         self.watch_safe_torque_off(now, m);
         self.watch_itself(now, m);
+        self.watch_sync(now, m);
         self.watch_following_error(now, m);
         self.watch_limit_switches(now, m);
     }
@@ -61,7 +62,8 @@ impl Drive {
     /// |0x60F4| > 0x6065 for 0x6066 ms.
     fn watch_following_error(&mut self, now: Time, m: &mut impl Mechanism) {
         let window = self.get(0x6065);
-        let error = self.demand(now).position - self.actual(m) as f64;
+        let demand = self.demand(now).position + self.cyclic.shortfall;
+        let error = demand - self.actual(m) as f64;
         let outside = error.abs() > window as f64 && window != NO_WINDOW;
         if !self.servo_on || !outside {
             self.following_since = None;
@@ -162,7 +164,13 @@ impl Drive {
     }
 
     /// Transition 13, then 14: emergency, reaction 0x605E, fault.
-    fn fail(&mut self, now: Time, code: EmergencyCode, bits: u8, m: &mut impl Mechanism) {
+    pub(super) fn fail(
+        &mut self,
+        now: Time,
+        code: EmergencyCode,
+        bits: u8,
+        m: &mut impl Mechanism,
+    ) {
         self.server.raise(now, code, bits, [0; 5]);
         self.fault = Some(code);
         self.command = None;

@@ -8,7 +8,7 @@ use units::Time;
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};
 use super::power::{Command, Power, Transition, transition};
-use super::{Drive, HOMING, PROFILE_POSITION};
+use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION};
 
 impl Drive {
     pub(super) fn on_controlword(&mut self, now: Time, m: &mut impl Mechanism) {
@@ -28,6 +28,7 @@ impl Drive {
             match self.mode() {
                 PROFILE_POSITION => self.control_positioning(now, old, new, m),
                 HOMING => self.control_homing(now, old, new, m),
+                CYCLIC_POSITION => self.control_cyclic(now, old, new),
                 _ => {}
             }
         }

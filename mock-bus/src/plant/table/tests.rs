@@ -71,7 +71,7 @@ fn what_no_table_can_be_is_refused() {
         (
             "[plant.table.motion]",
             "[plant.platform]\n[plant.table.motion]",
-            "platform and table",
+            "platform and table and volumetric",
         ),
         (
             "counts_per_turn = 129600000\nupper",

@@ -1,5 +1,6 @@
 //! The drive as a master meets it, over a mechanism that follows its demand ideally.
 
+mod cyclic;
 mod faults;
 mod homing;
 mod modes;

@@ -2,7 +2,6 @@
 
 use super::{AbortCode, Bench};
 use crate::node::cia402_drive::{Cia402DriveConfig, objects};
-use crate::plant::Servo;
 use drivers::wire::canopen::NodeId;
 
 #[test]
@@ -71,34 +70,6 @@ fn default_pdos_are_those_of_a_real_drive() {
             .iter()
             .all(|pdo| pdo.inhibit_100us == 10 && pdo.transmission == 255)
     );
-}
-
-/// 1 mm/s at a SYNC of 1 ms: 100 counts per SYNC.
-#[test]
-fn cyclic_positions_are_taken_at_every_sync() {
-    let mut bench = Bench::new();
-    bench.try_write(0x60C2, 1, &[1]).unwrap();
-    bench.write(0x6060, &[8]);
-    bench.enable_cyclic();
-    for step in 1..=50 {
-        bench.write_i32(0x607A, step * 100);
-        let _ = bench.send(0x80, &[]);
-        let _ = bench.wait_ms(1);
-    }
-    let _ = bench.wait_ms(2);
-    assert_eq!(bench.position(), 5000);
-    assert_eq!(bench.status() & 0x1000, 0x1000, "drive follows");
-}
-
-impl Bench {
-    fn enable_cyclic(&mut self) {
-        let _ = self.wait_ms(5);
-        for controlword in [0x06, 0x07, 0x0F] {
-            self.control(controlword);
-            let _ = self.wait_ms(5);
-        }
-        assert!(matches!(self.axis.servo, Servo::Follow { .. }));
-    }
 }
 
 #[test]

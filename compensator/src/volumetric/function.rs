@@ -1,0 +1,300 @@
+//! One error function of a position: a table or a spline, with the uncertainty of its nodes.
+//!
+//! Beyond the first and last node it holds their values on, so that it changes nowhere faster
+//! than between them. Straight lines and monotone cubics ([`crate::interpolation`]) never leave
+//! the interval of their nodes; the spline has a continuous curvature instead.
+//!
+//! Absent: hysteresis (both approaches apart), periodic terms: [`crate::screw`] has them.
+
+use core::marker::PhantomData;
+
+use units::{Metres, Quantity};
+
+use super::find::Finder;
+use crate::interpolation::{Segment, monotone_slopes, spline_slopes};
+
+/// How the values between two nodes are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Straight lines.
+    Linear,
+    /// Cubics that are monotone wherever the nodes are.
+    MonotoneCubic,
+    /// The cubic spline with continuous curvature, without knots next to its ends.
+    Spline,
+}
+
+/// Why nodes do not form a function. `index` counts from 0.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FunctionError {
+    /// Fewer than two nodes.
+    #[error("error function: {seen} node(s); at least 2 are needed")]
+    TooFewNodes {
+        /// Nodes given.
+        seen: usize,
+    },
+    /// Another number of values or uncertainties than of nodes.
+    #[error("error function: {seen} values for {nodes} nodes")]
+    Lengths {
+        /// Values given.
+        seen: usize,
+        /// Nodes given.
+        nodes: usize,
+    },
+    /// A NaN, an infinity or a negative uncertainty.
+    #[error("error function, node {index}: a value is not finite or an uncertainty is negative")]
+    NotFinite {
+        /// Which node.
+        index: usize,
+    },
+    /// A node not beyond the one before it.
+    #[error("error function, node {index}: its position does not follow the one before")]
+    NotIncreasing {
+        /// Which node.
+        index: usize,
+    },
+}
+
+/// Polynomial pieces over increasing nodes, held beyond them. Plain numbers inside.
+#[derive(Clone, Debug)]
+pub(crate) struct Pieces {
+    finder: Finder,
+    segments: Vec<Segment>,
+    first: f64,
+    last: f64,
+}
+
+impl Pieces {
+    pub(crate) fn new(nodes: &[f64], values: &[f64], shape: Shape) -> Result<Self, FunctionError> {
+        check(nodes, values)?;
+        let slopes = match shape {
+            Shape::Linear => Vec::new(),
+            Shape::MonotoneCubic => monotone_slopes(nodes, values),
+            Shape::Spline => spline_slopes(nodes, values),
+        };
+        let piece = |i: usize| {
+            let (x0, f0, x1, f1) = (nodes[i], values[i], nodes[i + 1], values[i + 1]);
+            match shape {
+                Shape::Linear => Segment::line(x0, f0, x1, f1),
+                Shape::MonotoneCubic | Shape::Spline => {
+                    Segment::hermite(x0, f0, slopes[i], x1, f1, slopes[i + 1])
+                }
+            }
+        };
+        Ok(Self {
+            segments: (0..nodes.len() - 1).map(piece).collect(),
+            finder: Finder::new(nodes.to_vec()),
+            first: nodes[0],
+            last: nodes[nodes.len() - 1],
+        })
+    }
+
+    #[inline]
+    pub(crate) fn at(&self, position: f64) -> f64 {
+        let (inside, at) = self.finder.find(position);
+        let piece = &self.segments[at];
+        piece.value(inside - piece.start)
+    }
+
+    pub(crate) fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    pub(crate) fn range(&self) -> (f64, f64) {
+        (self.first, self.last)
+    }
+
+    pub(crate) fn largest(&self) -> f64 {
+        let each = self.segments.iter().map(Segment::largest);
+        each.fold(0.0, f64::max)
+    }
+
+    pub(crate) fn steepest(&self) -> f64 {
+        let each = self.segments.iter().map(Segment::steepest);
+        each.fold(0.0, f64::max)
+    }
+}
+
+fn check(nodes: &[f64], values: &[f64]) -> Result<(), FunctionError> {
+    if nodes.len() < 2 {
+        return Err(FunctionError::TooFewNodes { seen: nodes.len() });
+    }
+    if values.len() != nodes.len() {
+        let (seen, nodes) = (values.len(), nodes.len());
+        return Err(FunctionError::Lengths { seen, nodes });
+    }
+    let sound = |i: &usize| nodes[*i].is_finite() && values[*i].is_finite();
+    if let Some(index) = (0..nodes.len()).find(|i| !sound(i)) {
+        return Err(FunctionError::NotFinite { index });
+    }
+    match (1..nodes.len()).find(|i| nodes[*i] <= nodes[i - 1]) {
+        Some(index) => Err(FunctionError::NotIncreasing { index }),
+        None => Ok(()),
+    }
+}
+
+/// An error (a length or an angle) as a function of a position; constant time per call.
+#[derive(Clone, Debug)]
+pub struct Function<Q> {
+    pieces: Pieces,
+    shape: Shape,
+    /// Standard uncertainties over the nodes, as straight lines.
+    uncertainty: Option<Pieces>,
+    quantity: PhantomData<Q>,
+}
+
+impl<Q: Quantity> Function<Q> {
+    /// The function through `values` at strictly increasing `nodes`.
+    ///
+    /// # Errors
+    /// When there are fewer than two nodes, they do not increase, or a value is not finite.
+    pub fn new(nodes: &[Metres], values: &[Q], shape: Shape) -> Result<Self, FunctionError> {
+        let nodes: Vec<f64> = nodes.iter().map(|it| it.value()).collect();
+        let values: Vec<f64> = values.iter().map(|it| it.value()).collect();
+        Ok(Self {
+            pieces: Pieces::new(&nodes, &values, shape)?,
+            shape,
+            uncertainty: None,
+            quantity: PhantomData,
+        })
+    }
+
+    /// The same value everywhere from `low` to `high`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn constant(low: Metres, high: Metres, value: Q) -> Result<Self, FunctionError> {
+        Self::new(&[low, high], &[value; 2], Shape::Linear)
+    }
+
+    /// With a standard uncertainty for every node; straight lines between them.
+    ///
+    /// # Errors
+    /// When there is another number of them than of nodes, or one is negative or not finite.
+    pub fn with_uncertainties(mut self, uncertainties: &[Q]) -> Result<Self, FunctionError> {
+        let values: Vec<f64> = uncertainties.iter().map(|it| it.value()).collect();
+        if let Some(index) = values.iter().position(|u| u.is_nan() || *u < 0.0) {
+            return Err(FunctionError::NotFinite { index });
+        }
+        let nodes: Vec<f64> = self.nodes().map(Metres::value).collect();
+        self.uncertainty = Some(Pieces::new(&nodes, &values, Shape::Linear)?);
+        Ok(self)
+    }
+
+    /// Its value at `position`; the end nodes' values beyond them. NaN for NaN.
+    #[inline]
+    pub fn at(&self, position: Metres) -> Q {
+        if position.value().is_nan() {
+            return Q::from_value(f64::NAN);
+        }
+        Q::from_value(self.pieces.at(position.value()))
+    }
+
+    /// Its standard uncertainty there; `None` when the nodes have none.
+    pub fn standard_uncertainty(&self, position: Metres) -> Option<Q> {
+        let pieces = self.uncertainty.as_ref()?;
+        Some(Q::from_value(pieces.at(position.value())))
+    }
+
+    /// Where its nodes are.
+    pub fn nodes(&self) -> impl Iterator<Item = Metres> {
+        let starts = self.pieces.segments.iter().map(|it| Metres(it.start));
+        starts.chain([Metres(self.pieces.last)])
+    }
+
+    /// First and last node.
+    pub fn range(&self) -> (Metres, Metres) {
+        let (first, last) = self.pieces.range();
+        (Metres(first), Metres(last))
+    }
+
+    /// How the values between two nodes are found.
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// The largest magnitude anywhere, in closed form.
+    pub fn largest(&self) -> Q {
+        Q::from_value(self.pieces.largest())
+    }
+
+    /// The largest magnitude of its slope anywhere, in its SI unit per metre, in closed form.
+    pub fn steepest(&self) -> f64 {
+        self.pieces.steepest()
+    }
+
+    pub(crate) fn pieces(&self) -> &Pieces {
+        &self.pieces
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn function(shape: Shape) -> Function<Metres> {
+        let nodes = [0.0, 0.1, 0.3, 0.4].map(Metres);
+        let values = [0.0, 1e-6, 9e-6, 16e-6].map(Metres);
+        Function::new(&nodes, &values, shape).unwrap()
+    }
+
+    #[test]
+    fn every_shape_meets_its_nodes_and_holds_its_ends() {
+        for shape in [Shape::Linear, Shape::MonotoneCubic, Shape::Spline] {
+            let f = function(shape);
+            for (x, y) in [
+                (0.0, 0.0),
+                (0.1, 1e-6),
+                (0.3, 9e-6),
+                (0.4, 16e-6),
+                (9.0, 16e-6),
+            ] {
+                assert!(
+                    (f.at(Metres(x)).value() - y).abs() < 1e-18,
+                    "{shape:?} at {x}"
+                );
+            }
+            assert_eq!(f.at(Metres(-5.0)), Metres(0.0));
+            assert!(f.at(Metres(f64::NAN)).value().is_nan());
+        }
+    }
+
+    /// The values are 1e-4·x² at all nodes, which a spline reproduces; 8 µm over 0.2 m is the
+    /// straight line's slope there.
+    #[test]
+    fn slopes_are_those_of_the_interpolant_in_use() {
+        assert!((function(Shape::Spline).at(Metres(0.2)).um() - 4.0).abs() < 1e-9);
+        assert!((function(Shape::Spline).steepest() - 8e-5).abs() < 1e-15);
+        assert!((function(Shape::Linear).at(Metres(0.2)).um() - 5.0).abs() < 1e-9);
+        assert!((function(Shape::Linear).steepest() - 7e-5).abs() < 1e-15);
+        assert!((function(Shape::Linear).largest().um() - 16.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn uncertainties_belong_to_nodes() {
+        let f = function(Shape::Linear);
+        assert_eq!(f.standard_uncertainty(Metres(0.1)), None);
+        let u = [1e-7, 3e-7, 3e-7, 3e-7].map(Metres);
+        let f = f.with_uncertainties(&u).unwrap();
+        assert!((f.standard_uncertainty(Metres(0.05)).unwrap().um() - 0.2).abs() < 1e-9);
+        let wrong = f.with_uncertainties(&[Metres(-1.0); 4]).unwrap_err();
+        assert_eq!(wrong, FunctionError::NotFinite { index: 0 });
+    }
+
+    #[test]
+    fn nodes_that_are_none_are_refused_by_number() {
+        let make = |nodes: &[f64], values: &[f64]| {
+            let nodes: Vec<Metres> = nodes.iter().copied().map(Metres).collect();
+            let values: Vec<Metres> = values.iter().copied().map(Metres).collect();
+            Function::new(&nodes, &values, Shape::Linear).map(|_| ())
+        };
+        let too_few = FunctionError::TooFewNodes { seen: 1 };
+        assert_eq!(make(&[0.0], &[0.0]), Err(too_few));
+        let lengths = FunctionError::Lengths { seen: 1, nodes: 2 };
+        assert_eq!(make(&[0.0, 1.0], &[0.0]), Err(lengths));
+        let order = FunctionError::NotIncreasing { index: 2 };
+        assert_eq!(make(&[0.0, 1.0, 1.0], &[0.0; 3]), Err(order));
+        let value = FunctionError::NotFinite { index: 1 };
+        assert_eq!(make(&[0.0, 1.0], &[0.0, f64::NAN]), Err(value));
+    }
+}

@@ -1,0 +1,207 @@
+//! The errors by weighted least squares, with their covariance.
+
+use units::{Celsius, Metres, Radians};
+
+use super::design::{Block, Design, error_row};
+use super::thermal::{IdentifiedBend, IdentifiedExpansion, add_heat};
+use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
+use crate::least_squares;
+use crate::volumetric::function::{Function, FunctionError, Shape};
+use crate::volumetric::model::{AxisErrors, ErrorName, Squareness};
+
+/// One function found: values and uncertainties in SI units, metres or radians by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentifiedFunction {
+    /// Which one.
+    pub name: ErrorName,
+    /// Where.
+    pub nodes: Vec<Metres>,
+    /// Its values at the nodes, metres or radians.
+    pub values: Vec<f64>,
+    /// Their standard uncertainties.
+    pub u: Vec<f64>,
+}
+
+/// Errors found, with what is known of their uncertainty.
+///
+/// Standard uncertainties are propagated from those of the readings, enlarged by the scatter of
+/// the readings about the model where that is larger than stated (Birge's ratio).
+#[derive(Clone, Debug)]
+pub struct Identified {
+    plan: Plan,
+    blocks: Vec<Block>,
+    /// The functions, in the order of the plan.
+    pub functions: Vec<IdentifiedFunction>,
+    /// The squarenesses; zero where not planned.
+    pub squareness: Squareness,
+    /// The expansions, in the order of the plan.
+    pub expansions: Vec<IdentifiedExpansion>,
+    /// The bends, in the order of the plan.
+    pub bends: Vec<IdentifiedBend>,
+    /// Readings − unknowns.
+    pub degrees_of_freedom: usize,
+    /// Scatter of the readings in units of their uncertainty; 1 when these are right, `None`
+    /// without spare readings.
+    pub birge_ratio: Option<f64>,
+    /// Reading − model of each reading, in units of its uncertainty.
+    pub residuals: Vec<f64>,
+    /// Of the parameters of functions, squarenesses and warmth alone.
+    covariance: Vec<f64>,
+}
+
+impl Identified {
+    /// The functions as errors of the three axes.
+    ///
+    /// # Errors
+    /// Never for functions found; nodes and values are checked again.
+    pub fn axis_errors(&self, shape: Shape) -> Result<[AxisErrors; 3], FunctionError> {
+        let mut axes: [AxisErrors; 3] = Default::default();
+        for it in &self.functions {
+            match it.name {
+                ErrorName::Along(axis, k) => {
+                    axes[axis.index()].along[k.index()] = Some(function(it, shape, Metres)?);
+                }
+                ErrorName::About(axis, k) => {
+                    axes[axis.index()].about[k.index()] = Some(function(it, shape, Radians)?);
+                }
+            }
+        }
+        Ok(axes)
+    }
+
+    /// The standard uncertainty of the deviation that the errors found make at a place, their
+    /// covariances included: between readings it is far below what the functions' own
+    /// uncertainties would make of it. `temperatures`: what the thermometers show, as far as it
+    /// is not their references; not how sure that is. `None` outside the nodes.
+    pub fn standard_uncertainty(
+        &self,
+        at: Point,
+        tool: Point,
+        temperatures: &[Celsius],
+    ) -> Option<Point> {
+        let inside = |block: &Block| {
+            let (ErrorName::Along(axis, _) | ErrorName::About(axis, _)) = block.name;
+            let position = at.along(axis).value();
+            position >= block.nodes[0] && position <= block.nodes[block.nodes.len() - 1]
+        };
+        if !self.blocks.iter().all(inside) {
+            return None;
+        }
+        let above = self.plan.thermal.above(temperatures);
+        let u = Axis::ALL.map(|axis| {
+            let row = error_row(&self.plan, &self.blocks, at, tool, &above, |effect| {
+                effect.moved[axis.index()]
+            });
+            let variance = crate::uncertainty::propagate(&row, &self.covariance);
+            Metres(variance.max(0.0).sqrt())
+        });
+        Some(Point::new(u[0], u[1], u[2]))
+    }
+}
+
+fn function<Q: Quantity>(
+    it: &IdentifiedFunction,
+    shape: Shape,
+    unit: fn(f64) -> Q,
+) -> Result<Function<Q>, FunctionError> {
+    let of = |values: &[f64]| -> Vec<Q> { values.iter().copied().map(unit).collect() };
+    Function::new(&it.nodes, &of(&it.values), shape)?.with_uncertainties(&of(&it.u))
+}
+
+pub(super) fn solve(
+    plan: &Plan,
+    design: &Design,
+    observations: &[Observation],
+) -> Result<Identified, IdentifyError> {
+    let all = design.columns();
+    let fit = least_squares::solve(&design.rows, all, &design.values)?;
+    let birge_ratio = fit.residual_sd();
+    let enlarged = birge_ratio.unwrap_or(1.0).max(1.0);
+    let functions: usize = design.blocks.iter().map(|it| it.basis.ncols()).sum();
+    let count = design.errors();
+    let mut covariance: Vec<f64> = (0..count * count)
+        .map(|at| fit.cofactor[at / count * all + at % count] * enlarged * enlarged)
+        .collect();
+    add_heat(plan, design, observations, &fit, &mut covariance);
+    let found = design.blocks.iter().map(|block| {
+        let mut gradient = vec![0.0; count];
+        let (mut values, mut u) = (Vec::new(), Vec::new());
+        for node in 0..block.nodes.len() {
+            gradient.fill(0.0);
+            let mut value = 0.0;
+            for column in 0..block.basis.ncols() {
+                let part = block.basis[(node, column)];
+                gradient[block.first + column] = part;
+                value += part * fit.coefficients[block.first + column];
+            }
+            values.push(value);
+            let variance = crate::uncertainty::propagate(&gradient, &covariance);
+            u.push(variance.max(0.0).sqrt());
+        }
+        IdentifiedFunction {
+            name: block.name,
+            nodes: block.nodes.iter().copied().map(Metres).collect(),
+            values,
+            u,
+        }
+    });
+    let known = |column: usize| {
+        let u = covariance[column * count + column].max(0.0).sqrt();
+        (fit.coefficients[column], u)
+    };
+    let warmth = functions + plan.squarenesses.len();
+    let (expansions, bends) = thermal(plan, &|at| known(warmth + at));
+    Ok(Identified {
+        plan: plan.clone(),
+        functions: found.collect(),
+        blocks: design.blocks.clone(),
+        squareness: squareness(plan, &|at| known(functions + at)),
+        expansions,
+        bends,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        birge_ratio,
+        residuals: fit.residuals,
+        covariance,
+    })
+}
+
+/// By `known` of their number: value and standard uncertainty.
+fn squareness(plan: &Plan, known: &impl Fn(usize) -> (f64, f64)) -> Squareness {
+    let mut squareness = Squareness::default();
+    for (at, name) in plan.squarenesses.iter().enumerate() {
+        let (value, u) = known(at);
+        match name {
+            SquarenessName::YToX => squareness.y_to_x = Radians(value),
+            SquarenessName::ZToX => squareness.z_to_x = Radians(value),
+            SquarenessName::ZToY => squareness.z_to_y = Radians(value),
+        }
+        squareness.u[*name as usize] = Radians(u);
+    }
+    squareness
+}
+
+fn thermal(
+    plan: &Plan,
+    known: &impl Fn(usize) -> (f64, f64),
+) -> (Vec<IdentifiedExpansion>, Vec<IdentifiedBend>) {
+    let expansions = plan.thermal.expansions.iter().enumerate();
+    let expansions = expansions.map(|(at, it)| {
+        let (per_kelvin, u) = known(at);
+        let plan = it.clone();
+        IdentifiedExpansion {
+            plan,
+            per_kelvin,
+            u,
+        }
+    });
+    let bends = plan.thermal.bends.iter().enumerate();
+    let bends = bends.map(|(at, it)| {
+        let (bow, u) = known(plan.thermal.expansions.len() + at);
+        IdentifiedBend {
+            plan: *it,
+            bow: Metres(bow),
+            u: Metres(u),
+        }
+    });
+    (expansions.collect(), bends.collect())
+}

@@ -1,0 +1,128 @@
+//! Which axis stands on which: the kinematic chain from the workpiece to the tool.
+
+use core::fmt;
+use core::str::FromStr;
+
+use crate::volumetric::Axis;
+
+/// A chain of three linear axes, written like `XFYZ`.
+///
+/// Read from the workpiece to the tool: axes before `F` (the foundation) carry the workpiece,
+/// the one next to `F` standing on it; axes after `F` carry the tool, again the one next to `F`
+/// standing on the foundation. `FXYZ` is a gantry that does everything, `XFYZ` a bed that moves
+/// under a column. The notation is that of H. Schwenke et al., "Geometric error measurement and
+/// compensation of machines: an update", CIRP Annals 57 (2008).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// From the workpiece to the tool.
+    axes: [Axis; 3],
+    /// How many of them carry the workpiece.
+    workpiece: usize,
+}
+
+/// A text that is no chain.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "kinematic chain `{seen}`: each of X, Y, Z and F is needed once, from the workpiece to the \
+     tool, F being the foundation: `FXYZ`, `XFYZ`"
+)]
+pub struct ChainError {
+    /// The text.
+    pub seen: String,
+}
+
+impl FromStr for Chain {
+    type Err = ChainError;
+
+    fn from_str(text: &str) -> Result<Self, ChainError> {
+        let wrong = || ChainError {
+            seen: text.to_owned(),
+        };
+        let workpiece = text.find('F').ok_or_else(wrong)?;
+        let letters: Vec<char> = text.chars().filter(|it| *it != 'F').collect();
+        let axis = |letter: &char| match letter {
+            'X' => Some(Axis::X),
+            'Y' => Some(Axis::Y),
+            'Z' => Some(Axis::Z),
+            _ => None,
+        };
+        let axes: Option<Vec<Axis>> = letters.iter().map(axis).collect();
+        let axes: [Axis; 3] = axes.and_then(|it| it.try_into().ok()).ok_or_else(wrong)?;
+        let each_once = Axis::ALL.iter().all(|it| axes.contains(it));
+        if text.len() == 4 && each_once {
+            Ok(Self { axes, workpiece })
+        } else {
+            Err(wrong())
+        }
+    }
+}
+
+impl fmt::Display for Chain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, axis) in self.axes.iter().enumerate() {
+            if at == self.workpiece {
+                f.write_str("F")?;
+            }
+            f.write_str(match axis {
+                Axis::X => "X",
+                Axis::Y => "Y",
+                Axis::Z => "Z",
+            })?;
+        }
+        if self.workpiece == 3 {
+            f.write_str("F")?;
+        }
+        Ok(())
+    }
+}
+
+impl Chain {
+    /// The axes from the workpiece to the tool.
+    pub fn axes(&self) -> [Axis; 3] {
+        self.axes
+    }
+
+    /// Whether `axis` carries the workpiece.
+    pub fn carries_workpiece(&self, axis: Axis) -> bool {
+        self.place(axis) < self.workpiece
+    }
+
+    /// Whether a tilt of `axis` acts on the position of `other` as on a lever: when `other` is
+    /// nearer to the tool. A slide that carries the workpiece also moves under the tool itself.
+    pub fn is_on_lever(&self, axis: Axis, other: Axis) -> bool {
+        let (own, its) = (self.place(axis), self.place(other));
+        its > own || (its == own && self.carries_workpiece(axis))
+    }
+
+    fn place(&self, axis: Axis) -> usize {
+        let place = self.axes.iter().position(|it| *it == axis);
+        place.expect("a chain has every axis")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chains_are_read_and_written_alike_and_others_are_refused() {
+        for text in ["FXYZ", "XFYZ", "YXFZ", "ZYXF", "XFZY"] {
+            let chain: Chain = text.parse().unwrap();
+            assert_eq!(chain.to_string(), text);
+        }
+        for text in ["XYZ", "FXYX", "FXYZF", "xfyz", "FXY", "FXÿZ", "", "FFXYZ"] {
+            assert!(text.parse::<Chain>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn levers_are_what_stands_nearer_to_the_tool() {
+        let chain: Chain = "XFYZ".parse().unwrap();
+        assert!(chain.carries_workpiece(Axis::X) && !chain.carries_workpiece(Axis::Y));
+        assert!(chain.is_on_lever(Axis::X, Axis::X));
+        assert!(chain.is_on_lever(Axis::X, Axis::Z));
+        assert!(!chain.is_on_lever(Axis::Y, Axis::Y));
+        assert!(chain.is_on_lever(Axis::Y, Axis::Z));
+        assert!(!chain.is_on_lever(Axis::Z, Axis::Y));
+    }
+}

@@ -1,0 +1,108 @@
+//! How sure the deviation is, by the uncertainties of all that makes it.
+
+use units::{Metres, Quantity, Radians};
+
+use super::thermal::ThermalSums;
+use super::{Conditions, Squareness, ThermalBend, VolumetricModel};
+use crate::volumetric::function::Function;
+use crate::volumetric::point::{V3, add, cross};
+use crate::volumetric::{Axis, NoCorrection, Point};
+
+impl VolumetricModel {
+    /// The standard uncertainty of the deviation at a command: of the functions, squarenesses,
+    /// temperatures and thermal coefficients as far as they have one, taken as independent of
+    /// each other; with that of the detectors' displacements and rolls.
+    ///
+    /// # Errors
+    /// When the command is outside the volume by more than the limit of size.
+    pub fn standard_uncertainty(
+        &self,
+        command: Point,
+        now: &Conditions,
+        u_displacement: Metres,
+        u_roll: Radians,
+    ) -> Result<Point, NoCorrection> {
+        self.commands.check(command)?;
+        let mut squares = [0.0; 3];
+        let mut combine = |effect: V3, u: f64| {
+            for k in 0..3 {
+                squares[k] += effect[k] * effect[k] * u * u;
+            }
+        };
+        for axis in Axis::ALL {
+            let lever = self.lever(axis, command, now);
+            let errors = &self.machine.axes[axis.index()];
+            let position = command.along(axis);
+            for direction in Axis::ALL {
+                let k = direction.index();
+                let unit: V3 = core::array::from_fn(|i| f64::from(u8::from(i == k)));
+                let sideways = direction != axis;
+                let u_live = if sideways {
+                    u_displacement.value()
+                } else {
+                    u_roll.value()
+                };
+                let along = u_of(errors.along[k].as_ref(), position);
+                let about = u_of(errors.about[k].as_ref(), position);
+                combine(unit, along);
+                combine(cross(unit, lever), about);
+                combine(if sideways { unit } else { cross(unit, lever) }, u_live);
+            }
+        }
+        for (k, u) in self.machine.squareness.u.iter().enumerate() {
+            let mut one = [0.0; 3];
+            one[k] = 1.0;
+            combine(lean_effect(Squareness::lean(one), command), u.value());
+        }
+        let thermal = &self.machine.thermal;
+        let way = (command - thermal.fixed).array();
+        for (at, channel) in thermal.channels.iter().enumerate() {
+            let mut one = ThermalSums::default();
+            one.add(channel, 1.0, false);
+            let lean = lean_effect(Squareness::lean(one.squareness), command);
+            let scale: V3 = core::array::from_fn(|k| one.expansion[k] * way[k]);
+            let mut effect = add(add(lean, scale), one.growth);
+            for bend in &thermal.bends {
+                let bows = bend.bow.value() * bend.share(at);
+                let arc = self.arc_effect(bend, command, now);
+                effect = core::array::from_fn(|k| effect[k] + arc[k] * bows);
+            }
+            combine(effect, channel.u);
+        }
+        for axis in Axis::ALL {
+            let k = axis.index();
+            let unit: V3 = core::array::from_fn(|i| f64::from(u8::from(i == k)));
+            combine(unit, now.u_expansion[k] * way[k]);
+        }
+        for bend in &thermal.bends {
+            let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
+            let effect = self.arc_effect(bend, command, now);
+            combine(effect, bend.u.value() * gradient);
+        }
+        Ok(Point::of(squares.map(f64::sqrt)))
+    }
+
+    /// What a guide's arc of height 1 moves the tool by.
+    fn arc_effect(&self, bend: &ThermalBend, command: Point, now: &Conditions) -> V3 {
+        let arc = bend.arc(self.machine.chain);
+        let position = command.along(bend.axis).value();
+        let tilt = arc.turn.map(|it| it * arc.slope(position));
+        let turned = cross(tilt, self.lever(bend.axis, command, now));
+        let sideways = if bend.is_watched {
+            0.0
+        } else {
+            arc.height(position)
+        };
+        add(turned, arc.towards.map(|it| it * sideways))
+    }
+}
+
+fn lean_effect(lean: [V3; 3], command: Point) -> V3 {
+    let q = command.array();
+    core::array::from_fn(|k| lean[0][k] * q[0] + lean[1][k] * q[1] + lean[2][k] * q[2])
+}
+
+fn u_of<Q: Quantity>(function: Option<&Function<Q>>, position: Metres) -> f64 {
+    let u = function.and_then(|it| it.standard_uncertainty(position));
+    u.map_or(0.0, Q::value)
+}

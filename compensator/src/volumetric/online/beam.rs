@@ -1,0 +1,289 @@
+//! The place of a beam on a four-channel detector, or why it cannot be told.
+//!
+//! Source: CN1214003A uses a beam splitter and a two-dimensional CCD; a detector with four
+//! analog channels says the same through the ratio of its currents. For a lateral-effect
+//! detector the ratio (a − b)/(a + b) of two opposite electrodes is proportional to the place,
+//! for four quadrants the ratio of the halves is a monotone function of it (textbooks on
+//! position sensitive detectors); a measured curve from ratio to place covers both.
+//!
+//! Absent: more than one beam on a detector, the shape of the spot.
+
+use core::time::Duration;
+
+use units::{Metres, MetresPerSecond, Time, Volts};
+
+use super::RollError;
+use crate::volumetric::function::{FunctionError, Pieces, Shape};
+
+/// How the four channels belong to the two directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Quadrants (+, +), (−, +), (−, −), (+, −) of (first, second) direction.
+    Quadrants,
+    /// Electrodes first +, first −, second +, second −.
+    Lateral,
+}
+
+/// The calibrated curve from a ratio of channels to a place.
+#[derive(Clone, Debug)]
+pub struct RatioCurve {
+    pieces: Pieces,
+}
+
+impl RatioCurve {
+    /// Through measured (ratio, place) pairs with increasing ratios: monotone cubics.
+    ///
+    /// # Errors
+    /// When there are fewer than two, ratios do not increase, or a value is not finite.
+    pub fn new(ratios: &[f64], places: &[Metres]) -> Result<Self, FunctionError> {
+        let places: Vec<f64> = places.iter().map(|it| it.value()).collect();
+        Pieces::new(ratios, &places, Shape::MonotoneCubic).map(|pieces| Self { pieces })
+    }
+
+    /// A straight line through zero: `per_one` is the place at ratio 1, used up to `ratio_max`.
+    ///
+    /// # Errors
+    /// When a value is not finite or `ratio_max` is not positive.
+    pub fn straight(per_one: Metres, ratio_max: f64) -> Result<Self, FunctionError> {
+        Self::new(
+            &[-ratio_max, 0.0, ratio_max],
+            &[per_one * -ratio_max, Metres::ZERO, per_one * ratio_max],
+        )
+    }
+}
+
+/// What is known of a detector.
+#[derive(Clone, Debug)]
+pub struct BeamDetectorSettings {
+    /// How its channels belong to the directions.
+    pub layout: Layout,
+    /// What each channel gives in the dark.
+    pub dark: [Volts; 4],
+    /// What each channel is multiplied with, so that all are equally sensitive.
+    pub gain: [f64; 4],
+    /// A channel at or above this is saturated.
+    pub saturation: Volts,
+    /// The sum of all channels below which the beam counts as blocked.
+    pub intensity_min: Volts,
+    /// The sum above which the light is not the beam's alone.
+    pub intensity_max: Volts,
+    /// A sample older than this says nothing about now.
+    pub age_max: Duration,
+    /// How fast a place can change.
+    pub speed_max: MetresPerSecond,
+    /// How far apart two samples of the same place can be, by noise.
+    pub noise_max: Metres,
+    /// From ratio to place, for both directions; the sign of the curve is the sign of the place.
+    pub curves: [RatioCurve; 2],
+}
+
+/// Settings of a detector that make no sense.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SettingsError {
+    /// Limits of the intensity that leave nothing between them.
+    #[error(
+        "beam detector: an intensity from {} to {} leaves nothing between",
+        low,
+        high
+    )]
+    Intensity {
+        /// Lower limit.
+        low: Volts,
+        /// Upper limit.
+        high: Volts,
+    },
+    /// A gain, a speed or a noise that is not positive, or a value that is no number.
+    #[error("beam detector: gains, speed and noise must be positive numbers, dark values finite")]
+    NotPositive,
+}
+
+/// What is wrong with a detector or channel at this moment.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Trouble {
+    /// Too little light.
+    #[error("the beam is blocked: intensity {seen}, at least {limit} expected")]
+    Blocked {
+        /// Sum of the channels.
+        seen: Volts,
+        /// The least expected.
+        limit: Volts,
+    },
+    /// Too much light, altogether or on one channel.
+    #[error("the detector is saturated: {seen}, below {limit} expected")]
+    Saturated {
+        /// The channel or the sum.
+        seen: Volts,
+        /// The most expected.
+        limit: Volts,
+    },
+    /// Nothing new for too long.
+    #[error("the last sample is {:.3} s old, at most {:.3} s expected",
+        seen.as_secs_f64(), limit.as_secs_f64())]
+    Stale {
+        /// Its age; the longest there is when there never was one.
+        seen: Duration,
+        /// The oldest accepted.
+        limit: Duration,
+    },
+    /// The beam is beside the calibrated part of the detector.
+    #[error(
+        "the beam is beside the calibrated field: ratio {seen:.3}, {low:.3} to {high:.3} known"
+    )]
+    Beside {
+        /// Ratio of the channels.
+        seen: f64,
+        /// Lowest calibrated ratio.
+        low: f64,
+        /// Highest calibrated ratio.
+        high: f64,
+    },
+    /// Changed faster than anything there can move.
+    #[error("the value changed by {seen:e}, at most {limit:e} is possible in that time (SI units)")]
+    Jumped {
+        /// The change in SI units.
+        seen: f64,
+        /// The largest possible.
+        limit: f64,
+    },
+    /// Outside what can be, or no number.
+    #[error("a value of {seen:e} is not plausible, {low:e} to {high:e} expected (SI units)")]
+    Implausible {
+        /// The value in SI units, or NaN.
+        seen: f64,
+        /// The lowest expected.
+        low: f64,
+        /// The highest expected.
+        high: f64,
+    },
+    /// Two readings that fit no roll.
+    #[error(transparent)]
+    Roll(#[from] RollError),
+}
+
+/// Four voltages taken together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// In the order of the [`Layout`].
+    pub channels: [Volts; 4],
+    /// When.
+    pub at: Time,
+}
+
+/// A detector: samples in, places out.
+#[derive(Clone, Debug)]
+pub struct BeamDetector {
+    settings: BeamDetectorSettings,
+    last: Option<(Time, [Metres; 2])>,
+}
+
+impl BeamDetector {
+    /// A detector that has seen nothing yet.
+    ///
+    /// # Errors
+    /// When the settings contradict themselves.
+    pub fn new(settings: BeamDetectorSettings) -> Result<Self, SettingsError> {
+        let (low, high) = (settings.intensity_min, settings.intensity_max);
+        if !(low > Volts::ZERO && high > low && high.is_finite()) {
+            return Err(SettingsError::Intensity { low, high });
+        }
+        let positive = [settings.speed_max.value(), settings.noise_max.value()]
+            .into_iter()
+            .chain(settings.gain)
+            .chain([settings.saturation.value()])
+            .all(|it| it > 0.0 && it.is_finite());
+        if !(positive && settings.dark.iter().all(|it| it.is_finite())) {
+            return Err(SettingsError::NotPositive);
+        }
+        Ok(Self {
+            settings,
+            last: None,
+        })
+    }
+
+    /// What is known of it.
+    pub fn settings(&self) -> BeamDetectorSettings {
+        self.settings.clone()
+    }
+
+    /// The place of the beam by the newest sample, at `now`.
+    ///
+    /// # Errors
+    /// What is wrong: nothing may then be concluded from the sample.
+    pub fn read(&mut self, now: Time, newest: Option<&Sample>) -> Result<[Metres; 2], Trouble> {
+        let limit = self.settings.age_max;
+        let seen = newest.map_or(Duration::MAX, |it| now.since(it.at));
+        let Some(sample) = newest.filter(|_| seen <= limit) else {
+            return Err(Trouble::Stale { seen, limit });
+        };
+        let place = self.place(&sample.channels)?;
+        self.check_jump(sample.at, place)?;
+        self.last = Some((sample.at, place));
+        Ok(place)
+    }
+
+    /// What four voltages say by themselves.
+    fn place(&self, channels: &[Volts; 4]) -> Result<[Metres; 2], Trouble> {
+        let own = &self.settings;
+        for (index, seen) in channels.iter().enumerate() {
+            if !seen.is_finite() {
+                let (low, high) = (own.dark[index].value(), own.saturation.value());
+                let seen = seen.value();
+                return Err(Trouble::Implausible { seen, low, high });
+            }
+            if *seen >= own.saturation {
+                let limit = own.saturation;
+                return Err(Trouble::Saturated { seen: *seen, limit });
+            }
+        }
+        let light = core::array::from_fn(|i| (channels[i] - own.dark[i]).value() * own.gain[i]);
+        let ratios = self.ratios(light)?;
+        let mut place = [Metres::ZERO; 2];
+        for ((place, curve), seen) in place.iter_mut().zip(&own.curves).zip(ratios) {
+            let (low, high) = curve.pieces.range();
+            if !(seen >= low && seen <= high) {
+                return Err(Trouble::Beside { seen, low, high });
+            }
+            *place = Metres(curve.pieces.at(seen));
+        }
+        Ok(place)
+    }
+
+    fn ratios(&self, light: [f64; 4]) -> Result<[f64; 2], Trouble> {
+        let [a, b, c, d] = light;
+        let sum = a + b + c + d;
+        let (low, high) = (self.settings.intensity_min, self.settings.intensity_max);
+        // Both pairs of a lateral detector see all the light, half of the sum each.
+        let (weakest, part) = match self.settings.layout {
+            Layout::Quadrants => (sum, 1.0),
+            Layout::Lateral => ((a + b).min(c + d), 0.5),
+        };
+        if weakest < low.value() * part {
+            let (seen, limit) = (Volts(weakest), low * part);
+            return Err(Trouble::Blocked { seen, limit });
+        }
+        if sum > high.value() {
+            let (seen, limit) = (Volts(sum), high);
+            return Err(Trouble::Saturated { seen, limit });
+        }
+        Ok(match self.settings.layout {
+            Layout::Quadrants => [(a + d - b - c) / sum, (a + b - c - d) / sum],
+            Layout::Lateral => [(a - b) / (a + b), (c - d) / (c + d)],
+        })
+    }
+
+    /// The longer nothing good was seen, the further away the next good place may be.
+    fn check_jump(&self, at: Time, place: [Metres; 2]) -> Result<(), Trouble> {
+        let Some((before, last)) = self.last else {
+            return Ok(());
+        };
+        let seconds = at.since(before).as_secs_f64();
+        let limit = self.settings.noise_max + Metres(self.settings.speed_max.value() * seconds);
+        let change = |k: usize| (place[k] - last[k]).abs();
+        let seen = change(0).max(change(1));
+        if seen > limit {
+            let (seen, limit) = (seen.value(), limit.value());
+            return Err(Trouble::Jumped { seen, limit });
+        }
+        Ok(())
+    }
+}

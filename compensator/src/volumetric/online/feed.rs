@@ -1,0 +1,247 @@
+//! Values of a detector on their way into a correction: they come and go without a jump.
+//!
+//! Source: none; the rules for a beam that is blocked, saturated, stale or implausible are
+//! those of the machine's configuration: hold, fade out over a set time, or stop.
+//!
+//! Whenever what is wanted changes its origin (a detector comes, goes, returns; a reference is
+//! exchanged), the difference between the value given out last and the value wanted now is kept
+//! as an offset that shrinks to nothing over a set time. The value given out has no jump then,
+//! by construction.
+//!
+//! What may fade to zero must be a difference: a temperature goes through a feed as what it is
+//! above its reference.
+
+use core::time::Duration;
+
+use units::{Quantity, Time};
+
+use super::Trouble;
+
+/// What is done when a detector is in trouble longer than is tolerated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reaction {
+    /// The last good value stays.
+    Hold,
+    /// It fades to zero over this time.
+    FadeOut(Duration),
+    /// It stays, and the machine is to stop.
+    Stop,
+}
+
+/// How a feed treats its detector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FeedSettings {
+    /// How long trouble is tolerated; the last good value stays meanwhile.
+    pub patience: Duration,
+    /// What happens then.
+    pub reaction: Reaction,
+    /// How long the way to a new or returned detector takes.
+    pub blend: Duration,
+    /// Good values in a row needed before a detector is believed (again); 1 at least.
+    pub confirm: u32,
+    /// Time constant by which good values are smoothed against noise; zero for none. What the
+    /// detectors see beyond their references changes over minutes, and little along the axes.
+    pub smoothing: Duration,
+}
+
+/// What stands behind the value a feed gives out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FeedStatus {
+    /// Nothing is believed yet: zero is given out. With the trouble there is, if any.
+    Waiting(Option<Trouble>),
+    /// A good value, on the way to it or at it.
+    Good,
+    /// The last good value, trouble being tolerated.
+    Tolerated(Trouble),
+    /// The last good value, by [`Reaction::Hold`].
+    Held(Trouble),
+    /// Fading out or faded, by [`Reaction::FadeOut`].
+    Faded(Trouble),
+    /// The last good value; the machine is to stop, by [`Reaction::Stop`].
+    Stop(Trouble),
+    /// Switched off: fading to zero or there.
+    Off,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Off,
+    /// Nothing is believed yet; with the number of good values in a row.
+    Waiting(u32),
+    Good,
+    Troubled {
+        since: Time,
+        good: u32,
+    },
+}
+
+/// N values of one detector.
+#[derive(Clone, Debug)]
+pub struct Feed<Q, const N: usize> {
+    settings: FeedSettings,
+    state: State,
+    status: FeedStatus,
+    /// The next good value is blended to.
+    jump: bool,
+    last: Time,
+    /// What is wanted while nothing good comes.
+    held: [Q; N],
+    output: [Q; N],
+    /// Output − wanted when what is wanted changed its origin, and how it shrinks from there.
+    offset: [Q; N],
+    since: Time,
+    over: Duration,
+}
+
+impl<Q: Quantity, const N: usize> Feed<Q, N> {
+    /// A feed that gives out zero until its detector is believed.
+    pub fn new(settings: FeedSettings) -> Self {
+        Self {
+            settings,
+            state: State::Waiting(0),
+            status: FeedStatus::Waiting(None),
+            jump: false,
+            last: Time::ZERO,
+            held: [Q::ZERO; N],
+            output: [Q::ZERO; N],
+            offset: [Q::ZERO; N],
+            since: Time::ZERO,
+            over: Duration::ZERO,
+        }
+    }
+
+    /// Takes what the detector says at `now` and gives out the values to use.
+    pub fn advance(&mut self, now: Time, measured: Result<[Q; N], Trouble>) -> [Q; N] {
+        let finite = |it: &[Q; N]| it.iter().all(|q| q.is_finite());
+        let measured = measured.and_then(|it| {
+            let (seen, low, high) = (f64::NAN, f64::MIN, f64::MAX);
+            let trouble = Trouble::Implausible { seen, low, high };
+            if finite(&it) { Ok(it) } else { Err(trouble) }
+        });
+        match measured {
+            Ok(value) => self.good(now, value),
+            Err(trouble) => self.bad(now, trouble),
+        }
+        self.last = now;
+        self.give(now)
+    }
+
+    /// Switches off: the values fade to zero over `fade`, whatever the detector says.
+    pub fn disable(&mut self, now: Time, fade: Duration) {
+        self.state = State::Off;
+        self.status = FeedStatus::Off;
+        self.turn_to(now, [Q::ZERO; N], fade);
+    }
+
+    /// Switches on again after [`disable`](Self::disable); nothing when it is on.
+    pub fn enable(&mut self) {
+        if let State::Off = self.state {
+            self.state = State::Waiting(0);
+            self.status = FeedStatus::Waiting(None);
+        }
+    }
+
+    /// Announces that the next good value will differ although nothing moved: the reference
+    /// was exchanged, a memory switched. It is blended to.
+    pub fn expect_jump(&mut self) {
+        self.jump = true;
+    }
+
+    /// What stands behind the values given out last.
+    pub fn status(&self) -> FeedStatus {
+        self.status
+    }
+
+    /// The values given out last.
+    pub fn values(&self) -> [Q; N] {
+        self.output
+    }
+
+    fn good(&mut self, now: Time, value: [Q; N]) {
+        let confirm = self.settings.confirm.max(1);
+        match self.state {
+            State::Off => return,
+            State::Good if !self.jump => {
+                self.smooth(now, value);
+                return;
+            }
+            State::Waiting(good) if good + 1 < confirm => {
+                self.state = State::Waiting(good + 1);
+                return;
+            }
+            State::Troubled { since, good } if good + 1 < confirm => {
+                self.state = State::Troubled {
+                    since,
+                    good: good + 1,
+                };
+                return;
+            }
+            State::Good | State::Waiting(_) | State::Troubled { .. } => {}
+        }
+        self.state = State::Good;
+        self.status = FeedStatus::Good;
+        self.jump = false;
+        self.turn_to(now, value, self.settings.blend);
+    }
+
+    fn bad(&mut self, now: Time, trouble: Trouble) {
+        let since = match self.state {
+            State::Off => return,
+            State::Waiting(_) => {
+                self.state = State::Waiting(0);
+                self.status = FeedStatus::Waiting(Some(trouble));
+                return;
+            }
+            State::Good => now,
+            State::Troubled { since, .. } => since,
+        };
+        self.state = State::Troubled { since, good: 0 };
+        if now.since(since) < self.settings.patience {
+            self.status = FeedStatus::Tolerated(trouble);
+            return;
+        }
+        let faded = matches!(self.status, FeedStatus::Faded(_));
+        self.status = match self.settings.reaction {
+            Reaction::Hold => FeedStatus::Held(trouble),
+            Reaction::Stop => FeedStatus::Stop(trouble),
+            Reaction::FadeOut(fade) => {
+                if !faded {
+                    self.turn_to(now, [Q::ZERO; N], fade);
+                }
+                FeedStatus::Faded(trouble)
+            }
+        };
+    }
+
+    /// A low pass of first order, whatever the time between two samples.
+    fn smooth(&mut self, now: Time, value: [Q; N]) {
+        let passed = now.since(self.last).as_secs_f64();
+        let constant = self.settings.smoothing.as_secs_f64();
+        let share = if constant > 0.0 {
+            passed / (passed + constant)
+        } else {
+            1.0
+        };
+        self.held = core::array::from_fn(|i| self.held[i] + (value[i] - self.held[i]) * share);
+    }
+
+    /// From now on `wanted` is wanted, reached over `over` from what was given out last.
+    fn turn_to(&mut self, now: Time, wanted: [Q; N], over: Duration) {
+        self.held = wanted;
+        self.offset = core::array::from_fn(|i| self.output[i] - wanted[i]);
+        self.since = now;
+        self.over = over;
+    }
+
+    fn give(&mut self, now: Time) -> [Q; N] {
+        let passed = now.since(self.since).as_secs_f64();
+        let over = self.over.as_secs_f64();
+        let left = if passed < over {
+            1.0 - passed / over
+        } else {
+            0.0
+        };
+        self.output = core::array::from_fn(|i| self.held[i] + self.offset[i] * left);
+        self.output
+    }
+}

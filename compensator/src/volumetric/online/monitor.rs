@@ -1,0 +1,173 @@
+//! One axis watched: its detectors, reference, memories and feeds put together.
+//!
+//! Each part can be used alone; this is the order in which they belong together: detector at the
+//! end of travel, detector of the slider, reference, memories, and the feed that lets nothing
+//! jump.
+
+use units::{Metres, Radians, Time};
+
+use super::{
+    BeamDetector, BeamReference, Displacement, Feed, FeedStatus, Memories, RollOptics, Sample,
+    Trouble,
+};
+use crate::volumetric::Axis;
+use crate::volumetric::function::Function;
+
+/// The sideways displacement of one slider, watched by its beam.
+#[derive(Clone, Debug)]
+pub struct AxisMonitor {
+    axis: Axis,
+    slider: BeamDetector,
+    end: Option<EndOfTravel>,
+    reference: BeamReference,
+    feed: Feed<Metres, 2>,
+    displacement: Option<Displacement>,
+}
+
+/// The detector that watches the beam itself, with a feed of its own: a beam that cannot be
+/// watched is taken to stay, to fade back or to stop the machine, as that feed is set.
+#[derive(Clone, Debug)]
+pub struct EndOfTravel {
+    /// The detector.
+    pub detector: BeamDetector,
+    /// How its shift is kept from jumping.
+    pub feed: Feed<Metres, 2>,
+}
+
+impl AxisMonitor {
+    /// Watches `axis` by the detector of its slider and, where there is one, that at the end of
+    /// travel; `feed` keeps what is given out from jumping.
+    pub fn new(
+        axis: Axis,
+        slider: BeamDetector,
+        end: Option<EndOfTravel>,
+        reference: BeamReference,
+        feed: Feed<Metres, 2>,
+    ) -> Self {
+        Self {
+            axis,
+            slider,
+            end,
+            reference,
+            feed,
+            displacement: None,
+        }
+    }
+
+    /// Takes the newest samples of both detectors at `now`, with the axis at `position`, and
+    /// gives out its displacement less what `memories` keep: what is to be compensated.
+    pub fn advance(
+        &mut self,
+        now: Time,
+        position: Metres,
+        slider: Option<&Sample>,
+        end: Option<&Sample>,
+        memories: &Memories,
+    ) -> Displacement {
+        let shift = self.end.as_mut().map(|own| {
+            let seen = own.detector.read(now, end);
+            own.feed
+                .advance(now, seen.map(|it| self.reference.beam_shift(it)))
+        });
+        let shift = shift.unwrap_or([Metres::ZERO; 2]);
+        let seen = self.slider.read(now, slider);
+        let seen = seen.map(|it| self.reference.displacement(position, it, shift));
+        self.displacement = seen.ok();
+        let error = seen.map(|it| memories.error(self.axis, position, it));
+        self.feed.advance(now, error)
+    }
+
+    /// Announces that what is given out will jump although nothing moved: memories changed.
+    pub fn expect_jump(&mut self) {
+        self.feed.expect_jump();
+    }
+
+    /// Exchanges the reference; what is given out is blended to it.
+    pub fn set_reference(&mut self, reference: BeamReference) {
+        self.reference = reference;
+        self.feed.expect_jump();
+        if let Some(end) = &mut self.end {
+            end.feed.expect_jump();
+        }
+    }
+
+    /// The displacement by the last samples, memories and smoothing not counted; `None` when the
+    /// slider's detector had no good one. A recorder takes this less what is compensated.
+    pub fn displacement(&self) -> Option<Displacement> {
+        self.displacement
+    }
+
+    /// What stands behind the values given out last: of the slider's detector, and of that at the
+    /// end of travel.
+    pub fn status(&self) -> (FeedStatus, Option<FeedStatus>) {
+        (
+            self.feed.status(),
+            self.end.as_ref().map(|it| it.feed.status()),
+        )
+    }
+
+    /// The feed, to switch it on or off.
+    pub fn feed_mut(&mut self) -> &mut Feed<Metres, 2> {
+        &mut self.feed
+    }
+}
+
+/// The roll of one slider, watched by two detectors.
+#[derive(Clone, Debug)]
+pub struct RollMonitor {
+    detectors: [BeamDetector; 2],
+    /// Which direction of each detector is read.
+    direction: usize,
+    optics: RollOptics,
+    reference: Function<Radians>,
+    feed: Feed<Radians, 1>,
+}
+
+impl RollMonitor {
+    /// Watches a roll by the first (`second_direction` false) or second direction of two
+    /// detectors, against its reference along the axis.
+    pub fn new(
+        detectors: [BeamDetector; 2],
+        second_direction: bool,
+        optics: RollOptics,
+        reference: Function<Radians>,
+        feed: Feed<Radians, 1>,
+    ) -> Self {
+        Self {
+            detectors,
+            direction: usize::from(second_direction),
+            optics,
+            reference,
+            feed,
+        }
+    }
+
+    /// Takes the newest samples of both detectors at `now`, with the axis at `position`, and gives
+    /// out how far the roll is from its reference.
+    pub fn advance(
+        &mut self,
+        now: Time,
+        position: Metres,
+        samples: [Option<&Sample>; 2],
+    ) -> Radians {
+        let seen = self.roll(now, samples);
+        let beyond = seen.map(|it| [it - self.reference.at(position)]);
+        self.feed.advance(now, beyond)[0]
+    }
+
+    fn roll(&mut self, now: Time, samples: [Option<&Sample>; 2]) -> Result<Radians, Trouble> {
+        let first = self.detectors[0].read(now, samples[0])?[self.direction];
+        let second = self.detectors[1].read(now, samples[1])?[self.direction];
+        Ok(self.optics.solve(first, second)?.angle)
+    }
+
+    /// What stands behind the value given out last.
+    pub fn status(&self) -> FeedStatus {
+        self.feed.status()
+    }
+
+    /// The feed, to switch it on or off.
+    pub fn feed_mut(&mut self) -> &mut Feed<Radians, 1> {
+        &mut self.feed
+    }
+}

@@ -1,0 +1,70 @@
+//! A temperature channel: is what it says believable?
+//!
+//! Source: none. What temperatures do to the machine is in [`crate::volumetric::model`].
+
+use core::time::Duration;
+
+use units::{Celsius, Time};
+
+use super::Trouble;
+
+/// What a temperature can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureSettings {
+    /// The lowest possible.
+    pub low: Celsius,
+    /// The highest possible.
+    pub high: Celsius,
+    /// How fast it can change, in kelvin per second.
+    pub rate_max: f64,
+    /// How far apart two samples of the same temperature can be, in kelvin.
+    pub noise_max: f64,
+    /// A sample older than this says nothing about now.
+    pub age_max: Duration,
+}
+
+/// One temperature sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureChannel {
+    settings: TemperatureSettings,
+    last: Option<(Time, Celsius)>,
+}
+
+impl TemperatureChannel {
+    /// A channel that has seen nothing yet.
+    pub fn new(settings: TemperatureSettings) -> Self {
+        Self {
+            settings,
+            last: None,
+        }
+    }
+
+    /// The temperature by the newest sample (its moment and value), at `now`.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read(&mut self, now: Time, newest: Option<(Time, Celsius)>) -> Result<Celsius, Trouble> {
+        let own = self.settings;
+        let limit = own.age_max;
+        let seen = newest.map_or(Duration::MAX, |(at, _)| now.since(at));
+        let Some((at, value)) = newest.filter(|_| seen <= limit) else {
+            return Err(Trouble::Stale { seen, limit });
+        };
+        if !(value >= own.low && value <= own.high) {
+            return Err(Trouble::Implausible {
+                seen: value.value(),
+                low: own.low.value(),
+                high: own.high.value(),
+            });
+        }
+        if let Some((before, last)) = self.last {
+            let limit = own.noise_max + own.rate_max * at.since(before).as_secs_f64();
+            let seen = (value - last).value().abs();
+            if seen > limit {
+                return Err(Trouble::Jumped { seen, limit });
+            }
+        }
+        self.last = Some((at, value));
+        Ok(value)
+    }
+}

@@ -1,0 +1,169 @@
+//! Where in the engine's channels each detector stands, and whether it is to be believed.
+
+use core::time::Duration;
+
+use compensator::volumetric::online::{
+    Feed, FeedStatus, RollOptics, Sample, TemperatureChannel, Trouble,
+};
+use units::{Celsius, Metres, Radians, Time, Volts};
+
+use crate::assemble::{feed_settings, roll_optics, temperature_settings};
+use crate::config::{AnalogConfig, FeedConfig, MachineConfig, RollConfig, TemperatureConfig};
+use crate::engine::{Channel, Observed};
+
+use super::VolumetricFailure;
+
+/// Where the voltage `channel` of `module` stands among all modules' channels.
+pub(super) fn place_of_voltage(config: &MachineConfig, module: &str, channel: u8) -> usize {
+    place(config, module, channel, |it| &it.channels)
+}
+
+/// Likewise of a thermometer.
+pub(super) fn place_of_temperature(config: &MachineConfig, module: &str, channel: u8) -> usize {
+    place(config, module, channel, |it| &it.temperature_channels)
+}
+
+/// The engine lists the modules in the order of their names.
+fn place(
+    config: &MachineConfig,
+    module: &str,
+    channel: u8,
+    channels: fn(&AnalogConfig) -> &Vec<u8>,
+) -> usize {
+    let modules = config.analog.iter();
+    let before = modules.take_while(|(name, _)| **name != module);
+    let before: usize = before.map(|(_, it)| channels(it).len()).sum();
+    let own = channels(&config.analog[module]);
+    let within = own.iter().position(|it| *it == channel);
+    before + within.unwrap_or(own.len())
+}
+
+/// Four voltages of one moment; `None` before the first sample.
+pub(super) fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Option<Sample> {
+    let mut sample = Sample {
+        channels: [Volts::ZERO; 4],
+        at: Time::NEVER,
+    };
+    for (volts, place) in sample.channels.iter_mut().zip(places) {
+        let channel = channels.get(*place).copied().flatten()?;
+        *volts = channel.volts;
+        sample.at = sample.at.min(channel.at);
+    }
+    Some(sample)
+}
+
+/// A feed counts what it is given: a module that samples every n SYNCs gives the same n times.
+pub(super) fn confirmed_by_samples(
+    config: &MachineConfig,
+    feed: &FeedConfig,
+    module: &str,
+) -> FeedConfig {
+    let every = config.analog.get(module).and_then(|it| it.every_syncs);
+    FeedConfig {
+        confirm: feed.confirm.saturating_mul(every.unwrap_or(1).into()),
+        ..feed.clone()
+    }
+}
+
+/// Two voltages that tell the roll of a slide.
+#[derive(Clone, Debug)]
+pub(super) struct RollReader {
+    places: [usize; 2],
+    per_volt: [f64; 2],
+    optics: RollOptics,
+    age_max: Duration,
+    /// Radians per second.
+    speed_max: f64,
+    noise_max: Radians,
+    last: Option<(Time, Radians)>,
+}
+
+impl RollReader {
+    pub(super) fn new(
+        config: &MachineConfig,
+        roll: &RollConfig,
+    ) -> Result<Self, VolumetricFailure> {
+        let place = |channel: u8| place_of_voltage(config, &roll.analog, channel);
+        Ok(Self {
+            places: roll.channels.map(place),
+            per_volt: roll.mm_per_v.map(|mm| mm * 1e-3),
+            optics: roll_optics(roll)?,
+            age_max: Duration::from_secs_f64(roll.age_max_ms * 1e-3),
+            speed_max: Radians::from_arcsec(roll.speed_max_arcsec_per_s).value(),
+            noise_max: Radians::from_arcsec(roll.noise_max_arcsec),
+            last: None,
+        })
+    }
+
+    /// The roll by the newest samples.
+    pub(super) fn read(&mut self, observed: &Observed<'_>) -> Result<Radians, Trouble> {
+        let mut readings = [Metres::ZERO; 2];
+        let mut at = Time::NEVER;
+        for (k, reading) in readings.iter_mut().enumerate() {
+            let channel = observed.channels.get(self.places[k]).copied().flatten();
+            let seen = channel.map_or(Duration::MAX, |it| observed.now.since(it.at));
+            let limit = self.age_max;
+            let Some(channel) = channel.filter(|_| seen <= limit) else {
+                return Err(Trouble::Stale { seen, limit });
+            };
+            if channel.saturated {
+                let (seen, limit) = (channel.volts, channel.volts);
+                return Err(Trouble::Saturated { seen, limit });
+            }
+            *reading = Metres(channel.volts.value() * self.per_volt[k]);
+            at = at.min(channel.at);
+        }
+        let roll = self.optics.solve(readings[0], readings[1])?.angle;
+        if let Some((before, last)) = self.last {
+            let passed = at.since(before).as_secs_f64();
+            let limit = self.noise_max.value() + self.speed_max * passed;
+            let seen = (roll - last).value().abs();
+            if seen > limit {
+                return Err(Trouble::Jumped { seen, limit });
+            }
+        }
+        self.last = Some((at, roll));
+        Ok(roll)
+    }
+}
+
+/// A thermometer on its way into the correction.
+#[derive(Clone, Debug)]
+pub(super) struct Thermometer {
+    place: usize,
+    channel: TemperatureChannel,
+    /// What it showed at the calibration.
+    reference: Celsius,
+    feed: Feed<Celsius, 1>,
+}
+
+impl Thermometer {
+    pub(super) fn new(
+        config: &MachineConfig,
+        temperature: &TemperatureConfig,
+        feed: &FeedConfig,
+        reference: Celsius,
+    ) -> Self {
+        let module = &temperature.analog;
+        let feed = confirmed_by_samples(config, feed, module);
+        Self {
+            place: place_of_temperature(config, module, temperature.channel),
+            channel: TemperatureChannel::new(temperature_settings(temperature)),
+            reference,
+            feed: Feed::new(feed_settings(&feed)),
+        }
+    }
+
+    /// The temperature to reckon with: the reference until there is a better one.
+    pub(super) fn advance(&mut self, observed: &Observed<'_>) -> Celsius {
+        let newest = observed.temperatures.get(self.place).copied().flatten();
+        let newest = newest.map(|it| (it.at, it.celsius.unwrap_or(Celsius(f64::NAN))));
+        let seen = self.channel.read(observed.now, newest);
+        let above = seen.map(|it| [it - self.reference]);
+        self.reference + self.feed.advance(observed.now, above)[0]
+    }
+
+    pub(super) fn status(&self) -> FeedStatus {
+        self.feed.status()
+    }
+}

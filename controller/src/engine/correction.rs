@@ -1,0 +1,203 @@
+//! What is added to the path so that the tool goes where the path says: limited, never a step.
+//!
+//! A [`Correction`] says what is right now; how that reaches the set-points is decided here.
+//! Size and rate are limited ([`SlewedCorrection`]), enabling, disabling and another correction
+//! are slewed, and one that has nothing to say is held or faded out. The slope along an axis is
+//! proved where a table is loaded; at run time the rate is its limit times the speed.
+
+use compensator::apply::SlewedCorrection;
+use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
+
+use super::{AXES_MAX, PerAxis};
+
+/// Analog channels that a correction sees at most.
+pub const CHANNELS_MAX: usize = 32;
+/// Thermometers that a correction sees at most.
+pub const THERMOMETERS_MAX: usize = 32;
+
+/// One analog channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel {
+    /// When its sample arrived; its age is the correction's to judge.
+    pub at: Time,
+    /// What it says.
+    pub volts: Volts,
+    /// Whether the converter stood at an end of its range.
+    pub saturated: bool,
+}
+
+/// One thermometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThermometerSample {
+    /// When its sample arrived.
+    pub at: Time,
+    /// What it says; `None` where the module says that there is none, or beyond its range.
+    pub celsius: Option<Celsius>,
+}
+
+/// What a correction is computed from.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// Now.
+    pub now: Time,
+    /// Where the path wants the axes at the next SYNC.
+    pub nominal: &'a [Metres],
+    /// Where they were at the last SYNC.
+    pub actual: &'a [Metres],
+    /// The analog modules' channels, in the order of the modules' names; `None` before the
+    /// first sample.
+    pub channels: &'a [Option<Channel>],
+    /// The thermometers of the same modules, likewise.
+    pub temperatures: &'a [Option<ThermometerSample>],
+}
+
+/// How far a correction can be relied upon now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validity {
+    /// It is right.
+    #[default]
+    Valid,
+    /// It cannot be known for the moment: the last one stays.
+    Hold,
+    /// It cannot be known for longer: it goes back to zero at the limited rate.
+    FadeOut,
+    /// The machine must not go on without it: a controlled stop, for this reason.
+    Stop(&'static str),
+}
+
+/// What a correction says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Corrected {
+    /// To be added to each axis's set-point.
+    pub offset: PerAxis<Metres>,
+    /// The standard uncertainty of each.
+    pub uncertainty: PerAxis<Metres>,
+    /// Whether to do so.
+    pub validity: Validity,
+}
+
+/// Computes corrections in the loop: without memory, locks or waiting.
+pub trait Correction: Send {
+    /// The correction for the next SYNC.
+    fn correct(&mut self, observed: &Observed<'_>) -> Corrected;
+}
+
+/// Corrects nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoCorrection;
+
+impl Correction for NoCorrection {
+    fn correct(&mut self, _observed: &Observed<'_>) -> Corrected {
+        Corrected::default()
+    }
+}
+
+/// How large a correction may be, and how fast it may change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CorrectionLimits {
+    /// Beyond this it is cut off.
+    pub size: Metres,
+    /// Faster it does not change.
+    pub rate: MetresPerSecond,
+}
+
+/// The correction in use and how far it is applied.
+pub(super) struct Applied {
+    correction: Box<dyn Correction>,
+    slewed: PerAxis<SlewedCorrection>,
+    last: Corrected,
+    enabled: bool,
+    /// What the slewing works towards: enabled, and not fading.
+    following: bool,
+    limited: u64,
+}
+
+impl Applied {
+    /// Switched off.
+    pub(super) fn new(correction: Box<dyn Correction>, limits: &PerAxis<CorrectionLimits>) -> Self {
+        Self {
+            correction,
+            slewed: core::array::from_fn(|axis| {
+                SlewedCorrection::new(limits[axis].size, limits[axis].rate)
+            }),
+            last: Corrected::default(),
+            enabled: false,
+            following: false,
+            limited: 0,
+        }
+    }
+
+    /// What was added last.
+    pub(super) fn current(&self) -> PerAxis<Metres> {
+        core::array::from_fn(|axis| self.slewed[axis].current())
+    }
+
+    pub(super) const fn switch(&mut self, on: bool) {
+        self.enabled = on;
+    }
+
+    /// Another correction from now on; the one before is handed back.
+    pub(super) fn swap(&mut self, correction: Box<dyn Correction>) -> Box<dyn Correction> {
+        self.expect_jump();
+        core::mem::replace(&mut self.correction, correction)
+    }
+
+    fn expect_jump(&mut self) {
+        for slewed in &mut self.slewed {
+            slewed.expect_jump();
+        }
+    }
+
+    /// The uncertainty that the correction gives, and whether it is followed.
+    pub(super) const fn last(&self) -> (&Corrected, bool) {
+        (&self.last, self.following)
+    }
+
+    /// How often a correction was cut off or could not be followed.
+    pub(super) const fn limited(&self) -> u64 {
+        self.limited
+    }
+
+    /// What to add at `observed.now`; with the reason to stop, if there is one.
+    pub(super) fn advance(
+        &mut self,
+        observed: &Observed<'_>,
+    ) -> (PerAxis<Metres>, Option<&'static str>) {
+        let wanted = self.correction.correct(observed);
+        let mut stop = None;
+        let mut follow = self.enabled;
+        match wanted.validity {
+            Validity::Valid => {
+                if self.last.validity != Validity::Valid {
+                    self.expect_jump();
+                }
+                self.last = wanted;
+            }
+            Validity::Hold => self.last.validity = Validity::Hold,
+            Validity::FadeOut => {
+                self.last.validity = Validity::FadeOut;
+                follow = false;
+            }
+            Validity::Stop(reason) => {
+                self.last.validity = wanted.validity;
+                // While it stops, the correction stays as it is.
+                stop = Some(reason).filter(|_| self.enabled);
+            }
+        }
+        if core::mem::replace(&mut self.following, follow) != follow {
+            for slewed in &mut self.slewed {
+                if follow {
+                    slewed.enable();
+                } else {
+                    slewed.disable();
+                }
+            }
+        }
+        let mut offset = [Metres::ZERO; AXES_MAX];
+        for (axis, slewed) in self.slewed.iter_mut().enumerate() {
+            offset[axis] = slewed.advance(observed.now, self.last.offset[axis]);
+            self.limited += u64::from(slewed.alarm().is_some());
+        }
+        (offset, stop)
+    }
+}

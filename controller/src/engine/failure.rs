@@ -1,0 +1,145 @@
+//! Why the cyclic engine refused, or had to stop every drive at once.
+
+use core::time::Duration;
+
+use units::{Metres, MetresPerSecond};
+
+use super::AXES_MAX;
+use super::motion::MotionError;
+
+/// Why the cyclic engine cannot begin or go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EngineFailure {
+    /// Nothing to move, or too much.
+    #[error("{seen} axes: the cyclic engine moves 1 to {AXES_MAX}")]
+    Axes {
+        /// How many were named.
+        seen: usize,
+    },
+    /// An axis is not made for it.
+    #[error("axis {axis}: [axis.{axis}.cyclic] is missing in the configuration")]
+    NotConfigured {
+        /// Which axis.
+        axis: String,
+    },
+    /// The axes' buses have different SYNC periods.
+    #[error(
+        "axis {axis}: its bus has a SYNC period of {seen:?}, the others {expected:?}; give all \
+         buses of one motion the same"
+    )]
+    Periods {
+        /// Which axis.
+        axis: String,
+        /// The first axis's period.
+        expected: Duration,
+        /// This one's.
+        seen: Duration,
+    },
+    /// An axis goes on moving although nothing drives it.
+    #[error(
+        "axis {axis}: still moves after {waited:?}; the cyclic mode is entered and left at rest \
+         only; does its servo oscillate, or something push it?"
+    )]
+    NotAtRest {
+        /// Which axis.
+        axis: String,
+        /// How long was waited.
+        waited: Duration,
+    },
+    /// A drive does not say what it holds.
+    #[error("axis {axis}: its drive is not in the cyclic mode any more")]
+    NotCyclic {
+        /// Which axis.
+        axis: String,
+    },
+    /// A calibration's correction would be cut off on the way.
+    #[error(
+        "axis {axis}: its calibration corrects by up to {:.3} um, and by up to {:.3} um/s at full \
+         speed, which is more than [axis.{axis}.cyclic] allows; raise correction_limit_um and \
+         correction_rate_um_per_s, or lower speed_max_mm_per_s",
+        size.um(), rate.value() * 1e6
+    )]
+    CorrectionLimit {
+        /// Which axis.
+        axis: String,
+        /// The largest deviation of its table.
+        size: Metres,
+        /// How fast the correction changes at the axis's full speed.
+        rate: MetresPerSecond,
+    },
+    /// A target cannot be reached.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// An axis stopped answering.
+    #[error(
+        "axis {axis}: no position for {periods} SYNC periods; all drives were stopped at once; \
+         check its cable and power"
+    )]
+    Missing {
+        /// Which axis.
+        axis: String,
+        /// For so long.
+        periods: u32,
+    },
+    /// An axis is not where it was sent.
+    #[error(
+        "axis {axis}: {:.3} um away from its set-points, the limit is {:.3} um; all drives were \
+         stopped at once; is it blocked, too fast, or running the wrong way?",
+        lag.um(), limit.um()
+    )]
+    Deviates {
+        /// Which axis.
+        axis: String,
+        /// How far.
+        lag: Metres,
+        /// How far it may be.
+        limit: Metres,
+    },
+    /// SYNCs were missed by so much that the drives took their own measures.
+    #[error(
+        "the loop was late by {periods} periods (the computer was held up), then: {then}; all \
+         drives were stopped at once; free the computer of other work, or allow SCHED_FIFO"
+    )]
+    HeldUp {
+        /// How many SYNCs were missed.
+        periods: u32,
+        /// What came of it.
+        then: String,
+    },
+    /// A frame could not leave before its SYNC.
+    #[error(
+        "set-points could not be sent before their SYNC ({why}); all drives were stopped at \
+         once; raise txqueuelen, or lower the bus load"
+    )]
+    NotSent {
+        /// What the port said.
+        why: String,
+    },
+    /// No way to stop within the limits was found.
+    #[error("no controlled stop was found; all drives were stopped at once")]
+    NoStop,
+    /// Nobody takes orders any more.
+    #[error("the engine has ended, or too many orders wait")]
+    NotTaken,
+}
+
+impl EngineFailure {
+    /// As [`crate::Failure::exit_code`].
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Axes { .. }
+            | Self::NotConfigured { .. }
+            | Self::Periods { .. }
+            | Self::CorrectionLimit { .. } => 2,
+            Self::Motion(_) => 3,
+            Self::NotAtRest { .. }
+            | Self::NotCyclic { .. }
+            | Self::Missing { .. }
+            | Self::Deviates { .. }
+            | Self::HeldUp { .. }
+            | Self::NotSent { .. }
+            | Self::NoStop
+            | Self::NotTaken => 4,
+        }
+    }
+}

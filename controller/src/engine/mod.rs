@@ -1,0 +1,286 @@
+//! The cyclic engine: one set-point for several drives at every SYNC (CiA 402, mode 8), with a
+//! correction computed in the same period from what the machine sees.
+//!
+//! - `decide` decides one period: samples judged, path or motion, correction, set-points, and when
+//!   to stop. Sans-io, of fixed size.
+//! - `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
+//!   send. It runs in the thread that calls it (docs/decisions/0014).
+//! - `path` and `csv` write paths, `motion` plans moves and stops, `correction` limits what is
+//!   added, `histogram` counts times.
+//!
+//! Two ways to stop. Trouble with the path or the host: a controlled stop, time-optimal within
+//! jerk, acceleration and speed, begun by all axes in the same period ([`Cause`]). Trouble with
+//! the bus or a drive: the quick stop command to every drive in the same period
+//! ([`crate::Failure`]). Nothing is resumed by itself.
+//!
+//! The host holds a [`Desk`], from any thread: a bounded queue of points, orders, and what the
+//! loop did lately. All of it passes through rings without locks. Linear axes only.
+
+mod correction;
+mod csv;
+mod decide;
+#[cfg(test)]
+mod decide_tests;
+mod failure;
+mod histogram;
+mod motion;
+mod pace;
+mod path;
+mod run;
+mod tables;
+
+use core::time::Duration;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
+
+pub use correction::{
+    CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
+    THERMOMETERS_MAX, ThermometerSample, Validity,
+};
+pub use csv::{CsvError, CsvFault, read_path};
+pub use decide::{Cause, Counts, Live, State};
+pub use failure::EngineFailure;
+pub use histogram::Histogram;
+pub use motion::{Moment, Motion, MotionError};
+pub use pace::Timing;
+pub use path::{PathError, PathFault, PathWriter, PushError};
+pub use tables::TableCorrection;
+
+use crate::failure::Failure;
+use crate::machine::Machine;
+use correction::Applied;
+use decide::{Command, Core, Lines};
+
+/// How many axes move together at most.
+pub const AXES_MAX: usize = 8;
+/// How many points the queue holds: half a second at 1 kHz.
+const QUEUE_POINTS: usize = 512;
+/// How many orders may wait.
+const QUEUE_COMMANDS: usize = 16;
+/// How many periods a watcher may be behind before he misses some.
+const QUEUE_LIVE: usize = 256;
+
+/// One value for each axis of an engine, in their order; what is beyond them means nothing.
+pub type PerAxis<T> = [T; AXES_MAX];
+
+/// Within which an axis is moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisLimits {
+    /// The lower soft limit.
+    pub min: Metres,
+    /// The upper soft limit.
+    pub max: Metres,
+    /// The greatest speed.
+    pub speed: MetresPerSecond,
+    /// The greatest acceleration, and deceleration of a controlled stop.
+    pub acceleration: MetresPerSecondSquared,
+    /// The greatest jerk.
+    pub jerk: MetresPerSecondCubed,
+    /// How far the axis may be from its latest set-points.
+    pub deviation: Metres,
+}
+
+/// What moves some axes of a machine together; driven by [`Machine::follow`].
+pub struct Engine {
+    axes: Vec<String>,
+    period: Duration,
+    core: Core,
+    timing: Timing,
+    real_time: bool,
+}
+
+/// The host's side of an [`Engine`]: lives in whatever thread writes the path.
+pub struct Desk {
+    /// Where the path is written.
+    pub path: PathWriter,
+    commands: Producer<Command>,
+    retired: Consumer<Box<dyn Correction>>,
+    live: Consumer<Live>,
+    latest: Option<Live>,
+    checker: Motion,
+}
+
+impl Engine {
+    /// For `axes` of `machine`, each with a `[axis.NAME.cyclic]` in the configuration. The
+    /// correction is switched off to begin with.
+    ///
+    /// # Errors
+    /// When there is no such axis, it is not configured for this, or the SYNC periods differ.
+    pub fn new(
+        machine: &Machine,
+        axes: &[&str],
+        correction: Box<dyn Correction>,
+    ) -> Result<(Self, Desk), Failure> {
+        if axes.is_empty() || axes.len() > AXES_MAX {
+            return Err(EngineFailure::Axes { seen: axes.len() }.into());
+        }
+        let mut limits = [AxisLimits::default(); AXES_MAX];
+        let mut of_correction = [CorrectionLimits {
+            size: Metres::ZERO,
+            rate: MetresPerSecond::ZERO,
+        }; AXES_MAX];
+        let mut common = None;
+        for (at, name) in axes.iter().enumerate() {
+            let (axis_limits, correction_limits, period) = machine.cyclic_limits(name)?;
+            (limits[at], of_correction[at]) = (axis_limits, correction_limits);
+            let expected = *common.get_or_insert(period);
+            if expected != period {
+                let axis = (*name).to_owned();
+                let seen = period;
+                return Err(EngineFailure::Periods {
+                    axis,
+                    expected,
+                    seen,
+                }
+                .into());
+            }
+        }
+        let names: Vec<String> = axes.iter().map(|name| (*name).to_owned()).collect();
+        let period = common.unwrap_or_default();
+        Ok(Self::assemble(
+            names,
+            period,
+            limits,
+            &of_correction,
+            correction,
+        ))
+    }
+
+    fn assemble(
+        axes: Vec<String>,
+        period: Duration,
+        limits: PerAxis<AxisLimits>,
+        of_correction: &PerAxis<CorrectionLimits>,
+        correction: Box<dyn Correction>,
+    ) -> (Self, Desk) {
+        let (points, path) = RingBuffer::new(QUEUE_POINTS);
+        let (orders, commands) = RingBuffer::new(QUEUE_COMMANDS);
+        let (retired, collected) = RingBuffer::new(QUEUE_COMMANDS);
+        let (live, seen) = RingBuffer::new(QUEUE_LIVE);
+        let lines = Lines {
+            path,
+            commands,
+            retired,
+            live,
+        };
+        let applied = Applied::new(correction, of_correction);
+        let desk = Desk {
+            path: PathWriter::new(axes.clone(), period, limits, points),
+            commands: orders,
+            retired: collected,
+            live: seen,
+            latest: None,
+            checker: Motion::new(axes.len(), limits),
+        };
+        let core = Core::new(axes.len(), period, limits, applied, lines);
+        let engine = Self {
+            axes,
+            period,
+            core,
+            timing: Timing::default(),
+            real_time: false,
+        };
+        (engine, desk)
+    }
+
+    /// Lets the loop ask for SCHED_FIFO and locked memory; [`Timing`] says what it got.
+    pub const fn in_real_time(&mut self) {
+        self.real_time = true;
+    }
+
+    /// The axes, in order.
+    pub fn axes(&self) -> &[String] {
+        &self.axes
+    }
+
+    /// From SYNC to SYNC.
+    pub const fn period(&self) -> Duration {
+        self.period
+    }
+
+    /// What the loop is doing, or did last.
+    pub const fn state(&self) -> State {
+        self.core.state()
+    }
+
+    /// What was counted.
+    pub fn counts(&self) -> Counts {
+        self.core.counts()
+    }
+
+    /// How punctual the loop was.
+    pub const fn timing(&self) -> &Timing {
+        &self.timing
+    }
+}
+
+impl Desk {
+    /// Asks for a controlled stop; the loop ends when all axes are at rest.
+    ///
+    /// # Errors
+    /// When nobody takes it.
+    pub fn stop(&mut self) -> Result<(), EngineFailure> {
+        self.order(Command::Stop)
+    }
+
+    /// Switches the correction on or off; it is slewed either way.
+    ///
+    /// # Errors
+    /// When nobody takes it.
+    pub fn correct(&mut self, on: bool) -> Result<(), EngineFailure> {
+        self.order(Command::Correct(on))
+    }
+
+    /// Another correction from one period to the next; the set-points are slewed to it.
+    ///
+    /// # Errors
+    /// When nobody takes it.
+    pub fn swap(&mut self, correction: Box<dyn Correction>) -> Result<(), EngineFailure> {
+        // What the loop has done with is freed here, not there.
+        while self.retired.pop().is_ok() {}
+        self.order(Command::Swap(correction))
+    }
+
+    /// Moves all axes together to `target`, from whatever they do now; a path that was begun is
+    /// given up.
+    ///
+    /// # Errors
+    /// When the target is outside the soft limits, or nobody takes the order.
+    pub fn move_to(&mut self, target: &[Metres]) -> Result<(), EngineFailure> {
+        let expected = self.path.axes().len();
+        if target.len() != expected {
+            return Err(EngineFailure::Axes { seen: target.len() });
+        }
+        let mut all = [Metres::ZERO; AXES_MAX];
+        all[..expected].copy_from_slice(target);
+        self.checker.plan_to(&Moment::at_rest(all), &all)?;
+        self.order(Command::MoveTo(all))
+    }
+
+    /// The newest period of the loop, `None` before the first. Who looked less often than every
+    /// 256 periods gets one that old, and the present one at his next look.
+    pub fn live(&mut self) -> Option<Live> {
+        while let Ok(live) = self.live.pop() {
+            self.latest = Some(live);
+        }
+        self.latest
+    }
+
+    /// The next period that was not looked at yet, in order; some are left out when nobody
+    /// looked for long.
+    pub fn next_live(&mut self) -> Option<Live> {
+        let live = self.live.pop().ok()?;
+        self.latest = Some(live);
+        self.latest
+    }
+
+    fn order(&mut self, command: Command) -> Result<(), EngineFailure> {
+        if self.commands.is_abandoned() {
+            return Err(EngineFailure::NotTaken);
+        }
+        self.commands
+            .push(command)
+            .map_err(|_| EngineFailure::NotTaken)
+    }
+}

@@ -1,0 +1,451 @@
+//! The engine's loop over a machine: [`Machine::follow`].
+//!
+//! One period: sleep to the absolute deadline, send SYNC, hear the answers (until all have come,
+//! or half the period is over), decide, send the set-points; the drives take them at the next
+//! SYNC. Devices, heartbeats and alarms are served as in every tick; what the devices judge
+//! (heartbeat, emergency, power state, following error, implausible position) ends the loop as it
+//! ends any procedure, but here with the quick stop command to every drive in the same period.
+//!
+//! A period that begins late is counted. Late by more than a period (times the patience of a
+//! machine in simulated time): the drives have missed a SYNC, the queued path is dropped, and the
+//! axes are stopped together.
+
+use core::time::Duration;
+
+use drivers::device::{AxisReading, DriveCommand};
+use drivers::transport::real_time::RealTime;
+use drivers::transport::{Payload, Port, SendError};
+use drivers::wire::canopen::sync::emit_sync;
+use drivers::wire::cia402::PowerState;
+use units::{Metres, Time};
+
+use super::decide::{Heard, Trouble};
+use super::pace::Pace;
+use super::{
+    AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
+    PerAxis, THERMOMETERS_MAX, ThermometerSample,
+};
+use crate::failure::Failure;
+use crate::machine::{Machine, Supervision};
+
+/// The share of a period in which answers are awaited.
+const LISTEN_SHARE: f64 = 0.5;
+/// How long a drive may take to change its mode or to be enabled.
+const CHANGE_LIMIT: Duration = Duration::from_secs(10);
+/// How long the axes may take to come to rest before the mode is entered, and left.
+const REST_LIMIT: Duration = Duration::from_secs(5);
+
+/// Where the engine's axes are among the machine's devices.
+struct Seats {
+    count: usize,
+    /// By the engine's order of axes, the number of the drive.
+    drive: PerAxis<usize>,
+    /// The buses that carry SYNC.
+    buses: Vec<Port>,
+    channels: [Option<Channel>; CHANNELS_MAX],
+    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+}
+
+impl Machine {
+    /// Moves the axes of `engine` along what its [`Desk`](super::Desk) says, until the path is
+    /// done or the axes were stopped in a controlled way; the cause says which. Axes that still
+    /// settle from an earlier motion are waited for. The drives stay enabled, at rest.
+    ///
+    /// This thread is the loop's: it does nothing else until then.
+    ///
+    /// # Errors
+    /// When an axis is not zeroed, does not come to rest, a drive refuses the mode, or something
+    /// made it unsafe to go on: every drive has been told to quick stop then; see
+    /// [`Machine::guarded`].
+    pub fn follow(&mut self, engine: &mut Engine) -> Result<Cause, Failure> {
+        self.follow_with(engine, &mut || {})
+    }
+
+    /// The same with `host` called once in every period, after the set-points have left: a host
+    /// without a thread of its own. In virtual time there is no other, since it passes as fast as
+    /// the loop runs.
+    ///
+    /// # Errors
+    /// As [`Machine::follow`].
+    pub fn follow_with(
+        &mut self,
+        engine: &mut Engine,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
+        for axis in engine.axes.clone() {
+            self.require_zeroed(&axis)?;
+        }
+        let mut seats = self.seats(engine)?;
+        self.await_rest(engine, &seats)?;
+        let held = self.enter_cyclic(engine, &seats)?;
+        engine.core.begin(held);
+        let outcome = self.with_own_sync(|machine| {
+            let granted = engine.real_time.then(RealTime::ask);
+            engine.timing.scheduling = granted
+                .as_ref()
+                .map_or_else(String::new, |it| it.to_string());
+            machine.run_periods(engine, &mut seats, host)
+        });
+        let cause = outcome?;
+        // A drive that changes its mode while it moves may do anything.
+        self.await_rest(engine, &seats)?;
+        for at in &seats.drive[..seats.count] {
+            self.control(
+                *at,
+                DriveCommand::LeaveCyclic,
+                "leaving the cyclic mode",
+                CHANGE_LIMIT,
+            )?;
+        }
+        for axis in &engine.axes {
+            self.remember(axis).approach.forget();
+        }
+        Ok(cause)
+    }
+
+    /// What the configuration says about a cyclic axis, and the period of its bus.
+    pub(super) fn cyclic_limits(
+        &self,
+        axis: &str,
+    ) -> Result<(AxisLimits, CorrectionLimits, Duration), Failure> {
+        let config = self.axis_config(axis)?;
+        let of_can = config.can().zip(config.cyclic.as_ref());
+        let Some((can, cyclic)) = of_can else {
+            let axis = axis.to_owned();
+            return Err(EngineFailure::NotConfigured { axis }.into());
+        };
+        let (limits, correction) = crate::assemble::cyclic_settings(config, cyclic);
+        let period_ms = self.config.can[can.bus].sync_period_ms;
+        Ok((
+            limits,
+            correction,
+            Duration::from_secs_f64(period_ms * 1e-3),
+        ))
+    }
+
+    fn seats(&self, engine: &Engine) -> Result<Seats, Failure> {
+        let mut drive = [0; AXES_MAX];
+        for (at, axis) in engine.axes.iter().enumerate() {
+            drive[at] = self.axis_index(axis)?;
+        }
+        let buses = self.port_names.iter();
+        let buses = buses.filter(|(_, name)| self.config.can.contains_key(*name));
+        Ok(Seats {
+            count: engine.axes.len(),
+            drive,
+            buses: buses.map(|(port, _)| *port).collect(),
+            channels: [None; CHANNELS_MAX],
+            temperatures: [None; THERMOMETERS_MAX],
+        })
+    }
+
+    /// Until every axis that its drive holds stands still; one that is not enabled goes where
+    /// it likes.
+    fn await_rest(&mut self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
+        let begun = self.now();
+        let deadline = begun + REST_LIMIT * self.patience;
+        while let Some(axis) = (0..seats.count).find(|axis| self.moves(seats.drive[*axis])) {
+            if self.now() >= deadline {
+                let axis = engine.axes[axis].clone();
+                let waited = self.now().since(begun);
+                return Err(EngineFailure::NotAtRest { axis, waited }.into());
+            }
+            self.tick(deadline)?;
+        }
+        Ok(())
+    }
+
+    fn moves(&self, at: usize) -> bool {
+        let device = &self.axes[at].device;
+        device.power_state() == Some(PowerState::OperationEnabled)
+            && device.reading().is_none_or(|it| !it.at_rest)
+    }
+
+    /// Every drive in the mode, enabled, and what each holds.
+    fn enter_cyclic(&mut self, engine: &Engine, seats: &Seats) -> Result<PerAxis<Metres>, Failure> {
+        let period = engine.period;
+        let enter = DriveCommand::EnterCyclic { period };
+        let mut held = [Metres::ZERO; AXES_MAX];
+        for at in &seats.drive[..seats.count] {
+            self.control(*at, enter, "entering the cyclic mode", CHANGE_LIMIT)?;
+        }
+        for at in &seats.drive[..seats.count] {
+            self.control(*at, DriveCommand::Enable, "enable", CHANGE_LIMIT)?;
+        }
+        for (axis, at) in seats.drive[..seats.count].iter().enumerate() {
+            let position = self.axes[*at].device.held();
+            held[axis] = position.ok_or_else(|| EngineFailure::NotCyclic {
+                axis: engine.axes[axis].clone(),
+            })?;
+        }
+        Ok(held)
+    }
+
+    /// SYNC is sent here instead of by the transport, and given back afterwards, come what may.
+    fn with_own_sync<R>(
+        &mut self,
+        run: impl FnOnce(&mut Self) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        self.set_sync(false)?;
+        let outcome = run(self);
+        let given_back = self.set_sync(true);
+        let result = outcome?;
+        given_back.map(|()| result)
+    }
+
+    fn run_periods(
+        &mut self,
+        engine: &mut Engine,
+        seats: &mut Seats,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
+        let mut pace = Pace {
+            // Between the transport's last SYNC and this one lies at most a period and a half.
+            deadline: self.now() + engine.period / 2,
+            synced: None,
+            held_up: None,
+        };
+        loop {
+            match self.one_period(engine, seats, &mut pace) {
+                Ok(None) => host(),
+                Ok(Some(cause)) => return Ok(cause),
+                Err(failure) => {
+                    let now = self.now();
+                    let failure = self.bus_watch.explain(now, failure);
+                    let failure = pace.explain(now, engine.period, failure);
+                    self.quick_stop_together(seats);
+                    return Err(failure);
+                }
+            }
+        }
+    }
+
+    fn one_period(
+        &mut self,
+        engine: &mut Engine,
+        seats: &mut Seats,
+        pace: &mut Pace,
+    ) -> Result<Option<Cause>, Failure> {
+        let late = self.begin_period(engine, seats, pace)?;
+        let synced = pace.synced.unwrap_or(pace.deadline);
+        self.hear_answers(engine, seats, synced)?;
+        let answered = self.now();
+        self.fire_deadlines(answered);
+        self.judge_alarms()?;
+        let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), trouble);
+        if late > 0 {
+            engine.core.overrun(late).map_err(judged)?;
+        }
+        if self.stop.is_requested() {
+            engine.core.stop(Cause::Asked).map_err(judged)?;
+        }
+        let heard = self.heard(seats, answered, synced);
+        let set_points = engine.core.step(&heard).map_err(judged)?;
+        for (at, set_point) in seats.drive[..seats.count].iter().zip(set_points) {
+            self.send_set_point(*at, set_point)?;
+        }
+        self.send_pending()?;
+        engine.timing.work.note(self.now().since(answered));
+        pace.deadline += engine.period;
+        Ok(engine.core.ended())
+    }
+
+    /// Waits for the deadline and sends SYNC. Returns how many SYNCs were missed, beyond what
+    /// is tolerated.
+    fn begin_period(
+        &mut self,
+        engine: &mut Engine,
+        seats: &Seats,
+        pace: &mut Pace,
+    ) -> Result<u32, Failure> {
+        let period = engine.period;
+        self.transport.sleep_until(pace.deadline);
+        let now = self.now();
+        let late = now.since(pace.deadline);
+        engine.timing.lateness.note(late);
+        let mut missed = 0;
+        if late >= period {
+            let periods = late.as_nanos() / period.as_nanos().max(1);
+            missed = u32::try_from(periods).unwrap_or(u32::MAX);
+            engine.timing.overruns += 1;
+            engine.timing.skipped += u64::from(missed);
+            pace.deadline += period * missed;
+        }
+        self.send_syncs(seats)
+            .map_err(|source| self.not_sent(source, "SYNC"))?;
+        if let Some(before) = pace.synced {
+            engine
+                .timing
+                .jitter
+                .note(now.since(before).abs_diff(period));
+        }
+        pace.synced = Some(now);
+        if missed < self.patience {
+            return Ok(0);
+        }
+        pace.held_up = Some((now, missed));
+        Ok(missed)
+    }
+
+    fn send_syncs(&mut self, seats: &Seats) -> Result<(), SendError> {
+        let sync = Payload::Frame(emit_sync(None));
+        seats
+            .buses
+            .iter()
+            .try_for_each(|port| self.transport.send(*port, &sync))
+    }
+
+    /// Takes what arrives until every axis has answered, or the time for it is over.
+    fn hear_answers(
+        &mut self,
+        engine: &mut Engine,
+        seats: &Seats,
+        synced: Time,
+    ) -> Result<(), Failure> {
+        let until = synced + engine.period.mul_f64(LISTEN_SHARE);
+        loop {
+            let complete = seats.drive[..seats.count]
+                .iter()
+                .all(|at| self.answer(*at, synced).is_some());
+            // What else waits is taken too, so that nothing piles up.
+            let until = if complete { Time::ZERO } else { until };
+            let Some(arrival) = self.transport.receive(until) else {
+                return Ok(());
+            };
+            let was_complete = complete;
+            self.take(&arrival)?;
+            if !was_complete {
+                engine.timing.answers.note(arrival.at.since(synced));
+            }
+        }
+    }
+
+    /// The newest sample of drive number `at`, if it came after the SYNC.
+    fn answer(&self, at: usize, synced: Time) -> Option<AxisReading> {
+        let reading = self.axes[at].device.reading()?;
+        (reading.at >= synced).then_some(reading)
+    }
+
+    fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
+        let mut actual = [None; AXES_MAX];
+        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
+            let reading = self.answer(*at, synced);
+            *actual = reading.map(|it| it.position);
+        }
+        self.hear_channels(&mut seats.channels);
+        self.hear_temperatures(&mut seats.temperatures);
+        Heard {
+            now,
+            actual,
+            channels: &seats.channels,
+            temperatures: &seats.temperatures,
+        }
+    }
+
+    /// Puts the newest sample of each analog channel into its place, in the order of the
+    /// modules' names.
+    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
+        // A module without a sample keeps its places: its channels would else be taken for
+        // those of the next one. What it said last stays, as old as it is.
+        let mut first = 0;
+        for analog in &self.analogs {
+            let own = channels.iter_mut().skip(first);
+            first += analog.device.channels();
+            let Some(sample) = analog.device.reading() else {
+                continue;
+            };
+            let values = sample.volts.iter().zip(&sample.saturated);
+            for (place, (volts, saturated)) in own.zip(values) {
+                *place = Some(Channel {
+                    at: sample.at,
+                    volts: *volts,
+                    saturated: *saturated,
+                });
+            }
+        }
+    }
+
+    /// Likewise of the thermometers.
+    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
+        let modules = self.analogs.iter();
+        let mut first = 0;
+        for module in modules.filter_map(|it| it.device.thermometers()) {
+            let own = temperatures.iter_mut().skip(first);
+            first += module.sensors();
+            let Some(sample) = module.temperatures() else {
+                continue;
+            };
+            for (place, celsius) in own.zip(&sample.celsius) {
+                *place = Some(ThermometerSample {
+                    at: sample.at,
+                    celsius: *celsius,
+                });
+            }
+        }
+    }
+
+    /// At once or not at all: a set-point that waits for room would be an old one.
+    fn send_set_point(&mut self, at: usize, set_point: Metres) -> Result<(), Failure> {
+        let now = self.transport.now();
+        let unit = &mut self.axes[at];
+        if let Err(source) = unit.device.follow(now, set_point) {
+            let device = unit.name.clone();
+            return Err(Failure::Device { device, source });
+        }
+        while let Some(payload) = unit.device.poll_transmit() {
+            if let Err(source) = self.transport.send(unit.port, &payload) {
+                let name = unit.name.clone();
+                return Err(self.not_sent(source, &name));
+            }
+        }
+        Ok(())
+    }
+
+    fn not_sent(&mut self, source: SendError, what: &str) -> Failure {
+        // What has arrived meanwhile may say why: bus-off, for one.
+        while let Some(arrival) = self.transport.receive(Time::ZERO) {
+            if let Err(failure) = self.take(&arrival) {
+                return failure;
+            }
+        }
+        if let SendError::Unusable { port, state } = source {
+            let port = self.port_name(port);
+            return Failure::Link { port, state };
+        }
+        let why = format!("{what}: {source}");
+        EngineFailure::NotSent { why }.into()
+    }
+
+    /// The quick stop command to every drive and the SYNC at which it counts, now. What a port
+    /// does not take is left to the drives' watch on our heartbeat.
+    fn quick_stop_together(&mut self, seats: &Seats) {
+        self.supervision = Supervision::Stopping;
+        self.outbox.clear();
+        let now = self.now();
+        for at in 0..self.drive_count() {
+            self.drive_mut(at).control(now, DriveCommand::QuickStop);
+        }
+        let _ = self.send_pending();
+        let _ = self.send_syncs(seats);
+    }
+}
+
+fn engine_axes(axes: &[String]) -> impl Fn(usize) -> String + '_ {
+    |axis| axes.get(axis).cloned().unwrap_or_default()
+}
+
+fn trouble_to_failure(name: impl Fn(usize) -> String, trouble: Trouble) -> Failure {
+    match trouble {
+        Trouble::Missing { axis, periods } => EngineFailure::Missing {
+            axis: name(axis),
+            periods,
+        },
+        Trouble::Deviates { axis, lag, limit } => EngineFailure::Deviates {
+            axis: name(axis),
+            lag,
+            limit,
+        },
+        Trouble::NoStop => EngineFailure::NoStop,
+    }
+    .into()
+}

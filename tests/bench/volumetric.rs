@@ -1,0 +1,396 @@
+//! How long the correction of a point in space takes: model and maps, exact inverse included.
+//!
+//! `volumetric times` prints one JSON object: for each case the nanoseconds per point of three
+//! components, as median and minimum of the repetitions; beside them the interpolators of the
+//! crate `interpn` on the same grids and values, called once for each component.
+//! `volumetric calls CASE CALLS` does that many calls and nothing else, for who counts
+//! instructions.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use compensator::error_table::Limits;
+use compensator::volumetric::function::{Function, Shape};
+use compensator::volumetric::grid::{GridMap, GridShape};
+use compensator::volumetric::model::{
+    AxisErrors, Conditions, Machine, Squareness, Thermal, ThermalBend, ThermalChannel,
+    VolumetricModel,
+};
+use compensator::volumetric::online::MovingState;
+use compensator::volumetric::{Axis, Point, Volume};
+use interpn::{MultiBsplineRectilinear, MulticubicRectilinear, MultilinearRectilinear};
+use serde_json::{Value, json};
+use units::{Celsius, Metres, MetresPerSecond, Radians};
+
+const SPAN_M: [f64; 3] = [0.6, 0.5, 0.4];
+const GRIDS: [[usize; 3]; 2] = [[13, 11, 9], [41, 31, 21]];
+const NODES: usize = 25;
+const REPETITIONS: usize = 25;
+const CALLS: usize = 100_000;
+/// A power of two.
+const TARGETS: usize = 1 << 13;
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    match words[..] {
+        ["times"] => println!("{}", times()),
+        ["calls", name, calls] => {
+            let fields = GRIDS.map(Field::new);
+            let cases = cases(&fields);
+            let case = cases
+                .iter()
+                .find(|it| it.name == name)
+                .expect("a known case");
+            black_box(in_a_row(&*case.run, &targets(), calls.parse().unwrap()));
+        }
+        _ => eprintln!("volumetric: run by tests/bench/run"),
+    }
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014), as a number from 0 to 1.
+fn random(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut mixed = *state;
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn limits() -> Limits {
+    Limits {
+        size: Metres::from_um(500.0),
+        slope: 0.1,
+        rate: MetresPerSecond(0.1),
+    }
+}
+
+fn volume() -> Volume {
+    Volume::new(Point::ZERO, point(SPAN_M)).unwrap()
+}
+
+fn point(v: [f64; 3]) -> Point {
+    Point::new(Metres(v[0]), Metres(v[1]), Metres(v[2]))
+}
+
+fn array(p: Point) -> [f64; 3] {
+    [p.x.value(), p.y.value(), p.z.value()]
+}
+
+fn targets() -> Vec<Point> {
+    let mut state = 1;
+    let mut target = || point(SPAN_M.map(|span| span * random(&mut state)));
+    (0..TARGETS).map(|_| target()).collect()
+}
+
+/// Eighteen functions of ±5 µm and ±5″ with a node every 25 mm or less, squarenesses, a tool, two
+/// temperatures and live detectors.
+fn model(shape: Shape) -> (VolumetricModel, Conditions) {
+    let mut state = 7;
+    let mut axes: [AxisErrors; 3] = Default::default();
+    for axis in Axis::ALL {
+        let span = SPAN_M[axis.index()];
+        let step = span / (NODES - 1) as f64;
+        let nodes: Vec<Metres> = (0..NODES).map(|n| Metres(step * n as f64)).collect();
+        let mut even = || 2.0 * random(&mut state) - 1.0;
+        for k in 0..3 {
+            let along: Vec<Metres> = nodes
+                .iter()
+                .map(|_| Metres::from_um(5.0 * even()))
+                .collect();
+            axes[axis.index()].along[k] = Some(Function::new(&nodes, &along, shape).unwrap());
+            let about: Vec<Radians> = nodes
+                .iter()
+                .map(|_| Radians::from_arcsec(5.0 * even()))
+                .collect();
+            axes[axis.index()].about[k] = Some(Function::new(&nodes, &about, shape).unwrap());
+        }
+    }
+    let channel = ThermalChannel {
+        reference: Celsius(20.0),
+        low: Celsius(15.0),
+        high: Celsius(35.0),
+        expansion: [8e-6, 8e-6, 11e-6],
+        u_expansion: [1e-7; 3],
+        growth: point([0.0, 1e-6, 3e-6]),
+        squareness: [Radians(1e-6), Radians(0.0), Radians(0.0)],
+        u: 0.1,
+    };
+    let bend = |axis: Axis| ThermalBend {
+        axis,
+        towards: axis.others()[1],
+        over: 0,
+        under: Some(1),
+        bow: Metres::from_um(4.0),
+        u: Metres::from_um(0.1),
+        low: Metres(0.0),
+        high: Metres(SPAN_M[axis.index()]),
+        gradient_max: 5.0,
+        is_watched: axis == Axis::X,
+    };
+    let machine = Machine {
+        chain: "XFYZ".parse().unwrap(),
+        volume: volume(),
+        axes,
+        squareness: Squareness {
+            y_to_x: Radians(20e-6),
+            z_to_x: Radians(-30e-6),
+            z_to_y: Radians(10e-6),
+            u: [Radians(1e-6); 3],
+        },
+        thermal: Thermal {
+            channels: vec![channel; 2],
+            bends: Axis::ALL.map(bend).to_vec(),
+            fixed: Point::ZERO,
+        },
+        tool_max: Metres(0.3),
+        displacement_max: Metres::from_um(50.0),
+        roll_max: Radians::from_arcsec(30.0),
+    };
+    let model = VolumetricModel::new(machine, limits()).unwrap();
+    let now = conditions(&model, 22.0);
+    (model, now)
+}
+
+fn conditions(model: &VolumetricModel, temperature: f64) -> Conditions {
+    let live = MovingState {
+        sideways: [[Metres::from_um(3.0); 2]; 3],
+        roll: [Radians::from_arcsec(2.0); 3],
+    };
+    let temperatures = [Celsius(temperature), Celsius(21.0)];
+    let tool = point([0.05, 0.0, -0.2]);
+    model.conditions(tool, &temperatures, &live).unwrap()
+}
+
+/// The same nodes and values for all maps: waves with some noise, at uneven distances.
+struct Field {
+    size: [usize; 3],
+    nodes: [Vec<f64>; 3],
+    components: [Vec<f64>; 3],
+    splines: [Vec<f64>; 3],
+}
+
+impl Field {
+    fn new(size: [usize; 3]) -> Self {
+        let mut state = size[0] as u64;
+        let nodes: [Vec<f64>; 3] = core::array::from_fn(|axis| {
+            let last = size[axis] - 1;
+            let mut uneven = |n: usize| match n {
+                0 => 0.0,
+                n if n == last => SPAN_M[axis],
+                n => SPAN_M[axis] * (n as f64 + 0.3 * random(&mut state)) / last as f64,
+            };
+            (0..size[axis]).map(&mut uneven).collect()
+        });
+        let mut components: [Vec<f64>; 3] = Default::default();
+        for x in &nodes[0] {
+            for y in &nodes[1] {
+                for z in &nodes[2] {
+                    for (k, component) in components.iter_mut().enumerate() {
+                        let wave = (7.0 * x + k as f64).sin() * (5.0 * y).cos() + (6.0 * z).sin();
+                        component.push(1e-5 * wave + 1e-7 * random(&mut state));
+                    }
+                }
+            }
+        }
+        let grids = nodes.each_ref().map(Vec::as_slice);
+        let splines = components.each_ref().map(|values| {
+            let mut coefficients = vec![0.0; values.len()];
+            let mut scratch =
+                vec![0.0; MultiBsplineRectilinear::<f64, 3>::construction_scratch_len(size)];
+            interpn::multibspline::rectilinear::coefficients(
+                &grids,
+                values,
+                &mut coefficients,
+                &mut scratch,
+            )
+            .unwrap();
+            coefficients
+        });
+        Self {
+            size,
+            nodes,
+            components,
+            splines,
+        }
+    }
+
+    fn map(&self, shape: GridShape) -> GridMap {
+        let metres = self
+            .nodes
+            .each_ref()
+            .map(|it| it.iter().copied().map(Metres).collect::<Vec<_>>());
+        let [x, y, z] = &self.components;
+        let deviations: Vec<Point> = (0..x.len())
+            .map(|at| point([x[at], y[at], z[at]]))
+            .collect();
+        let nodes = metres.each_ref().map(Vec::as_slice);
+        GridMap::new(nodes, &deviations, shape, limits()).unwrap()
+    }
+
+    fn named(&self, name: &str) -> String {
+        let [x, y, z] = self.size;
+        format!("{name}, {x} x {y} x {z}")
+    }
+}
+
+type Run<'a> = Box<dyn Fn(&[Point], bool) -> Point + 'a>;
+
+struct Case<'a> {
+    name: String,
+    run: Run<'a>,
+    alone_ns: Vec<f64>,
+    in_a_row_ns: Vec<f64>,
+}
+
+/// The loops are compiled for each case, so that a call is not hidden behind a pointer.
+fn case<'a>(name: String, correct: impl Fn(Point) -> Point + 'a) -> Case<'a> {
+    let run = move |targets: &[Point], wait: bool| {
+        let mut last = Point::ZERO;
+        for target in targets {
+            last = if wait {
+                // Adds nothing, which the compiler may not assume of floating-point numbers.
+                let nothing = Metres(last.x.value() * 0.0);
+                correct(*target + Point::new(nothing, nothing, nothing))
+            } else {
+                black_box(correct(*target))
+            };
+        }
+        last
+    };
+    Case {
+        name,
+        run: Box::new(run),
+        alone_ns: Vec::new(),
+        in_a_row_ns: Vec::new(),
+    }
+}
+
+fn cases(fields: &[Field]) -> Vec<Case<'_>> {
+    let mut cases = Vec::new();
+    for (name, shape) in [("tables", Shape::Linear), ("splines", Shape::Spline)] {
+        let (own, now) = model(shape);
+        let (other, then) = model(shape);
+        let deviation = move |at| own.deviation(at, &now).expect("within the volume");
+        cases.push(case(format!("model of {name}"), deviation));
+        let command = move |at| other.command(at, &then).expect("within the volume");
+        cases.push(case(format!("model of {name}, inverse"), command));
+    }
+    let (own, _) = model(Shape::Linear);
+    let with_conditions = move |at: Point| {
+        let now = conditions(&own, 22.0 + at.x.value());
+        own.deviation(at, &now).expect("within the volume")
+    };
+    cases.push(case(
+        "model, new conditions each time".into(),
+        with_conditions,
+    ));
+    for field in fields {
+        for (name, shape) in [
+            ("trilinear", GridShape::Trilinear),
+            ("tricubic", GridShape::Tricubic),
+        ] {
+            let (own, other) = (field.map(shape), field.map(shape));
+            let deviation = move |at| own.deviation(at).expect("within the map");
+            cases.push(case(field.named(name), deviation));
+            let command = move |at| other.command(at).expect("within the map");
+            cases.push(case(field.named(&format!("{name}, inverse")), command));
+        }
+        cases.extend(others(field));
+    }
+    cases
+}
+
+/// The same by `interpn`: its linear, its cubic of continuous slope, its B-splines.
+fn others(field: &Field) -> [Case<'_>; 3] {
+    let grids: &'static [&'static [f64]; 3] = Box::leak(Box::new(
+        field
+            .nodes
+            .each_ref()
+            .map(|it| &*Box::leak(it.clone().into_boxed_slice())),
+    ));
+    let each = field.components.each_ref();
+    let linear = each.map(|it| MultilinearRectilinear::new(grids, it).unwrap());
+    let cubic = each.map(|it| MulticubicRectilinear::new(grids, it, false).unwrap());
+    let each = field.splines.each_ref();
+    let spline = each.map(|it| MultiBsplineRectilinear::new(grids, it, false).unwrap());
+    let linear = move |at| {
+        point(
+            linear
+                .each_ref()
+                .map(|it| it.interp_one(array(at)).unwrap()),
+        )
+    };
+    let cubic = move |at| point(cubic.each_ref().map(|it| it.interp_one(array(at)).unwrap()));
+    let spline = move |at| {
+        point(
+            spline
+                .each_ref()
+                .map(|it| it.interp_one(array(at)).unwrap()),
+        )
+    };
+    check_alike(&field.map(GridShape::Trilinear), &linear);
+    [
+        case(field.named("(interpn) multilinear"), linear),
+        case(field.named("(interpn) multicubic"), cubic),
+        case(field.named("(interpn) multibspline"), spline),
+    ]
+}
+
+/// Both interpolate the same: otherwise there is nothing to compare.
+fn check_alike(map: &GridMap, other: &impl Fn(Point) -> Point) {
+    for target in targets() {
+        let off = map.deviation(target).unwrap() - other(target);
+        assert!(off.distance().value() < 1e-15, "at {target:?}: {off:?}");
+    }
+}
+
+fn in_a_row(run: &dyn Fn(&[Point], bool) -> Point, targets: &[Point], calls: usize) -> Point {
+    let mut last = Point::ZERO;
+    for _ in 0..calls / TARGETS {
+        last = run(targets, false);
+    }
+    last
+}
+
+fn nanoseconds(case: &Case, targets: &[Point], wait: bool) -> f64 {
+    let rounds = CALLS / TARGETS;
+    let begin = Instant::now();
+    for _ in 0..rounds {
+        black_box((case.run)(black_box(targets), wait));
+    }
+    begin.elapsed().as_secs_f64() * 1e9 / (rounds * TARGETS) as f64
+}
+
+fn median_and_least(values: &mut [f64]) -> (f64, f64) {
+    values.sort_by(f64::total_cmp);
+    (values[values.len() / 2], values[0])
+}
+
+/// Repetitions go round all cases, so that a disturbance hits each of them.
+fn times() -> Value {
+    let targets = targets();
+    let fields = GRIDS.map(Field::new);
+    let mut cases = cases(&fields);
+    for _ in 0..REPETITIONS {
+        for case in &mut cases {
+            let alone = nanoseconds(case, &targets, true);
+            let in_a_row = nanoseconds(case, &targets, false);
+            case.alone_ns.push(alone);
+            case.in_a_row_ns.push(in_a_row);
+        }
+    }
+    let results = cases.iter_mut().map(|case| {
+        let (alone_ns, alone_ns_min) = median_and_least(&mut case.alone_ns);
+        let (in_a_row_ns, in_a_row_ns_min) = median_and_least(&mut case.in_a_row_ns);
+        json!({
+            "case": case.name,
+            "alone_ns": alone_ns,
+            "alone_ns_min": alone_ns_min,
+            "in_a_row_ns": in_a_row_ns,
+            "in_a_row_ns_min": in_a_row_ns_min,
+        })
+    });
+    let results: Vec<Value> = results.collect();
+    json!({ "calls": CALLS, "repetitions": REPETITIONS, "cases": results })
+}
