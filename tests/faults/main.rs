@@ -6,6 +6,7 @@
 
 mod bus;
 mod cyclic;
+mod cyclic_host;
 mod drive;
 mod files;
 mod hall;

@@ -1,6 +1,5 @@
 //! Three axes corrected throughout their volume while they work, judged by the plant's truth.
 
-use core::time::Duration;
 use std::sync::{Arc, Mutex};
 
 use compensator::volumetric::function::{Function, Shape};
@@ -69,10 +68,6 @@ fn visit(
     periods: u32,
 ) -> Vec<[Metres; 3]> {
     let emulated = bench.emulated.clone();
-    // A drive enters the cyclic mode at rest only, and a correction may have moved it until now.
-    let until = bench.machine.now() + Duration::from_millis(100);
-    let rested = bench.machine.run_until(until);
-    rested.unwrap_or_else(|it| panic!("{it}"));
     let (mut next, mut standing, mut errors) = (0, 0, Vec::new());
     let set_point = |live: Live| -> [Metres; 3] {
         core::array::from_fn(|axis| live.nominal[axis] + live.offset[axis])
