@@ -2,9 +2,8 @@
 //!
 //! `cargo run --example stream -- machine.toml path.csv` (`time_s,x_mm`)
 #![expect(clippy::print_stdout, reason = "an example shows what it reads")]
-
 use std::time::Duration;
-use truestage::engine::{Engine, NoCorrection, PushError, read_path};
+use truestage::engine::{Engine, State, read_path};
 use truestage::{Failure, Machine, Store, config, ports};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,27 +13,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut machine = Machine::new(&loaded, Box::new(ports));
     let store = Store::new(&loaded.config.machine.data_dir, &loaded.config.machine.name);
     let path = std::fs::read_to_string(&words[2])?;
-    machine.guarded(|machine| -> Result<(), Failure> {
+    Ok(machine.guarded(|machine| -> Result<(), Failure> {
         machine.start()?;
+        machine.load_active("x", &store)?;
         machine.zero("x", &store)?;
-        let (mut engine, mut desk) = Engine::new(machine, &["x"], Box::new(NoCorrection))?;
+        let correction = Box::new(machine.table_correction(&["x"])?);
+        let (mut engine, mut desk) = Engine::new(machine, &["x"], correction)?;
         engine.in_real_time();
         let points = read_path(&path, engine.axes(), engine.period()).expect("a path");
         let writer = std::thread::spawn(move || {
             desk.correct(true).expect("the loop listens");
-            for point in points {
-                while desk.path.push(&point) == Err(PushError::Full) {
-                    std::thread::sleep(Duration::from_millis(20));
-                    let Some(live) = desk.live() else { continue };
-                    let (offset, u) = (live.offset[0].um(), live.uncertainty[0].um());
-                    println!("x {:.6} mm, {offset:+.3} ± {u:.3} um", live.actual[0].mm());
-                }
+            let mut points = points.into_iter();
+            while !matches!(desk.live().map(|it| it.state), Some(State::Stopped(_))) {
+                let written = desk.path.write(&mut points);
+                written.unwrap_or_else(|error| panic!("{error}"));
+                std::thread::sleep(Duration::from_millis(20));
+                let Some(live) = desk.live() else { continue };
+                let (offset, u) = (live.offset[0].um(), live.uncertainty[0].um());
+                println!("x {:.6} mm, {offset:+.3} ± {u:.3} um", live.actual[0].mm());
             }
-            desk.path.finish().expect("room for the end");
         });
         println!("{}\n{}", machine.follow(&mut engine)?, engine.timing());
         writer.join().expect("the writer ends");
         machine.shut_down()
-    })?;
-    Ok(())
+    })?)
 }

@@ -6,6 +6,7 @@
 mod cia404;
 mod copley;
 mod cyclic;
+mod line;
 mod patience;
 mod rotary;
 mod volumetric;
@@ -17,14 +18,15 @@ pub use cia404::cia404_settings;
 pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
 pub(crate) use cyclic::cyclic_settings;
+pub(crate) use line::{angular_separation, line_corrections};
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};
 pub(crate) use volumetric::point_of_mm;
 pub use volumetric::{
-    BeamDetectorError, beam_detector, beam_drift, feed_settings, function_shape, influences,
-    model_limits, roll_optics, temperature_settings, thermal, volume_axis, volumetric_chain,
-    work_volume,
+    BeamDetectorError, beam_detector, beam_drift, bend_plans, feed_settings, function_shape,
+    influences, model_limits, roll_optics, temperature_settings, thermal, volume_axis,
+    volumetric_chain, work_volume,
 };
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};

@@ -11,13 +11,17 @@ use std::rc::Rc;
 use drivers::transport::in_process::{InProcess, World};
 use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
+use mock_bus::plant::{LineOptics as EmulatedOptics, LineSetUp};
 use mock_bus::runner::{self, RunError, Running};
 use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
 use units::Time;
 
 use crate::assemble;
 use crate::config::MachineConfig;
+use crate::cycle::volumetric::{LineOperator, LineOptics, LineTask};
+use crate::failure::Failure;
 use crate::ports::{Endpoint, Overrides};
+use compensator::volumetric::{Axis, Point};
 
 pub use mock_bus::plant::{DriftLimits, HallDrift};
 
@@ -214,6 +218,73 @@ impl EmulatedOnPtys {
     /// When the machine's thread has ended.
     pub fn turn_plate(&self, lines: f64) -> Result<(), EmulatedError> {
         Ok(self.running.turn_plate(lines)?)
+    }
+
+    /// Somebody mounts the moving optic of `task` and sets the laser up along its line, from where the
+    /// machine stands.
+    ///
+    /// # Errors
+    /// When the machine's thread has ended.
+    pub fn set_up_line(&self, task: &LineTask) -> Result<(), EmulatedError> {
+        Ok(self.running.set_up_line(line_set_up(task))?)
+    }
+
+    /// Somebody packs laser and optics up again.
+    ///
+    /// # Errors
+    /// When the machine's thread has ended.
+    pub fn take_line_away(&self) -> Result<(), EmulatedError> {
+        Ok(self.running.take_line_away()?)
+    }
+}
+
+/// What the hand does when it is asked for a line.
+fn line_set_up(task: &LineTask) -> LineSetUp {
+    let metres = |point: Point| [point.x, point.y, point.z];
+    let way = metres(task.end - task.start);
+    let unit = |axis: Axis| Axis::ALL.map(|it| f64::from(u8::from(it == axis)));
+    LineSetUp {
+        optics: match task.optics {
+            LineOptics::Linear => EmulatedOptics::Linear,
+            LineOptics::Straightness { across } => EmulatedOptics::Straightness {
+                across: unit(across),
+            },
+            LineOptics::Angular { about } => EmulatedOptics::Angular { about: unit(about) },
+        },
+        along: way.map(|it| it.value()),
+        tool_offset: metres(task.tool),
+    }
+}
+
+/// The emulated machine's own hand, at once.
+impl LineOperator for Emulated {
+    fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
+        self.simulation_mut().set_up_line(&line_set_up(task));
+        Ok(())
+    }
+
+    fn is_set_up(&mut self) -> Result<bool, Failure> {
+        Ok(true)
+    }
+
+    fn pack_up(&mut self) -> Result<(), Failure> {
+        self.simulation_mut().take_line_away();
+        Ok(())
+    }
+}
+
+/// Likewise on pseudo-terminals.
+impl LineOperator for &EmulatedOnPtys {
+    fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
+        Ok(self.set_up_line(task)?)
+    }
+
+    fn is_set_up(&mut self) -> Result<bool, Failure> {
+        Ok(true)
+    }
+
+    fn pack_up(&mut self) -> Result<(), Failure> {
+        Ok(self.take_line_away()?)
     }
 }
 

@@ -5,6 +5,8 @@
 pub enum Stage {
     /// Finding the origin.
     Zero,
+    /// Taking down what the detectors read.
+    Reference,
     /// Measuring to learn the deviations.
     Calibrate,
     /// Measuring to judge.
@@ -16,6 +18,7 @@ impl Stage {
     pub const fn text(self) -> &'static str {
         match self {
             Self::Zero => "zero",
+            Self::Reference => "reference",
             Self::Calibrate => "calibrate",
             Self::Verify => "verify",
         }

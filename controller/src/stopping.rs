@@ -1,9 +1,15 @@
 //! How a machine comes to rest: in order, or because something failed.
 
+use core::time::Duration;
+
 use drivers::device::DriveCommand;
+use units::Time;
 
 use crate::failure::Failure;
 use crate::machine::{Machine, STOP_LIMIT, Supervision};
+
+/// How long the slowest module may take to send again after a rest.
+const AWAKE_LIMIT: Duration = Duration::from_secs(1);
 
 impl Machine {
     /// Disables every axis in a controlled way and stops supervision and SYNC.
@@ -18,6 +24,53 @@ impl Machine {
         }
         self.supervision = Supervision::Off;
         result.and(self.set_sync(false))
+    }
+
+    /// Rests for `span`: every axis is switched off and no SYNC is sent, while heartbeats go on, so
+    /// that each drive keeps its origin. Then SYNC runs again and every device must have sent.
+    ///
+    /// # Errors
+    /// When an axis cannot be disabled, a bus fails, somebody asks to stop, or a device is silent
+    /// afterwards.
+    pub fn idle(&mut self, span: Duration) -> Result<(), Failure> {
+        for at in 0..self.drive_count() {
+            self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT)?;
+        }
+        // Without SYNC the silence of the devices is no alarm.
+        self.supervision = Supervision::Off;
+        self.set_sync(false)?;
+        let until = self.now() + span;
+        self.run_until(until)?;
+        self.set_sync(true)?;
+        let resumed = self.now();
+        let deadline = resumed + AWAKE_LIMIT * self.patience;
+        while let Some(device) = self.silent_since(resumed) {
+            if self.now() >= deadline {
+                return Err(Failure::Overdue {
+                    device,
+                    step: "process data after a rest",
+                    waited: self.now().since(resumed),
+                });
+            }
+            self.tick(deadline)?;
+        }
+        self.supervision = Supervision::On;
+        Ok(())
+    }
+
+    /// The first drive or module without a sample newer than `resumed`.
+    fn silent_since(&self, resumed: Time) -> Option<String> {
+        let is_old = |at: Option<Time>| at.is_none_or(|at| at <= resumed);
+        let axis = self
+            .axes
+            .iter()
+            .find(|it| is_old(it.device.reading().map(|it| it.at)));
+        let module = || {
+            let modules = self.analogs.iter();
+            let mut silent = modules.filter(|it| is_old(it.device.reading().map(|it| it.at)));
+            silent.next().map(|it| it.name.clone())
+        };
+        axis.map(|it| it.name.clone()).or_else(module)
     }
 
     /// Runs `procedure`; when it fails, stops and disables every axis before the failure is

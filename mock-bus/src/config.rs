@@ -113,6 +113,10 @@ pub struct NodeConfig {
     /// Not on the machine's mains: a power cycle of the machine leaves it running.
     #[serde(default)]
     pub own_mains: bool,
+    /// Brought along for a calibration: it has no power, from its own mains, until somebody sets
+    /// a line up with it.
+    #[serde(default)]
+    pub brought_along: bool,
     /// What it is.
     pub device: DeviceConfig,
 }

@@ -1,10 +1,11 @@
 """Runs the benchmark programs in turn and prints what they measured as one JSON object.
 
-    measure.py bus PROGRAMS    SDO round trips and SYNC jitter on vcan0
-    measure.py host PROGRAMS   corrections, rotary self-calibration, and SYNC jitter without CAN
+    measure.py bus PROGRAMS    SDO round trips, SYNC jitter and the cyclic engine on vcan0
+    measure.py host PROGRAMS   corrections, rotary self-calibration, SYNC jitter without CAN, and
+                               the cyclic engine on a pseudo-terminal
 
 PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "rotary": path,
-"volumetric": path, "sync": path}.
+"volumetric": path, "sync": path, "cycle": path}.
 The caller pins this process to one core; what it starts inherits that.
 """
 
@@ -32,6 +33,10 @@ SYNC_COUNT = 400
 BUS_PERIODS_US = [5000]
 HOST_PERIODS_US = [2000, 5000]
 FIFO_PRIORITY = 40
+
+# Four axes; the first of these periods that the computer bears.
+CYCLE_PERIODS_MS = ["2.0", "5.0", "10.0", "20.0"]
+CYCLE_S = "5" if QUICK else "60"
 
 COUNTED_CALLS = 200_000
 COUNTED = [("linear", 20), ("linear", 20_000), ("monotone cubic", 20), ("monotone cubic", 20_000)]
@@ -136,6 +141,16 @@ def sync(program, sink, periods_us):
     }
 
 
+def cycle(program, bus):
+    """The engine beside a tokio interval in the same process, with and without load."""
+    cases = []
+    for busy in (False, True):
+        with load(busy):
+            run_of_it = run([program, "follow", bus, CYCLE_S, *CYCLE_PERIODS_MS])
+        cases.append({"bus": bus, "busy": busy} | run_of_it)
+    return cases
+
+
 def judge_sync(case, runs):
     name, period_us, busy = case
     own = runs[0]["real_time"]
@@ -189,6 +204,7 @@ def main(place, programs):
         measured = {
             "sdo": sdo(programs["sdo"]),
             "sync": sync(programs["sync"], INTERFACE, BUS_PERIODS_US),
+            "cycle": cycle(programs["cycle"], INTERFACE),
         }
     else:
         measured = {
@@ -198,6 +214,8 @@ def main(place, programs):
             "scipy_grid": scipy_grid(),
             "table_instructions": instructions(programs["table"]),
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
+            "cycle": cycle(programs["cycle"], "pty"),
+            "cycle_cost": run([programs["cycle"], "cost"])["cases"],
         }
     measured["seconds"] = round(time.monotonic() - begin)
     print(json.dumps(measured))

@@ -106,6 +106,34 @@ def show_volumetric(volumetric, scipy):
         )
 
 
+def show_cycle(title, cases):
+    print(f"\nThe cyclic engine, four axes, {title}: lateness in us beside a tokio interval")
+    columns = ("p50", "p99", "p999", "max")
+    heads = [(name, 9) for name in columns]
+    line(("", 8), ("load", 12), *heads, ("followed", 11), ("overruns", 10), ("stops", 0))
+    for case in cases:
+        load = "busy" if case["busy"] else "idle"
+        for name, key in (("ours", "lateness"), ("tokio", "tokio")):
+            if name == "ours":
+                load += f" {case['period_us'] / 1000:.0f} ms"
+            cells = [(f"{case[key][column + '_us']:.0f}", 9) for column in columns]
+            counted = [
+                (f"{case['followed_s']:.0f} s", 11),
+                (case["overruns"], 10),
+                (sum(case["stops"].values()), 0),
+            ]
+            line((name, 8), (load, 12), *cells, *(counted if name == "ours" else []))
+        line((f"  {case['scheduling']}", 0))
+        for stop, count in case["stops"].items():
+            line((f"  {count} times: {stop}", 0))
+
+
+def show_cycle_cost(cases):
+    print("\nA period of the cyclic engine apart from its bus: us, median (least)")
+    for case in cases:
+        line((case["case"], 46), (f"{case['us']:.1f} ({case['us_min']:.1f})", 0))
+
+
 def growth_of(table):
     """How much longer a call takes in the longest table than in the shortest, in a row."""
     least = {}
@@ -147,11 +175,14 @@ def main(vcan_host, host_file, bus_file=None):
     show_rotary(measured["host"]["rotary"])
     show_volumetric(measured["host"]["volumetric"], measured["host"]["scipy_grid"])
     show_sync("on the host, without CAN", measured["host"]["sync"])
+    show_cycle("on a pseudo-terminal", measured["host"]["cycle"])
+    show_cycle_cost(measured["host"]["cycle_cost"])
     if bus_file:
         with open(bus_file, encoding="utf-8") as file:
             measured["bus"] = json.load(file)
         show_sdo(measured["bus"]["sdo"])
         show_sync(f"vcan0 ({vcan_host})", measured["bus"]["sync"])
+        show_cycle(f"vcan0 ({vcan_host})", measured["bus"]["cycle"])
     measured["goals"] = goals_of(measured)
     print()
     print(json.dumps(measured))

@@ -1,5 +1,6 @@
 //! The commands as a user runs them: `mock-bus` in one process, `truestage` in others.
 
+mod example;
 mod interrupted;
 mod platform;
 mod programs;

@@ -28,7 +28,7 @@ fn program(name: &str) -> PathBuf {
     let path = folder.join(name);
     assert!(
         path.exists(),
-        "{} is not there: run `cargo build --workspace` first, as tests/run does",
+        "{} is not there: run `cargo build --workspace --bins --examples` first, as tests/run does",
         path.display()
     );
     path
@@ -147,13 +147,27 @@ impl Bench {
 
     /// The same with any machine that ships, its emulation after `change`.
     pub(crate) fn of(rig: Rig, shipped: Shipped, change: impl Fn(String) -> String) -> Self {
+        Self::at_speed(rig, shipped, &speed(rig), change)
+    }
+
+    /// The linear machine in real time.
+    pub(crate) fn in_real_time(rig: Rig) -> Self {
+        Self::at_speed(rig, LINEAR, "1", |text| text)
+    }
+
+    fn at_speed(
+        rig: Rig,
+        shipped: Shipped,
+        speed: &str,
+        change: impl Fn(String) -> String,
+    ) -> Self {
         let emulated = change(shipped.emulated.to_owned());
         let turn = ONE_MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         fs::write(folder.path().join("emulated.toml"), &emulated).expect("a file can be written");
         let mut command = Command::new(program("mock-bus"));
         command.current_dir(folder.path());
-        command.args(["emulated.toml", "--seed", "51", "--speed", &speed(rig)]);
+        command.args(["emulated.toml", "--seed", "51", "--speed", speed]);
         if rig == Rig::Vcan {
             command.args(["--can", INTERFACE]);
         } else {
@@ -206,6 +220,17 @@ impl Bench {
             .replace("runs = 3", "runs = 2")
             .replace("targets = 8\nruns = 5", "targets = 4\nruns = 2");
         fs::write(self.folder().join(name), change(short)).expect("a file can be written");
+    }
+
+    /// Runs an example of the controller with these words in the machine's folder; what it
+    /// printed, to standard output and to standard error.
+    pub(crate) fn example(&self, name: &str, words: &[&str]) -> (bool, String, String) {
+        let mut command = Command::new(program(&format!("examples/{name}")));
+        let command = command.current_dir(self.folder()).args(words);
+        let output = command.output().expect("it can be started");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let (printed, said) = (text(&output.stdout), text(&output.stderr));
+        (output.status.success(), printed, said)
     }
 
     /// Runs `truestage --json` with these words and no others in the machine's folder.

@@ -3,8 +3,10 @@
 use core::time::Duration;
 
 use drivers::device::umd2::Umd2;
-use drivers::device::{Alarm, DisplacementInstrument};
+use drivers::device::{Alarm, Device, DisplacementInstrument};
 use mock_bus::fault::{Fault, FaultConfig};
+use mock_bus::plant::{LineOptics, LineSetUp};
+use mock_bus::simulation::Simulation;
 use tests::{Desk, Emulator, Setup, rigs};
 use truestage::assemble;
 use units::{Metres, Pascals};
@@ -15,16 +17,19 @@ type Laser = Desk<Umd2>;
 #[track_caller]
 fn check(procedure: impl Fn(&mut Laser)) {
     for rig in rigs() {
-        let emulator = Emulator::new(rig, &Setup::new(23));
-        let loaded = &emulator.loaded;
-        let instrument = &loaded.config.instrument["laser"];
-        let settings = assemble::umd2_settings(instrument, loaded.patience);
-        let mut laser = Desk::new(emulator, "laser", Umd2::new(settings));
+        let mut laser = laser(Emulator::new(rig, &Setup::new(23)));
         if let Err(error) = laser.start() {
             panic!("{rig:?}: {error}; {:?}", laser.alarms);
         }
         procedure(&mut laser);
     }
+}
+
+fn laser(emulator: Emulator) -> Laser {
+    let loaded = &emulator.loaded;
+    let instrument = &loaded.config.instrument["laser"];
+    let settings = assemble::umd2_settings(instrument, loaded.patience);
+    Desk::new(emulator, "laser", Umd2::new(settings))
 }
 
 fn average(laser: &mut Laser, samples: u32) -> Metres {
@@ -109,4 +114,60 @@ fn a_blocked_beam_is_an_alarm_and_no_number_until_a_new_datum() {
             displacement.nm()
         );
     });
+}
+
+/// Along x, from where the machine was switched on.
+const LINE: LineSetUp = LineSetUp {
+    optics: LineOptics::Linear,
+    along: [1.0, 0.0, 0.0],
+    tool_offset: [Metres::ZERO; 3],
+};
+
+fn samples(laser: &Laser) -> u64 {
+    let counters = laser.device.counters();
+    let samples = counters.iter().find(|(name, _)| *name == "samples");
+    samples.expect("it counts them").1
+}
+
+/// Silent until somebody sets it up; hands in the beam void its count; what is counted from the
+/// next datum on is half wavelengths.
+#[test]
+fn a_laser_at_three_axes_counts_from_when_a_line_is_set_up() {
+    for rig in rigs() {
+        let mut laser = laser(Emulator::new(rig, &Setup::volumetric(23)));
+        laser.live(Duration::from_secs(1));
+        assert_eq!(samples(&laser), 0, "{rig:?}: it is in its case");
+        laser
+            .emulator
+            .simulation(|machine| machine.set_up_line(&LINE));
+        let started = laser.start();
+        started.unwrap_or_else(|error| panic!("{rig:?}: {error}"));
+        laser.live_until(|laser| laser.latest().is_some());
+        laser.alarms.clear();
+        laser
+            .emulator
+            .simulation(|machine| machine.set_up_line(&LINE));
+        laser.live(Duration::from_millis(700));
+        assert_eq!(laser.alarms, [Alarm::BeamLost], "{rig:?}");
+        assert_eq!(laser.device.latest(), None, "{rig:?}");
+        let now = laser.now();
+        laser.device.set_datum(now);
+        let before = average(&mut laser, 100);
+        let half_wavelengths = 5;
+        let jump = FaultConfig::permanent(Fault::FringeJump { half_wavelengths });
+        let injected = laser.emulator.simulation(|machine| machine.inject(jump));
+        injected.expect("no port is named");
+        laser.live(Duration::from_millis(200));
+        let moved = average(&mut laser, 100) - before;
+        assert!(
+            (moved.nm() - 5.0 * 316.495_686).abs() < 5.0,
+            "{rig:?}: {} nm",
+            moved.nm()
+        );
+        laser.emulator.simulation(Simulation::take_line_away);
+        laser.live(Duration::from_millis(200));
+        let said = samples(&laser);
+        laser.live(Duration::from_secs(1));
+        assert_eq!(samples(&laser), said, "{rig:?}: it is packed up");
+    }
 }

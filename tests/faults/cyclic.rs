@@ -1,5 +1,5 @@
-//! The same faults while an axis follows a path, a set-point at every SYNC (classes 1, 2, 4, 5, 6,
-//! 8, 9, 12 to 15, 22, 23, 50).
+//! The same faults while an axis follows a path, a set-point at every SYNC (classes 1 to 6, 8 to
+//! 10, 12 to 15, 22 to 24, 32, 50; those of the host are in `cyclic_host.rs`).
 
 use drivers::device::Alarm;
 use drivers::transport::LinkState;
@@ -65,6 +65,68 @@ fn single_lost_and_doubled_samples_are_ridden_out() {
     check_harmless(Scene::during(Phase::Follow).inject(now_and_then(lost, 0.02)));
     let doubled = on_tpdo(|port, cob_id| Fault::Duplicate { port, cob_id });
     check_harmless(Scene::during(Phase::Follow).inject(now_and_then(doubled, 0.5)));
+    // An adapter that exchanges a sample and what comes after it.
+    let reordered = on_tpdo(|port, cob_id| Fault::Reorder { port, cob_id });
+    check_harmless(Scene::during(Phase::Follow).inject(now_and_then(reordered, 0.1)));
+}
+
+#[test]
+fn a_bus_that_gets_worse_is_told_and_goes_on() {
+    let fault = Fault::ErrorPassive { port: CAN.into() };
+    let played = check_harmless(following().inject(FaultConfig::times(fault, 1)));
+    let warnings = played.warnings();
+    let told = |it: &String| it.contains("can0") && it.contains("error-passive");
+    assert!(warnings.iter().any(told), "{warnings:?}");
+}
+
+#[test]
+fn a_second_node_with_the_drives_number_stops_it() {
+    let fault = Fault::DuplicateBootUp {
+        port: CAN.into(),
+        node_id: 1,
+    };
+    let cause = |it: &Failure| {
+        matches!(
+            it,
+            Failure::Alarm {
+                alarm: Alarm::DuplicateNode { .. } | Alarm::UnexpectedBootUp { .. },
+                ..
+            }
+        )
+    };
+    let scene = following().inject(FaultConfig::times(fault, 1));
+    let played = check(scene, &wanted(cause, &["x:"], 2));
+    assert!(!played.bench.machine.is_zeroed("x"));
+}
+
+#[test]
+fn a_drive_that_shows_one_position_for_ever_is_away_from_its_set_points() {
+    let fault = Fault::StaleData { node: DRIVE.into() };
+    let cause = |it: &Failure| {
+        matches!(
+            it,
+            Failure::Engine(EngineFailure::Deviates { .. }) | Failure::Alarm { .. }
+        )
+    };
+    // 1 mm and the last four set-points at 80 mm/s and more.
+    check(following().fault(fault), &wanted(cause, &["x:"], 8));
+}
+
+#[test]
+fn a_limit_switch_that_is_pressed_on_the_way_stops_the_drive() {
+    let cause = |it: &Failure| {
+        matches!(
+            it,
+            Failure::Engine(EngineFailure::Deviates { .. }) | Failure::Alarm { .. }
+        )
+    };
+    let pressed = |positive| Fault::LimitSwitch {
+        axis: 0,
+        positive,
+        pressed: true,
+    };
+    let both = following().fault(pressed(true)).fault(pressed(false));
+    check(both, &wanted(cause, &["x:"], 10));
 }
 
 #[test]

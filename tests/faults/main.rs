@@ -6,6 +6,8 @@
 
 mod bus;
 mod cyclic;
+mod cyclic_host;
+mod detectors;
 mod drive;
 mod files;
 mod hall;

@@ -1,6 +1,7 @@
 //! A scene: a machine in some phase of its work, and what goes wrong with it there.
 
-use std::cell::{Ref, RefCell};
+use std::cell::{Cell, Ref, RefCell};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -64,7 +65,13 @@ pub struct Scene {
     machine: Change,
     emulated: Change,
     stop: bool,
+    stall: Option<Duration>,
+    full: Option<u16>,
+    killed: bool,
 }
+
+/// What a controller that is killed panics with: nobody is told, nothing is done.
+struct Killed;
 
 /// The shipped machine with fewer points: the same procedures in less time.
 pub fn shortened(text: String) -> String {
@@ -96,8 +103,8 @@ fn path(period: Duration) -> Vec<Metres> {
     points.collect()
 }
 
-/// Follows the path to its end, whatever the host must do for that.
-fn follow(machine: &mut Machine) -> Result<(), Failure> {
+/// Follows the path to its end or to a stop, whatever the host must do for that.
+pub fn follow(machine: &mut Machine) -> Result<Cause, Failure> {
     let (mut engine, mut desk) = Engine::new(machine, &["x"], Box::new(NoCorrection))?;
     let points = path(engine.period());
     let mut next = 0;
@@ -113,7 +120,7 @@ fn follow(machine: &mut Machine) -> Result<(), Failure> {
         }
     })?;
     match cause {
-        Cause::PathDone => Ok(()),
+        Cause::PathDone | Cause::Overrun { .. } => Ok(cause),
         Cause::Asked => Err(Failure::Interrupted),
         other => panic!("{other}\n{}", engine.timing()),
     }
@@ -135,6 +142,9 @@ impl Scene {
             },
             emulated: Box::new(|text| text),
             stop: false,
+            stall: None,
+            full: None,
+            killed: false,
         }
     }
 
@@ -193,6 +203,24 @@ impl Scene {
         self
     }
 
+    /// The controller is held up for so long when the fault is due, right after a SYNC.
+    pub const fn stall(mut self, span: Duration) -> Self {
+        self.stall = Some(span);
+        self
+    }
+
+    /// The controller's port has no more room for frames with this identifier.
+    pub const fn full(mut self, cob_id: u16) -> Self {
+        self.full = Some(cob_id);
+        self
+    }
+
+    /// The controller is killed when the fault is due: it does nothing any more.
+    pub fn killed(mut self) -> Self {
+        self.killed = true;
+        self.deed(|_| resume_unwind(Box::new(Killed)), |_| true)
+    }
+
     /// Plays the scene.
     #[track_caller]
     pub fn play(mut self) -> Played {
@@ -213,11 +241,19 @@ impl Scene {
         let due = bench.machine.now() + self.after;
         let ids = self.schedule(&bench, due, &seen);
         let mut ended = due;
-        let calibrated = RefCell::new(None);
-        let result = bench.machine.guarded(|machine| {
-            let result = perform(machine, self.phase, &store, &calibrated);
-            ended = machine.now();
-            result
+        let (calibrated, cause) = (RefCell::new(None), Cell::new(None));
+        let guarded = AssertUnwindSafe(|| {
+            bench.machine.guarded(|machine| {
+                let result = perform(machine, self.phase, &store, &calibrated, &cause);
+                ended = machine.now();
+                result
+            })
+        });
+        let result = catch_unwind(guarded).unwrap_or_else(|panic| {
+            if self.killed && panic.is::<Killed>() {
+                return Err(Failure::Interrupted);
+            }
+            resume_unwind(panic)
         });
         let played = Played {
             bench,
@@ -228,6 +264,7 @@ impl Scene {
             ended,
             warnings,
             calibrated,
+            cause: cause.get(),
         };
         played.rest();
         if let Some(delivered) = &self.delivered {
@@ -243,6 +280,12 @@ impl Scene {
         let mut seen = seen.borrow_mut();
         if let Some(deed) = self.deed.take() {
             seen.plan(due, deed);
+        }
+        if let Some(span) = self.stall {
+            seen.stall(due, span);
+        }
+        if let Some(cob_id) = self.full {
+            seen.fill(due, cob_id);
         }
         if self.stop {
             let request = bench.machine.stop_request();
@@ -283,6 +326,7 @@ fn perform(
     phase: Phase,
     store: &Store,
     calibrated: &RefCell<Option<Calibrated>>,
+    cause: &Cell<Option<Cause>>,
 ) -> Result<(), Failure> {
     match phase {
         Phase::Start => machine.start()?,
@@ -307,7 +351,7 @@ fn perform(
             let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
             calibrated.replace(Some(done));
         }
-        Phase::Follow => follow(machine)?,
+        Phase::Follow => cause.set(Some(follow(machine)?)),
         Phase::Verify => {
             let options = VerifyOptions {
                 compensated: false,
@@ -340,6 +384,8 @@ pub struct Played {
     warnings: Rc<RefCell<Vec<String>>>,
     /// What a calibration gave.
     pub calibrated: RefCell<Option<Calibrated>>,
+    /// How following a path came to its end.
+    pub cause: Option<Cause>,
     /// When the fault was due.
     pub due: Time,
     /// When the phase ended.

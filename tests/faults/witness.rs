@@ -21,13 +21,32 @@ pub struct Testimony {
     pub path: Vec<(Time, f64)>,
     /// The frames that the controller sent.
     pub sent: Vec<(Time, CanFrame)>,
+    /// How many of them the port did not take.
+    pub refused: u32,
     deeds: Vec<(Time, Deed)>,
+    stall: Option<(Time, Duration)>,
+    full: Option<(Time, u16)>,
 }
 
 impl Testimony {
     /// Does `deed` at `at`.
     pub fn plan(&mut self, at: Time, deed: Deed) {
         self.deeds.push((at, deed));
+    }
+
+    /// The controller is held up for so long right after its first SYNC from `at` on.
+    pub const fn stall(&mut self, at: Time, span: Duration) {
+        self.stall = Some((at, span));
+    }
+
+    /// From `at` on the port has no room for frames with this identifier.
+    pub const fn fill(&mut self, at: Time, cob_id: u16) {
+        self.full = Some((at, cob_id));
+    }
+
+    /// Whether a stall that was ordered has come.
+    pub const fn has_stalled(&self) -> bool {
+        self.stall.is_none()
     }
 
     /// The controlwords of RPDO 1 of node 1, with their times.
@@ -79,6 +98,23 @@ impl Witnessed {
         self.seen.borrow_mut().path.push(here);
     }
 
+    fn is_full_for(&self, frame: &CanFrame) -> bool {
+        let full = self.seen.borrow().full;
+        full.is_some_and(|(at, id)| self.inner.now() >= at && frame.standard_id() == Some(id))
+    }
+
+    fn stall_after(&self, frame: &CanFrame) {
+        const SYNC: u16 = 0x080;
+        let now = self.inner.now();
+        let mut seen = self.seen.borrow_mut();
+        let due = seen.stall.filter(|(at, _)| now >= *at);
+        if let Some((_, span)) = due.filter(|_| frame.standard_id() == Some(SYNC)) {
+            seen.stall = None;
+            drop(seen);
+            self.inner.world().simulation_mut().advance(now + span);
+        }
+    }
+
     fn next_deed(&self) -> Time {
         let deeds = &self.seen.borrow().deeds;
         deeds.iter().map(|(at, _)| *at).min().unwrap_or(Time::NEVER)
@@ -104,11 +140,18 @@ impl Transport for Witnessed {
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        if let Payload::Frame(frame) = payload {
-            let now = self.inner.now();
-            self.seen.borrow_mut().sent.push((now, *frame));
+        let Payload::Frame(frame) = payload else {
+            return self.inner.send(port, payload);
+        };
+        if self.is_full_for(frame) {
+            self.seen.borrow_mut().refused += 1;
+            return Err(SendError::QueueFull { port });
         }
-        self.inner.send(port, payload)
+        let now = self.inner.now();
+        self.seen.borrow_mut().sent.push((now, *frame));
+        self.inner.send(port, payload)?;
+        self.stall_after(frame);
+        Ok(())
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {

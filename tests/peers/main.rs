@@ -2,6 +2,7 @@
 //! as our driver's server, python-can as the reader of our recordings.
 
 mod analog;
+mod csp;
 mod drive;
 mod emulated;
 mod local_node;

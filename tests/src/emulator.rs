@@ -8,7 +8,11 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::ports;
 
-use crate::rig::{LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, shipped_config};
+use crate::four_screws::{four_cyclic_axes, with_fourth_drive};
+use crate::rig::{
+    LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC, shipped_config,
+};
+use crate::stream::Watch;
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -23,8 +27,17 @@ pub struct Setup {
     shipped: Shipped,
     seed: u64,
     interface: &'static str,
-    machine: Vec<(String, String)>,
-    emulated: Vec<(String, String)>,
+    /// How much faster than the wall's clock it lives on live buses, if not by the rig.
+    speed: Option<f64>,
+    machine: Vec<Change>,
+    emulated: Vec<Change>,
+}
+
+/// Something that turns a text into another.
+#[derive(Clone, Debug)]
+enum Change {
+    Replace(String, String),
+    By(fn(String) -> String),
 }
 
 impl Setup {
@@ -48,9 +61,31 @@ impl Setup {
             shipped,
             seed,
             interface: INTERFACE,
+            speed: None,
             machine: Vec::new(),
             emulated: Vec::new(),
         }
+    }
+
+    /// The platform with four screws that follow a set-point every two milliseconds.
+    pub fn four_cyclic_axes(seed: u64) -> Self {
+        let mut setup = Self::of(UVW, seed);
+        setup.machine.push(Change::By(four_cyclic_axes));
+        setup.emulated.push(Change::By(with_fourth_drive));
+        setup
+    }
+
+    /// The shipped three-axis machine with the noise and errors of `seed`.
+    pub const fn volumetric(seed: u64) -> Self {
+        Self::of(VOLUMETRIC, seed)
+    }
+
+    /// In real time on live buses, whatever they bear: the machine has no more patience with
+    /// the computer than one of metal has.
+    #[must_use]
+    pub const fn in_real_time(mut self) -> Self {
+        self.speed = Some(1.0);
+        self
     }
 
     /// The shipped rotary table with the noise and errors of `seed`.
@@ -68,7 +103,8 @@ impl Setup {
     /// With `from` replaced by `to` in the machine's configuration.
     #[must_use]
     pub fn machine(mut self, from: &str, to: &str) -> Self {
-        self.machine.push((from.to_owned(), to.to_owned()));
+        self.machine
+            .push(Change::Replace(from.to_owned(), to.to_owned()));
         self
     }
 
@@ -91,17 +127,21 @@ impl Setup {
     /// With `from` replaced by `to` in the description of the emulation.
     #[must_use]
     pub fn emulated(mut self, from: &str, to: &str) -> Self {
-        self.emulated.push((from.to_owned(), to.to_owned()));
+        self.emulated
+            .push(Change::Replace(from.to_owned(), to.to_owned()));
         self
     }
 }
 
 /// # Panics
 /// When there is nothing to replace: the text has changed and the test has not.
-fn replace(text: String, changes: &[(String, String)]) -> String {
-    changes.iter().fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "`{from}` is not in the text");
-        text.replace(from, to)
+fn replace(text: String, changes: &[Change]) -> String {
+    changes.iter().fold(text, |text, change| match change {
+        Change::Replace(from, to) => {
+            assert!(text.contains(from), "`{from}` is not in the text");
+            text.replace(from, to)
+        }
+        Change::By(change) => change(text),
     })
 }
 
@@ -117,6 +157,7 @@ pub struct Emulator {
     pub rig: Rig,
     /// What its controller is told.
     pub loaded: Loaded,
+    speed: f64,
     emulation: Emulation,
     /// For the controller's records; gone when dropped.
     pub folder: tempfile::TempDir,
@@ -134,9 +175,10 @@ impl Emulator {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let change = |text| replace(text, &setup.machine);
         let mut loaded = shipped_config(&setup.shipped, folder.path(), change);
-        loaded.patience = ports::patience(rig.speed());
+        let speed = setup.speed.unwrap_or_else(|| rig.speed());
+        loaded.patience = ports::patience(speed);
         let text = replace(setup.shipped.emulated.to_owned(), &setup.emulated);
-        let (speed, seed) = (rig.speed(), setup.seed);
+        let seed = setup.seed;
         let emulation = match rig {
             Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),
             Rig::Pty => EmulatedOnPtys::start(&text, seed, speed).map(Emulation::Running),
@@ -146,6 +188,7 @@ impl Emulator {
         Self {
             rig,
             loaded,
+            speed,
             emulation: emulation.unwrap_or_else(|error| panic!("{rig:?}: {error}")),
             folder,
             _turn: turn,
@@ -163,14 +206,17 @@ impl Emulator {
         };
         let config = &self.loaded.config;
         let overrides = emulated.overrides(config).expect("its ports were matched");
-        match ports::open(
-            config,
-            &overrides,
-            ports::Use::Measurement,
-            self.rig.speed(),
-        ) {
+        match ports::open(config, &overrides, ports::Use::Measurement, self.speed) {
             Ok(live) => Box::new(live),
             Err(failure) => panic!("{:?}: {failure}", self.rig),
+        }
+    }
+
+    /// The machine as who looks at it while its controller works needs it.
+    pub fn watch(&self) -> Watch<'_> {
+        match &self.emulation {
+            Emulation::InProcess(emulated) => Watch::InProcess(emulated.clone()),
+            Emulation::Running(emulated) => Watch::Running(emulated.running()),
         }
     }
 

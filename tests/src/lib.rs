@@ -4,8 +4,10 @@
 //! `RIG` unset: in this process (virtual time) and on pseudo-terminals. `RIG=vcan`: on the
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
+pub mod apart;
 mod desk;
 mod emulator;
+mod four_screws;
 mod group;
 mod hand;
 mod interface;
@@ -13,9 +15,12 @@ mod pose_judge;
 mod rig;
 mod slcan_hub;
 mod stand;
+pub mod stream;
+pub mod volume;
 
 pub use desk::Desk;
 pub use emulator::{Emulator, INTERFACE, Setup};
+pub use four_screws::{four_cyclic_axes, with_fourth_drive, with_fourth_screw};
 pub use group::{Group, Start};
 pub use hand::Hand;
 pub use interface::{Interface, run};

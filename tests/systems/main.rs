@@ -1,5 +1,6 @@
 //! Whole cycles of whole machines, on every bus and in virtual time.
 
+mod engine;
 mod linear;
 mod platform;
 mod rotary;

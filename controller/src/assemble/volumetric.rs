@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, FunctionError, Shape};
+use compensator::volumetric::identify::BendPlan;
 use compensator::volumetric::model::{Chain, ChainError, Thermal, ThermalChannel};
 use compensator::volumetric::online::{
     BeamDetector, BeamDetectorSettings, BeamDrift, FeedSettings, Influences, Layout, RatioCurve,
@@ -187,6 +188,21 @@ pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
         bends: Vec::new(),
         fixed: point_of_mm(config.expansion_fixed_mm),
     }
+}
+
+/// The guides that bend, as identification looks for their bows: from tilts alone, since films and
+/// supports shift a slide sideways too.
+pub fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
+    let each = config.bend.iter().map(|it| BendPlan {
+        axis: volume_axis(it.axis),
+        towards: volume_axis(it.towards),
+        over: it.over,
+        under: it.under,
+        low: Metres::from_mm(it.low_mm),
+        high: Metres::from_mm(it.high_mm),
+        sideways: false,
+    });
+    each.collect()
 }
 
 /// The influence functions; 1 where there is none.

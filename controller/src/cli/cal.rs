@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use serde_json::{Value, json};
 use truestage::config::Loaded;
+use truestage::cycle::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
+use truestage::store::MemoryName;
 use truestage::store::{
     CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, Store, short,
 };
@@ -233,7 +235,11 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
     let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
-    if known.contains(&axis) {
+    let volume = [GEOMETRY, REFERENCES]
+        .into_iter()
+        .chain([MemoryName::First, MemoryName::Second].map(memory_pointer));
+    let mut volume = volume.filter(|_| loaded.config.volumetric.is_some());
+    if known.contains(&axis) || volume.any(|it| it == axis) {
         return Ok(());
     }
     Err(Failure::NoSuchAxis {

@@ -1,4 +1,4 @@
-//! What a verb acts upon: a platform, linear axes or rotary axes, as the configuration says.
+//! What a verb acts upon: a platform, a work volume, linear or rotary axes, as the configuration says.
 
 use truestage::Failure;
 use truestage::config::{self, MachineConfig};
@@ -15,6 +15,8 @@ pub(super) enum Kind {
     Linear,
     /// Rotary axes.
     Rotary,
+    /// Three axes corrected throughout their volume.
+    Volume,
 }
 
 /// Runs a verb on what it is for: the axes it names, or the only kind that there is.
@@ -39,6 +41,9 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
             help: "name linear and rotary axes in commands of their own".into(),
         });
     }
+    if config.volumetric.is_some() {
+        return Ok(Kind::Volume);
+    }
     if config.platform.is_some() {
         return Ok(Kind::Platform);
     }
@@ -61,6 +66,7 @@ mod tests {
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
+    const VOLUME: &str = include_str!("../../../configs/machines/volumetric.toml");
     const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
 
     #[track_caller]
@@ -77,6 +83,7 @@ mod tests {
         check(ROTARY, &["c"], Some(Kind::Rotary));
         check(UVW, &[], Some(Kind::Platform));
         check(UVW, &["x", "theta"], Some(Kind::Platform));
+        check(VOLUME, &["x", "z"], Some(Kind::Volume));
     }
 
     #[test]

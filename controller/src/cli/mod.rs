@@ -15,6 +15,7 @@ mod screw;
 mod session;
 mod table;
 mod verbs;
+mod volume;
 mod volumetric;
 
 use std::path::PathBuf;
@@ -58,6 +59,13 @@ enum Command {
     Verify(VerifyArgs),
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
+    /// Zero, then take down what the detectors of three axes read, for the errors in use.
+    Reference(MachineArgs),
+    /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
+    Run(RunArgs),
+    /// What three axes are to keep although it deviates.
+    #[command(subcommand)]
+    Memory(MemoryCommand),
     /// Stored calibrations.
     #[command(subcommand)]
     Cal(cal::CalCommand),
@@ -122,9 +130,13 @@ struct CalibrateArgs {
     /// Save although the place measured first and last differs by more than the limit.
     #[arg(long)]
     accept_drift: bool,
-    /// Do not wait for the person who turns the plate of a rotary table.
+    /// Do not wait for the person who turns the plate of a rotary table, or sets up the lines of
+    /// an interferometer.
     #[arg(long)]
     yes: bool,
+    /// Three axes: let them go to and fro for so long, then measure again what warmth changes.
+    #[arg(long, value_name = "MINUTES")]
+    warm_up_min: Option<f64>,
 }
 
 #[derive(Clone, Debug, Args)]
@@ -140,6 +152,49 @@ struct VerifyArgs {
     /// Do not wait for the person who turns the plate of a rotary table.
     #[arg(long)]
     yes: bool,
+}
+
+/// What is done with the state memories of three axes.
+#[derive(Debug, Subcommand)]
+enum MemoryCommand {
+    /// Zero, then record the present state: it is kept from now on.
+    Record(MemoryArgs),
+    /// Keep nothing by it any more; nothing moves.
+    Clear(MemoryArgs),
+}
+
+/// Which memory, of which machine.
+#[derive(Clone, Debug, Args)]
+struct MemoryArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// What the machine was built with, or what the first part was made with beyond that.
+    #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
+    memory: MemoryChoice,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MemoryChoice {
+    First,
+    Second,
+}
+
+impl From<MemoryChoice> for truestage::store::MemoryName {
+    fn from(choice: MemoryChoice) -> Self {
+        match choice {
+            MemoryChoice::First => Self::First,
+            MemoryChoice::Second => Self::Second,
+        }
+    }
+}
+
+/// A path, and on which machine.
+#[derive(Clone, Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
+    path: PathBuf,
 }
 
 /// Which way round a rotary axis goes.
@@ -213,16 +268,19 @@ pub(crate) fn main() -> ExitCode {
             Kind::Platform => platform::zero(&args, output),
             Kind::Linear => verbs::zero(&args, output),
             Kind::Rotary => table::zero(&args, output),
+            Kind::Volume => volume::zero(&args, output),
         }),
         Command::Calibrate(args) => args.axis.by_kind(|kind| match kind {
             Kind::Platform => platform::calibrate(&args, output),
             Kind::Linear => verbs::calibrate(&args, output),
             Kind::Rotary => table::calibrate(&args, output),
+            Kind::Volume => volume::calibrate(&args, output),
         }),
         Command::Verify(args) => args.axis.by_kind(|kind| match kind {
             Kind::Platform => platform::verify(&args, output),
             Kind::Linear => verbs::verify(&args, output),
             Kind::Rotary => table::verify(&args, output),
+            Kind::Volume => volume::verify(&args, output),
         }),
         Command::Move(args) => {
             let args = args.settle();
@@ -234,8 +292,15 @@ pub(crate) fn main() -> ExitCode {
                     .without_way()
                     .and_then(|()| verbs::move_to(&args, output)),
                 Kind::Rotary => table::move_to(&args, output),
+                Kind::Volume => args
+                    .without_way()
+                    .and_then(|()| volume::move_to(&args, output)),
             })
         }
+        Command::Reference(args) => volume::reference(&args, output),
+        Command::Run(args) => volume::run(&args, output),
+        Command::Memory(MemoryCommand::Record(args)) => volume::memory_record(&args, output),
+        Command::Memory(MemoryCommand::Clear(args)) => volume::memory_clear(&args, output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => rotary::plan(&command, output),

@@ -1,4 +1,5 @@
-//! The person at the terminal, who turns the plate of a rotary table.
+//! The person at the terminal, who turns the plate of a rotary table, or sets up the lines of a
+//! laser interferometer.
 
 use std::fs::File;
 use std::io::{self, IsTerminal, Read, stdin};
@@ -8,14 +9,15 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, tcflush};
 use truestage::Failure;
 use truestage::cycle::rotary::{Operator, PlateTask};
+use truestage::cycle::volumetric::{LineOperator, LineTask};
 
 use super::output::Output;
 
 /// Asks on stderr and waits for Enter on stdin; the machine lives on meanwhile.
 #[derive(Debug)]
 pub(super) struct Terminal {
-    /// Where Enter comes from. `None`: somebody else sees to it that the plate is turned, and
-    /// nothing is waited for.
+    /// Where Enter comes from. `None`: somebody else sees to it that it is done, and nothing is
+    /// waited for.
     answers: Option<File>,
     output: Output,
 }
@@ -43,23 +45,21 @@ impl Terminal {
         };
         Ok(Self { answers, output })
     }
-}
 
-impl Operator for Terminal {
-    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
-        self.output.note(&format!("> {}", task.text()));
+    fn wait_for_enter(&mut self, text: &str) -> Result<(), Failure> {
+        self.output.note(&format!("> {text}"));
         let Some(answers) = &self.answers else {
             return Ok(());
         };
         self.output.note(
-            "  the drive is switched off, which is no safe stop: make the machine safe first; \
+            "  what it moves is switched off, which is no safe stop: make the machine safe first; \
              Enter when it is done, Ctrl-C to stop (what was read is kept)",
         );
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))
     }
 
-    fn is_done(&mut self) -> Result<bool, Failure> {
+    fn has_entered(&mut self) -> Result<bool, Failure> {
         let Some(answers) = &mut self.answers else {
             return Ok(true);
         };
@@ -75,6 +75,32 @@ impl Operator for Terminal {
             Ok(length) => Ok(line[..length].contains(&b'\n')),
             Err(error) => Err(gone(&error)),
         }
+    }
+}
+
+impl Operator for Terminal {
+    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
+        self.wait_for_enter(&task.text())
+    }
+
+    fn is_done(&mut self) -> Result<bool, Failure> {
+        self.has_entered()
+    }
+}
+
+impl LineOperator for Terminal {
+    fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
+        self.wait_for_enter(&task.text())
+    }
+
+    fn is_set_up(&mut self) -> Result<bool, Failure> {
+        self.has_entered()
+    }
+
+    fn pack_up(&mut self) -> Result<(), Failure> {
+        self.output
+            .note("> the interferometer is not needed any more and may be packed up");
+        Ok(())
     }
 }
 

@@ -306,7 +306,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 }
 
 /// `x=12.5mm`: the unit is never guessed.
-fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
+pub(super) fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
     let usage = || Failure::Usage {
         what: format!("`{text}` is no target"),
         help: "write AXIS=LENGTH with a unit: x=12.5mm, x=-300um, x=0.1m".into(),

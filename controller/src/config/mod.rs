@@ -19,7 +19,8 @@ pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
     CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
     IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
-    MachineSection, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig, ZeroConfig,
+    MachineSection, OpticsConfig, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig,
+    ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
@@ -31,7 +32,8 @@ pub use rotary::{
     RotaryVerifyConfig, RotaryZeroConfig,
 };
 pub use volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, FeedConfig,
-    InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName, TemperatureConfig,
-    VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig, VolumetricZeroConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
+    FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
+    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
+    VolumetricConfig, VolumetricVerifyConfig, VolumetricZeroConfig,
 };

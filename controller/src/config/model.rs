@@ -356,6 +356,17 @@ pub struct InstrumentConfig {
     pub instrument_standard_uncertainty_nm: f64,
     #[serde(default = "half_an_hour")]
     pub environment_frozen_s: f64,
+    #[serde(default)]
+    pub optics: OpticsConfig,
+}
+
+/// What an instrument can be set up with besides linear optics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct OpticsConfig {
+    pub straightness_factor: Option<f64>,
+    pub angular_separation_mm: Option<f64>,
 }
 
 /// The last digit of a good sensor moves with the air of a good hall.

@@ -23,8 +23,13 @@ pub struct VolumetricConfig {
     #[serde(default)]
     pub temperature: Vec<TemperatureConfig>,
     #[serde(default)]
+    pub bend: Vec<BendConfig>,
+    #[serde(default)]
     pub influence: Vec<InfluenceConfig>,
     pub feed: Option<FeedConfig>,
+    pub reference: Option<ReferenceConfig>,
+    pub calibrate: Option<VolumetricCalibrateConfig>,
+    pub verify: Option<VolumetricVerifyConfig>,
     pub compensation: VolumetricCompensationConfig,
 }
 
@@ -108,6 +113,8 @@ pub enum LayoutName {
 pub struct BeamDetectorConfig {
     pub analog: String,
     pub channels: [u8; 4],
+    #[serde(default)]
+    pub place_mm: [f64; 3],
     pub layout: LayoutName,
     #[serde(default)]
     pub dark_mv: [f64; 4],
@@ -178,6 +185,21 @@ pub struct TemperatureConfig {
     pub squareness_arcsec_per_k: [f64; 3],
 }
 
+/// A guide that bends when it is warmer over its neutral plane than under it; by how much is found
+/// by calibration.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct BendConfig {
+    pub axis: VolumeAxisName,
+    pub towards: VolumeAxisName,
+    pub over: usize,
+    pub under: Option<usize>,
+    pub low_mm: f64,
+    pub high_mm: f64,
+    pub gradient_max_k: f64,
+}
+
 /// How much of a displacement appears as an error at the tool, as a function of one position.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -214,6 +236,39 @@ pub struct FeedConfig {
     pub confirm: u32,
     #[serde(default)]
     pub smoothing_s: f64,
+}
+
+/// How it is found out what the detectors read when the machine is as its tables say.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct ReferenceConfig {
+    pub step_mm: f64,
+    pub samples: u32,
+}
+
+/// How lines are read to learn the errors.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct VolumetricCalibrateConfig {
+    pub instrument: String,
+    pub step_mm: f64,
+    pub settle_ms: f64,
+    pub average_samples: u32,
+    pub detector_samples: u32,
+    pub second_tool_offset_mm: Option<[f64; 3]>,
+}
+
+/// Which line is read to judge the correction.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "configs/README.md documents each key")]
+pub struct VolumetricVerifyConfig {
+    pub from_mm: [f64; 3],
+    pub to_mm: [f64; 3],
+    pub points: u32,
+    pub limit_um: f64,
 }
 
 /// How an error function is drawn between its nodes.

@@ -184,7 +184,7 @@ impl Machine {
         }
     }
 
-    fn drive_record(&self, axis: &str) -> IdentityRecord {
+    pub(crate) fn drive_record(&self, axis: &str) -> IdentityRecord {
         let drive = self.drive_index(axis).ok();
         let identity = drive.and_then(|at| self.drive(at).identity());
         identity

@@ -498,3 +498,21 @@ fn a_full_queue_says_so_and_takes_the_point_later() {
         }
     );
 }
+
+#[test]
+fn a_path_is_written_as_there_is_room_and_finished_behind_its_last_point() {
+    let mut bench = Bench::new();
+    let mut points = circle(800).map(|point| point.to_vec());
+    assert_eq!(bench.desk.path.write(&mut points), Ok(false));
+    let mut written = false;
+    for _ in 0..2_000 {
+        bench.period().unwrap();
+        written = bench.desk.path.write(&mut points).unwrap();
+        if bench.engine.core.ended().is_some() {
+            break;
+        }
+    }
+    assert!(written);
+    assert_eq!(bench.engine.core.ended(), Some(Cause::PathDone));
+    assert_eq!(bench.desk.path.write(&mut points), Ok(true));
+}

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 use super::AXES_MAX;
 use super::motion::MotionError;
@@ -35,11 +35,37 @@ pub enum EngineFailure {
         /// This one's.
         seen: Duration,
     },
+    /// An axis goes on moving although nothing drives it.
+    #[error(
+        "axis {axis}: still moves after {waited:?}; the cyclic mode is entered and left at rest \
+         only; does its servo oscillate, or something push it?"
+    )]
+    NotAtRest {
+        /// Which axis.
+        axis: String,
+        /// How long was waited.
+        waited: Duration,
+    },
     /// A drive does not say what it holds.
     #[error("axis {axis}: its drive is not in the cyclic mode any more")]
     NotCyclic {
         /// Which axis.
         axis: String,
+    },
+    /// A calibration's correction would be cut off on the way.
+    #[error(
+        "axis {axis}: its calibration corrects by up to {:.3} um, and by up to {:.3} um/s at full \
+         speed, which is more than [axis.{axis}.cyclic] allows; raise correction_limit_um and \
+         correction_rate_um_per_s, or lower speed_max_mm_per_s",
+        size.um(), rate.value() * 1e6
+    )]
+    CorrectionLimit {
+        /// Which axis.
+        axis: String,
+        /// The largest deviation of its table.
+        size: Metres,
+        /// How fast the correction changes at the axis's full speed.
+        rate: MetresPerSecond,
     },
     /// A target cannot be reached.
     #[error(transparent)]
@@ -69,6 +95,17 @@ pub enum EngineFailure {
         /// How far it may be.
         limit: Metres,
     },
+    /// SYNCs were missed by so much that the drives took their own measures.
+    #[error(
+        "the loop was late by {periods} periods (the computer was held up), then: {then}; all \
+         drives were stopped at once; free the computer of other work, or allow SCHED_FIFO"
+    )]
+    HeldUp {
+        /// How many SYNCs were missed.
+        periods: u32,
+        /// What came of it.
+        then: String,
+    },
     /// A frame could not leave before its SYNC.
     #[error(
         "set-points could not be sent before their SYNC ({why}); all drives were stopped at \
@@ -90,11 +127,16 @@ impl EngineFailure {
     /// As [`crate::Failure::exit_code`].
     pub const fn exit_code(&self) -> u8 {
         match self {
-            Self::Axes { .. } | Self::NotConfigured { .. } | Self::Periods { .. } => 2,
+            Self::Axes { .. }
+            | Self::NotConfigured { .. }
+            | Self::Periods { .. }
+            | Self::CorrectionLimit { .. } => 2,
             Self::Motion(_) => 3,
-            Self::NotCyclic { .. }
+            Self::NotAtRest { .. }
+            | Self::NotCyclic { .. }
             | Self::Missing { .. }
             | Self::Deviates { .. }
+            | Self::HeldUp { .. }
             | Self::NotSent { .. }
             | Self::NoStop
             | Self::NotTaken => 4,

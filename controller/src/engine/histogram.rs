@@ -59,6 +59,15 @@ impl Histogram {
         self.greatest = self.greatest.max(time);
     }
 
+    /// Takes over what another one has noted.
+    pub fn add(&mut self, other: &Self) {
+        for (count, more) in self.counts.iter_mut().zip(&other.counts) {
+            *count += more;
+        }
+        self.total += other.total;
+        self.greatest = self.greatest.max(other.greatest);
+    }
+
     /// How many were noted.
     pub const fn total(&self) -> u64 {
         self.total
@@ -131,6 +140,11 @@ mod tests {
             Duration::from_micros(100).max(histogram.percentile(0.98))
         );
         assert_eq!(histogram.greatest(), Duration::from_secs(3_600));
+        let mut sum = Histogram::default();
+        sum.note(Duration::from_micros(7));
+        sum.add(&histogram);
+        assert_eq!((sum.total(), sum.greatest()), (102, histogram.greatest()));
+        assert_eq!(sum.percentile(0.07), Duration::from_micros(8));
         assert!(histogram.to_string().starts_with("p50 52 us, p99 "));
     }
 }

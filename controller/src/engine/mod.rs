@@ -24,8 +24,10 @@ mod decide_tests;
 mod failure;
 mod histogram;
 mod motion;
+mod pace;
 mod path;
 mod run;
+mod tables;
 
 use core::time::Duration;
 
@@ -41,8 +43,9 @@ pub use decide::{Cause, Counts, Live, State};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use motion::{Moment, Motion, MotionError};
+pub use pace::Timing;
 pub use path::{PathError, PathFault, PathWriter, PushError};
-pub use run::Timing;
+pub use tables::TableCorrection;
 
 use crate::failure::Failure;
 use crate::machine::Machine;

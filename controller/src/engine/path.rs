@@ -245,6 +245,24 @@ impl PathWriter {
         Ok(())
     }
 
+    /// Takes from `points` as many as there is room for, and finishes the path behind the last
+    /// one; whether that is done. Called again and again by whoever writes a path as it is driven.
+    ///
+    /// # Errors
+    /// As [`PathWriter::push`]; the point that is refused is lost.
+    pub fn write(
+        &mut self,
+        points: &mut impl Iterator<Item = Vec<Metres>>,
+    ) -> Result<bool, PushError> {
+        while self.room() > 0 && !self.finished {
+            match points.next() {
+                Some(point) => self.push(&point)?,
+                None => self.finish()?,
+            }
+        }
+        Ok(self.finished)
+    }
+
     fn enqueue(&mut self, item: Item) -> Result<(), PushError> {
         if self.queue.is_abandoned() {
             return Err(PushError::Stopped);

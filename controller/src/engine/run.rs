@@ -10,19 +10,20 @@
 //! machine in simulated time): the drives have missed a SYNC, the queued path is dropped, and the
 //! axes are stopped together.
 
-use core::fmt;
 use core::time::Duration;
 
 use drivers::device::{AxisReading, DriveCommand};
 use drivers::transport::real_time::RealTime;
 use drivers::transport::{Payload, Port, SendError};
 use drivers::wire::canopen::sync::emit_sync;
+use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
 use super::decide::{Heard, Trouble};
+use super::pace::Pace;
 use super::{
     AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
-    Histogram, PerAxis, THERMOMETERS_MAX, ThermometerSample,
+    PerAxis, THERMOMETERS_MAX, ThermometerSample,
 };
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
@@ -31,43 +32,8 @@ use crate::machine::{Machine, Supervision};
 const LISTEN_SHARE: f64 = 0.5;
 /// How long a drive may take to change its mode or to be enabled.
 const CHANGE_LIMIT: Duration = Duration::from_secs(10);
-
-/// How punctual a loop was.
-#[derive(Clone, Debug, Default)]
-pub struct Timing {
-    /// How late each SYNC left after its deadline.
-    pub lateness: Histogram,
-    /// How far the time from SYNC to SYNC was from the period.
-    pub jitter: Histogram,
-    /// From SYNC to the last answer.
-    pub answers: Histogram,
-    /// From the last answer to the last set-point sent.
-    pub work: Histogram,
-    /// SYNCs that left more than a period late.
-    pub overruns: u64,
-    /// SYNCs left out because of that.
-    pub skipped: u64,
-    /// What the system granted; empty when nothing was asked for.
-    pub scheduling: String,
-}
-
-impl fmt::Display for Timing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "lateness  {}", self.lateness)?;
-        writeln!(f, "jitter    {}", self.jitter)?;
-        writeln!(f, "answers   {}", self.answers)?;
-        writeln!(f, "work      {}", self.work)?;
-        write!(
-            f,
-            "overruns  {}, SYNCs left out {}",
-            self.overruns, self.skipped
-        )?;
-        if !self.scheduling.is_empty() {
-            write!(f, "\nthread    {}", self.scheduling)?;
-        }
-        Ok(())
-    }
-}
+/// How long the axes may take to come to rest before the mode is entered, and left.
+const REST_LIMIT: Duration = Duration::from_secs(5);
 
 /// Where the engine's axes are among the machine's devices.
 struct Seats {
@@ -80,22 +46,17 @@ struct Seats {
     temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
 }
 
-/// The grid of SYNCs.
-struct Pace {
-    deadline: Time,
-    synced: Option<Time>,
-}
-
 impl Machine {
     /// Moves the axes of `engine` along what its [`Desk`](super::Desk) says, until the path is
-    /// done or the axes were stopped in a controlled way; the cause says which. The drives stay
-    /// enabled, at rest.
+    /// done or the axes were stopped in a controlled way; the cause says which. Axes that still
+    /// settle from an earlier motion are waited for. The drives stay enabled, at rest.
     ///
     /// This thread is the loop's: it does nothing else until then.
     ///
     /// # Errors
-    /// When an axis is not zeroed, a drive refuses the mode, or something made it unsafe to go
-    /// on: every drive has been told to quick stop then; see [`Machine::guarded`].
+    /// When an axis is not zeroed, does not come to rest, a drive refuses the mode, or something
+    /// made it unsafe to go on: every drive has been told to quick stop then; see
+    /// [`Machine::guarded`].
     pub fn follow(&mut self, engine: &mut Engine) -> Result<Cause, Failure> {
         self.follow_with(engine, &mut || {})
     }
@@ -115,6 +76,7 @@ impl Machine {
             self.require_zeroed(&axis)?;
         }
         let mut seats = self.seats(engine)?;
+        self.await_rest(engine, &seats)?;
         let held = self.enter_cyclic(engine, &seats)?;
         engine.core.begin(held);
         let outcome = self.with_own_sync(|machine| {
@@ -125,6 +87,8 @@ impl Machine {
             machine.run_periods(engine, &mut seats, host)
         });
         let cause = outcome?;
+        // A drive that changes its mode while it moves may do anything.
+        self.await_rest(engine, &seats)?;
         for at in &seats.drive[..seats.count] {
             self.control(
                 *at,
@@ -175,6 +139,28 @@ impl Machine {
         })
     }
 
+    /// Until every axis that its drive holds stands still; one that is not enabled goes where
+    /// it likes.
+    fn await_rest(&mut self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
+        let begun = self.now();
+        let deadline = begun + REST_LIMIT * self.patience;
+        while let Some(axis) = (0..seats.count).find(|axis| self.moves(seats.drive[*axis])) {
+            if self.now() >= deadline {
+                let axis = engine.axes[axis].clone();
+                let waited = self.now().since(begun);
+                return Err(EngineFailure::NotAtRest { axis, waited }.into());
+            }
+            self.tick(deadline)?;
+        }
+        Ok(())
+    }
+
+    fn moves(&self, at: usize) -> bool {
+        let device = &self.axes[at].device;
+        device.power_state() == Some(PowerState::OperationEnabled)
+            && device.reading().is_none_or(|it| !it.at_rest)
+    }
+
     /// Every drive in the mode, enabled, and what each holds.
     fn enter_cyclic(&mut self, engine: &Engine, seats: &Seats) -> Result<PerAxis<Metres>, Failure> {
         let period = engine.period;
@@ -217,6 +203,7 @@ impl Machine {
             // Between the transport's last SYNC and this one lies at most a period and a half.
             deadline: self.now() + engine.period / 2,
             synced: None,
+            held_up: None,
         };
         loop {
             match self.one_period(engine, seats, &mut pace) {
@@ -225,6 +212,7 @@ impl Machine {
                 Err(failure) => {
                     let now = self.now();
                     let failure = self.bus_watch.explain(now, failure);
+                    let failure = pace.explain(now, engine.period, failure);
                     self.quick_stop_together(seats);
                     return Err(failure);
                 }
@@ -292,7 +280,11 @@ impl Machine {
                 .note(now.since(before).abs_diff(period));
         }
         pace.synced = Some(now);
-        Ok(if missed >= self.patience { missed } else { 0 })
+        if missed < self.patience {
+            return Ok(0);
+        }
+        pace.held_up = Some((now, missed));
+        Ok(missed)
     }
 
     fn send_syncs(&mut self, seats: &Seats) -> Result<(), SendError> {
@@ -340,11 +332,24 @@ impl Machine {
             let reading = self.answer(*at, synced);
             *actual = reading.map(|it| it.position);
         }
+        self.hear_channels(&mut seats.channels);
+        self.hear_temperatures(&mut seats.temperatures);
+        Heard {
+            now,
+            actual,
+            channels: &seats.channels,
+            temperatures: &seats.temperatures,
+        }
+    }
+
+    /// Puts the newest sample of each analog channel into its place, in the order of the
+    /// modules' names.
+    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
         // A module without a sample keeps its places: its channels would else be taken for
         // those of the next one. What it said last stays, as old as it is.
         let mut first = 0;
         for analog in &self.analogs {
-            let own = seats.channels.iter_mut().skip(first);
+            let own = channels.iter_mut().skip(first);
             first += analog.device.channels();
             let Some(sample) = analog.device.reading() else {
                 continue;
@@ -358,20 +363,14 @@ impl Machine {
                 });
             }
         }
-        self.hear_temperatures(seats);
-        Heard {
-            now,
-            actual,
-            channels: &seats.channels,
-            temperatures: &seats.temperatures,
-        }
     }
 
-    fn hear_temperatures(&self, seats: &mut Seats) {
+    /// Likewise of the thermometers.
+    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
         let modules = self.analogs.iter();
         let mut first = 0;
         for module in modules.filter_map(|it| it.device.thermometers()) {
-            let own = seats.temperatures.iter_mut().skip(first);
+            let own = temperatures.iter_mut().skip(first);
             first += module.sensors();
             let Some(sample) = module.temperatures() else {
                 continue;

@@ -218,6 +218,18 @@ impl Store {
         Ok(pointer.current)
     }
 
+    /// Uses nothing under `axis` any more; what was in use stays in the history. Returns its name.
+    ///
+    /// # Errors
+    /// When the pointer cannot be read or written.
+    pub fn put_out_of_use(&self, axis: &str) -> Result<Option<String>, StoreError> {
+        let mut pointer = self.active(axis)?;
+        let before = pointer.current.take();
+        pointer.history.extend(before.clone());
+        self.write_pointer(axis, &pointer)?;
+        Ok(before)
+    }
+
     /// Writes a page for people.
     ///
     /// # Errors

@@ -28,10 +28,11 @@ pub use lease::Lease;
 pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
-    BeamRecord, BeamReferencesContent, CalibrationRecord, Content, EnvironmentRecord,
-    FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord, IdentityRecord,
-    InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord, ReadingName, RecordHead,
-    RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent, StrokeRecord,
+    BeamRecord, BeamReferencesContent, BendRecord, CalibrationRecord, Content, EnvironmentRecord,
+    ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
+    IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
+    ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
+    StrokeRecord,
 };
 
 pub(crate) use atomic::write_new_or_replace;

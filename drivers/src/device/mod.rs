@@ -219,6 +219,8 @@ pub struct AxisReading<Q: Coordinate = Metres> {
     pub following_error: Option<Q>,
     /// Whether the drive reports its target reached and no motion pending.
     pub standing: bool,
+    /// Whether the last samples lie together: it does not move, whatever the drive says.
+    pub at_rest: bool,
 }
 
 /// Voltages that are read together.

@@ -13,6 +13,7 @@ use units::{Celsius, Metres, Pascals, RelativeHumidity};
 
 use super::config::InterferometerConfig;
 use super::thermal::Environment;
+use super::volumetric::Sighting;
 
 /// Iodine-locked or not, the heads are taken to emit exactly this, in vacuum.
 const VACUUM_WAVELENGTH_M: f64 = 632.991_372e-9;
@@ -69,16 +70,26 @@ impl Interferometer {
         }
     }
 
-    /// The fringes for a true position and speed.
-    pub(super) fn fringes(&mut self, position_m: f64, speed: f64, air: &Environment) -> Fringes {
+    /// The linear stage's reflector at a true position and speed.
+    pub(super) fn reflector(&self, position_m: f64, speed: f64) -> Sighting {
+        Sighting {
+            path_m: self.config.dead_path_mm * 1e-3 + position_m * self.cosine,
+            speed_m_per_s: speed * self.cosine,
+            is_lit: true,
+        }
+    }
+
+    /// The fringes of what is seen, if anything is.
+    pub(super) fn fringes(&mut self, seen: Option<Sighting>, air: &Environment) -> Fringes {
+        let is_lit = seen.is_some_and(|it| it.is_lit);
+        let (path_m, speed) = seen.map_or((0.0, 0.0), |it| (it.path_m, it.speed_m_per_s));
         let n = refractive_index(air.air_temperature, air.pressure, air.humidity);
         let per_m = 2.0 * n / VACUUM_WAVELENGTH_M;
-        let path_m = self.config.dead_path_mm * 1e-3 + position_m * self.cosine;
         let noise_m = (self.config.noise_nm * 1e-9 + self.vibration_m) * self.noise.gaussian();
         Fringes {
             half_wavelengths: (path_m + noise_m) * per_m + self.slipped as f64,
-            half_wavelengths_per_s: speed * self.cosine * per_m,
-            beam: self.beam,
+            half_wavelengths_per_s: speed * per_m,
+            beam: if is_lit { self.beam } else { Beam::Blocked },
             too_fast: speed.abs() > self.config.speed_max_m_per_s,
         }
     }

@@ -104,7 +104,8 @@ impl Machine {
         } else if let Some(table) = &config.table {
             Self::Table(Box::new(Table::new(table, seed)))
         } else if let Some(volumetric) = &config.volumetric {
-            Self::Volumetric(Box::new(Volumetric::new(volumetric, seed)))
+            let dead_path_m = config.interferometer.dead_path_mm * 1e-3;
+            Self::Volumetric(Box::new(Volumetric::new(volumetric, dead_path_m, seed)))
         } else {
             Self::Stage(Box::new(Stage::new(config.stage.clone(), seed)))
         }

@@ -37,7 +37,7 @@ pub use platform::{PlatformTruth, Pose};
 pub use table::TableTruth;
 pub use thermal::Environment;
 pub use truth::Truth;
-pub use volumetric::VolumetricTruth;
+pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 
 use analog::Input;
 use camera::Camera;
@@ -204,16 +204,36 @@ impl Plant {
 
     /// The interferometer's signal now, noise included.
     pub fn fringes(&mut self) -> Fringes {
-        let air = self.climate.at(self.now);
-        let position_m = self.true_position().value();
-        let stage = self.machine.stage();
-        let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
-        self.interferometer.fringes(position_m, speed, &air)
+        let air = self.environment();
+        let seen = match self.machine.volumetric() {
+            Some(volumetric) => volumetric.sighting(self.now),
+            None => {
+                let position_m = self.true_position().value();
+                let stage = self.machine.stage();
+                let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
+                Some(self.interferometer.reflector(position_m, speed))
+            }
+        };
+        self.interferometer.fringes(seen, &air)
     }
 
     /// What the interferometer's own sensors say about air and stage now.
     pub fn sensed_environment(&self) -> Environment {
-        self.interferometer.sensed(self.climate.at(self.now))
+        self.interferometer.sensed(self.environment())
+    }
+
+    /// Air and machine. Three axes have their own warmth, in the air that makes it.
+    fn environment(&self) -> Environment {
+        let climate = self.climate.at(self.now);
+        let Some(volumetric) = self.machine.volumetric() else {
+            return climate;
+        };
+        let (air_c, machine_c) = volumetric.temperatures_c(self.now);
+        Environment {
+            air_temperature: Celsius(air_c),
+            stage_temperature: Celsius(machine_c),
+            ..climate
+        }
     }
 
     /// The cameras over the platform begin to take their pictures.
@@ -253,6 +273,22 @@ impl Plant {
     pub fn turn_plate(&mut self, lines: f64) {
         if let Some(table) = self.machine.table_mut() {
             table.turn_plate(lines);
+        }
+    }
+
+    /// Somebody mounts a target on the tool of three axes and sets a laser up along a line that
+    /// begins where the machine stands, a little off as ever.
+    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
+        let now = self.now;
+        if let Some(volumetric) = self.machine.volumetric_mut() {
+            volumetric.set_up_line(set_up, now);
+        }
+    }
+
+    /// Somebody takes laser and target away again.
+    pub fn take_line_away(&mut self) {
+        if let Some(volumetric) = self.machine.volumetric_mut() {
+            volumetric.take_line_away();
         }
     }
 

@@ -81,7 +81,7 @@ impl<'a> Truth<'a> {
 
     /// Air and machine as they are.
     pub fn environment(&self) -> Environment {
-        self.plant.climate.at(self.plant.now)
+        self.plant.environment()
     }
 
     /// Path in air between optic and reflector when the stage is at its true origin.

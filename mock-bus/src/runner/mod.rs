@@ -21,7 +21,7 @@ use std::thread::JoinHandle;
 
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{FaultConfig, FaultId};
-use crate::plant::HallDrift;
+use crate::plant::{HallDrift, LineSetUp};
 use crate::simulation::Simulation;
 use endpoint::Endpoint;
 use event_loop::EventLoop;
@@ -248,6 +248,22 @@ impl Running {
     /// When the machine has stopped.
     pub fn turn_plate(&self, lines: f64) -> Result<(), RunError> {
         self.with(move |machine| machine.turn_plate(lines))
+    }
+
+    /// Sets a laser up along a line; see [`Simulation::set_up_line`].
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn set_up_line(&self, set_up: LineSetUp) -> Result<(), RunError> {
+        self.with(move |machine| machine.set_up_line(&set_up))
+    }
+
+    /// Packs the laser up again; see [`Simulation::take_line_away`].
+    ///
+    /// # Errors
+    /// When the machine has stopped.
+    pub fn take_line_away(&self) -> Result<(), RunError> {
+        self.with(Simulation::take_line_away)
     }
 
     /// Whether the machine has come to an end by itself; [`Running::stop`] says why.

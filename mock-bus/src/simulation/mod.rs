@@ -30,7 +30,7 @@ use crate::bus::Sender;
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
-use crate::plant::{HallDrift, Plant, Truth};
+use crate::plant::{HallDrift, LineSetUp, Plant, Truth};
 use log::{Direction, Log};
 use port::PortState;
 
@@ -271,7 +271,7 @@ impl Simulation {
     pub fn power_cycle(&mut self, drift: HallDrift) {
         for place in 0..self.slots.len() {
             let entry = self.config.nodes.get(place);
-            if !entry.is_some_and(|entry| entry.own_mains) {
+            if !entry.is_some_and(|entry| entry.own_mains || entry.brought_along) {
                 self.power_off(place);
             }
         }
@@ -283,6 +283,19 @@ impl Simulation {
     /// fixes it again, a little off as ever. Nothing happens on a machine without one.
     pub fn turn_plate(&mut self, lines: f64) {
         self.plant.turn_plate(lines);
+    }
+
+    /// Somebody sets a laser up along a line of three axes, from where their tool stands, and
+    /// switches on what was brought along for it.
+    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
+        self.plant.set_up_line(set_up);
+        self.power_what_was_brought(true);
+    }
+
+    /// Somebody packs the laser up again.
+    pub fn take_line_away(&mut self) {
+        self.plant.take_line_away();
+        self.power_what_was_brought(false);
     }
 
     /// The device called `name`, when it is a `T`: for the faults that only it knows. It is
@@ -330,7 +343,24 @@ impl Simulation {
 
     fn switch_on(&mut self) {
         for place in 0..self.slots.len() {
-            self.power_on(place);
+            if !self.is_brought_along(place) {
+                self.power_on(place);
+            }
+        }
+    }
+
+    fn is_brought_along(&self, place: usize) -> bool {
+        let entry = self.config.nodes.get(place);
+        entry.is_some_and(|entry| entry.brought_along)
+    }
+
+    fn power_what_was_brought(&mut self, on: bool) {
+        for place in 0..self.slots.len() {
+            match (self.is_brought_along(place), on) {
+                (true, true) => self.power_on(place),
+                (true, false) => self.power_off(place),
+                (false, _) => {}
+            }
         }
     }
 

@@ -4,13 +4,16 @@ use super::*;
 use crate::fault::Fault;
 use crate::plant::config::PlantConfig;
 use crate::plant::volumetric::config::VolumetricConfig;
+use crate::plant::{LineOptics, LineSetUp};
 use core::time::Duration;
 use std::collections::BTreeMap;
 
 use drivers::wire::can::CanFrame;
+use drivers::wire::umd2::{Line, Sample};
 use units::Metres;
 
 const CAN: Port = Port(0);
+const LASER: Port = Port(1);
 const PERIOD: Duration = Duration::from_millis(2);
 const DRIVES: [u8; 3] = [1, 2, 3];
 const MODULES: [u8; 4] = [11, 12, 13, 14];
@@ -405,4 +408,55 @@ fn a_stuck_channel_stands_still_alone() {
     let still: Vec<usize> = (0..8).filter(|place| !varies(*place)).collect();
     assert_eq!(still, [1]);
     assert_eq!(master.machine.fault_deliveries(id), 1);
+}
+
+/// What the laser says for a while.
+fn listen(machine: &mut Simulation, span: Duration) -> Vec<Sample> {
+    let (until, mut text) = (machine.now() + span, String::new());
+    while let Some(delivery) = machine.advance_to_delivery(until) {
+        if let (LASER, Event::Payload(Payload::Bytes(bytes))) = (delivery.port, delivery.event) {
+            text += core::str::from_utf8(&bytes).unwrap();
+        }
+    }
+    let lines = text.lines().map(|line| Line::parse(line).unwrap());
+    lines
+        .filter_map(|line| match line {
+            Line::Sample(sample) => Some(sample),
+            Line::Debug => None,
+        })
+        .collect()
+}
+
+#[test]
+fn a_laser_speaks_from_when_a_line_is_set_up_until_it_is_taken_away() {
+    let mut machine = Simulation::new(&config(), 1).unwrap();
+    let second = Duration::from_secs(1);
+    assert_eq!(listen(&mut machine, second), [], "it is in its case");
+    let set_up = LineSetUp {
+        optics: LineOptics::Linear,
+        along: [0.0, 1.0, 0.0],
+        tool_offset: [Metres::ZERO; 3],
+    };
+    machine.set_up_line(&set_up);
+    let samples = listen(&mut machine, second);
+    // It boots while hands are in the beam.
+    let lit = samples.iter().filter(|it| it.measurement_count > 0);
+    assert!((400..500).contains(&lit.count()), "{}", samples.len());
+    assert!(samples[0].measurement_count == 0 && samples[400].phase_is_valid());
+    // Another line: it stays on and loses the beam for a while, and its count with it.
+    machine.set_up_line(&set_up);
+    let samples = listen(&mut machine, second);
+    assert!((600..620).contains(&samples.len()), "{}", samples.len());
+    let dark = samples.iter().filter(|it| it.measurement_count == 0);
+    assert!((175..190).contains(&dark.count()));
+    machine.power_cycle(HallDrift::default());
+    let still_there = listen(&mut machine, second).len();
+    assert!(
+        (600..620).contains(&still_there),
+        "{still_there}: own mains"
+    );
+    machine.take_line_away();
+    assert_eq!(listen(&mut machine, second), []);
+    machine.power_cycle(HallDrift::default());
+    assert_eq!(listen(&mut machine, second), [], "nobody has set it up");
 }

@@ -10,3 +10,6 @@ mod rotary;
 mod rotary_table;
 mod serial_zero;
 mod volumetric;
+mod volumetric_day;
+mod volumetric_kept;
+mod volumetric_line;

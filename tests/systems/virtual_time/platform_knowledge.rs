@@ -1,7 +1,7 @@
 //! What a platform does with what it knows and does not know: play after an interruption, images
 //! that never agree, a fourth screw that contradicts the others.
 
-use tests::{Bench, PoseJudge, UVW};
+use tests::{Bench, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
 use truestage::cycle::platform::Pose;
 use truestage::machine::StopRequest;
 use truestage::{Failure, config};
@@ -143,81 +143,9 @@ fn alignment_is_bounded_and_told_apart_from_the_open_loop() {
     );
 }
 
-const FOURTH_AXIS: &str = "[axis.r]
-device = \"cia402\"
-bus = \"can0\"
-node_id = 4
-resolution_nm = 10.0
-soft_min_mm = -4.5
-soft_max_mm = 4.5
-speed_mm_per_s = 5.0
-speed_max_mm_per_s = 20.0
-acceleration_mm_per_s2 = 50.0
-quick_stop_deceleration_mm_per_s2 = 500.0
-following_error_limit_um = 200.0
-following_error_timeout_ms = 20
-position_window_um = 0.1
-position_window_time_ms = 20
-move_timeout_s = 10.0
-heartbeat_producer_ms = 50
-heartbeat_consumer_ms = 150
-watch_master_ms = 500
-synchronous_start = true
-
-[axis.r.identity]
-device_type = 0x0002_0192
-vendor_id = 0x7FF
-product_code = 0x42_0001
-revision = 0x1_0000
-serial_number = 3004
-
-# The job";
-
-const FOURTH_ACTUATOR: &str = "[[platform.actuator]]
-axis = \"r\"
-point_mm = [0.0, 80.0]
-direction = [0.0, 1.0]
-lead_mm = 2.0
-index_mm = -4.0
-
-[platform.zero]";
-
-const FOURTH_NODE: &str = "[[nodes]]
-name = \"drive_r\"
-port = \"can0\"
-[nodes.device]
-kind = \"cia402_drive\"
-node_id = 4
-axis = 3
-encoder_resolution_nm = 10.0
-identity = { vendor_id = 0x7FF, product_code = 0x42_0001, revision = 0x1_0000, serial_number = 3004 }
-has_index = true
-following_error_window_um = 200.0
-homing_search_limit_mm = 20.0
-max_profile_velocity_mm_per_s = 50.0
-
-[[nodes]]
-name = \"image_controller\"";
-
-/// The platform with a second screw along y, and how far its screws may contradict each other.
-fn with_four(text: String, limit_um: Option<f64>) -> String {
-    let limit = limit_um.map_or(String::new(), |um| {
-        format!("inconsistency_limit_um = {um:.3}\n")
-    });
-    text.replace("# The job", FOURTH_AXIS)
-        .replace("[platform.zero]", FOURTH_ACTUATOR)
-        .replace("exposures = 4", &format!("{limit}exposures = 4"))
-}
-
 fn four_screws(limit_um: f64) -> Bench {
-    let emulated = |text: String| {
-        let screw = "[plant.platform.screw]";
-        let place =
-            "[[plant.platform.actuators]]\npoint_mm = [0.0, 80.0]\ndirection = [0.0, 1.0]\n";
-        text.replace("[[nodes]]\nname = \"image_controller\"", FOURTH_NODE)
-            .replace(screw, &format!("{place}\n{screw}"))
-    };
-    Bench::shaped(&UVW, 4, |text| with_four(text, Some(limit_um)), emulated)
+    let machine = |text| with_fourth_screw(text, Some(limit_um));
+    Bench::shaped(&UVW, 4, machine, with_fourth_drive)
 }
 
 #[test]
@@ -249,18 +177,18 @@ fn how_far_four_screws_may_contradict_each_other_must_be_said_and_three_cannot()
         Err(failure) => failure.to_string(),
     };
     let text = UVW.machine.to_owned();
-    let missing = judged(&with_four(text.clone(), None));
+    let missing = judged(&with_fourth_screw(text.clone(), None));
     assert!(
         missing.contains("`inconsistency_limit_um` is missing"),
         "{missing}"
     );
-    assert_eq!(judged(&with_four(text.clone(), Some(5.0))), "");
+    assert_eq!(judged(&with_fourth_screw(text.clone(), Some(5.0))), "");
     let unneeded = text.replace(
         "exposures = 4",
         "inconsistency_limit_um = 5.0\nexposures = 4",
     );
     let unneeded = judged(&unneeded);
     assert!(unneeded.contains("three screws cannot"), "{unneeded}");
-    let impossible = judged(&with_four(text, Some(-1.0)));
+    let impossible = judged(&with_fourth_screw(text, Some(-1.0)));
     assert!(impossible.contains("-1 is impossible"), "{impossible}");
 }

@@ -6,6 +6,7 @@
 mod linear;
 mod rotary;
 mod uvw;
+mod volumetric;
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -55,6 +56,8 @@ enum Which {
     UvwCopley,
     /// A rotary table and a plate of lines, turned from placement to placement.
     Rotary,
+    /// Three axes corrected throughout their volume, for eight hours in virtual time.
+    Volumetric,
 }
 
 impl Which {
@@ -75,6 +78,11 @@ impl Which {
                 "configs/machines/rotary.toml",
                 include_str!("../../../../configs/machines/rotary.toml"),
                 include_str!("../../../../configs/emulated/rotary.toml"),
+            ],
+            Self::Volumetric => [
+                "configs/machines/volumetric.toml",
+                include_str!("../../../../configs/machines/volumetric.toml"),
+                include_str!("../../../../configs/emulated/volumetric.toml"),
             ],
             Self::UvwCopley => [
                 "configs/machines/uvw-copley.toml",
@@ -115,6 +123,9 @@ struct Shown {
 }
 
 pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
+    if args.machine == Which::Volumetric {
+        return volumetric::run(args, output);
+    }
     let started = Instant::now();
     let loaded = load(args)?;
     let section = &loaded.config.machine;
@@ -144,6 +155,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
         Which::Linear => linear::show(&mut stand, args, output),
         Which::Uvw | Which::UvwCopley => uvw::show(&mut stand, args, output),
         Which::Rotary => rotary::show(&mut stand, args, output),
+        Which::Volumetric => unreachable!("it was shown in virtual time"),
     }?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),

@@ -198,6 +198,22 @@ fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &
     );
     let uncertainty = instrument.instrument_standard_uncertainty_nm;
     judge.within("instrument_standard_uncertainty_nm", uncertainty, 0.0, 1e6);
+    for (key, value, high) in [
+        (
+            "optics.straightness_factor",
+            instrument.optics.straightness_factor,
+            1e4,
+        ),
+        (
+            "optics.angular_separation_mm",
+            instrument.optics.angular_separation_mm,
+            1e3,
+        ),
+    ] {
+        if let Some(value) = value {
+            judge.within(key, value, 1.0, high);
+        }
+    }
 }
 
 /// Node ids by bus: the master's, the drives', the modules'.

@@ -18,6 +18,9 @@ pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_compensation(judge, config, volumetric);
     check_feed(judge, volumetric);
     check_influences(judge, volumetric);
+    check_reference(judge, volumetric);
+    check_calibrate(judge, config, volumetric);
+    check_bends(judge, volumetric);
     check_room(judge, config);
     check_detectors(findings, config, volumetric);
 }
@@ -232,6 +235,99 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     }
 }
 
+fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    if let Some(own) = &volumetric.calibrate {
+        let instruments = &config.instrument;
+        judge.known(
+            "calibrate.instrument",
+            &own.instrument,
+            instruments,
+            "instrument",
+        );
+        judge.within("calibrate.step_mm", own.step_mm, 0.1, 1e3);
+        judge.within("calibrate.settle_ms", own.settle_ms, 0.0, 1e5);
+        let samples = f64::from(own.average_samples);
+        judge.within("calibrate.average_samples", samples, 1.0, 1e5);
+        let samples = f64::from(own.detector_samples);
+        judge.within("calibrate.detector_samples", samples, 1.0, 1e4);
+        let second = own.second_tool_offset_mm.unwrap_or_default();
+        for mm in second {
+            let most = volumetric.tool_max_mm;
+            judge.within("calibrate.second_tool_offset_mm", mm, -most, most);
+        }
+        if volumetric.reference.is_none() {
+            judge.say(
+                "calibrate",
+                "the detectors' references are taken with the errors, but nothing says how",
+                "add [volumetric.reference]",
+            );
+        }
+    }
+    if let Some(own) = &volumetric.verify {
+        judge.within("verify.points", f64::from(own.points), 2.0, 1e4);
+        judge.within("verify.limit_um", own.limit_um, 1e-3, 1e5);
+        for k in 0..3 {
+            let (low, high) = (volumetric.low_mm[k], volumetric.high_mm[k]);
+            judge.within("verify.from_mm", own.from_mm[k], low, high);
+            judge.within("verify.to_mm", own.to_mm[k], low, high);
+        }
+        if volumetric.calibrate.is_none() {
+            judge.say(
+                "verify",
+                "nothing says how lines are read",
+                "add [volumetric.calibrate]",
+            );
+        }
+    }
+}
+
+fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let known = volumetric.temperature.len();
+    for (at, bend) in volumetric.bend.iter().enumerate() {
+        let key = |key: &str| format!("bend.{at}.{key}");
+        let missing = |it: usize| it >= known;
+        if missing(bend.over) || bend.under.is_some_and(missing) || bend.under == Some(bend.over) {
+            judge.say(
+                &key("over"),
+                format!(
+                    "thermometers {} and {:?} are not two of the {known}",
+                    bend.over, bend.under
+                ),
+                "count [[volumetric.temperature]] from 0",
+            );
+        }
+        if bend.axis == bend.towards {
+            judge.say(
+                &key("towards"),
+                "a guide bends across its axis",
+                "name another axis",
+            );
+        }
+        let mut before = volumetric.bend[..at].iter();
+        if before.any(|it| (it.axis, it.towards) == (bend.axis, bend.towards)) {
+            judge.say(
+                &key("axis"),
+                "this guide bends in this direction twice",
+                "keep one",
+            );
+        }
+        judge.below(
+            (&key("low_mm"), bend.low_mm),
+            (&key("high_mm"), bend.high_mm),
+        );
+        judge.within(&key("gradient_max_k"), bend.gradient_max_k, 1e-3, 100.0);
+    }
+}
+
+fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let Some(reference) = &volumetric.reference else {
+        return;
+    };
+    judge.within("reference.step_mm", reference.step_mm, 0.1, 1e3);
+    let samples = f64::from(reference.samples);
+    judge.within("reference.samples", samples, 1.0, 1e4);
+}
+
 fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     let mut seen = Vec::new();
     for it in &volumetric.influence {
@@ -405,6 +501,50 @@ mod tests {
             ".temperature[1].channel",
             "has no 1",
         );
+    }
+
+    #[test]
+    fn guides_bend_by_thermometers_that_there_are_and_across_their_axes() {
+        check(
+            "over = 0\n",
+            "over = 6\n",
+            ".bend.0.over",
+            "not two of the 6",
+        );
+        check("under = 1\n", "under = 0\n", ".bend.0.over", "not two");
+        check(
+            "towards = \"z\"",
+            "towards = \"x\"",
+            ".bend.0.towards",
+            "across",
+        );
+        check(
+            "gradient_max_k = 4.0",
+            "gradient_max_k = 0.0",
+            ".bend.0.gradient_max_k",
+            "0",
+        );
+    }
+
+    #[test]
+    fn lines_are_read_by_an_instrument_that_there_is_within_the_volume() {
+        let key = ".calibrate.instrument";
+        check(
+            "instrument = \"laser\"",
+            "instrument = \"ruler\"",
+            key,
+            "ruler",
+        );
+        check("step_mm = 50.0", "step_mm = 0.0", ".calibrate.step_mm", "0");
+        check("to_mm = [500.0,", "to_mm = [501.0,", ".verify.to_mm", "501");
+    }
+
+    #[test]
+    fn references_need_stops_and_samples() {
+        let key = ".reference.step_mm";
+        check("step_mm = 25.0", "step_mm = 0.0", key, "0");
+        let key = ".reference.samples";
+        check("samples = 50", "samples = 0", key, "0");
     }
 
     #[test]

@@ -10,8 +10,10 @@
 //! old: a reference is wrong by its slope times the way since then.
 
 use compensator::volumetric::function::Function;
-use compensator::volumetric::model::VolumetricModel;
-use compensator::volumetric::model::{AxisErrors, Conditions, Machine as Model, Squareness};
+use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
+use compensator::volumetric::model::{
+    AxisErrors, Conditions, Machine as Model, Squareness, ThermalBend, VolumetricModel,
+};
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, EndOfTravel, Feed, FeedStatus, Influences, Memories, MovingState,
 };
@@ -25,8 +27,8 @@ use crate::assemble::{
     volumetric_chain, work_volume,
 };
 use crate::config::{
-    BeamConfig, BeamDetectorConfig, FeedConfig, MachineConfig, ReactionName, RollConfig,
-    VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
+    ReactionName, RollConfig, VolumetricConfig,
 };
 use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
 
@@ -37,6 +39,10 @@ pub struct VolumetricState {
     pub axes: [AxisErrors; 3],
     /// The squarenesses.
     pub squareness: Squareness,
+    /// Guides that bend, of those in the configuration.
+    pub bends: Vec<IdentifiedBend>,
+    /// Expansions of scales, in place of those in the configuration.
+    pub expansions: Vec<IdentifiedExpansion>,
     /// What the detectors of each axis read; needed for each beam of the configuration.
     pub beams: [Option<BeamReference>; 3],
     /// What the roll detectors read along their axis; needed where there are some.
@@ -53,6 +59,8 @@ struct WatchedBeam {
     monitor: AxisMonitor,
     slider: [usize; 4],
     end: Option<[usize; 4]>,
+    /// Where the detector sits on the slide: there it sees the slide's tilts too.
+    place: Point,
 }
 
 /// The roll of one slide.
@@ -75,6 +83,9 @@ pub struct VolumetricCorrection {
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
+    bends: Vec<ThermalBend>,
+    /// The temperatures at which no guide bends beyond its tables.
+    references: Vec<Celsius>,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
     /// Of a displacement by detectors that are believed.
@@ -113,12 +124,15 @@ impl VolumetricCorrection {
         for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
             thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
         }
+        let bends = model.machine().thermal.bends.clone();
         Ok(Self {
             model,
             tool: point_of_mm(own.tool_offset_mm),
             beams,
             roll,
             thermometers,
+            bends,
+            references: state.temperatures.clone(),
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
@@ -128,6 +142,28 @@ impl VolumetricCorrection {
                 Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
             }),
         })
+    }
+
+    /// The same by the tables alone: what the machine would do without its detectors and
+    /// thermometers.
+    ///
+    /// # Errors
+    /// As [`VolumetricCorrection::new`].
+    pub fn by_tables(
+        config: &MachineConfig,
+        state: VolumetricState,
+    ) -> Result<Self, VolumetricFailure> {
+        let mut blind = config.clone();
+        if let Some(own) = &mut blind.volumetric {
+            own.beam = BeamsConfig::default();
+            (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
+        }
+        let state = VolumetricState {
+            axes: state.axes,
+            squareness: state.squareness,
+            ..VolumetricState::default()
+        };
+        Self::new(&blind, state)
     }
 
     /// The model in use.
@@ -161,7 +197,41 @@ impl VolumetricCorrection {
             let beyond = seen.map(|it| [it - roll.reference.at(position)]);
             state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
         }
+        for axis in Axis::ALL {
+            self.take_off_tilts(&mut state, axis, actual);
+        }
         state
+    }
+
+    /// A detector that sits beside its slide's zero also sees the slide tilt: by its roll, and
+    /// where the guide bends. That is no displacement of the slide.
+    fn take_off_tilts(&self, state: &mut MovingState, axis: Axis, actual: Point) {
+        let Some(beam) = &self.beams[axis.index()] else {
+            return;
+        };
+        let mut turn = [0.0; 3];
+        turn[axis.index()] = state.roll[axis.index()].value();
+        for bend in self.bends.iter().filter(|it| it.axis == axis) {
+            let above = |at: usize| (self.temperatures[at] - self.references[at]).value();
+            let gradient = above(bend.over) - bend.under.map_or(0.0, above);
+            let (low, high) = (bend.low.value(), bend.high.value());
+            let way = low + high - 2.0 * actual.along(axis).value();
+            let slope = bend.bow.value() * gradient * 4.0 * way / ((high - low) * (high - low));
+            // From the axis towards the bow, about the third direction by the right hand.
+            let (from, to) = (axis.index(), bend.towards.index());
+            let sense = if (from + 1) % 3 == to { 1.0 } else { -1.0 };
+            turn[3 - from - to] += sense * slope;
+        }
+        let [x, y, z] = Axis::ALL.map(|it| beam.place.along(it).value());
+        let seen = [
+            turn[1] * z - turn[2] * y,
+            turn[2] * x - turn[0] * z,
+            turn[0] * y - turn[1] * x,
+        ];
+        let sideways = &mut state.sideways[axis.index()];
+        for (value, direction) in sideways.iter_mut().zip(axis.others()) {
+            *value -= Metres(seen[direction.index()]);
+        }
     }
 
     /// An axis at the end of the volume is some counts beyond it: the end's correction holds there.
@@ -304,12 +374,17 @@ fn model(
     config: &VolumetricConfig,
     state: &VolumetricState,
 ) -> Result<VolumetricModel, VolumetricFailure> {
+    let mut thermal = thermal(config, &state.temperatures);
+    for expansion in &state.expansions {
+        expansion.apply(&mut thermal.channels);
+    }
+    thermal.bends = bends(config, state)?;
     let machine = Model {
         chain: volumetric_chain(config)?,
         volume: work_volume(config)?,
         axes: state.axes.clone(),
         squareness: state.squareness,
-        thermal: thermal(config, &state.temperatures),
+        thermal,
         tool_max: Metres::from_mm(config.tool_max_mm),
         displacement_max: Metres::from_um(config.compensation.displacement_max_um),
         roll_max: config
@@ -321,6 +396,24 @@ fn model(
         machine,
         model_limits(&config.compensation),
     )?)
+}
+
+/// The bends found, within what the configuration permits.
+fn bends(
+    config: &VolumetricConfig,
+    state: &VolumetricState,
+) -> Result<Vec<ThermalBend>, VolumetricFailure> {
+    let section = "bend";
+    let bend = |found: &IdentifiedBend| {
+        let (axis, towards) = (found.plan.axis, found.plan.towards);
+        let is_this =
+            |it: &&BendConfig| (volume_axis(it.axis), volume_axis(it.towards)) == (axis, towards);
+        let own = config.bend.iter().find(is_this);
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let is_watched = config.beam.each()[axis.index()].is_some();
+        Ok(found.thermal_bend(own.gradient_max_k, is_watched))
+    };
+    state.bends.iter().map(bend).collect()
 }
 
 fn check_speed(
@@ -371,6 +464,7 @@ fn watched_beam(
         monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
         slider: places(&beam.slider),
         end: beam.end.as_ref().map(places),
+        place: point_of_mm(beam.slider.place_mm),
     })
 }
 

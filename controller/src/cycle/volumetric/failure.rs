@@ -1,12 +1,16 @@
 //! What can go wrong with three axes beyond what can go wrong with each.
 
+use core::time::Duration;
+
 use compensator::volumetric::function::FunctionError;
-use compensator::volumetric::model::{ChainError, ModelError};
-use compensator::volumetric::online::RollError;
-use compensator::volumetric::{Axis, VolumeError};
-use units::MetresPerSecond;
+use compensator::volumetric::identify::IdentifyError;
+use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
+use compensator::volumetric::online::{RollError, Trouble};
+use compensator::volumetric::{Axis, NoCorrection, VolumeError};
+use units::{Metres, MetresPerSecond, Radians};
 
 use crate::assemble::BeamDetectorError;
+use crate::engine::{Cause, PushError};
 
 /// Why three axes are not corrected, or not zeroed.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +43,91 @@ pub enum VolumetricFailure {
         seen: usize,
         /// How many there should be.
         expected: usize,
+    },
+    /// Nothing is known of the errors.
+    #[error(
+        "the errors of the three axes were never measured; `truestage calibrate` measures them"
+    )]
+    NoGeometry,
+    /// References that were taken with other errors in use.
+    #[error(
+        "the references {references} of the detectors count from the calibration {measured_with}, but          {geometry} is in use; activate what belongs together (`truestage cal activate`), or take          the references again (`truestage reference`)"
+    )]
+    OtherGeometry {
+        /// The references.
+        references: String,
+        /// Which calibration they belong to.
+        measured_with: String,
+        /// Which is in use.
+        geometry: String,
+    },
+    /// A memory that counts from other references.
+    #[error(
+        "the state memory {memory} counts from the references {measured_with}, but `{references}` are          in use; record it again (`truestage memory record`), or clear it (`truestage memory clear`)"
+    )]
+    OtherReferences {
+        /// The memory.
+        memory: String,
+        /// Which references it belongs to.
+        measured_with: String,
+        /// Which are in use.
+        references: String,
+    },
+    /// A detector that says nothing where its reference is to be taken.
+    #[error(
+        "axis {axis} at {:.3} mm: the detector {what} says nothing to be relied upon: {source}; no          references were stored", at.mm()
+    )]
+    Blind {
+        /// Along which axis.
+        axis: Axis,
+        /// Where the axis stands.
+        at: Metres,
+        /// Which detector.
+        what: &'static str,
+        /// What is wrong.
+        source: Trouble,
+    },
+    /// A thermometer that shows nothing.
+    #[error(
+        "thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; no references were stored"
+    )]
+    NoTemperature {
+        /// Which, from 1.
+        index: usize,
+    },
+    /// Samples that do not come.
+    #[error("the measuring modules sent {seen} of {expected} samples in {:.1} s; do they sample (every_syncs)?",
+        waited.as_secs_f64())]
+    NoSamples {
+        /// How many came.
+        seen: usize,
+        /// How many were awaited.
+        expected: usize,
+        /// How long.
+        waited: Duration,
+    },
+    /// Readings that do not tell the errors.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// What detectors see is more than a correction is proven for.
+    #[error(transparent)]
+    Conditions(#[from] ConditionsError),
+    /// A place for which there is no correction.
+    #[error(transparent)]
+    NoCorrection(#[from] NoCorrection),
+    /// The line of a verification.
+    #[error("deviations along the line range over {:.3} um, the limit is {:.3} um", seen.um(), limit.um())]
+    OutOfTolerance {
+        /// Largest minus smallest.
+        seen: Metres,
+        /// What it may be.
+        limit: Metres,
+    },
+    /// A path that cannot be driven.
+    #[error("the path was not driven to its end: {source}")]
+    Path {
+        /// Why.
+        source: PushError,
     },
     /// A detector that cannot be.
     #[error("axis {axis}: {source}")]
@@ -75,6 +164,66 @@ pub enum VolumetricFailure {
         /// What the axes reach.
         axes: MetresPerSecond,
     },
+    /// A line without a direction, or with optics that look along it.
+    #[error(
+        "this line has no direction, or its optics do not look across it; nothing was moved: give \
+         it a length, and a direction across that is square to it"
+    )]
+    NotALine,
+    /// A line is to be measured with something that is not there.
+    #[error("there is no instrument `{instrument}`; add [instrument.{instrument}]")]
+    NoInstrument {
+        /// How it is called.
+        instrument: String,
+    },
+    /// A line is to be measured with optics that nobody has described.
+    #[error(
+        "instrument {instrument}: `{key}` is missing in [instrument.{instrument}.optics]; nothing \
+         was moved"
+    )]
+    NoOptics {
+        /// Which instrument.
+        instrument: String,
+        /// What is missing.
+        key: &'static str,
+    },
+    /// A line was set up, but the interferometer sees nothing.
+    #[error(
+        "instrument {instrument}: no beam comes back along the line that was set up; align \
+         laser and optics, and begin again"
+    )]
+    NoLight {
+        /// Which instrument.
+        instrument: String,
+    },
+    /// A straight move ended elsewhere.
+    #[error("the tool did not arrive: {cause}")]
+    NotThere {
+        /// Why it ended.
+        cause: Cause,
+    },
+    /// A reading that is no error of the machine.
+    #[error(
+        "the line reads {:.1} um off, more than {:.1} um that a machine like this can be: check \
+         the optics, `reverse`, and that the tool stays on the line", seen.um(), limit.um()
+    )]
+    ImpossibleReading {
+        /// What was read.
+        seen: Metres,
+        /// What is possible.
+        limit: Metres,
+    },
+    /// A tilt that is no error of the machine.
+    #[error(
+        "the line reads a tilt of {:.1} arcsec, more than {:.1} arcsec that a machine like this \
+         can have: check the optics", seen.arcsec(), limit.arcsec()
+    )]
+    ImpossibleTilt {
+        /// What was read.
+        seen: Radians,
+        /// What is possible.
+        limit: Radians,
+    },
 }
 
 impl VolumetricFailure {
@@ -84,15 +233,33 @@ impl VolumetricFailure {
             Self::None
             | Self::NotConfigured { .. }
             | Self::Detector { .. }
+            | Self::NotALine
+            | Self::NoInstrument { .. }
+            | Self::NoOptics { .. }
             | Self::Chain(_)
             | Self::Volume(_)
             | Self::Influence(_)
+            | Self::Path { .. }
             | Self::Roll(_) => 2,
+            Self::OutOfTolerance { .. } => 5,
             Self::NoReference { .. }
+            | Self::NoGeometry
+            | Self::OtherGeometry { .. }
+            | Self::OtherReferences { .. }
+            | Self::Blind { .. }
+            | Self::NoTemperature { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
+            | Self::Identify(_)
+            | Self::Conditions(_)
+            | Self::NoCorrection(_)
             | Self::Model(_)
             | Self::TooFast { .. } => 3,
+            Self::NoSamples { .. }
+            | Self::NoLight { .. }
+            | Self::NotThere { .. }
+            | Self::ImpossibleReading { .. }
+            | Self::ImpossibleTilt { .. } => 4,
         }
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn place_of_voltage(config: &MachineConfig, module: &str, channel: u8
 }
 
 /// Likewise of a thermometer.
-fn place_of_temperature(config: &MachineConfig, module: &str, channel: u8) -> usize {
+pub(super) fn place_of_temperature(config: &MachineConfig, module: &str, channel: u8) -> usize {
     place(config, module, channel, |it| &it.temperature_channels)
 }
 

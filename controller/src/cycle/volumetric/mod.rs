@@ -3,13 +3,34 @@
 //! | file | what |
 //! |---|---|
 //! | `zero` | every axis on its index pulse, one after the other |
+//! | `calibrate` | lines by interferometer and detectors, cold and warm, and what made them |
+//! | `reference` | what the detectors read when the machine is as its tables say |
+//! | `memory` | displacements that are to be kept, recorded |
+//! | `moves` | all three axes in one line, corrected |
+//! | `verify` | a line that no calibration uses, read with the correction on |
+//! | `state` | what is stored, put together: errors, references, memories |
 //! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
+//! | `line` | lines of the tool's way that a laser interferometer measures: set up, travelled, read |
 //! | `inputs` | where in the engine's channels each detector stands, and whether it is to be believed |
 
+mod calibrate;
 mod correction;
 mod failure;
 mod inputs;
+mod line;
+mod memory;
+mod moves;
+mod reference;
+mod state;
+mod verify;
 mod zero;
 
+pub use calibrate::{VolumetricCalibrated, WarmUp};
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
+pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};
+pub use memory::Remembered;
+pub use moves::Mover;
+pub use reference::{References, VolumetricReferenced};
+pub use state::{GEOMETRY, REFERENCES, VolumetricRecords, memory_pointer};
+pub use verify::{VerifyBy, VolumetricVerified, VolumetricVerifiedPoint};

@@ -19,8 +19,8 @@ pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
 pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
 pub use volumetric::{
-    BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
-    MemoryRecord, StateMemoryContent,
+    BeamRecord, BeamReferencesContent, BendRecord, ExpansionRecord, FunctionRecord, FunctionShape,
+    GeometryContent, MemoryName, MemoryRecord, StateMemoryContent,
 };
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,

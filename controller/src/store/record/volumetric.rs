@@ -6,13 +6,16 @@ use core::fmt;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
+use compensator::volumetric::identify::{
+    BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion,
+};
 use compensator::volumetric::model::{AxisErrors, ErrorName, Squareness};
 use compensator::volumetric::online::{BeamDrift, BeamReference, StateMap};
 use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
 use super::super::{StoreError, short};
-use super::{CalibrationRecord, Content};
+use super::{CalibrationRecord, Content, IdentityRecord};
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
@@ -104,6 +107,119 @@ pub struct GeometryContent {
     pub squareness_u_rad: [f64; 3],
     /// What the thermometers showed, in the order of the configuration, °C.
     pub temperatures_c: Vec<f64>,
+    /// Guides that bend, where that was measured.
+    #[serde(default)]
+    pub bends: Vec<BendRecord>,
+    /// Expansions of the scales, where these were measured.
+    #[serde(default)]
+    pub expansions: Vec<ExpansionRecord>,
+    /// Who the drives of x, y and z were; empty where the errors were measured elsewhere.
+    #[serde(default)]
+    pub drives: Vec<IdentityRecord>,
+}
+
+/// A guide that bends when it is warmer on one side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BendRecord {
+    /// `x`, `y` or `z`.
+    pub axis: char,
+    /// The direction of a positive bow.
+    pub towards: char,
+    /// The thermometer over the neutral plane, from 0.
+    pub over: usize,
+    /// The one under it.
+    pub under: Option<usize>,
+    /// Where the arc begins on its chord.
+    pub low_m: f64,
+    /// Where it ends.
+    pub high_m: f64,
+    /// Displacement in the middle of the arc per kelvin.
+    pub bow_m_per_k: f64,
+    /// Its standard uncertainty.
+    pub standard_uncertainty_m_per_k: f64,
+}
+
+/// How a scale expands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExpansionRecord {
+    /// `x`, `y` or `z`.
+    pub axis: char,
+    /// The thermometers whose mean is its temperature, from 0.
+    pub thermometers: Vec<usize>,
+    /// 1/K.
+    pub per_k: f64,
+    /// Its standard uncertainty.
+    pub standard_uncertainty_per_k: f64,
+}
+
+fn letter(axis: Axis) -> char {
+    AXES[axis.index()]
+}
+
+fn axis_of(letter: char, id: &str) -> Result<Axis, StoreError> {
+    let axis = Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
+    axis.ok_or_else(|| StoreError::ErrorName {
+        id: short(id),
+        name: letter.to_string(),
+    })
+}
+
+impl BendRecord {
+    /// What was found.
+    pub fn of(found: &IdentifiedBend) -> Self {
+        let plan = found.plan;
+        Self {
+            axis: letter(plan.axis),
+            towards: letter(plan.towards),
+            over: plan.over,
+            under: plan.under,
+            low_m: plan.low.value(),
+            high_m: plan.high.value(),
+            bow_m_per_k: found.bow.value(),
+            standard_uncertainty_m_per_k: found.u.value(),
+        }
+    }
+
+    fn found(&self, id: &str) -> Result<IdentifiedBend, StoreError> {
+        Ok(IdentifiedBend {
+            plan: BendPlan {
+                axis: axis_of(self.axis, id)?,
+                towards: axis_of(self.towards, id)?,
+                over: self.over,
+                under: self.under,
+                low: Metres(self.low_m),
+                high: Metres(self.high_m),
+                sideways: false,
+            },
+            bow: Metres(self.bow_m_per_k),
+            u: Metres(self.standard_uncertainty_m_per_k),
+        })
+    }
+}
+
+impl ExpansionRecord {
+    /// What was found.
+    pub fn of(found: &IdentifiedExpansion) -> Self {
+        Self {
+            axis: letter(found.plan.axis),
+            thermometers: found.plan.thermometers.clone(),
+            per_k: found.per_kelvin,
+            standard_uncertainty_per_k: found.u,
+        }
+    }
+
+    fn found(&self, id: &str) -> Result<IdentifiedExpansion, StoreError> {
+        Ok(IdentifiedExpansion {
+            plan: ExpansionPlan {
+                axis: axis_of(self.axis, id)?,
+                thermometers: self.thermometers.clone(),
+            },
+            per_kelvin: self.per_k,
+            u: self.standard_uncertainty_per_k,
+        })
+    }
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -135,6 +251,9 @@ impl GeometryContent {
             squareness_rad: each.map(Radians::value),
             squareness_u_rad: squareness.u.map(Radians::value),
             temperatures_c: temperatures.iter().map(|it| it.value()).collect(),
+            bends: Vec::new(),
+            expansions: Vec::new(),
+            drives: Vec::new(),
         }
     }
 
@@ -174,6 +293,22 @@ impl GeometryContent {
             z_to_y,
             u: self.squareness_u_rad.map(Radians),
         }
+    }
+
+    /// Which guides bend by how much, in the calibration `id`.
+    ///
+    /// # Errors
+    /// When an axis is none.
+    pub fn bends(&self, id: &str) -> Result<Vec<IdentifiedBend>, StoreError> {
+        self.bends.iter().map(|it| it.found(id)).collect()
+    }
+
+    /// How the scales expand, in the calibration `id`.
+    ///
+    /// # Errors
+    /// When an axis is none.
+    pub fn expansions(&self, id: &str) -> Result<Vec<IdentifiedExpansion>, StoreError> {
+        self.expansions.iter().map(|it| it.found(id)).collect()
     }
 
     /// What the thermometers showed.
@@ -292,6 +427,8 @@ pub struct MemoryRecord {
 pub struct StateMemoryContent {
     /// Which memory.
     pub memory: MemoryName,
+    /// The name of the references from which the displacements count.
+    pub references: String,
     /// By axis.
     pub axes: Vec<MemoryRecord>,
 }
@@ -300,8 +437,8 @@ impl StateMemoryContent {
     /// The name of this kind.
     pub const KIND: &'static str = "state_memory";
 
-    /// What `map` keeps.
-    pub fn new(memory: MemoryName, map: &StateMap) -> Self {
+    /// What `map` keeps, counted from the references of the name `references`.
+    pub fn new(memory: MemoryName, references: &str, map: &StateMap) -> Self {
         let axes = AXES.iter().zip(&map.of).filter_map(|(axis, functions)| {
             let [first, second] = functions.as_ref()?;
             Some(MemoryRecord {
@@ -314,6 +451,7 @@ impl StateMemoryContent {
         });
         Self {
             memory,
+            references: references.to_owned(),
             axes: axes.collect(),
         }
     }
@@ -476,7 +614,7 @@ mod tests {
         assert!(content.roll(&id).unwrap().is_none());
         let mut map = StateMap::default();
         map.of[2] = Some([function([0.0, 5e-6, 0.0]), function([0.0; 3])]);
-        let content = StateMemoryContent::new(MemoryName::Second, &map);
+        let content = StateMemoryContent::new(MemoryName::Second, "r", &map);
         let (id, record) = stored(Content::StateMemory(content));
         let content = record.state_memory(&id).unwrap();
         let back = content.map(&id).unwrap();

@@ -122,6 +122,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             standing: reached
                 && !pending
                 && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
+            at_rest: self.image.stands(),
         })
     }
 }

@@ -591,7 +591,7 @@ fn a_move_shakes_hands_and_ends_at_the_target() {
     assert_eq!(rig.fake.position(), 150_000);
     assert_eq!(rig.controlwords(), ["3F00", "0F00"]);
     let reading = rig.drive.reading().unwrap();
-    assert!(reading.standing);
+    assert!(reading.standing && reading.at_rest);
     assert!((reading.position.um() - 1500.0).abs() < 1e-6);
     // Speed and acceleration were read back before; a second move needs no SDO.
     rig.sent.clear();

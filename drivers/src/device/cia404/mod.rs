@@ -286,23 +286,26 @@ impl Cia404Analog {
         }
     }
 
+    /// Into the memory of the sample before: in a cyclic loop nothing is asked for.
     fn take_sample(&mut self, now: Time) {
-        let parts = core::mem::take(&mut self.parts);
-        self.parts = vec![None; parts.len()];
         let raw = |place: usize| {
-            let part = parts.get(place / PER_PDO).copied().flatten();
+            let part = self.parts.get(place / PER_PDO).copied().flatten();
             let raw = part.and_then(|part| extract(&part, place % PER_PDO * 16, 16));
             raw.map_or(i16::MIN, |raw| (raw as u16).cast_signed())
         };
-        let mut volts = AnalogReading {
+        let mut volts = self.volts.take().unwrap_or(AnalogReading {
             at: now,
             volts: Vec::new(),
             saturated: Vec::new(),
-        };
-        let mut temperatures = TemperatureReading {
+        });
+        let mut temperatures = self.temperatures.take().unwrap_or(TemperatureReading {
             at: now,
             celsius: Vec::new(),
-        };
+        });
+        (volts.at, temperatures.at) = (now, now);
+        volts.volts.clear();
+        volts.saturated.clear();
+        temperatures.celsius.clear();
         for (place, input) in self.settings.inputs.iter().enumerate() {
             let raw = raw(place);
             let at_an_end = raw == i16::MAX || raw == i16::MIN;
@@ -318,6 +321,7 @@ impl Cia404Analog {
                 }
             }
         }
+        self.parts.fill(None);
         self.volts = (!volts.volts.is_empty()).then_some(volts);
         self.temperatures = (!temperatures.celsius.is_empty()).then_some(temperatures);
         if !self.node.is_up() {

@@ -476,6 +476,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 .following_error
                 .map(|counts| scale.to_coordinate(counts)),
             standing: !moving,
+            at_rest: self.image.stands(),
         })
     }
 }

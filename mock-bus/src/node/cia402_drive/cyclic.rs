@@ -1,9 +1,10 @@
 //! Cyclic synchronous position: a set-point with every SYNC (CiA 402-2, mode 8).
 //!
 //! At SYNC the drive takes 0x607A + 0x60B0 and goes there in a straight line over one
-//! interpolation period (0x60C2). The speed is limited to 0x607F, positions to 0x607D; what the
-//! limited demand is short of counts as following error. A drive that has waited for SYNC for two
-//! periods and half a period of grace faults. With 0x60C2 at 0, as at power-on, nothing is
+//! interpolation period (0x60C2), which its servo is told in the steps of its own clock. The speed
+//! is limited to 0x607F, positions to 0x607D; what the limited demand is short of counts as
+//! following error. A drive that has waited for SYNC for two periods and half a period of grace
+//! faults. With 0x60C2 at 0, as at power-on, nothing is
 //! interpolated, limited or watched: every set-point is a step.
 //!
 //! Absent: velocity and torque offsets (0x60B1, 0x60B2), 0x60C5, extrapolation when a set-point
@@ -66,8 +67,11 @@ impl Drive {
             sync_due: patience(now, period),
             shortfall: target - reached,
         };
-        self.command_servo(now, m);
-        self.schedule(now);
+        // The position loop has a clock of its own: told at both moments, which may lie a
+        // microsecond apart, the servo would take one of them for a demand that stands. A round
+        // that is due now is not put off either.
+        let round = Duration::from_micros(self.config.servo_period_us.max(1));
+        self.servo_due = self.servo_due.min(now + round);
     }
 
     fn is_halted(&self) -> bool {

@@ -59,6 +59,16 @@ impl Chain {
 
     /// The tool point in the workpiece's frame.
     pub(super) fn tool_point(&self, scales_m: Vector, motions: &[Motion; 3]) -> Vector {
+        self.point(scales_m, motions, self.tool_offset)
+    }
+
+    /// Likewise of what is mounted beside the tool, by its place with all axes at 0.
+    pub(super) fn point(
+        &self,
+        scales_m: Vector,
+        motions: &[Motion; 3],
+        offset_m: Vector,
+    ) -> Vector {
         let body = |axis: usize, way: f64| {
             let motion = &motions[axis];
             // What is off along the axis belongs to its coordinate, what is off sideways to
@@ -76,7 +86,7 @@ impl Chain {
                 carrier.carrying(&body(*axis, way))
             })
         };
-        let tool = outermost(&self.tool_side, 1.0).place(self.tool_offset);
+        let tool = outermost(&self.tool_side, 1.0).place(offset_m);
         outermost(&self.workpiece_side, -1.0).point_at(tool)
     }
 }

@@ -30,6 +30,8 @@ pub struct VolumetricConfig {
     pub roll: RollConfig,
     /// The temperature sensors.
     pub temperatures: TemperatureConfig,
+    /// The optics that a laser is set up with.
+    pub laser: LaserConfig,
 }
 
 impl Default for VolumetricConfig {
@@ -45,6 +47,7 @@ impl Default for VolumetricConfig {
             beams: BeamConfig::default(),
             roll: RollConfig::default(),
             temperatures: TemperatureConfig::default(),
+            laser: LaserConfig::default(),
         }
     }
 }
@@ -343,6 +346,37 @@ impl Default for TemperatureConfig {
     }
 }
 
+/// The optics of a laser interferometer, and the hand that sets them up.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LaserConfig {
+    /// A beam is off its line by up to this, either way in both directions across.
+    pub misalignment_urad: f64,
+    /// A straightedge slopes by up to this, either way.
+    pub straightedge_slope_urad: f64,
+    /// Between the two beams of the prism: 1.5916° make a displacement 36 times its path.
+    pub prism_divergence_deg: f64,
+    /// From one corner cube of the angular optics to the other.
+    pub angular_separation_mm: f64,
+    /// So far from its line a target loses the beam.
+    pub lateral_max_mm: f64,
+    /// How long hands are in the beam.
+    pub set_up_ms: f64,
+}
+
+impl Default for LaserConfig {
+    fn default() -> Self {
+        Self {
+            misalignment_urad: 100.0,
+            straightedge_slope_urad: 150.0,
+            prism_divergence_deg: 1.5916,
+            angular_separation_mm: 30.0,
+            lateral_max_mm: 2.0,
+            set_up_ms: 300.0,
+        }
+    }
+}
+
 impl VolumetricConfig {
     /// Whether the chain names the foot and each axis once.
     pub(crate) fn is_a_chain(&self) -> bool {
@@ -384,6 +418,10 @@ impl VolumetricConfig {
             ("sum_v", beams.sum_v),
             ("beams.rail_v", beams.rail_v),
             ("distance_mm", self.roll.distance_mm),
+            ("prism_divergence_deg", self.laser.prism_divergence_deg),
+            ("angular_separation_mm", self.laser.angular_separation_mm),
+            ("lateral_max_mm", self.laser.lateral_max_mm),
+            ("set_up_ms", self.laser.set_up_ms),
         ];
         for travel_mm in self.travel_mm {
             numbers.push(("travel_mm", travel_mm));

@@ -56,6 +56,10 @@ impl Heat {
         }
     }
 
+    pub(super) fn air_c(&self, now: Time) -> f64 {
+        self.swing(now.seconds() / 3600.0, 0.0)
+    }
+
     /// What follows the air with a time constant.
     fn swing(&self, hours: f64, time_constant_h: f64) -> f64 {
         let per_h = TAU / self.config.air_swing_period_h;

@@ -19,6 +19,9 @@ mod chain;
 pub mod config;
 mod guide;
 mod heat;
+mod laser;
+#[cfg(test)]
+mod laser_tests;
 mod rigid;
 mod roll;
 mod slide;
@@ -29,6 +32,8 @@ mod truth;
 use units::Time;
 
 pub(crate) use beam::BeamTrouble;
+pub(super) use laser::Sighting;
+pub use laser::{LineOptics, LineSetUp, LineTruth};
 pub use truth::{ErrorMotion, Point, VolumetricTruth};
 
 use super::machine::Actuator;
@@ -38,6 +43,7 @@ use chain::Chain;
 use config::VolumetricConfig;
 use guide::{Guide, Motion};
 use heat::Heat;
+use laser::Laser;
 use rigid::Vector;
 use roll::RollDetectors;
 use slide::Slide;
@@ -47,6 +53,9 @@ pub(in crate::plant) const TERMINALS: usize = FIRST_TEMPERATURE + 6;
 const PER_AXIS: usize = 8;
 const FIRST_ROLL: usize = 3 * PER_AXIS;
 const FIRST_TEMPERATURE: usize = FIRST_ROLL + 2;
+
+/// Over which a speed is taken.
+const SOON_S: f64 = 1e-3;
 
 /// Whether a temperature sensor is wired to a terminal.
 pub(in crate::plant) const fn is_temperature(terminal: usize) -> bool {
@@ -81,10 +90,12 @@ pub(super) struct Volumetric {
     roll: RollDetectors,
     roll_axis: usize,
     sensor_offsets_k: [f64; 6],
+    laser: Laser,
 }
 
 impl Volumetric {
-    pub(super) fn new(config: &VolumetricConfig, seed: u64) -> Self {
+    /// `dead_path_m` is that of a laser's linear optics.
+    pub(super) fn new(config: &VolumetricConfig, dead_path_m: f64, seed: u64) -> Self {
         let mut stream = Stream::new(seed, "temperature sensors");
         let offset_k = config.temperatures.offset_k;
         let beam = |axis: usize| Beam::new(&config.beams, config.travel_mm[axis], axis, seed);
@@ -97,6 +108,7 @@ impl Volumetric {
             roll: RollDetectors::new(&config.roll),
             roll_axis: config.roll.axis,
             sensor_offsets_k: [(); 6].map(|()| stream.between(-offset_k, offset_k)),
+            laser: Laser::new(&config.laser, dead_path_m, seed),
         }
     }
 
@@ -135,9 +147,44 @@ impl Volumetric {
         self.guides[axis].motion(scale_m, &heat, now)
     }
 
+    fn motions(&self, scales_m: Vector, now: Time) -> [Motion; 3] {
+        [0, 1, 2].map(|axis| self.motion(axis, scales_m[axis], now))
+    }
+
     fn tool_point_m(&self, scales_m: Vector, now: Time) -> Vector {
-        let motions = [0, 1, 2].map(|axis| self.motion(axis, scales_m[axis], now));
+        let motions = self.motions(scales_m, now);
         self.chain.tool_point(scales_m, &motions)
+    }
+
+    /// Sets the laser up along a line that begins where the machine stands.
+    pub(super) fn set_up_line(&mut self, set_up: &LineSetUp, now: Time) {
+        let scales_m = self.scales_m(now);
+        let motions = self.motions(scales_m, now);
+        let chain = &self.chain;
+        let target = |offset_m| chain.point(scales_m, &motions, offset_m);
+        self.laser.set_up(set_up, target, now);
+    }
+
+    pub(super) fn take_line_away(&mut self) {
+        self.laser.take_away();
+    }
+
+    /// What the laser looks at; `None` while no line is set up.
+    pub(super) fn sighting(&self, now: Time) -> Option<Sighting> {
+        let here_m = self.scales_m(now);
+        let speeds = [0, 1, 2].map(|axis| self.slides[axis].speed_m_per_s(now));
+        let soon_m = rigid::add(here_m, rigid::times(speeds, SOON_S));
+        let [here, soon] = [here_m, soon_m].map(|scales_m| {
+            let motions = self.motions(scales_m, now);
+            move |offset_m| self.chain.point(scales_m, &motions, offset_m)
+        });
+        self.laser.sighting(here, (soon, SOON_S), now)
+    }
+
+    /// The air, and the machine as a thermometer on its frame shows it.
+    pub(super) fn temperatures_c(&self, now: Time) -> (f64, f64) {
+        let scales = [0, 1, 2].map(|axis| self.heat.axis(axis, now).scale_c);
+        (self.heat.air_c(now), scales.iter().sum::<f64>() / 3.0)
     }
 
     /// What is at a terminal, without the noise of its channel.

@@ -63,6 +63,10 @@ impl Slide {
         self.train.mass.position_at(now)
     }
 
+    pub(super) fn speed_m_per_s(&self, now: Time) -> f64 {
+        self.train.mass.speed_at(now)
+    }
+
     pub(super) fn count_zero_m(&self) -> f64 {
         self.train.encoder.count_zero()
     }

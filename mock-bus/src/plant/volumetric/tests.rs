@@ -15,15 +15,15 @@ fn plant(config: VolumetricConfig, seed: u64) -> Plant {
     Plant::new(&config, seed)
 }
 
-fn truth(plant: &Plant) -> VolumetricTruth<'_> {
+pub(super) fn truth(plant: &Plant) -> VolumetricTruth<'_> {
     plant.truth().volumetric().unwrap()
 }
 
-fn hours(hours: f64) -> Time {
+pub(super) fn hours(hours: f64) -> Time {
     Time::from_seconds(3600.0 * hours)
 }
 
-fn point(mm: [f64; 3]) -> Point {
+pub(super) fn point(mm: [f64; 3]) -> Point {
     mm.map(Metres::from_mm)
 }
 
@@ -41,7 +41,7 @@ fn volume() -> impl Iterator<Item = Point> {
 }
 
 /// No error, no heat.
-fn perfect() -> VolumetricConfig {
+pub(super) fn perfect() -> VolumetricConfig {
     VolumetricConfig {
         errors: ErrorsConfig {
             positioning_um: 0.0,
@@ -298,7 +298,7 @@ fn the_roll_detectors_see_the_roll_that_comes_with_warmth() {
 
 /// All slides on a smooth way to scale positions, standing at the end; what a drive would ask for
 /// every 4 ms.
-fn move_to(plant: &mut Plant, start: Time, targets_mm: [f64; 3]) -> Time {
+pub(super) fn move_to(plant: &mut Plant, start: Time, targets_mm: [f64; 3]) -> Time {
     const STEPS: u32 = 150;
     let from = truth(plant).scales().map(Metres::value);
     let zeros = [0, 1, 2].map(|axis| truth(plant).count_zero(axis).value());

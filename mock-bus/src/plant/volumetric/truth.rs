@@ -2,8 +2,8 @@
 
 use units::{Celsius, Metres, Radians, Time};
 
-use super::Volumetric;
 use super::rigid::Vector;
+use super::{LineTruth, Volumetric};
 
 /// A place, or a displacement: x, y, z.
 pub type Point = [Metres; 3];
@@ -67,6 +67,20 @@ impl<'a> VolumetricTruth<'a> {
     /// Where it would be now at other scale positions.
     pub fn tool_point_for(&self, scales: Point) -> Point {
         metres(self.machine.tool_point_m(values(scales), self.now))
+    }
+
+    /// Where a point of the tool would be now at other scale positions, by its place with all axes
+    /// at 0.
+    pub fn point_for(&self, tool_offset: Point, scales: Point) -> Point {
+        let scales_m = values(scales);
+        let motions = self.machine.motions(scales_m, self.now);
+        let chain = &self.machine.chain;
+        metres(chain.point(scales_m, &motions, values(tool_offset)))
+    }
+
+    /// What the hand that set up the laser's line has left, while one is set up.
+    pub fn laser_line(&self) -> Option<LineTruth> {
+        self.machine.laser.truth()
     }
 
     /// Where a machine without errors would have it.

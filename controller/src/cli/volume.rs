@@ -1,0 +1,380 @@
+//! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
+
+use core::time::Duration;
+
+use compensator::volumetric::{Axis, Point};
+use serde_json::{Value, json};
+use truestage::cycle::volumetric::{
+    VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified,
+    WarmUp,
+};
+use truestage::engine::{CsvError, Live, read_path};
+use truestage::ports::Use;
+use truestage::store::{MemoryName, short};
+use truestage::{Failure, Machine, Store, json as to_json};
+use units::Metres;
+
+use super::operator::Terminal;
+use super::output::{Ended, Output};
+use super::session::Session;
+use super::verbs::parse_target;
+use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, RunArgs, VerifyArgs};
+
+/// How long the tool is seen to stand at its target.
+const STAND: Duration = Duration::from_millis(200);
+
+/// Starts the machine, zeroes it, runs `procedure`, switches off.
+fn with_zeroed_volume<R>(
+    args: &MachineArgs,
+    verb: &str,
+    purpose: Use,
+    output: Output,
+    procedure: impl FnOnce(&mut Machine, &Store) -> Result<R, Failure>,
+) -> Result<(R, Value), Failure> {
+    let mut session = Session::open(args, verb, purpose, output)?;
+    let store = session.store.clone();
+    session.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_volumetric()?;
+        let result = procedure(machine, &store)?;
+        machine.shut_down()?;
+        Ok((result, to_json::counters(&machine.counters())))
+    })
+}
+
+pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
+    let run = |_: &mut Machine, _: &Store| Ok(());
+    let ((), counters) = with_zeroed_volume(&args.machine, "zero", Use::Motion, output, run)?;
+    let text = "x, y and z: zero found on their index pulses";
+    output.result(
+        text,
+        &json!({"axes": ["x", "y", "z"], "counters": counters}),
+    )
+}
+
+pub(super) fn reference(args: &MachineArgs, output: Output) -> Ended {
+    let run = |machine: &mut Machine, store: &Store| machine.reference_volumetric(store);
+    let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, run)?;
+    let mut value = referenced_value(&taken);
+    value["counters"] = counters;
+    output.result(&referenced_text(&taken), &value)
+}
+
+pub(super) fn referenced_text(taken: &VolumetricReferenced) -> String {
+    let content = &taken.references.content;
+    let axes: String = content.beams.iter().map(|it| it.axis).collect();
+    format!(
+        "references {} of the beams of {axes}{} are in use, for the errors {}",
+        short(&taken.id),
+        if content.roll.is_some() {
+            " and the roll"
+        } else {
+            ""
+        },
+        short(&content.geometry)
+    )
+}
+
+fn referenced_value(taken: &VolumetricReferenced) -> Value {
+    let temperatures = taken.references.temperatures.iter();
+    json!({
+        "references": taken.id,
+        "geometry": taken.references.content.geometry,
+        "temperatures_c": temperatures.map(|it| it.value()).collect::<Vec<_>>(),
+    })
+}
+
+pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    if args.resume.is_some() || args.accept_drift {
+        return Err(Failure::Usage {
+            what: "a calibration of three axes is neither resumed nor judged by its closure".into(),
+            help: "start it again without --resume and --accept-drift".into(),
+        });
+    }
+    let warm_up = match args.warm_up_min {
+        None => WarmUp::None,
+        Some(minutes) if minutes.is_finite() && minutes > 0.0 && minutes < 1e5 => {
+            WarmUp::Travel(Duration::from_secs_f64(minutes * 60.0))
+        }
+        Some(minutes) => {
+            return Err(Failure::Usage {
+                what: format!("--warm-up-min is {minutes}"),
+                help: "give the minutes for which the axes go to and fro".into(),
+            });
+        }
+    };
+    let mut operator = Terminal::new(args.yes, output)?;
+    let run = |machine: &mut Machine, store: &Store| {
+        machine.calibrate_volumetric(store, warm_up, &mut operator)
+    };
+    let machine = &args.axis.machine;
+    let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
+    let mut value = calibrated_value(&made);
+    value["counters"] = counters;
+    output.result(&calibrated_text(&made), &value)
+}
+
+pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
+    let found = &made.found;
+    let birge = found
+        .birge_ratio
+        .map_or("–".into(), |it| format!("{it:.2}"));
+    let mut text = format!(
+        "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
+         of what was stated\n  tool: standard uncertainty {:.3} µm at most",
+        short(&made.id),
+        short(&made.references),
+        made.lines,
+        found.degrees_of_freedom,
+        made.u_max.um(),
+    );
+    for it in &found.expansions {
+        let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
+        text += &format!(
+            "\n  scale of {}: {value:.3} ppm/K, u {u:.3} ppm/K",
+            it.plan.axis
+        );
+    }
+    for it in &found.bends {
+        let (value, u) = (it.bow.um(), it.u.um());
+        let plan = it.plan;
+        text += &format!(
+            "\n  guide of {} bends towards {}: {value:.3} µm/K, u {u:.3} µm/K",
+            plan.axis, plan.towards
+        );
+    }
+    text
+}
+
+pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
+    let found = &made.found;
+    let expansions = found.expansions.iter().map(|it| {
+        json!({"axis": it.plan.axis.to_string(), "ppm_per_k": it.per_kelvin * 1e6,
+               "u_ppm_per_k": it.u * 1e6})
+    });
+    let bends = found.bends.iter().map(|it| {
+        json!({"axis": it.plan.axis.to_string(), "towards": it.plan.towards.to_string(),
+               "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
+    });
+    json!({
+        "geometry": made.id,
+        "references": made.references,
+        "lines": made.lines,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "birge_ratio": found.birge_ratio,
+        "u_tool_max_um": made.u_max.um(),
+        "expansions": expansions.collect::<Vec<_>>(),
+        "bends": bends.collect::<Vec<_>>(),
+    })
+}
+
+pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    if args.resume.is_some() {
+        return Err(Failure::Usage {
+            what: "a verification of three axes cannot be resumed".into(),
+            help: "it is one line: start it again".into(),
+        });
+    }
+    let mut operator = Terminal::new(args.yes, output)?;
+    let run = |machine: &mut Machine, store: &Store| {
+        let by = match args.uncompensated {
+            true => VerifyBy::AsFound,
+            false => VerifyBy::Everything,
+        };
+        machine.verify_volumetric(store, by, &mut operator)
+    };
+    let machine = &args.axis.machine;
+    let (verified, counters) =
+        with_zeroed_volume(machine, "verify", Use::Measurement, output, run)?;
+    let mut value = verified_value(&verified);
+    value["counters"] = counters;
+    let text = verified_text(&verified);
+    if args.uncompensated || verified.is_within_tolerance() {
+        return output.result(&text, &value);
+    }
+    output.bad_result(&text, value, out_of_tolerance(&verified))
+}
+
+pub(super) fn out_of_tolerance(verified: &VolumetricVerified) -> Failure {
+    VolumetricFailure::OutOfTolerance {
+        seen: verified.range,
+        limit: verified.limit,
+    }
+    .into()
+}
+
+pub(super) fn verified_text(verified: &VolumetricVerified) -> String {
+    let head = format!(
+        "deviations along the line: range {:.3} µm, limit {:.3} µm\n        x        y        z (mm)  \
+         deviation (µm)   u (µm)",
+        verified.range.um(),
+        verified.limit.um()
+    );
+    verified.points.iter().fold(head, |text, it| {
+        let [x, y, z] = mm(it.at);
+        text + &format!(
+            "\n {x:>8.3} {y:>8.3} {z:>8.3}  {:>19.3} {:>8.3}",
+            it.deviation.um(),
+            it.u.um()
+        )
+    })
+}
+
+pub(super) fn verified_value(verified: &VolumetricVerified) -> Value {
+    let points = verified.points.iter().map(
+        |it| json!({"at_mm": mm(it.at), "deviation_um": it.deviation.um(), "u_um": it.u.um()}),
+    );
+    json!({
+        "range_um": verified.range.um(),
+        "limit_um": verified.limit.um(),
+        "points": points.collect::<Vec<_>>(),
+    })
+}
+
+fn mm(point: Point) -> [f64; 3] {
+    Axis::ALL.map(|axis| point.along(axis).mm())
+}
+
+/// Where the axes that are not named stay: where the zero left them.
+pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    if args.align {
+        return Err(Failure::Usage {
+            what: "--align is for platforms, which a camera sees".into(),
+            help: "leave it out".into(),
+        });
+    }
+    let mut target: [Option<Metres>; 3] = [None; 3];
+    for text in &args.targets {
+        let (axis, place) = parse_target(text)?;
+        let known = "x, y, z".to_owned();
+        let at = ["x", "y", "z"].iter().position(|it| *it == axis);
+        let at = at.ok_or(Failure::NoSuchAxis { axis, known })?;
+        target[at] = Some(place);
+    }
+    if target.iter().all(Option::is_none) {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=PLACE with a unit: x=12.5mm y=20mm z=5mm".into(),
+        });
+    }
+    let run = |machine: &mut Machine, store: &Store| {
+        let index_mm = machine.volumetric_config()?.zero.index_mm;
+        let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
+        let target = Point::new(at(0), at(1), at(2));
+        match machine.stored_mover(store)? {
+            None => machine.go_straight(target).map(|()| None),
+            Some(mut mover) => {
+                machine.correct_volume(&mut mover, true)?;
+                machine.drive_to(&mut mover, target, STAND).map(Some)
+            }
+        }
+    };
+    let (live, counters) = with_zeroed_volume(&args.machine, "move", Use::Motion, output, run)?;
+    let Some(live) = live else {
+        let text = "moved without correction: the errors were never measured";
+        return output.result(text, &json!({"corrected": false, "counters": counters}));
+    };
+    let value =
+        json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
+    output.result(&live_text(&live), &value)
+}
+
+fn live_text(live: &Live) -> String {
+    let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
+        let (offset, u) = (live.offset[k].um(), live.uncertainty[k].um());
+        let set_point = (live.nominal[k] + live.offset[k]).mm();
+        format!(
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u:.3} µm",
+            live.nominal[k].mm()
+        )
+    });
+    rows.collect::<Vec<_>>().join("\n")
+}
+
+fn live_value(live: &Live) -> Value {
+    let axes = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
+        json!({"axis": name, "target_mm": live.nominal[k].mm(), "correction_um": live.offset[k].um(),
+               "u_um": live.uncertainty[k].um()})
+    });
+    axes.collect()
+}
+
+pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
+    let path = std::fs::read_to_string(&args.path).map_err(|source| Failure::File {
+        path: args.path.clone(),
+        source,
+    })?;
+    let follow = |machine: &mut Machine, store: &Store| {
+        let stored = machine.stored_mover(store)?;
+        let is_corrected = stored.is_some();
+        let mut mover = match stored {
+            Some(mover) => mover,
+            None => machine.volumetric_mover(Box::new(truestage::engine::NoCorrection))?,
+        };
+        let engine = mover.engine();
+        let points = read_path(&path, engine.axes(), engine.period());
+        let points = points.map_err(|source: CsvError| Failure::Usage {
+            what: format!("{}: {source}", args.path.display()),
+            help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
+        })?;
+        machine.correct_volume(&mut mover, is_corrected)?;
+        let mut largest = [Metres(0.0); 3];
+        let count = points.len();
+        machine.drive_along(&mut mover, points, &mut |live| {
+            for (largest, offset) in largest.iter_mut().zip(live.offset) {
+                *largest = largest.max(offset.abs());
+            }
+        })?;
+        Ok((
+            is_corrected,
+            count,
+            largest,
+            mover.engine().timing().to_string(),
+        ))
+    };
+    let ((is_corrected, count, largest, timing), counters) =
+        with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
+    let largest = largest.map(|it| it.um());
+    let text = format!(
+        "{count} points followed, {}\n{timing}",
+        if is_corrected {
+            format!("largest corrections {largest:.3?} µm")
+        } else {
+            "uncorrected: the errors were never measured".into()
+        }
+    );
+    let value = json!({"points": count, "corrected": is_corrected,
+                       "largest_correction_um": largest, "counters": counters});
+    output.result(&text, &value)
+}
+
+pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
+    let which = MemoryName::from(args.memory);
+    let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
+    let (kept, counters) =
+        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
+    let axes = Axis::ALL
+        .into_iter()
+        .filter(|it| kept.map.of[it.index()].is_some());
+    let axes: Vec<String> = axes.map(|it| it.to_string()).collect();
+    let text = format!(
+        "{} keeps the present state of {} from now on",
+        short(&kept.id),
+        axes.join(", ")
+    );
+    output.result(
+        &text,
+        &json!({"memory": kept.id, "axes": axes, "counters": counters}),
+    )
+}
+
+pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
+    let which = MemoryName::from(args.memory);
+    let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
+    let before = session.machine.clear_memory(&session.store, which)?;
+    let text = match &before {
+        Some(id) => format!("{} is kept no more", short(id)),
+        None => "nothing was kept".into(),
+    };
+    output.result(&text, &json!({"cleared": before}))
+}

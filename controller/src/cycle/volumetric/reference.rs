@@ -1,0 +1,462 @@
+//! References: what the detectors read along each axis when the machine is as its tables say.
+//!
+//! Each axis that is watched stops along the work volume, and its detectors' samples are averaged
+//! there. While that lasts the beam itself wanders: what the detector at its end saw at each stop
+//! brings the slide's reading to the same place of the beam. A detector in trouble ends it; half a
+//! set of references is none.
+
+use core::time::Duration;
+
+use compensator::volumetric::Axis;
+use compensator::volumetric::function::{Function, Shape};
+use compensator::volumetric::online::{BeamDetector, Displacement, Trouble};
+use units::{Celsius, Metres, Quantity, Radians, Time};
+
+use super::inputs::{RollReader, place_of_temperature, place_of_voltage, sample};
+use super::{GEOMETRY, REFERENCES, VolumetricFailure};
+use crate::assemble::{beam_detector, beam_drift, volume_axis};
+use crate::config::{BeamConfig, BeamDetectorConfig, MachineConfig, RollConfig, VolumetricConfig};
+use crate::cycle::utc_now;
+use crate::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::observer::Stage;
+use crate::store::{
+    BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord, RecordHead,
+    Store,
+};
+
+/// How long an axis stands before its detectors count.
+const REST: Duration = Duration::from_millis(50);
+/// How long one sample may take to come.
+const SAMPLE_LIMIT: Duration = Duration::from_millis(500);
+/// Which detector.
+const ON_THE_SLIDE: &str = "on the slide";
+const AT_THE_END: &str = "at the end of the beam";
+const OF_THE_ROLL: &str = "of the roll";
+/// Letters of the axes in files.
+const LETTERS: [char; 3] = ['x', 'y', 'z'];
+
+/// What the detectors read, and how warm the machine was meanwhile.
+#[derive(Clone, Debug)]
+pub struct References {
+    /// To be stored; still without the name of the errors it belongs to.
+    pub content: BeamReferencesContent,
+    /// Means of the thermometers, in the order of the configuration.
+    pub temperatures: Vec<Celsius>,
+}
+
+/// References that were taken, stored and activated.
+#[derive(Clone, Debug)]
+pub struct VolumetricReferenced {
+    /// The name of the record.
+    pub id: String,
+    /// What was read.
+    pub references: References,
+}
+
+/// All channels at one moment of rest.
+#[derive(Clone, Debug)]
+pub(super) struct Still {
+    now: Time,
+    channels: [Option<Channel>; CHANNELS_MAX],
+    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+}
+
+impl Still {
+    fn observed(&self) -> Observed<'_> {
+        Observed {
+            now: self.now,
+            nominal: &[],
+            actual: &[],
+            channels: &self.channels,
+            temperatures: &self.temperatures,
+        }
+    }
+}
+
+/// Mean and standard uncertainty of the mean.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mean {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.count += 1.0;
+        let before = self.sum;
+        self.sum += value;
+        if self.count > 1.0 {
+            // Welford's update: what the value is off the mean before and after it.
+            let old = before / (self.count - 1.0);
+            self.squares += (value - old) * (value - self.mean());
+        }
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    fn u(&self) -> f64 {
+        if self.count < 2.0 {
+            return 0.0;
+        }
+        (self.squares / (self.count - 1.0) / self.count).sqrt()
+    }
+}
+
+/// What one axis was read at its stops.
+#[derive(Clone, Debug, Default)]
+struct Stops {
+    nodes: Vec<Metres>,
+    /// Of each stop: the slide's detector in both directions, that at the beam's end, the roll.
+    slider: Vec<[Mean; 2]>,
+    end: Vec<[Mean; 2]>,
+    roll: Vec<Mean>,
+}
+
+impl Machine {
+    /// Takes the references of all detectors against the errors in use, stores and activates
+    /// them: from now on a displacement is what has changed since now. The machine must be as
+    /// warm as it was when its errors were measured.
+    ///
+    /// # Errors
+    /// When an axis is not zeroed, the errors were never measured, a detector is in trouble, or
+    /// anything stops the machine. What was in use before stays in use then.
+    pub fn reference_volumetric(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
+        let geometry = store.active(GEOMETRY)?.current;
+        let geometry = geometry.ok_or(VolumetricFailure::NoGeometry)?;
+        store.load(&geometry)?.geometry(&geometry)?;
+        let references = self.take_references()?;
+        self.keep_references(store, &geometry, references)
+    }
+
+    /// Stores `references` as those of the errors called `geometry`, and activates them.
+    pub(super) fn keep_references(
+        &self,
+        store: &Store,
+        geometry: &str,
+        mut references: References,
+    ) -> Result<VolumetricReferenced, Failure> {
+        references.content.geometry = geometry.to_owned();
+        let head = RecordHead {
+            created: utc_now(),
+            source: "reference".into(),
+            ..self.this_volume(REFERENCES)?
+        };
+        let content = Content::BeamReferences(references.content.clone());
+        let id = store.save(&CalibrationRecord { head, content })?;
+        store.activate(REFERENCES, &id)?;
+        Ok(VolumetricReferenced { id, references })
+    }
+
+    /// Drives each watched axis along the work volume and takes down what its detectors read.
+    pub(super) fn take_references(&mut self) -> Result<References, Failure> {
+        let config = self.volumetric_config()?.clone();
+        for axis in &config.axes {
+            self.require_zeroed(axis)?;
+            self.enable(axis)?;
+        }
+        let mut temperatures = vec![Mean::default(); config.temperature.len()];
+        let mut content = BeamReferencesContent::default();
+        for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
+            let roll = config.roll.as_ref();
+            let roll = roll.filter(|it| volume_axis(it.axis) == axis);
+            if beam.is_none() && roll.is_none() {
+                continue;
+            }
+            let stops = self.read_along(&config, axis, beam, roll, &mut temperatures)?;
+            if let Some(beam) = beam {
+                content.beams.push(stops.beam(axis, beam)?);
+            }
+            if roll.is_some() {
+                content.roll = Some(stops.roll()?);
+            }
+        }
+        if temperatures.iter().any(|it| it.count == 0.0) {
+            let seen = self.watch_at_rest(1)?;
+            add_temperatures(self.config(), &config, &seen, &mut temperatures)?;
+        }
+        let temperatures = temperatures.iter().map(|it| Celsius(it.mean())).collect();
+        Ok(References {
+            content,
+            temperatures,
+        })
+    }
+
+    fn read_along(
+        &mut self,
+        config: &VolumetricConfig,
+        axis: Axis,
+        beam: Option<&BeamConfig>,
+        roll: Option<&RollConfig>,
+        temperatures: &mut [Mean],
+    ) -> Result<Stops, Failure> {
+        let section = "reference";
+        let own = config.reference;
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let name = config.axes[axis.index()].clone();
+        let mut stops = Stops::default();
+        let nodes = stops_along(config, axis, own.step_mm);
+        let total = nodes.len() as u64;
+        for (done, node) in (0..).zip(nodes) {
+            self.observer.progress(Stage::Reference, &name, done, total);
+            self.move_to(&name, node)?;
+            self.stand_still(&name, REST)?;
+            let seen = self.watch_at_rest(own.samples)?;
+            let machine = self.config();
+            let blind = |what, source| VolumetricFailure::Blind {
+                axis,
+                at: node,
+                what,
+                source,
+            };
+            stops.nodes.push(node);
+            if let Some(beam) = beam {
+                let place = |it: &BeamDetectorConfig, what| {
+                    place_of_beam(machine, axis, it, &seen, |source| blind(what, source))
+                };
+                stops.slider.push(place(&beam.slider, ON_THE_SLIDE)?);
+                if let Some(end) = &beam.end {
+                    stops.end.push(place(end, AT_THE_END)?);
+                }
+            }
+            if let Some(roll) = roll {
+                let mean = mean_roll(machine, roll, &seen, |it| blind(OF_THE_ROLL, it))?;
+                stops.roll.push(mean);
+            }
+            add_temperatures(machine, config, &seen, temperatures)?;
+        }
+        self.observer
+            .progress(Stage::Reference, &name, total, total);
+        Ok(stops)
+    }
+
+    /// Where the detectors of a beam saw it at `seen`, with the axis at `at`: that on the slide,
+    /// and that at the beam's end.
+    pub(super) fn places_of_beam(
+        &self,
+        axis: Axis,
+        at: Metres,
+        beam: &BeamConfig,
+        seen: &[Still],
+    ) -> Result<(Displacement, Option<Displacement>), VolumetricFailure> {
+        let place = |it: &BeamDetectorConfig, what| {
+            let blind = |source| VolumetricFailure::Blind {
+                axis,
+                at,
+                what,
+                source,
+            };
+            let means = place_of_beam(self.config(), axis, it, seen, blind)?;
+            Ok::<_, VolumetricFailure>(means.map(|it| Metres(it.mean())))
+        };
+        let slider = place(&beam.slider, ON_THE_SLIDE)?;
+        let end = beam.end.as_ref().map(|it| place(it, AT_THE_END));
+        Ok((slider, end.transpose()?))
+    }
+
+    /// Likewise the roll.
+    pub(super) fn roll_of(
+        &self,
+        axis: Axis,
+        at: Metres,
+        config: &RollConfig,
+        seen: &[Still],
+    ) -> Result<Radians, VolumetricFailure> {
+        let what = OF_THE_ROLL;
+        let blind = |source| VolumetricFailure::Blind {
+            axis,
+            at,
+            what,
+            source,
+        };
+        let mean = mean_roll(self.config(), config, seen, blind)?;
+        Ok(Radians(mean.mean()))
+    }
+
+    /// Means of what the thermometers showed at `seen`.
+    pub(super) fn temperatures_of(
+        &self,
+        config: &VolumetricConfig,
+        seen: &[Still],
+    ) -> Result<Vec<Celsius>, VolumetricFailure> {
+        let mut means = vec![Mean::default(); config.temperature.len()];
+        add_temperatures(self.config(), config, seen, &mut means)?;
+        Ok(means.iter().map(|it| Celsius(it.mean())).collect())
+    }
+
+    /// So many samples of all modules, each newer than the one before, while nothing moves.
+    pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
+        let expected = samples as usize;
+        let started = self.now();
+        let limit = SAMPLE_LIMIT * self.patience;
+        let mut seen: Vec<Still> = Vec::with_capacity(expected);
+        let (mut last, mut deadline) = (started, started + limit);
+        while seen.len() < expected {
+            let now = self.now();
+            if now >= deadline {
+                let (seen, waited) = (seen.len(), now.since(started));
+                return Err(VolumetricFailure::NoSamples {
+                    seen,
+                    expected,
+                    waited,
+                }
+                .into());
+            }
+            self.tick(deadline)?;
+            let oldest = self.analogs.iter();
+            let oldest = oldest.map(|it| it.device.reading().map_or(Time::ZERO, |it| it.at));
+            let oldest = oldest.min().unwrap_or(Time::ZERO);
+            if oldest <= last {
+                continue;
+            }
+            (last, deadline) = (self.now(), self.now() + limit);
+            let mut still = Still {
+                now: last,
+                channels: [None; CHANNELS_MAX],
+                temperatures: [None; THERMOMETERS_MAX],
+            };
+            self.hear_channels(&mut still.channels);
+            self.hear_temperatures(&mut still.temperatures);
+            seen.push(still);
+        }
+        Ok(seen)
+    }
+}
+
+/// From one end of the work volume to the other.
+fn stops_along(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> Vec<Metres> {
+    let (low, high) = (config.low_mm[axis.index()], config.high_mm[axis.index()]);
+    let steps = ((high - low) / step_mm).ceil().max(1.0) as u32;
+    let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(steps);
+    (0..=steps).map(|it| Metres::from_mm(at(it))).collect()
+}
+
+/// Where a detector saw the beam, over all samples.
+fn place_of_beam(
+    machine: &MachineConfig,
+    axis: Axis,
+    config: &BeamDetectorConfig,
+    seen: &[Still],
+    blind: impl Fn(Trouble) -> VolumetricFailure,
+) -> Result<[Mean; 2], VolumetricFailure> {
+    let places = config
+        .channels
+        .map(|channel| place_of_voltage(machine, &config.analog, channel));
+    let detector = beam_detector(config);
+    let mut detector: BeamDetector =
+        detector.map_err(|source| VolumetricFailure::Detector { axis, source })?;
+    let mut means = [Mean::default(); 2];
+    for still in seen {
+        let sample = sample(&still.channels, &places);
+        let place = detector.read(still.now, sample.as_ref()).map_err(&blind)?;
+        for (mean, place) in means.iter_mut().zip(place) {
+            mean.add(place.value());
+        }
+    }
+    Ok(means)
+}
+
+fn mean_roll(
+    machine: &MachineConfig,
+    config: &RollConfig,
+    seen: &[Still],
+    blind: impl Fn(Trouble) -> VolumetricFailure,
+) -> Result<Mean, VolumetricFailure> {
+    let mut reader = RollReader::new(machine, config)?;
+    let mut mean = Mean::default();
+    for still in seen {
+        let roll = reader.read(&still.observed()).map_err(&blind)?;
+        mean.add(roll.value());
+    }
+    Ok(mean)
+}
+
+fn add_temperatures(
+    machine: &MachineConfig,
+    config: &VolumetricConfig,
+    seen: &[Still],
+    means: &mut [Mean],
+) -> Result<(), VolumetricFailure> {
+    let thermometers = config.temperature.iter().zip(means).enumerate();
+    for (index, (thermometer, mean)) in thermometers {
+        let place = place_of_temperature(machine, &thermometer.analog, thermometer.channel);
+        for still in seen {
+            let sample = still.temperatures.get(place).copied().flatten();
+            let celsius = sample.and_then(|it| it.celsius);
+            let celsius = celsius.ok_or(VolumetricFailure::NoTemperature { index: index + 1 })?;
+            mean.add(celsius.value());
+        }
+    }
+    Ok(())
+}
+
+impl Stops {
+    /// The references of a beam, all brought to where it was on average.
+    fn beam(&self, axis: Axis, config: &BeamConfig) -> Result<BeamRecord, VolumetricFailure> {
+        let section = "beam";
+        let drift = beam_drift(config).ok_or(VolumetricFailure::NotConfigured { section })?;
+        let count = self.end.len().max(1) as f64;
+        let end = [0, 1].map(|k| self.end.iter().map(|it| it[k].mean()).sum::<f64>() / count);
+        let function = |k: usize| {
+            let values = self.slider.iter().zip(&self.nodes).enumerate();
+            let values = values.map(|(at, (seen, node))| {
+                let wandered = self.end.get(at).map_or(0.0, |it| it[k].mean() - end[k]);
+                Metres(seen[k].mean() + wandered * drift.fraction(*node))
+            });
+            let u = self.slider.iter().map(|it| Metres(it[k].u()));
+            let name = ["first", "second"][k];
+            record(name, &self.nodes, values.collect(), u.collect())
+        };
+        Ok(BeamRecord {
+            axis: LETTERS[axis.index()],
+            slider: [function(0)?, function(1)?],
+            end_m: config.end.as_ref().map(|_| end),
+        })
+    }
+
+    fn roll(&self) -> Result<FunctionRecord, VolumetricFailure> {
+        let values = self.roll.iter().map(|it| Radians(it.mean())).collect();
+        let u = self.roll.iter().map(|it| Radians(it.u())).collect();
+        record("roll", &self.nodes, values, u)
+    }
+}
+
+fn record<Q: Quantity>(
+    name: &str,
+    nodes: &[Metres],
+    values: Vec<Q>,
+    u: Vec<Q>,
+) -> Result<FunctionRecord, VolumetricFailure> {
+    let function = Function::new(nodes, &values, Shape::Spline)?;
+    Ok(FunctionRecord::of(name, &function.with_uncertainties(&u)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_knows_how_sure_it_is() {
+        let mut mean = Mean::default();
+        for value in [1.0, 2.0, 3.0, 4.0] {
+            mean.add(value);
+        }
+        assert!((mean.mean() - 2.5).abs() < 1e-15);
+        // s² = 5/3, of the mean a quarter.
+        assert!((mean.u() - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn stops_are_at_both_ends_and_no_farther_apart_than_said() {
+        let text = include_str!("../../../../configs/machines/volumetric.toml");
+        let config = crate::config::parse(text, "m").unwrap().config;
+        let config = config.volumetric.unwrap();
+        let stops = stops_along(&config, Axis::Z, 70.0);
+        let mm: Vec<f64> = stops.iter().map(|it| it.mm()).collect();
+        assert_eq!(mm, [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
+    }
+}

@@ -1,0 +1,127 @@
+//! The example of the library, as somebody who reads it runs it.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use tests::Rig;
+
+use crate::programs::{Bench, live_rigs};
+
+/// The example lives in real time: SYNC periods as shipped, and what a busier computer may bear.
+const TRIES_MS: [&str; 5] = ["5.0", "5.0", "20.0", "20.0", "50.0"];
+
+/// What was measured on some other stage: 20 um off at one end, 2 um apart between directions.
+fn measured() -> String {
+    let mut rows = "run,approach,target_mm,measured_mm\n".to_owned();
+    for run in 1..=2 {
+        for (approach, lag_um) in [("+", -1.0), ("-", 1.0)] {
+            for at in 0..=20 {
+                let at = if approach == "+" { at } else { 20 - at };
+                let target_mm = 3.0 * f64::from(at);
+                let off_um = target_mm / 3.0 + lag_um + 0.01 * f64::from(run);
+                let measured_mm = target_mm + off_um * 1e-3;
+                let row = writeln!(rows, "{run},{approach},{target_mm:.3},{measured_mm:.6}");
+                row.expect("a text takes everything");
+            }
+        }
+    }
+    rows
+}
+
+/// From 10 mm to 40 mm and back in four seconds.
+fn path() -> String {
+    let mut rows = "time_s,x_mm\n".to_owned();
+    for at in 0..=40 {
+        let time_s = 0.1 * f64::from(at);
+        let x_mm = 25.0 - 15.0 * (core::f64::consts::FRAC_PI_2 * time_s).cos();
+        writeln!(rows, "{time_s:.1},{x_mm:.6}").expect("a text takes everything");
+    }
+    rows
+}
+
+/// With its axis cyclic, and its bus where this machine has it.
+fn streaming(bench: &Bench, text: &str, period_ms: &str) -> String {
+    let cyclic = "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
+                  deviation_limit_um = 1000.0\ncorrection_limit_um = 50.0\n\
+                  correction_rate_um_per_s = 5000.0\n[axis.x.identity]";
+    let port = bench.port("can0");
+    let place = match port.split_once(':') {
+        Some(("socketcan", interface)) => format!("interface = {interface:?}"),
+        Some((_, path)) => format!("path = {path:?}"),
+        None => panic!("{port} is no CAN bus"),
+    };
+    let text = text
+        .replace(
+            "sync_period_ms = 5.0",
+            &format!("sync_period_ms = {period_ms}"),
+        )
+        .replace("[axis.x.identity]", cyclic)
+        .replace("path = \"/dev/ttyACM1\"", &place);
+    match bench.rig() {
+        Rig::Vcan => text.replace("transport = \"slcan\"", "transport = \"socketcan\""),
+        Rig::Pty | Rig::InProcess => text,
+    }
+}
+
+/// The lines that say where the axis is: position, correction and its uncertainty.
+fn lives(printed: &str) -> Vec<[f64; 3]> {
+    let number = |text: &str| text.trim().parse::<f64>().expect("a number");
+    let lines = printed.lines().filter_map(|line| {
+        let (at, rest) = line.strip_prefix("x ")?.split_once(" mm, ")?;
+        let (offset, rest) = rest.split_once(" ± ")?;
+        let uncertainty = rest.strip_suffix(" um")?;
+        Some([number(at), number(offset), number(uncertainty)])
+    });
+    lines.collect()
+}
+
+#[test]
+fn the_example_streams_a_path_and_shows_the_correction_and_its_uncertainty() {
+    for rig in live_rigs() {
+        let bench = Bench::in_real_time(rig);
+        let configure = |period_ms| {
+            let machine = |text: String| streaming(&bench, &text, period_ms);
+            bench.configure("machine.toml", machine);
+        };
+        configure("5.0");
+        let file = |name: &str, text: String| {
+            fs::write(bench.folder().join(name), text).expect("a file can be written");
+        };
+        file("data.csv", measured());
+        file("path.csv", path());
+        let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
+        let saved = bench.run_plainly(&fit).with_code(0);
+        let id = saved["calibration"].as_str().expect("its name");
+        let activate = ["cal", "activate", "machine.toml", id];
+        bench.run_plainly(&activate).with_code(0);
+
+        let mut flagged = String::new();
+        let done = TRIES_MS.into_iter().find_map(|period_ms| {
+            configure(period_ms);
+            let words = ["machine.toml", "path.csv"];
+            let (well, printed, said) = bench.example("stream", &words);
+            // A computer that is too busy is told so.
+            assert!(well || !said.is_empty(), "it failed without a word");
+            flagged = format!("{printed}{said}");
+            println!(
+                "{rig:?}, {period_ms} ms: {}",
+                flagged.lines().last().unwrap_or("")
+            );
+            (well && printed.contains("the path is done")).then_some(printed)
+        });
+        let Some(printed) = done else {
+            println!("{rig:?}: this computer is too busy: {flagged}");
+            continue;
+        };
+        let lives = lives(&printed);
+        assert!(lives.len() > 20, "{printed}");
+        // Once it is slewed in: the negated table, and a turn's lost motion.
+        for [at_mm, offset_um, uncertainty_um] in &lives[lives.len() / 2..] {
+            let expected_um = -at_mm / 3.0;
+            assert!((offset_um - expected_um).abs() < 1.6, "{printed}");
+            assert!((0.0..1.0).contains(uncertainty_um), "{printed}");
+        }
+        assert!(lives.iter().any(|[_, _, uncertainty]| *uncertainty > 0.0));
+        assert!(printed.contains("lateness"), "{printed}");
+    }
+}

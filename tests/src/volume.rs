@@ -1,0 +1,441 @@
+//! Three axes on the bench, judged by the plant's truth.
+
+use core::time::Duration;
+
+use compensator::volumetric::function::{Function, Shape};
+use compensator::volumetric::model::{AxisErrors, Squareness};
+use compensator::volumetric::online::StateMap;
+use compensator::volumetric::{Axis, Point};
+use mock_bus::plant::VolumetricTruth;
+use truestage::Failure;
+use truestage::cycle::volumetric::{
+    GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
+};
+use truestage::engine::{Live, Observed};
+use truestage::store::{
+    BendRecord, CalibrationRecord, Content, GeometryContent, MemoryName, RecordHead,
+    StateMemoryContent,
+};
+use units::{Celsius, Metres, Radians};
+
+use crate::{Bench, VOLUMETRIC};
+
+/// How far the axes go.
+pub const TRAVEL_MM: [f64; 3] = [500.0, 400.0, 300.0];
+/// How far apart what a calibration finds is.
+const NODE_MM: f64 = 25.0;
+/// How long the tool stands before it is judged.
+pub const STAND: Duration = Duration::from_millis(300);
+
+/// An error of the tool: along x, y, z.
+pub type Off = [Metres; 3];
+
+/// The shipped three axes with a judge.
+pub struct Volume {
+    /// The machine and its emulation.
+    pub bench: Bench,
+}
+
+/// A point given in millimetres.
+pub fn point_mm(mm: [f64; 3]) -> Point {
+    let [x, y, z] = mm.map(Metres::from_mm);
+    Point::new(x, y, z)
+}
+
+fn each(point: Point) -> Off {
+    Axis::ALL.map(|axis| point.along(axis))
+}
+
+/// `count` places all over the volume, from number `first` of an endless row.
+pub fn spread(first: u32, count: u32) -> Vec<[f64; 3]> {
+    let part = |at: u32, ratio: f64| (f64::from(at) * ratio).fract();
+    let each = (first + 1..=first + count).map(|at| {
+        [
+            TRAVEL_MM[0] * part(at, 0.819_172_513),
+            TRAVEL_MM[1] * part(at, 0.671_043_607),
+            TRAVEL_MM[2] * part(at, 0.549_700_478),
+        ]
+    });
+    each.collect()
+}
+
+/// Where a machine's own frame lies in that of its truth: a shift and small turns. No calibration
+/// can know it; whoever mounts a workpiece sets it up in the machine's frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Frame {
+    shift: [f64; 3],
+    turn: [f64; 3],
+}
+
+impl Frame {
+    /// The frame that explains most of `errors` at `places`, by least squares.
+    ///
+    /// # Panics
+    /// When the places do not span a volume.
+    pub fn of(places: &[[f64; 3]], errors: &[Off]) -> Self {
+        // Normal equations of error = shift + turn × place.
+        let (mut normal, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
+        for (mm, error) in places.iter().zip(errors) {
+            for (row, value) in rows(*mm).iter().zip(error) {
+                for i in 0..6 {
+                    right[i] += row[i] * value.value();
+                    for k in 0..6 {
+                        normal[i][k] += row[i] * row[k];
+                    }
+                }
+            }
+        }
+        let [a, b, c, d, e, f] = solved(normal, right);
+        Self {
+            shift: [a, b, c],
+            turn: [d, e, f],
+        }
+    }
+
+    /// The error at a place as seen in this frame.
+    pub fn seen(&self, mm: [f64; 3], error: Off) -> Off {
+        let own = [self.shift, self.turn].concat();
+        let rows = rows(mm);
+        core::array::from_fn(|k| {
+            let part: f64 = rows[k].iter().zip(&own).map(|(a, b)| a * b).sum();
+            error[k] - Metres(part)
+        })
+    }
+
+    /// All of them.
+    pub fn all_seen(&self, places: &[[f64; 3]], errors: &[Off]) -> Vec<Off> {
+        let pairs = places.iter().zip(errors);
+        pairs.map(|(mm, error)| self.seen(*mm, *error)).collect()
+    }
+}
+
+/// Along x, y and z, by shift and turn.
+fn rows(mm: [f64; 3]) -> [[f64; 6]; 3] {
+    let [x, y, z] = mm.map(|it| it * 1e-3);
+    [
+        [1.0, 0.0, 0.0, 0.0, z, -y],
+        [0.0, 1.0, 0.0, -z, 0.0, x],
+        [0.0, 0.0, 1.0, y, -x, 0.0],
+    ]
+}
+
+/// By elimination with pivots.
+fn solved(mut matrix: [[f64; 6]; 6], mut right: [f64; 6]) -> [f64; 6] {
+    for i in 0..6 {
+        let size = |row: &usize| matrix[*row][i].abs();
+        let pivot = (i..6).max_by(|a, b| size(a).total_cmp(&size(b)));
+        let pivot = pivot.expect("there are rows left");
+        matrix.swap(i, pivot);
+        right.swap(i, pivot);
+        assert!(matrix[i][i].abs() > 1e-12, "the places span no volume");
+        for row in i + 1..6 {
+            let factor = matrix[row][i] / matrix[i][i];
+            let own = matrix[i];
+            for (value, own) in matrix[row].iter_mut().zip(own) {
+                *value -= factor * own;
+            }
+            right[row] -= factor * right[i];
+        }
+    }
+    let mut solution = [0.0; 6];
+    for i in (0..6).rev() {
+        let known: f64 = (i + 1..6).map(|k| matrix[i][k] * solution[k]).sum();
+        solution[i] = (right[i] - known) / matrix[i][i];
+    }
+    solution
+}
+
+/// How large an error is.
+pub fn size([x, y, z]: Off) -> Metres {
+    Metres(x.value().hypot(y.value()).hypot(z.value()))
+}
+
+/// The size that 95 % of the errors do not exceed.
+///
+/// # Panics
+/// When there are none.
+pub fn percentile_95(errors: &[Off]) -> Metres {
+    let mut sizes: Vec<f64> = errors.iter().map(|it| size(*it).value()).collect();
+    sizes.sort_by(f64::total_cmp);
+    Metres(sizes[(sizes.len() * 95).div_ceil(100) - 1])
+}
+
+/// Whatever failed, in its own words.
+///
+/// # Panics
+/// When it failed.
+#[track_caller]
+pub fn good<R>(result: Result<R, Failure>) -> R {
+    result.unwrap_or_else(|failure| panic!("{failure}"))
+}
+
+impl Volume {
+    /// The shipped machine, zeroed.
+    ///
+    /// # Panics
+    /// When it does not come up.
+    pub fn zeroed(
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: impl Fn(String) -> String,
+    ) -> Self {
+        let mut bench = Bench::shaped(&VOLUMETRIC, seed, machine, emulated);
+        good(bench.machine.start());
+        good(bench.machine.zero_volumetric());
+        Self { bench }
+    }
+
+    /// Stores what `other` has stored: the same machine on another day.
+    ///
+    /// # Panics
+    /// When files cannot be copied.
+    pub fn inherit(&self, other: &Self) {
+        for folder in ["calibrations", "active"] {
+            let from = other.bench.store.root().join(folder);
+            let to = self.bench.store.root().join(folder);
+            std::fs::create_dir_all(&to).expect("there is room");
+            for file in std::fs::read_dir(from).expect("it is there") {
+                let file = file.expect("it is there");
+                let copied = std::fs::copy(file.path(), to.join(file.file_name()));
+                copied.expect("there is room");
+            }
+        }
+    }
+
+    /// A look behind all sensors.
+    ///
+    /// # Panics
+    /// Never: the machine has three axes.
+    pub fn truth<R>(&self, look: impl FnOnce(VolumetricTruth<'_>) -> R) -> R {
+        let simulation = self.bench.emulated.simulation();
+        look(simulation.truth().volumetric().expect("three axes"))
+    }
+
+    /// By how much the tool is off `target` now.
+    pub fn off(&self, target: Point) -> Off {
+        self.truth(|truth| {
+            let (is, should) = (truth.tool_point(), truth.nominal_for(each(target)));
+            core::array::from_fn(|k| is[k] - should[k])
+        })
+    }
+
+    /// By how much the tool would be off, were nothing corrected.
+    pub fn uncorrected(&self, places: &[[f64; 3]]) -> Vec<Off> {
+        let of =
+            |truth: VolumetricTruth<'_>, mm: &[f64; 3]| truth.deviation_for(each(point_mm(*mm)));
+        self.truth(|truth| places.iter().map(|mm| of(truth, mm)).collect())
+    }
+
+    /// What a perfect calibration would find now, stored as the errors in use.
+    ///
+    /// # Panics
+    /// When it cannot be stored.
+    pub fn know_errors(&self) -> String {
+        let (axes, squareness) = self.true_errors();
+        let machine = &self.bench.machine;
+        let config = good(machine.volumetric_config());
+        // The sensors' own offsets are nobody's business: nothing but their change counts.
+        let temperatures = self.truth(|truth| {
+            let each = (0..config.temperature.len()).map(|it| {
+                let side = if it % 2 == 0 { 0.5 } else { -0.5 };
+                let scale = truth.scale_temperature(it / 2);
+                Celsius(scale.value() + side * truth.gradient_k(it / 2))
+            });
+            each.collect::<Vec<_>>()
+        });
+        let mut content = GeometryContent::new(&axes, &squareness, &temperatures);
+        content.bends = self.true_bends();
+        let head = RecordHead {
+            axis: GEOMETRY.into(),
+            ..machine.this_machine("x")
+        };
+        let content = Content::VolumetricGeometry(content);
+        let record = CalibrationRecord { head, content };
+        let id = self.bench.store.save(&record).expect("there is room");
+        let activated = self.bench.store.activate(GEOMETRY, &id);
+        activated.expect("it was just stored");
+        id
+    }
+
+    /// How the guides bend per kelvin: what a cold and a warm calibration would find.
+    fn true_bends(&self) -> Vec<BendRecord> {
+        // Soon enough that nothing else has begun by then; the plant is exact.
+        let later = self.bench.machine.now() + Duration::from_secs(60);
+        let towards = [2, 2, 1];
+        self.truth(|truth| {
+            let each = (0..3).map(|axis| {
+                // The slope at the beginning of the arc is 4 h/L, about the third direction.
+                let about = 3 - axis - towards[axis];
+                let sense = if (axis + 1) % 3 == towards[axis] {
+                    1.0
+                } else {
+                    -1.0
+                };
+                let tilt = |truth: VolumetricTruth<'_>| {
+                    truth.error_motion(axis, Metres::ZERO).turn[about].value()
+                };
+                let warmer = truth.at(later);
+                let kelvin = warmer.gradient_k(axis) - truth.gradient_k(axis);
+                let travel = TRAVEL_MM[axis] * 1e-3;
+                let slope = sense * (tilt(warmer) - tilt(truth)) / kelvin;
+                let letters = ['x', 'y', 'z'];
+                BendRecord {
+                    axis: letters[axis],
+                    towards: letters[towards[axis]],
+                    over: 2 * axis,
+                    under: Some(2 * axis + 1),
+                    low_m: 0.0,
+                    high_m: travel,
+                    bow_m_per_k: slope * travel / 4.0,
+                    standard_uncertainty_m_per_k: 0.0,
+                }
+            });
+            each.collect()
+        })
+    }
+
+    /// The errors as the plant has them now.
+    ///
+    /// # Panics
+    /// Never: nodes of a plant are sound.
+    pub fn true_errors(&self) -> ([AxisErrors; 3], Squareness) {
+        self.truth(|truth| {
+            let axes = [0, 1, 2].map(|axis| {
+                let count = (TRAVEL_MM[axis] / NODE_MM) as u32;
+                let nodes: Vec<Metres> = (0..=count)
+                    .map(|at| Metres::from_mm(f64::from(at) * NODE_MM))
+                    .collect();
+                let motions: Vec<_> = nodes
+                    .iter()
+                    .map(|it| truth.error_motion(axis, *it))
+                    .collect();
+                let along = core::array::from_fn(|k| {
+                    let values: Vec<Metres> = motions.iter().map(|it| it.shift[k]).collect();
+                    Some(Function::new(&nodes, &values, Shape::Spline).expect("sound"))
+                });
+                let about = core::array::from_fn(|k| {
+                    let values: Vec<Radians> = motions.iter().map(|it| it.turn[k]).collect();
+                    Some(Function::new(&nodes, &values, Shape::Spline).expect("sound"))
+                });
+                AxisErrors { along, about }
+            });
+            let [y_to_x, z_to_x, z_to_y] = truth.squareness();
+            let squareness = Squareness {
+                y_to_x,
+                z_to_x,
+                z_to_y,
+                u: [Radians(0.0); 3],
+            };
+            (axes, squareness)
+        })
+    }
+
+    /// Stores by design that the x guide bows upwards by so much in its middle, as the first
+    /// memory.
+    ///
+    /// # Panics
+    /// When it cannot be stored.
+    pub fn remember_bow(&self, height: Metres) {
+        let travel = TRAVEL_MM[0];
+        let nodes: Vec<Metres> = (0..=20)
+            .map(|it| Metres::from_mm(f64::from(it) * 25.0))
+            .collect();
+        let bow = |node: &Metres| {
+            let share = node.mm() / travel;
+            height * (4.0 * share * (1.0 - share))
+        };
+        let up: Vec<Metres> = nodes.iter().map(bow).collect();
+        let none = vec![Metres(0.0); nodes.len()];
+        let function = |values: &[Metres]| Function::new(&nodes, values, Shape::Spline);
+        let functions = [function(&none), function(&up)].map(|it| it.expect("sound"));
+        let mut map = StateMap::default();
+        map.of[0] = Some(functions);
+        let store = &self.bench.store;
+        let references = store.active(REFERENCES).expect("it can be read");
+        let references = references.current.expect("they were taken");
+        let content = StateMemoryContent::new(MemoryName::First, &references, &map);
+        let pointer = memory_pointer(MemoryName::First);
+        let head = RecordHead {
+            axis: pointer.into(),
+            ..self.bench.machine.this_machine("x")
+        };
+        let content = Content::StateMemory(content);
+        let id = store.save(&CalibrationRecord { head, content });
+        let activated = store.activate(pointer, &id.expect("there is room"));
+        activated.expect("it was just stored");
+    }
+
+    /// The machine corrected by all that is stored, and that state.
+    ///
+    /// # Panics
+    /// When nothing is stored, or it cannot be applied.
+    pub fn corrected(&mut self) -> (Mover, VolumetricState) {
+        let stored = good(self.bench.machine.volumetric_state(&self.bench.store));
+        let (state, _) = stored.expect("it was stored");
+        let correction = VolumetricCorrection::new(&self.bench.loaded.config, state.clone());
+        let correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
+        let mover = self.bench.machine.volumetric_mover(Box::new(correction));
+        let mut mover = good(mover);
+        good(self.bench.machine.correct_volume(&mut mover, true));
+        (mover, state)
+    }
+
+    /// Brings the tool to each place, stands there and says by how much it is off; `along` gets
+    /// what is off on the way at some set-points, as if the drives were there already.
+    pub fn visit(
+        &mut self,
+        mover: &mut Mover,
+        places: &[[f64; 3]],
+        along: &mut Vec<([f64; 3], Off)>,
+    ) -> Vec<Off> {
+        let emulated = self.bench.emulated.clone();
+        let mut watch = |live: &Live| {
+            if !live.cycle.is_multiple_of(64) {
+                return;
+            }
+            let simulation = emulated.simulation();
+            let truth = simulation.truth().volumetric().expect("three axes");
+            let nominal: Off = core::array::from_fn(|k| live.nominal[k]);
+            let command = core::array::from_fn(|k| live.nominal[k] + live.offset[k]);
+            let (is, should) = (truth.tool_point_for(command), truth.nominal_for(nominal));
+            let off = core::array::from_fn(|k| is[k] - should[k]);
+            along.push((nominal.map(|it| it.mm()), off));
+        };
+        let mut errors = Vec::new();
+        for mm in places {
+            let target = point_mm(*mm);
+            let machine = &mut self.bench.machine;
+            good(machine.drive_watched(mover, target, STAND, &mut watch));
+            errors.push(self.off(target));
+        }
+        errors
+    }
+
+    /// By how much the tool would be off now at `places`, corrected by the tables of `state`
+    /// alone: no detectors, no thermometers.
+    ///
+    /// # Panics
+    /// When these tables cannot be applied.
+    pub fn by_tables(&self, places: &[[f64; 3]], state: &VolumetricState) -> Vec<Off> {
+        let machine = &self.bench.loaded.config;
+        let correction = VolumetricCorrection::by_tables(machine, state.clone());
+        let mut correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
+        self.truth(|truth| {
+            let one = |mm: &[f64; 3]| {
+                use truestage::engine::Correction;
+                let target = each(point_mm(*mm));
+                let corrected = correction.correct(&Observed {
+                    now: self.bench.machine.now(),
+                    nominal: &target,
+                    actual: &target,
+                    channels: &[],
+                    temperatures: &[],
+                });
+                let command = core::array::from_fn(|k| target[k] + corrected.offset[k]);
+                let (is, should) = (truth.tool_point_for(command), truth.nominal_for(target));
+                core::array::from_fn(|k| is[k] - should[k])
+            };
+            places.iter().map(one).collect()
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! What three axes are to keep although it deviates, and the roll of a slide.
+
+use core::time::Duration;
+
+use tests::volume::{Off, Volume, good, percentile_95, size, spread};
+use truestage::store::MemoryName;
+use units::{Metres, Time};
+
+/// The tool of the shipped machine, and of its emulation.
+const TOOL: &str = "tool_offset_mm = [0.0, 0.0, -100.0]";
+
+/// When what is deliberate begins.
+const BEGINS_S: f64 = 360.0;
+
+/// Heartbeats so rare that hours without SYNC cost little.
+fn calm(text: String) -> String {
+    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
+        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .replace(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
+        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+}
+
+/// With its errors known and the detectors' references taken.
+fn known(seed: u64, machine: impl Fn(String) -> String, deliberate: &str, own: &str) -> Volume {
+    let emulated = |text: String| {
+        assert!(text.contains(deliberate) && text.contains("deliberate_from_h = 0.0"));
+        text.replace(deliberate, own)
+            .replace("deliberate_from_h = 0.0", "deliberate_from_h = 0.1")
+            .replace(TOOL, &machine(TOOL.to_owned()))
+    };
+    let mut volume = Volume::zeroed(seed, |text| calm(machine(text)), emulated);
+    volume.know_errors();
+    let store = volume.bench.store.clone();
+    good(volume.bench.machine.reference_volumetric(&store));
+    volume
+}
+
+fn idle_until(volume: &mut Volume, seconds: f64) {
+    let machine = &mut volume.bench.machine;
+    let pause = Time::from_seconds(seconds).since(machine.now());
+    if pause > Duration::from_secs(1) {
+        good(machine.idle(pause));
+    }
+}
+
+/// What the deliberate part does to the tool at these places.
+fn deliberate(volume: &Volume, places: &[[f64; 3]]) -> Vec<Off> {
+    volume.truth(|truth| {
+        let before = truth.at(Time::from_seconds(BEGINS_S - 1e-3));
+        let after = truth.at(Time::from_seconds(BEGINS_S + 1e-3));
+        let one = |mm: &[f64; 3]| {
+            let scales = mm.map(Metres::from_mm);
+            let (before, after) = (before.deviation_for(scales), after.deviation_for(scales));
+            core::array::from_fn(|k| after[k] - before[k])
+        };
+        places.iter().map(one).collect()
+    })
+}
+
+fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
+    let pairs = errors.iter().zip(expected);
+    pairs
+        .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
+        .collect()
+}
+
+fn largest(errors: &[Off]) -> Metres {
+    errors
+        .iter()
+        .map(|it| size(*it))
+        .fold(Metres(0.0), |a, b| a.max(b))
+}
+
+/// The x guide bows by 15 um, and its slide pitches along: the first memory lets the tool follow.
+#[test]
+fn a_bow_that_a_machine_was_built_with_is_kept() {
+    let same = |text: String| text;
+    let bow = "deliberate_bow_um = 15.0";
+    let mut volume = known(1, same, "deliberate_bow_um = 0.0", bow);
+    assert!(volume.bench.machine.now() < Time::from_seconds(BEGINS_S));
+    idle_until(&mut volume, BEGINS_S + 5.0);
+    let places: Vec<[f64; 3]> = (0..=10)
+        .map(|n| [f64::from(n) * 50.0, 200.0, 150.0])
+        .collect();
+    let expected = deliberate(&volume, &places);
+    assert!(expected.iter().any(|it| it[2] > Metres::from_um(14.9)));
+    let (mut mover, _) = volume.corrected();
+    let without = volume.visit(&mut mover, &places, &mut Vec::new());
+    volume.remember_bow(Metres::from_um(15.0));
+    let (mut mover, _) = volume.corrected();
+    let with = volume.visit(&mut mover, &places, &mut Vec::new());
+    let (without, with) = (beyond(&without, &expected), beyond(&with, &expected));
+    eprintln!(
+        "{:.2} um without, {:.2} um with",
+        largest(&without).um(),
+        largest(&with).um()
+    );
+    assert!(largest(&without) > Metres::from_um(10.0));
+    assert!(
+        largest(&with) <= Metres::from_um(1.0),
+        "{} um",
+        largest(&with).um()
+    );
+}
+
+#[test]
+fn fifty_parts_are_alike_while_the_machine_drifts() {
+    let same = |text: String| text;
+    let none = "deliberate_bow_um = 0.0";
+    let mut volume = known(1, same, none, none);
+    idle_until(&mut volume, 3600.0);
+    let store = volume.bench.store.clone();
+    good(
+        volume
+            .bench
+            .machine
+            .record_memory(&store, MemoryName::Second),
+    );
+    let (mut mover, _) = volume.corrected();
+    let places = spread(40, 2);
+    let everywhere = spread(0, 100);
+    let morning = volume.uncorrected(&everywhere);
+    let first = volume.visit(&mut mover, &places, &mut Vec::new());
+    let mut worst = Metres(0.0);
+    for part in 2..=50 {
+        idle_until(&mut volume, 3600.0 + f64::from(part) * 500.0);
+        good(volume.bench.machine.correct_volume(&mut mover, true));
+        let errors = volume.visit(&mut mover, &places, &mut Vec::new());
+        worst = worst.max(largest(&beyond(&errors, &first)));
+    }
+    let drifted = percentile_95(&beyond(&volume.uncorrected(&everywhere), &morning));
+    eprintln!(
+        "{:.2} um from the first part, drifted by {:.2} um",
+        worst.um(),
+        drifted.um()
+    );
+    assert!(drifted > Metres::from_um(5.0), "{} um", drifted.um());
+    assert!(worst <= Metres::from_um(1.0), "{} um", worst.um());
+}
+
+/// 5 arcsec on a tool of 200 mm: 4.8 um.
+#[test]
+fn a_roll_is_corrected_at_a_long_tool() {
+    let long = |text: String| text.replace(TOOL, "tool_offset_mm = [0.0, 0.0, -200.0]");
+    let roll = "deliberate_roll_arcsec = 5.0";
+    let mut volume = known(1, long, "deliberate_roll_arcsec = 0.0", roll);
+    let places: Vec<[f64; 3]> = (1..=5).map(|n| [f64::from(n) * 90.0, 0.0, 0.0]).collect();
+    let expected = deliberate(&volume, &places);
+    assert!(
+        expected
+            .iter()
+            .all(|it| (size(*it).um() - 4.85).abs() < 0.05),
+        "{expected:?}"
+    );
+    let (mut mover, _) = volume.corrected();
+    let before = volume.visit(&mut mover, &places, &mut Vec::new());
+    assert!(volume.bench.machine.now() < Time::from_seconds(BEGINS_S));
+    idle_until(&mut volume, BEGINS_S + 5.0);
+    good(volume.bench.machine.correct_volume(&mut mover, true));
+    let after = volume.visit(&mut mover, &places, &mut Vec::new());
+    let left = beyond(&after, &before);
+    eprintln!(
+        "{:.3} um left of {:.3} um",
+        largest(&left).um(),
+        largest(&expected).um()
+    );
+    assert!(
+        largest(&left) <= largest(&expected) * 0.1,
+        "{} um",
+        largest(&left).um()
+    );
+}
