@@ -4,7 +4,7 @@
 //! derivatives are continuous (C. de Boor, A Practical Guide to Splines (1978), chapters X and
 //! XVII; ends without knots next to them). Grids may have uneven distances along each axis. The
 //! splines are kept as coefficients of B-splines, so that a call reads 64 of them for each
-//! component, one after the other in memory along z, wherever it is.
+//! component, wherever it is: sixteen rows along z, all components together.
 //!
 //! Bounds are proven: a trilinear map is steepest along an edge of a cell; the derivative of a
 //! spline is itself a spline of coefficients 3(c₁ − c₀)/(t₃ − t₀), whose largest magnitude it

@@ -121,9 +121,11 @@ fn span(knots: &[f64], at: usize) -> Span {
 #[derive(Clone, Debug)]
 pub(super) struct Splines {
     lines: [Line; 3],
+    /// How many numbers apart neighbours along x and along y are.
     stride: [usize; 2],
-    /// Coefficients of the three components, z changing fastest.
-    coefficients: [Vec<f64>; 3],
+    /// Coefficients, z changing fastest, each of the three components one after the other: four
+    /// along z are twelve numbers in a row.
+    coefficients: Vec<f64>,
 }
 
 impl Splines {
@@ -160,8 +162,10 @@ impl Splines {
         }
         let map = Self {
             lines: lines.try_into().expect("one for each axis"),
-            stride: [lengths[1] * lengths[2], lengths[2]],
-            coefficients: components,
+            stride: [3 * lengths[1] * lengths[2], 3 * lengths[2]],
+            coefficients: (0..components[0].len())
+                .flat_map(|at| components.each_ref().map(|it| it[at]))
+                .collect(),
         };
         (map, slopes)
     }
@@ -172,29 +176,34 @@ impl Splines {
         let (j, of_y) = self.lines[1].weights(position[1]);
         let (k, of_z) = self.lines[2].weights(position[2]);
         let [along_x, along_y] = self.stride;
-        let corner = i * along_x + j * along_y + k;
-        // Row by row along z, all three components: six registers of sums that do not wait for
-        // each other.
-        let mut sums = [[0.0; 4]; 3];
+        let corner = i * along_x + j * along_y + 3 * k;
+        // Row by row along z: six registers of sums that do not wait for each other.
+        let mut sums = [0.0; ROW];
         for (a, weight_x) in of_x.into_iter().enumerate() {
             let begin = corner + a * along_x;
-            let end = begin + 3 * along_y + 4;
-            let [p, q, r] = &self.coefficients;
-            let planes = [&p[begin..end], &q[begin..end], &r[begin..end]];
+            let plane = &self.coefficients[begin..begin + 3 * along_y + ROW];
             for (b, weight_y) in of_y.into_iter().enumerate() {
+                let row = &plane[b * along_y..b * along_y + ROW];
+                let row: &[f64; ROW] = row.try_into().expect("it was just made that long");
                 let weight = weight_x * weight_y;
-                for (sum, plane) in sums.iter_mut().zip(planes) {
-                    let row = &plane[b * along_y..b * along_y + 4];
-                    for z in 0..4 {
-                        sum[z] += weight * row[z];
-                    }
-                }
+                sums = core::array::from_fn(|n| sums[n] + weight * row[n]);
             }
         }
-        sums.map(|sum| {
-            (sum[0] * of_z[0] + sum[1] * of_z[1]) + (sum[2] * of_z[2] + sum[3] * of_z[3])
-        })
+        across(&sums, &of_z)
     }
+}
+
+/// Coefficients read at once: four along z of three components.
+const ROW: usize = 12;
+
+/// What the four along z come to. Not inlined: seen together with the rows, a compiler pairs the
+/// sums as they are needed here and shuffles every row for it.
+#[inline(never)]
+fn across(sums: &[f64; ROW], weights: &[f64; 4]) -> V3 {
+    core::array::from_fn(|c| {
+        let [p, q, r, s] = [0, 3, 6, 9].map(|z| sums[z + c]);
+        (p * weights[0] + q * weights[1]) + (r * weights[2] + s * weights[3])
+    })
 }
 
 /// Two or three nodes determine a line or a parabola, which four at even distances keep.
