@@ -32,7 +32,10 @@ impl Drive {
                 _ => {}
             }
         }
-        self.command_servo(now, m);
+        // With set-points of a bus the controlword comes at every SYNC: see `on_sync`.
+        if self.activity != Activity::Cyclic {
+            self.command_servo(now, m);
+        }
     }
 
     /// "Enable" during the ramp of a disable command: the drive stays enabled.
