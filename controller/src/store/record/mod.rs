@@ -9,6 +9,7 @@ mod linear;
 mod rotary;
 mod screw;
 mod volumetric;
+mod warmth;
 
 use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
@@ -19,9 +20,10 @@ pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
 pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
 pub use volumetric::{
-    BeamRecord, BeamReferencesContent, BendRecord, ExpansionRecord, FunctionRecord, FunctionShape,
-    GeometryContent, MemoryName, MemoryRecord, StateMemoryContent,
+    BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
+    MemoryRecord, StateMemoryContent,
 };
+pub use warmth::{BendRecord, ExpansionRecord};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
