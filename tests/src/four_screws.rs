@@ -73,6 +73,7 @@ pub fn with_fourth_screw(text: String, limit_um: Option<f64>) -> String {
     });
     text.replace("# The job", AXIS)
         .replace("[platform.zero]", ACTUATOR)
+        .replace("[platform.zero]", "[platform.zero]\nlone_homing = true")
         .replace("exposures = 4", &format!("{limit}exposures = 4"))
 }
 

@@ -175,6 +175,8 @@ fn without_an_interpolation_time_every_set_point_is_a_step() {
     let mut bench = Bench::cyclic(0);
     let _ = bench.command(ENABLE, 400);
     let _ = bench.sync();
+    // The servo is told at the next beat of its own clock, not at SYNC.
+    let _ = bench.wait_ms(1);
     assert_eq!(bench.axis.counts, 400);
     let _ = bench.wait_ms(200);
     assert_eq!(bench.status() & 0x6F, 0x27, "and SYNC is not watched");
