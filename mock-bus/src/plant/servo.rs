@@ -21,9 +21,6 @@ const GRID_S: f64 = GRID_NS as f64 * 1e-9;
 /// A demand older than this is not extrapolated: its sender has stopped.
 const DEMAND_STALE_NS: u64 = 20_000_000;
 
-/// How fast a longer interval is forgotten, from demand to demand.
-const HOLD_DECAY: f64 = 0.9;
-
 /// Mass, servo and mechanical ends, in metres or radians and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Dynamics {
@@ -69,16 +66,13 @@ struct Demand {
     acceleration: f64,
     at: Time,
     period_s: f64,
-    /// About the longest of the last intervals: a SYNC between two beats of the drive's own
-    /// shortens two of them.
-    hold_s: f64,
 }
 
 impl Demand {
     /// Position, speed and acceleration `age_s` after the demand came. The speed of the last
     /// interval is that of its middle.
     fn ahead(&self, demand: f64, age_s: f64) -> (f64, f64, f64) {
-        let age_s = age_s.min(self.hold_s);
+        let age_s = age_s.min(self.period_s);
         let at_start = self.speed + self.acceleration * self.period_s / 2.0;
         let target = demand + at_start * age_s + self.acceleration * age_s * age_s / 2.0;
         let speed = at_start + self.acceleration * age_s;
@@ -118,7 +112,6 @@ impl Mass {
                 acceleration: 0.0,
                 at: Time::ZERO,
                 period_s: 0.0,
-                hold_s: 0.0,
             },
             position,
             speed: 0.0,
@@ -179,21 +172,14 @@ impl Mass {
             acceleration: 0.0,
             at: now,
             period_s: 0.0,
-            hold_s: 0.0,
         };
         let (Servo::Follow { demand: before }, Servo::Follow { demand: after }) =
             (old.servo, servo)
         else {
             return standing;
         };
-        // A SYNC right behind a beat of the drive's own: from two demands so close no speed is
-        // told, and what the servo knew before still holds.
-        if age < GRID_NS {
-            return Demand {
-                servo,
-                at: now,
-                ..old
-            };
+        if age == 0 {
+            return Demand { servo, ..old };
         }
         if age > DEMAND_STALE_NS {
             return standing;
@@ -204,7 +190,6 @@ impl Mass {
             speed,
             acceleration: (speed - old.speed) / period_s,
             period_s,
-            hold_s: period_s.max(HOLD_DECAY * old.hold_s),
             ..standing
         }
     }
@@ -276,7 +261,7 @@ impl Mass {
     fn follow(&mut self, now: Time, demand: f64) {
         let age_s = (now - self.demand.at).as_secs_f64();
         // Between two demands the servo interpolates on; a silent sender's demand stands still.
-        let live = age_s <= 1.5 * self.demand.hold_s;
+        let live = age_s <= 1.5 * self.demand.period_s;
         let (target, speed, acceleration) = if live {
             self.demand.ahead(demand, age_s)
         } else {

@@ -98,29 +98,6 @@ fn it_lags_while_moving_and_goes_its_speed() {
 }
 
 #[test]
-fn demands_close_behind_each_other_do_not_take_its_feed_forward_away() {
-    let lag = |behind_ns: Option<u64>| {
-        let mut plant = plant(1);
-        for ms in 1..=200_u64 {
-            let demand_m = 1e-4 * ms as f64;
-            demand_at(&mut plant, Time(ms * 1_000_000), demand_m);
-            if let Some(ns) = behind_ns.filter(|_| ms % 2 == 0 && ms < 200) {
-                let later_m = demand_m + 0.1 * ns as f64 * 1e-9;
-                demand_at(&mut plant, Time(ms * 1_000_000 + ns), later_m);
-            }
-        }
-        0.02 / 10e-9 - plant.encoder_counts(0) as f64
-    };
-    let usual = lag(None);
-    // It goes on by itself for as long as the last two demands were apart: less than the rest of
-    // the millisecond when one came in between.
-    for ns in [1, 1_000, 20_000, 240_000, 400_000] {
-        let share = lag(Some(ns)) / usual;
-        assert!((share - 1.0).abs() < 0.25, "{ns} ns: {share} of the usual");
-    }
-}
-
-#[test]
 fn without_torque_it_coasts_to_a_stop() {
     let mut plant = plant(1);
     for ms in 1..=200_u64 {
