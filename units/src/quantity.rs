@@ -272,6 +272,11 @@ impl Radians {
     pub const fn degrees(self) -> f64 {
         self.0.to_degrees()
     }
+
+    /// The whole turns nearest to this angle: less these, it is within half a turn of 0.
+    pub fn whole_turns(self) -> Self {
+        Self(Self::TURN.0 * (self.0 / Self::TURN.0).round())
+    }
 }
 
 #[cfg(test)]

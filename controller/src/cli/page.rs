@@ -52,7 +52,7 @@ fn platform(path: &Path, journal: &ReadJournal) -> Result<String, Failure> {
 }
 
 /// The calibrations that were made from the journal at `path`.
-fn made_from(path: &Path) -> Result<Vec<(String, CalibrationRecord)>, Failure> {
+pub(super) fn made_from(path: &Path) -> Result<Vec<(String, CalibrationRecord)>, Failure> {
     Ok(match (Store::of_journal(path), path.file_name()) {
         (Some(store), Some(name)) => store.made_from(&name.to_string_lossy())?,
         _ => Vec::new(),

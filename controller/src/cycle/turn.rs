@@ -28,8 +28,8 @@ impl Way {
     /// than `near` from `here` is where the axis is: no way leads round to it.
     pub fn target(self, here: Radians, angle: Radians, near: Radians) -> Radians {
         let turn = Radians::TURN.value();
-        let away = (angle - here).value();
-        let shortest = away - turn * (away / turn).round();
+        let away = angle - here;
+        let shortest = (away - away.whole_turns()).value();
         let is_here = shortest.abs() <= near.value();
         match self {
             Self::Turns => angle,

@@ -12,7 +12,7 @@ use truestage::store::{ZeroEntry, read_journal};
 use truestage::{Failure, Machine, Store, json as to_json, text};
 use units::{Metres, Volts};
 
-use super::{DemoArgs, Shown, Stand, power_cycle, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
 use crate::cli::output::Output;
 
 const AXIS: &str = "x";
@@ -234,8 +234,5 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         calibration: Some(&story.calibrated.record),
         zeros,
     };
-    let stamp = journal.header.started.replace([':', '-'], "");
-    let path = store.reports().join(format!("{stamp}-demo.html"));
-    store.write_report(&path, &report::render(&page))?;
-    Ok(path)
+    write_page(store, &journal, &report::render(&page))
 }

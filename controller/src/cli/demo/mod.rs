@@ -16,7 +16,7 @@ use clap::{Args, ValueEnum};
 use serde_json::Value;
 use truestage::config::{self, Loaded};
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
-use truestage::store::Lease;
+use truestage::store::{Lease, ReadJournal};
 use truestage::{Failure, Machine, Store, ports};
 
 use super::output::{Ended, Output};
@@ -112,6 +112,14 @@ fn power_cycle(
     let back = machine.now() + POWER_OFF;
     machine.run_until(back)?;
     machine.start()
+}
+
+/// Writes the page of a demonstration whose run `journal` is, and says where.
+fn write_page(store: &Store, journal: &ReadJournal, html: &str) -> Result<PathBuf, Failure> {
+    let stamp = journal.header.started.replace([':', '-'], "");
+    let path = store.reports().join(format!("{stamp}-demo.html"));
+    store.write_report(&path, html)?;
+    Ok(path)
 }
 
 /// What was shown.

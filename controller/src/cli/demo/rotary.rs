@@ -14,8 +14,9 @@ use truestage::store::read_journal;
 use truestage::{Failure, Store};
 use units::Radians;
 
-use super::{DemoArgs, Shown, Stand, power_cycle, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
 use crate::cli::output::Output;
+use crate::cli::page::made_from;
 use crate::cli::table::{
     calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
     verified_value,
@@ -138,13 +139,10 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         read_journal(&story.left.journal)?,
         read_journal(&story.after.journal)?,
     );
-    let source = story.calibrated.journal.file_name().unwrap_or_default();
-    let calibrations = store.made_from(&source.to_string_lossy())?;
+    let calibrations = made_from(&story.calibrated.journal)?;
     let later = [("", &left), (", after a power cycle", &after)];
-    let stamp = left.header.started.replace([':', '-'], "");
-    let path = store.reports().join(format!("{stamp}-demo.html"));
-    store.write_report(&path, &page::render_with(&measured, &calibrations, &later))?;
-    Ok(path)
+    let html = page::render_with(&measured, &calibrations, &later);
+    write_page(store, &left, &html)
 }
 
 fn planned(machine: &truestage::Machine, output: Output) -> Result<Design, Failure> {

@@ -12,8 +12,9 @@ use truestage::store::read_journal;
 use truestage::{Failure, Store, json as to_json};
 use units::{Metres, Radians};
 
-use super::{DemoArgs, Shown, Stand, power_cycle, took};
+use super::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
 use crate::cli::output::Output;
+use crate::cli::page::made_from;
 use crate::cli::platform::{
     calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
 };
@@ -122,8 +123,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         read(&story.zeros[0].journal)?,
         read(&story.zeros[1].journal)?,
     ];
-    let source = story.calibrated.journal.file_name().unwrap_or_default();
-    let calibrations = store.made_from(&source.to_string_lossy())?;
+    let calibrations = made_from(&story.calibrated.journal)?;
     let page = PlatformPage {
         title: format!("truestage: platform {}", left.header.machine),
         facts: page::facts_of(&left),
@@ -135,10 +135,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         calibrated: Some((&measured, calibrations)),
         zeros: zeros.iter().collect(),
     };
-    let stamp = left.header.started.replace([':', '-'], "");
-    let path = store.reports().join(format!("{stamp}-demo.html"));
-    store.write_report(&path, &page::render(&page))?;
-    Ok(path)
+    write_page(store, &left, &page::render(&page))
 }
 
 /// Another pose for each seed.

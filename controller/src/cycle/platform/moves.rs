@@ -50,9 +50,12 @@ impl Machine {
     /// When it may not.
     pub fn check_pose(&self, target: Pose) -> Result<(), Failure> {
         check_work_range(self.platform_config()?, target)?;
-        let reached = self.platform_state()?.kinematics.check(target);
-        reached.map_err(PlatformFailure::from)?;
-        Ok(())
+        self.strokes_to(target).map(drop)
+    }
+
+    fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
+        let strokes = self.platform_state()?.kinematics.check(target);
+        Ok(strokes.map_err(PlatformFailure::from)?)
     }
 
     /// Moves the platform to `target`, compensated where screws have a calibration.
@@ -63,8 +66,7 @@ impl Machine {
     pub fn move_pose(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
         self.require_platform_zeroed()?;
         self.check_pose(target)?;
-        let strokes = self.platform_state()?.kinematics.check(target);
-        self.plan(&strokes.map_err(PlatformFailure::from)?, Correction::On)?;
+        self.plan(&self.strokes_to(target)?, Correction::On)?;
         let taken_up = self.take_up()?;
         let moved = self.go_to_pose(target, Correction::On)?;
         Ok(PoseMoved { taken_up, ..moved })
@@ -75,11 +77,8 @@ impl Machine {
         target: Pose,
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
+        let strokes = self.strokes_to(target)?;
         let state = self.platform_state()?;
-        let strokes = state
-            .kinematics
-            .check(target)
-            .map_err(PlatformFailure::from)?;
         if let Some(from) = state.pose {
             let path = state.kinematics.check_path(from, target);
             path.map_err(PlatformFailure::from)?;

@@ -105,10 +105,9 @@ pub(crate) fn kinematics(
 /// The displacement from the pose `datum` to the pose `seen`, as a motion of the platform's own
 /// frame: what lay at p then lies at t + R(angle)·p now.
 pub(crate) fn from_datum(seen: Pose, datum: Pose) -> Pose {
-    let turn = core::f64::consts::TAU;
-    let angle = (seen.angle - datum.angle).value();
+    let angle = seen.angle - datum.angle;
     // What the camera says jumps by a turn where its angles begin again.
-    let angle = Radians(angle - turn * (angle / turn).round());
+    let angle = angle - angle.whole_turns();
     let (sin, cos) = angle.value().sin_cos();
     let (x, y) = (datum.x.value(), datum.y.value());
     Pose {

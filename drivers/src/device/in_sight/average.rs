@@ -86,9 +86,8 @@ impl Measurement {
             picture.angle * settings.angle_unit.value(),
         ]);
         // An angle near half a turn may be told with either sign.
-        let (turn, angle) = (core::f64::consts::TAU, &mut values[2]);
         if self.good > 1 {
-            *angle -= turn * ((*angle - self.means[2]) / turn).round();
+            values[2] -= Radians(values[2] - self.means[2]).whole_turns().value();
         }
         let sums = self.means.iter_mut().zip(&mut self.squares);
         for (value, (mean, square)) in values.into_iter().zip(sums) {
