@@ -1,12 +1,13 @@
-//! How punctual the cyclic engine is with four axes, beside a tokio interval in the same run.
+//! How punctual the cyclic engine is, beside a tokio interval in the same run.
 //!
-//! `cycle follow BUS SECONDS PERIOD_MS...` follows a circle with four axes in real time, for that
-//! long in sum, and prints one JSON object. BUS is `vcan0` or `pty`. The first period is taken that
-//! the computer bears (or the last one). What stops the engine before its end is counted and
-//! named, and it is begun anew. The tokio interval, in a thread of its own under the ordinary
-//! scheduler, only notes how late it wakes.
+//! `cycle follow MACHINE BUS SECONDS PERIOD_MS...` follows a path in real time, for that long in sum,
+//! and prints one JSON object. MACHINE is `screws` (four axes along a circle) or `volumetric` (three
+//! axes along a diagonal, corrected by what their detectors and thermometers show), BUS is `vcan0`
+//! or `pty`. The first period is taken that the computer bears (or the last one). What stops the
+//! engine before its end is counted and named, and it is begun anew. The tokio interval, in a thread
+//! of its own under the ordinary scheduler, only notes how late it wakes.
 //!
-//! `cycle show BUS SECONDS PERIOD_MS...` prints the same for a person.
+//! `cycle show MACHINE BUS SECONDS PERIOD_MS...` prints the same for a person.
 //!
 //! `cycle cost` prints what a period costs the processor apart from its bus: samples taken in,
 //! judged, the path, the correction, set-points encoded.
@@ -24,10 +25,13 @@ use tests::apart::{Apart, used_by_the_loop};
 use tests::stream::{self, Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::Failure;
+use truestage::config::MachineConfig;
 use truestage::cycle::volumetric::VolumetricCorrection;
 use truestage::engine::{Cause, Correction, Engine, Histogram, NoCorrection, Timing};
+use units::Metres;
 
 const SCREWS: [&str; 4] = ["u", "v", "w", "r"];
+const AXES: [&str; 3] = ["x", "y", "z"];
 /// One path is no longer than this, so that a stop costs little.
 const PATH_S: f64 = 20.0;
 /// A computer that bears nothing is given up after so many times the seconds asked for.
@@ -44,16 +48,64 @@ fn main() {
         println!("{}", costs());
         return;
     }
-    let [how @ ("follow" | "show"), bus, seconds, ref periods_ms @ ..] = words[..] else {
-        eprintln!("cycle: run by tests/bench/run, or as `cycle show pty 60 2.0 5.0 10.0 20.0`");
+    let [how @ ("follow" | "show"), machine, bus, seconds, ref periods_ms @ ..] = words[..] else {
+        eprintln!("cycle: run by tests/bench/run, or as `cycle show screws pty 60 2.0 5.0 20.0`");
         return;
     };
-    let run = measure(bus, bearable(bus, periods_ms), seconds.parse().unwrap());
+    let place = Place::new(machine, bus);
+    let run = measure(place, bearable(place, periods_ms), seconds.parse().unwrap());
     if how == "show" {
         run.show();
     } else {
         println!("{}", run.json());
     }
+}
+
+/// Which machine, on which bus.
+#[derive(Clone, Copy)]
+struct Place {
+    axes: &'static [&'static str],
+    rig: Rig,
+}
+
+impl Place {
+    fn new(machine: &str, bus: &str) -> Self {
+        let axes: &[&str] = match machine {
+            "screws" => &SCREWS,
+            "volumetric" => &AXES,
+            other => panic!("machine {other}: known are screws and volumetric"),
+        };
+        let rig = match bus {
+            "pty" => Rig::Pty,
+            "vcan0" => Rig::Vcan,
+            other => panic!("bus {other}: known are pty and vcan0"),
+        };
+        Self { axes, rig }
+    }
+
+    fn stand(self, period_ms: &str) -> Stand {
+        let period = format!("sync_period_ms = {period_ms}");
+        let setup = setup_of(self.axes).in_real_time();
+        // Modules' samples must not get older when SYNC is rarer.
+        let often = match period_ms.parse::<f64>().unwrap() {
+            ms if ms > 5.0 => "every_syncs = 2",
+            _ => "every_syncs = 10",
+        };
+        let setup = setup.machine("sync_period_ms = 2.0", &period);
+        Stand::new(self.rig, &setup.machine("every_syncs = 10", often))
+    }
+}
+
+fn setup_of(axes: &[&str]) -> Setup {
+    if is_volumetric(axes) {
+        Setup::volumetric(1)
+    } else {
+        Setup::four_cyclic_axes(1)
+    }
+}
+
+fn is_volumetric(axes: &[&str]) -> bool {
+    axes[0] == AXES[0]
 }
 
 /// Lateness of a tokio interval until it is told to end.
@@ -91,12 +143,12 @@ impl Tokio {
 }
 
 /// The first period with which the machine is zeroed and follows a short path.
-fn bearable<'a>(bus: &str, periods_ms: &[&'a str]) -> &'a str {
+fn bearable<'a>(place: Place, periods_ms: &[&'a str]) -> &'a str {
     let _granted = RealTime::ask();
     let bears = |period_ms: &&&str| {
         (0..TRIES).any(|_| {
-            let mut stand = stand(bus, period_ms);
-            let mut run = Measured::new(period_ms);
+            let mut stand = place.stand(period_ms);
+            let mut run = Measured::new(place, period_ms);
             let well = zero(&mut stand).is_ok() && follow(&mut stand, TRIAL_S, &mut run).is_none();
             stand.machine.make_safe();
             well
@@ -108,6 +160,7 @@ fn bearable<'a>(bus: &str, periods_ms: &[&'a str]) -> &'a str {
 
 /// What was measured.
 struct Measured {
+    axes: &'static [&'static str],
     period: Duration,
     /// Along paths.
     cycles: u64,
@@ -118,16 +171,16 @@ struct Measured {
     stops: BTreeMap<String, u32>,
 }
 
-fn measure(bus: &str, period_ms: &str, seconds: f64) -> Measured {
+fn measure(place: Place, period_ms: &str, seconds: f64) -> Measured {
     let begun = Instant::now();
-    let mut run = Measured::new(period_ms);
+    let mut run = Measured::new(place, period_ms);
     let period = run.period;
     let tokio = Tokio::begin(period);
     // Of this thread and the emulator's, which it begins.
     let granted = RealTime::ask();
     let followed = |run: &Measured| run.cycles as f64 * period.as_secs_f64();
     while followed(&run) < seconds && begun.elapsed().as_secs_f64() < PATIENCE * seconds {
-        let mut stand = stand(bus, period_ms);
+        let mut stand = place.stand(period_ms);
         let mut stopped = zero(&mut stand).err().map(|it| it.to_string());
         while stopped.is_none() && followed(&run) < seconds {
             let path_s = PATH_S.min(seconds - followed(&run)).max(1.0);
@@ -144,30 +197,43 @@ fn measure(bus: &str, period_ms: &str, seconds: f64) -> Measured {
     run
 }
 
-fn stand(bus: &str, period_ms: &str) -> Stand {
-    let period = format!("sync_period_ms = {period_ms}");
-    let setup = Setup::four_cyclic_axes(1)
-        .in_real_time()
-        .machine("sync_period_ms = 2.0", &period);
-    match bus {
-        "pty" => Stand::new(Rig::Pty, &setup),
-        "vcan0" => Stand::new(Rig::Vcan, &setup),
-        other => panic!("bus {other}: known are pty and vcan0"),
-    }
-}
-
 fn zero(stand: &mut Stand) -> Result<(), Failure> {
     let store = stand.store.clone();
     stand.machine.start()?;
-    stand.machine.zero_platform(&store).map(drop)
+    if stand.machine.config().volumetric.is_some() {
+        stand.machine.zero_volumetric()
+    } else {
+        stand.machine.zero_platform(&store).map(drop)
+    }
+}
+
+/// None for screws; for three axes what their detectors and thermometers make of nothing known.
+fn correction_of(config: &MachineConfig) -> Box<dyn Correction> {
+    let Some(known) = &config.volumetric else {
+        return Box::new(NoCorrection);
+    };
+    Box::new(VolumetricCorrection::new(config, nothing_known(known)).unwrap())
+}
+
+/// From rest to rest; screws beyond those of the engine stand still.
+fn path_of(axes: &[&str], period: Duration, path_s: f64) -> Vec<Vec<Metres>> {
+    let points = if is_volumetric(axes) {
+        diagonal(period, path_s)
+    } else {
+        circle(period, path_s, path_s / 1.5)
+    };
+    let points = points.into_iter();
+    points.map(|it| it[..axes.len()].to_vec()).collect()
 }
 
 /// One path; what stopped it before its end.
 fn follow(stand: &mut Stand, path_s: f64, run: &mut Measured) -> Option<String> {
-    let engine = Engine::new(&stand.machine, &SCREWS, Box::new(NoCorrection));
-    let (mut engine, desk) = engine.unwrap_or_else(|failure| panic!("{failure}"));
+    let correction = correction_of(stand.machine.config());
+    let engine = Engine::new(&stand.machine, run.axes, correction);
+    let (mut engine, mut desk) = engine.unwrap_or_else(|failure| panic!("{failure}"));
     engine.in_real_time();
-    let writer = Writer::new(desk, circle(engine.period(), path_s, path_s / 1.5));
+    desk.correct(true).unwrap();
+    let writer = Writer::new(desk, path_of(run.axes, engine.period(), path_s));
     let watch = stand.emulator.watch();
     let machine = &mut stand.machine;
     let (outcome, _) = stream::follow(machine, &mut engine, writer, &watch, |_| {}, &mut |_| {});
@@ -192,8 +258,9 @@ fn micros(histogram: &Histogram) -> Value {
 }
 
 impl Measured {
-    fn new(period_ms: &str) -> Self {
+    fn new(place: Place, period_ms: &str) -> Self {
         Self {
+            axes: place.axes,
             period: Duration::from_secs_f64(period_ms.parse::<f64>().unwrap() * 1e-3),
             cycles: 0,
             wall: Duration::ZERO,
@@ -206,7 +273,7 @@ impl Measured {
     fn json(&self) -> Value {
         json!({
             "period_us": self.period.as_secs_f64() * 1e6,
-            "axes": SCREWS.len(),
+            "axes": self.axes.len(),
             "followed_s": self.cycles as f64 * self.period.as_secs_f64(),
             "wall_s": self.wall.as_secs_f64(),
             "lateness": micros(&self.timing.lateness),
@@ -226,7 +293,7 @@ impl Measured {
         let followed_s = self.cycles as f64 * self.period.as_secs_f64();
         println!(
             "{} axes at {:?}: {followed_s:.1} s followed in {:.1} s",
-            SCREWS.len(),
+            self.axes.len(),
             self.period,
             self.wall.as_secs_f64()
         );
@@ -249,7 +316,7 @@ fn costs() -> Value {
         ("1 axis", &SCREWS[..1]),
         ("2 axes", &SCREWS[..2]),
         ("4 axes", &SCREWS),
-        ("3 axes, corrected by what they see", &["x", "y", "z"]),
+        ("3 axes, corrected by what they see", &AXES),
     ];
     let costs = cases.map(|(name, axes)| {
         let mut each: Vec<f64> = (0..REPETITIONS).map(|_| cost_us(axes)).collect();
@@ -261,43 +328,19 @@ fn costs() -> Value {
 
 /// Of one run in virtual time: what the loop took outside of its transport.
 fn cost_us(axes: &[&str]) -> f64 {
-    let volumetric = axes[0] == "x";
-    let setup = if volumetric {
-        Setup::volumetric(1)
-    } else {
-        Setup::four_cyclic_axes(1)
-    };
     let mut inside = None;
-    let mut stand = Stand::wrapped(Rig::InProcess, &setup, |inner| {
+    let mut stand = Stand::wrapped(Rig::InProcess, &setup_of(axes), |inner| {
         let (apart, cell) = Apart::new(inner, nanos);
         inside = Some(cell);
         Box::new(apart)
     });
     let inside = inside.unwrap();
-    let config = stand.emulator.loaded.config.clone();
+    zero(&mut stand).unwrap();
+    let correction = correction_of(stand.machine.config());
     let machine = &mut stand.machine;
-    machine.start().unwrap();
-    let correction: Box<dyn Correction> = match &config.volumetric {
-        Some(known) => {
-            machine.zero_volumetric().unwrap();
-            let known = nothing_known(known);
-            Box::new(VolumetricCorrection::new(&config, known).unwrap())
-        }
-        None => {
-            machine.zero_platform(&stand.store).unwrap();
-            Box::new(NoCorrection)
-        }
-    };
     let (mut engine, mut desk) = Engine::new(machine, axes, correction).unwrap();
     desk.correct(true).unwrap();
-    let points = if volumetric {
-        diagonal(engine.period(), 8.0)
-    } else {
-        circle(engine.period(), 8.0, 4.0)
-    };
-    // Screws beyond those of the engine stand still.
-    let points = points.into_iter().map(|it| it[..axes.len()].to_vec());
-    let writer = Writer::new(desk, points.collect());
+    let writer = Writer::new(desk, path_of(axes, engine.period(), 8.0));
     let meter = (nanos as fn() -> u64, &*inside);
     let used = used_by_the_loop(machine, &mut engine, writer, meter, (200, 3_500));
     let (_, nanos, periods) = used.unwrap();

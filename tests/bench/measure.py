@@ -141,14 +141,15 @@ def sync(program, sink, periods_us):
     }
 
 
-def cycle(program, bus):
-    """The engine beside a tokio interval in the same process, with and without load."""
-    cases = []
-    for busy in (False, True):
-        with load(busy):
-            run_of_it = run([program, "follow", bus, CYCLE_S, *CYCLE_PERIODS_MS])
-        cases.append({"bus": bus, "busy": busy} | run_of_it)
-    return cases
+def cycle(program, bus, cases):
+    """The engine beside a tokio interval in the same process, on machines with and without load."""
+    return [cycle_of(program, bus, machine, busy) for machine, busy in cases]
+
+
+def cycle_of(program, bus, machine, busy):
+    with load(busy):
+        measured = run([program, "follow", machine, bus, CYCLE_S, *CYCLE_PERIODS_MS])
+    return {"machine": machine, "bus": bus, "busy": busy} | measured
 
 
 def judge_sync(case, runs):
@@ -204,7 +205,11 @@ def main(place, programs):
         measured = {
             "sdo": sdo(programs["sdo"]),
             "sync": sync(programs["sync"], INTERFACE, BUS_PERIODS_US),
-            "cycle": cycle(programs["cycle"], INTERFACE),
+            "cycle": cycle(
+                programs["cycle"],
+                INTERFACE,
+                [("screws", False), ("screws", True), ("volumetric", False)],
+            ),
         }
     else:
         measured = {
@@ -214,7 +219,7 @@ def main(place, programs):
             "scipy_grid": scipy_grid(),
             "table_instructions": instructions(programs["table"]),
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
-            "cycle": cycle(programs["cycle"], "pty"),
+            "cycle": cycle(programs["cycle"], "pty", [("screws", False), ("screws", True)]),
             "cycle_cost": run([programs["cycle"], "cost"])["cases"],
         }
     measured["seconds"] = round(time.monotonic() - begin)

@@ -107,12 +107,13 @@ def show_volumetric(volumetric, scipy):
 
 
 def show_cycle(title, cases):
-    print(f"\nThe cyclic engine, four axes, {title}: lateness in us beside a tokio interval")
+    print(f"\nThe cyclic engine, {title}: lateness in us beside a tokio interval")
     columns = ("p50", "p99", "p999", "max")
     heads = [(name, 9) for name in columns]
     line(("", 8), ("load", 12), *heads, ("followed", 11), ("overruns", 10), ("stops", 0))
     for case in cases:
         load = "busy" if case["busy"] else "idle"
+        line((f"{case['axes']} axes, {case['machine']}", 0))
         for name, key in (("ours", "lateness"), ("tokio", "tokio")):
             if name == "ours":
                 load += f" {case['period_us'] / 1000:.0f} ms"
