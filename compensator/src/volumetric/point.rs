@@ -167,6 +167,15 @@ impl Volume {
         (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k])
     }
 
+    /// The point inside that is nearest to `point`.
+    pub fn nearest(&self, point: Point) -> Point {
+        let inside = |axis: Axis| {
+            let (low, high) = (self.low.along(axis), self.high.along(axis));
+            Metres(point.along(axis).value().clamp(low.value(), high.value()))
+        };
+        Point::new(inside(Axis::X), inside(Axis::Y), inside(Axis::Z))
+    }
+
     /// Refuses what is outside, naming the axis.
     #[inline]
     pub(crate) fn check(&self, point: Point) -> Result<(), super::NoCorrection> {

@@ -127,7 +127,9 @@ fn volumetric_dependence(config: &MachineConfig, volumetric: &VolumetricConfig) 
             Some(it) => {
                 let drift = (it.drift, it.source_mm, it.end_mm, it.translation_share);
                 let end = it.end.as_ref().map(detector);
-                format!("\nbeam {drift:?} {} {end:?}", detector(&it.slider))
+                // Where it sits is in the tables that it told, and taken off what it says later.
+                let (slider, place_mm) = (detector(&it.slider), it.slider.place_mm);
+                format!("\nbeam {drift:?} {slider} {place_mm:?} {end:?}")
             }
             None => "\nno beam".into(),
         };

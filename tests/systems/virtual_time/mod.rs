@@ -12,4 +12,5 @@ mod serial_zero;
 mod volumetric;
 mod volumetric_day;
 mod volumetric_kept;
+mod volumetric_kinds;
 mod volumetric_line;

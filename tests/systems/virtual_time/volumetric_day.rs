@@ -13,7 +13,7 @@ use units::{Metres, Time};
 const DAY_H: f64 = 8.0;
 
 /// Heartbeats so rare that hours without SYNC cost little.
-fn calm(text: String) -> String {
+pub(super) fn calm(text: String) -> String {
     text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
         .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
         .replace(

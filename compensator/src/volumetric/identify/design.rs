@@ -226,13 +226,7 @@ pub(super) fn error_row(
 }
 
 pub(super) fn lever(plan: &Plan, axis: Axis, at: Point, tool: Point) -> V3 {
-    let mut lever = tool.array();
-    for other in Axis::ALL {
-        if plan.chain.is_on_lever(axis, other) {
-            lever[other.index()] += at.along(other).value();
-        }
-    }
-    lever
+    plan.chain.lever(axis, at, tool).array()
 }
 
 fn dot(a: V3, b: V3) -> f64 {

@@ -211,7 +211,11 @@ impl StandardDesign {
                 self.volume.high().along(axis),
             );
             let last = nodes[axis.index()].max(2) - 1;
-            let node = |n: usize| low + (high - low) * (n as f64 / last as f64);
+            // Rounding must not leave the volume's end uncovered.
+            let node = |n: usize| match n {
+                n if n == last => high,
+                n => low + (high - low) * (n as f64 / last as f64),
+            };
             FunctionPlan {
                 name,
                 nodes: (0..=last).map(node).collect(),

@@ -3,7 +3,9 @@
 use core::fmt;
 use core::str::FromStr;
 
-use crate::volumetric::Axis;
+use units::Metres;
+
+use crate::volumetric::{Axis, Point};
 
 /// A chain of three linear axes, written like `XFYZ`.
 ///
@@ -87,11 +89,34 @@ impl Chain {
         self.place(axis) < self.workpiece
     }
 
+    /// Which way the tool goes, seen from the workpiece, when the slide of `axis` strays or turns
+    /// by one: the other way (−1) where the slide carries the workpiece, else with it (1).
+    pub fn sense(&self, axis: Axis) -> f64 {
+        if self.carries_workpiece(axis) {
+            -1.0
+        } else {
+            1.0
+        }
+    }
+
     /// Whether a tilt of `axis` acts on the position of `other` as on a lever: when `other` is
     /// nearer to the tool. A slide that carries the workpiece also moves under the tool itself.
     pub fn is_on_lever(&self, axis: Axis, other: Axis) -> bool {
         let (own, its) = (self.place(axis), self.place(other));
         its > own || (its == own && self.carries_workpiece(axis))
+    }
+
+    /// Where the point that is `tool` from the tool's zero stands in the frame of the slide of
+    /// `axis`, at the command `at`: what a tilt of the slide acts on.
+    pub fn lever(&self, axis: Axis, at: Point, tool: Point) -> Point {
+        let carried = |other: Axis| {
+            if self.is_on_lever(axis, other) {
+                at.along(other)
+            } else {
+                Metres::ZERO
+            }
+        };
+        tool + Point::new(carried(Axis::X), carried(Axis::Y), carried(Axis::Z))
     }
 
     fn place(&self, axis: Axis) -> usize {
@@ -124,5 +149,13 @@ mod tests {
         assert!(!chain.is_on_lever(Axis::Y, Axis::Y));
         assert!(chain.is_on_lever(Axis::Y, Axis::Z));
         assert!(!chain.is_on_lever(Axis::Z, Axis::Y));
+        let (at, tool) = (
+            Point::from_mm(1.0, 2.0, 4.0),
+            Point::from_mm(8.0, 16.0, 32.0),
+        );
+        let levers = Axis::ALL.map(|it| chain.lever(it, at, tool));
+        assert_eq!(levers[0], Point::from_mm(9.0, 18.0, 36.0));
+        assert_eq!(levers[1], Point::from_mm(8.0, 16.0, 36.0));
+        assert_eq!(levers[2], tool);
     }
 }

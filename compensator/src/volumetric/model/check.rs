@@ -4,7 +4,7 @@ use units::{Metres, MetresPerSecond};
 
 use super::bound::{AxisBound, Bounds};
 use super::errors::{ErrorName, Squareness};
-use super::pack::PackedAxis;
+use super::pack::{PackedAxis, SAME_NODE_M};
 use super::thermal::{Thermal, ThermalBend, ThermalSums};
 use super::{Machine, ModelError};
 use crate::error_table::Limits;
@@ -104,7 +104,7 @@ pub(super) fn pack(machine: &Machine) -> Result<[PackedAxis; 3], ModelError> {
                 let Some((first, last)) = pieces.map(Pieces::range) else {
                     continue;
                 };
-                if first > low.value() || last < high.value() {
+                if first > low.value() + SAME_NODE_M || last < high.value() - SAME_NODE_M {
                     return Err(ModelError::NotCovered {
                         function,
                         first: Metres(first),

@@ -187,9 +187,11 @@ impl VolumetricModel {
         let own = self.machine.squareness.values();
         let squareness = core::array::from_fn(|k| own[k] + sums.squareness[k]);
         let fixed = self.machine.thermal.fixed.array();
+        // Detectors say what slides do, the rest is of the tool as seen from the workpiece.
+        let sense = |axis| self.machine.chain.sense(axis);
         let mut now = Conditions {
             tool: wide(tool.array()),
-            shift: Axis::ALL.map(|axis| wide(live.sideways_of(axis))),
+            shift: Axis::ALL.map(|axis| wide(live.sideways_of(axis).map(|it| it * sense(axis)))),
             lean: Squareness::lean(squareness).map(wide),
             bend: [[0.0; 4]; 3],
             turn: [[0.0; 4]; 3],
@@ -201,7 +203,7 @@ impl VolumetricModel {
         for (k, fixed) in fixed.into_iter().enumerate() {
             now.lean[k][k] += sums.expansion[k];
             now.shift[k][k] -= sums.expansion[k] * fixed;
-            now.turn[k][k] = live.roll[k].value();
+            now.turn[k][k] = live.roll[k].value() * sense(Axis::ALL[k]);
         }
         self.bend(&mut now, temperatures)?;
         Ok(now)
@@ -300,13 +302,8 @@ impl VolumetricModel {
     /// What a tilt of `axis` acts on, without the errors.
     fn lever(&self, axis: Axis, command: Point, now: &Conditions) -> V3 {
         let [x, y, z, _] = now.tool;
-        let mut lever = [x, y, z];
-        for other in Axis::ALL {
-            if self.machine.chain.is_on_lever(axis, other) {
-                lever[other.index()] += command.along(other).value();
-            }
-        }
-        lever
+        let tool = Point::of([x, y, z]);
+        self.machine.chain.lever(axis, command, tool).array()
     }
 
     /// Adds what the guides' arcs do: their tilts, and where no detector sees it the rest.

@@ -6,7 +6,7 @@ use crate::volumetric::function::Pieces;
 use crate::volumetric::point::V4;
 
 /// Nodes nearer together than this are one: no error function changes within a nanometre.
-const SAME_NODE_M: f64 = 1e-9;
+pub(super) const SAME_NODE_M: f64 = 1e-9;
 
 /// Six cubics over one interval by power: displacements along x, y, z and a lane that is not
 /// used, tilts about them and another. The first lanes not used say where it starts and ends.

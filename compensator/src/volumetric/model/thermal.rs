@@ -100,11 +100,7 @@ impl Arc {
         let unit = |axis: Axis| core::array::from_fn(|k| f64::from(u8::from(k == axis.index())));
         // A slide with the workpiece goes the other way than the tool does as seen from it, and
         // turns the tool the other way too: of the three signs one is left.
-        let sense = if chain.carries_workpiece(axis) {
-            -1.0
-        } else {
-            1.0
-        };
+        let sense = chain.sense(axis);
         let per = 4.0 / ((high - low) * (high - low));
         Self {
             powers: [-low * high * per, (low + high) * per, -per],

@@ -9,7 +9,9 @@ use super::Displacement;
 use crate::volumetric::function::Function;
 use crate::volumetric::{Axis, Point};
 
-/// What the detectors of all axes say: the moving state.
+/// What the detectors of all axes say of the slides: the moving state. Displacements and rolls are
+/// those of the slide itself, also of one that carries the workpiece: the model knows which way
+/// the tool goes then.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MovingState {
     /// D_y, D_z of the x axis; D_x, D_z of y; D_x, D_y of z.

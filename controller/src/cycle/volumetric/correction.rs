@@ -234,16 +234,6 @@ impl VolumetricCorrection {
         }
     }
 
-    /// An axis at the end of the volume is some counts beyond it: the end's correction holds there.
-    fn nearest_inside(&self, target: Point) -> Point {
-        let volume = self.model.machine().volume;
-        let inside = |axis: Axis| {
-            let (low, high) = (volume.low().along(axis), volume.high().along(axis));
-            Metres(target.along(axis).value().clamp(low.value(), high.value()))
-        };
-        Point::new(inside(Axis::X), inside(Axis::Y), inside(Axis::Z))
-    }
-
     /// What stands behind each value that is used.
     fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
         let beams = self.beams.iter().flatten().flat_map(|it| {
@@ -326,7 +316,8 @@ impl Correction for VolumetricCorrection {
         let Ok(now) = self.model.conditions(self.tool, &self.temperatures, &state) else {
             return self.without();
         };
-        let inside = self.nearest_inside(target);
+        // An axis at the end of the volume is some counts beyond it: the end's correction holds there.
+        let inside = self.model.machine().volume.nearest(target);
         if (target - inside).distance() > self.model.limits().size {
             return nothing(Validity::Stop("the path leaves the calibrated volume"));
         }

@@ -7,6 +7,7 @@ use compensator::volumetric::{Axis, Point};
 use units::Metres;
 
 use super::VolumetricFailure;
+use crate::assemble::work_volume;
 use crate::config::VolumetricConfig;
 use crate::engine::{Cause, Correction, Desk, Engine, Live, PushError, State};
 use crate::failure::Failure;
@@ -43,12 +44,35 @@ impl Machine {
     /// Switches the correction on or off at standstill, and waits until it is all there: each
     /// detector confirmed, blended in and smoothed. Says what it was in the last period.
     ///
+    /// Outside the volume no correction is known, and with one the machine would stop there: before
+    /// it is switched on, axes that stand outside go straight to the nearest place inside.
+    ///
     /// # Errors
     /// Whatever stops the machine, also a correction that must not be done without.
     pub fn correct_volume(&mut self, mover: &mut Mover, on: bool) -> Result<Live, Failure> {
+        if on {
+            self.enter_volume()?;
+        }
         let rest = settling(self.volumetric_config()?, self);
         mover.desk.correct(on)?;
         self.hold(mover, None, rest, &mut |_| {})
+    }
+
+    fn enter_volume(&mut self) -> Result<(), Failure> {
+        let config = self.volumetric_config()?.clone();
+        let volume = work_volume(&config).map_err(VolumetricFailure::from)?;
+        let mut here = [Metres::ZERO; 3];
+        for (position, axis) in here.iter_mut().zip(&config.axes) {
+            *position = self.reading(axis)?.map_or(*position, |it| it.position);
+        }
+        let here = Point::new(here[0], here[1], here[2]);
+        let inside = volume.nearest(here);
+        // Nearer than that it is at the end of the volume.
+        let near = Metres::from_um(config.compensation.size_limit_um);
+        if (inside - here).distance() > near {
+            self.go_straight(inside)?;
+        }
+        Ok(())
     }
 
     /// Moves the tool so that all axes together go straight to `target`, and stays there for

@@ -85,6 +85,8 @@ struct Growth {
 #[derive(Clone, Debug)]
 pub(super) struct Guide {
     axis: usize,
+    /// Which way the slide goes as its coordinate grows: one with the workpiece goes back.
+    way: f64,
     travel_m: f64,
     shifts: [Curve; 3],
     turns: [Curve; 3],
@@ -116,8 +118,11 @@ impl Guide {
             };
             Curve::new(arcsec(size), true, stream)
         };
+        let (workpiece_side, _) = config.chain.split_once('F').unwrap_or_default();
+        let carries_workpiece = workpiece_side.contains(['X', 'Y', 'Z'][axis]);
         Self {
             axis,
+            way: if carries_workpiece { -1.0 } else { 1.0 },
             travel_m: config.travel_mm[axis] * 1e-3,
             shifts: [0, 1, 2].map(|along| shift(along, &mut stream)),
             turns: [0, 1, 2].map(|about| turn(about, &mut stream)),
@@ -156,7 +161,7 @@ impl Guide {
     fn bend(&self, motion: &mut Motion, u: f64, bow_m: f64) {
         let direction = self.bow_direction();
         motion.shift[direction] += bow_m * 4.0 * u * (1.0 - u);
-        let slope = bow_m * 4.0 * (1.0 - 2.0 * u) / self.travel_m;
+        let slope = self.way * bow_m * 4.0 * (1.0 - 2.0 * u) / self.travel_m;
         // The turn from the axis towards the direction: the third axis, by the right hand.
         let about = 3 - self.axis - direction;
         let sign = if (self.axis + 1) % 3 == direction {

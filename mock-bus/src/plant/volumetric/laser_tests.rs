@@ -194,23 +194,24 @@ fn straightness_optics_see_the_bow_and_their_own_slope() {
     near(36.0 * end, -500e3 * slope, 2e-3);
 }
 
-/// 30 mm times 2.4e-4 rad about y; a table under the tool pitches the tool the other way.
+/// 30 mm times 2.4e-4 rad about y. A table under the tool turns the tool the other way, and goes the
+/// other way along its bowed guide: that is the same again.
 #[test]
 fn angular_optics_see_the_tool_tilt_by_the_right_hand() {
     let about = |about| LineOptics::Angular { about };
-    for (chain, sign) in [("FXYZ", 1.0), ("XFYZ", -1.0)] {
+    for chain in ["FXYZ", "XFYZ"] {
         let mut config = bowed();
         config.chain = chain.into();
         let mut stand = Stand::new(config, [0.0; 3]);
         stand.set_up(about([0.0, 1.0, 0.0]), ALONG_X, [0.0, 0.0, -100.0]);
-        near(stand.change_um([500.0, 0.0, 0.0]), sign * 7.2, 1e-3);
+        near(stand.change_um([500.0, 0.0, 0.0]), 7.2, 1e-3);
         // The other way round; what of it is along the line does not count.
         stand.set_up(
             about([1.0, -2.0, 0.0]),
             [-1.0, 0.0, 0.0],
             [0.0, 0.0, -100.0],
         );
-        near(stand.change_um([0.0; 3]), sign * 7.2, 1e-3);
+        near(stand.change_um([0.0; 3]), 7.2, 1e-3);
         stand.set_up(about([0.0, 0.0, 1.0]), ALONG_X, [0.0; 3]);
         near(stand.change_um([500.0, 0.0, 0.0]), 0.0, 1e-3);
     }

@@ -140,6 +140,21 @@ fn a_bow_lifts_the_middle_and_pitches_the_slide_with_its_slope() {
     }
 }
 
+/// A table that goes back along a guide that bends pitches the other way at the same coordinate.
+#[test]
+fn a_table_under_the_tool_pitches_along_its_own_way() {
+    let pitch = |chain: &str| {
+        let mut config = perfect();
+        config.chain = chain.into();
+        config.errors.deliberate_bow_um = 15.0;
+        let motion = truth(&plant(config, 1)).error_motion(0, Metres::ZERO);
+        (motion.shift[2], motion.turn[1])
+    };
+    let ((up, nose), (table_up, table_nose)) = (pitch("FXYZ"), pitch("XFYZ"));
+    assert_eq!(up, table_up);
+    assert!(nose.value().abs() > 1e-4 && nose == -table_nose, "{nose:?}");
+}
+
 /// What the issue asks of the machine, with room to spare.
 #[test]
 fn twenty_machines_err_by_30_um_and_drift_by_10_um_in_8_hours() {

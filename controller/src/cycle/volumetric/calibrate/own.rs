@@ -50,19 +50,24 @@ impl Session<'_> {
         let direction = core::array::from_fn(|k| f64::from(u8::from(k == along.index())));
         let u_mean = record.slider[place].standard_uncertainties_si.as_ref();
         let stops = self.stops_at_nodes(axis, &record.slider[place].positions_m);
-        let middle = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
-        let each = stops.into_iter().map(|(at, position)| {
-            let deviation = reference.slider(position)[place];
-            let u_mean = u_mean.and_then(|it| it.get(at)).copied().unwrap_or(0.0);
-            let scale = (deviation - middle).value() * BEAM_SCALE;
+        let first = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
+        let chain = self.live.machine().chain;
+        let each = stops.into_iter().map(|(index, position)| {
+            let strayed = reference.slider(position)[place];
+            let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
+            let scale = (strayed - first).value() * BEAM_SCALE;
             let u = BEAM_FLOOR.value().hypot(u_mean).hypot(scale);
+            let at = self.on_axis(axis, position);
+            // The slide's tilts act on the detector's place on it alone: not on what an offset of
+            // the tool is added to.
+            let carried = chain.lever(axis, at, Point::ZERO);
             Observation {
-                at: self.on_axis(axis, position),
-                tool: point_of_mm(beam.slider.place_mm),
+                at,
+                tool: point_of_mm(beam.slider.place_mm) - carried,
                 run,
                 reading: Reading::Length {
                     along: direction,
-                    deviation,
+                    deviation: strayed * chain.sense(axis),
                     u: Metres(u),
                 },
             }
@@ -75,15 +80,16 @@ impl Session<'_> {
         let record = self.references.content.roll.as_ref()?;
         let stops = self.stops_at_nodes(axis, &record.positions_m);
         let u = record.standard_uncertainties_si.as_ref();
-        let each = stops.into_iter().map(|(at, position)| {
-            let u = u.and_then(|it| it.get(at)).copied().unwrap_or(0.0);
+        let sense = self.live.machine().chain.sense(axis);
+        let each = stops.into_iter().map(|(index, position)| {
+            let u = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             Observation {
                 at: self.on_axis(axis, position),
                 tool: Point::ZERO,
                 run,
                 reading: Reading::Angle {
                     about: axis,
-                    deviation: reference.at(position),
+                    deviation: reference.at(position) * sense,
                     u: Radians(ROLL_FLOOR.value().hypot(u)),
                 },
             }

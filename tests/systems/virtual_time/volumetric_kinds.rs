@@ -1,0 +1,78 @@
+//! Three axes of another kind than the shipped ones, calibrated and corrected alike.
+
+use core::time::Duration;
+
+use tests::volume::{Frame, TRAVEL_MM, Volume, good, percentile_95, spread};
+use truestage::cycle::volumetric::WarmUp;
+use units::Metres;
+
+use super::volumetric_day::calm;
+
+/// Where the volume begins.
+const LOW_MM: [f64; 3] = [0.0, 100.0, 50.0];
+/// How long the machine becomes warm for its warm lines, and before it works.
+const WARM_UP: Duration = Duration::from_secs(2 * 3600);
+
+/// A table under a column, its volume away from the axes' zeros.
+fn table_under_a_column(text: String) -> String {
+    calm(text)
+        .replace("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
+        .replace("low_mm = [0.0, 0.0, 0.0]", &format!("low_mm = {LOW_MM:?}"))
+        .replace(
+            "from_mm = [0.0, 0.0, 150.0]",
+            "from_mm = [0.0, 100.0, 150.0]",
+        )
+}
+
+/// `count` places of that volume.
+fn places(first: u32, count: u32) -> Vec<[f64; 3]> {
+    let inside = |mm: [f64; 3]| {
+        core::array::from_fn(|k| LOW_MM[k] + mm[k] / TRAVEL_MM[k] * (TRAVEL_MM[k] - LOW_MM[k]))
+    };
+    spread(first, count).into_iter().map(inside).collect()
+}
+
+/// The table's own detectors tell where it strays and how it rolls: the tool sees the opposite.
+/// Where the other axes are at is no lever of the table's detector.
+#[test]
+fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
+    let zeroed = || {
+        Volume::zeroed(3, table_under_a_column, |text| {
+            text.replace("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
+        })
+    };
+    let mut volume = zeroed();
+    assert_eq!(good(volume.bench.machine.volumetric_config()).chain, "XFYZ");
+    let store = volume.bench.store.clone();
+    let mut hand = volume.bench.emulated.clone();
+    let machine = &mut volume.bench.machine;
+    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), &mut hand));
+
+    let mut later = zeroed();
+    later.inherit(&volume);
+    let (mut mover, state) = later.corrected();
+    let everywhere = places(0, 100);
+    let frame = Frame::of(&everywhere, &later.by_tables(&everywhere, &state));
+    let mut left = Vec::new();
+    for first in [100, 110] {
+        let here = places(first, 10);
+        let off = later.visit(&mut mover, &here, &mut Vec::new());
+        left.push(percentile_95(&frame.all_seen(&here, &off)));
+        good(later.bench.machine.idle(WARM_UP));
+        good(later.bench.machine.correct_volume(&mut mover, true));
+    }
+    let found = percentile_95(&later.uncorrected(&everywhere));
+    let tables = later.by_tables(&everywhere, &state);
+    let tables = percentile_95(&frame.all_seen(&everywhere, &tables));
+    let [cold, warm] = [left[0], left[1]].map(Metres::um);
+    println!(
+        "{} um found, {} by tables, {cold} cold, {warm} um warm",
+        found.um(),
+        tables.um()
+    );
+    assert!(
+        found.um() >= 15.0 && tables.um() >= 5.0,
+        "{found:?} {tables:?}"
+    );
+    assert!(cold <= 2.0 && warm <= 2.0, "{cold} um cold, {warm} um warm");
+}
