@@ -5,8 +5,8 @@ use core::time::Duration;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified,
-    WarmUp,
+    GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    VolumetricVerified, WarmUp,
 };
 use truestage::engine::{CsvError, Live, read_path};
 use truestage::ports::Use;
@@ -17,7 +17,7 @@ use units::Metres;
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
-use super::verbs::parse_target;
+use super::verbs::{journal_to_resume, parse_target};
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, RunArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
@@ -85,10 +85,10 @@ fn referenced_value(taken: &VolumetricReferenced) -> Value {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    if args.resume.is_some() || args.accept_drift {
+    if args.accept_drift {
         return Err(Failure::Usage {
-            what: "a calibration of three axes is neither resumed nor judged by its closure".into(),
-            help: "start it again without --resume and --accept-drift".into(),
+            what: "a calibration of three axes is not judged by its closure".into(),
+            help: "start it again without --accept-drift".into(),
         });
     }
     let warm_up = match args.warm_up_min {
@@ -105,7 +105,8 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let mut operator = Terminal::new(args.yes, output)?;
     let run = |machine: &mut Machine, store: &Store| {
-        machine.calibrate_volumetric(store, warm_up, &mut operator)
+        let resume = journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)?;
+        machine.calibrate_volumetric(store, warm_up, resume.as_deref(), &mut operator)
     };
     let machine = &args.axis.machine;
     let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
@@ -160,6 +161,7 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
         "geometry": made.id,
         "references": made.references,
         "lines": made.lines,
+        "journal": made.journal,
         "degrees_of_freedom": found.degrees_of_freedom,
         "birge_ratio": found.birge_ratio,
         "u_tool_max_um": made.u_max.um(),
@@ -227,6 +229,7 @@ pub(super) fn verified_value(verified: &VolumetricVerified) -> Value {
     json!({
         "range_um": verified.range.um(),
         "limit_um": verified.limit.um(),
+        "journal": verified.journal,
         "points": points.collect::<Vec<_>>(),
     })
 }

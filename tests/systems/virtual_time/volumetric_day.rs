@@ -56,7 +56,7 @@ fn day_of_calibrated(seed: u64, stretches: u32, places: u32) -> Day {
     let made = volume
         .bench
         .machine
-        .calibrate_volumetric(&store, warm_up, &mut hand);
+        .calibrate_volumetric(&store, warm_up, None, &mut hand);
     let made = good(made);
     eprintln!(
         "seed {seed}: {} lines, birge {:?}, {} dof, u {:.3} um, at {:.2} h, {:?}",

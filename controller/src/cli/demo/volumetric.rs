@@ -51,7 +51,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
         machine.start()?;
         machine.zero_volumetric()?;
         output.note("2 calibrate: references, lines by interferometer, cold and 2 h later");
-        let made = machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), &mut hand)?;
+        let made = machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
         output.note(&calibrated_text(&made));
         output.note("3 eight hours: deviations along a line that no calibration uses");
         let hours = day(machine, &store, &mut hand, output)?;
