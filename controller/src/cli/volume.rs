@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
@@ -120,15 +121,21 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     let birge = found
         .birge_ratio
         .map_or("–".into(), |it| format!("{it:.2}"));
-    let mut text = format!(
+    format!(
         "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
-         of what was stated\n  tool: standard uncertainty {:.3} µm at most",
+         of what was stated\n  tool: standard uncertainty {:.3} µm at most{}",
         short(&made.id),
         short(&made.references),
         made.lines,
         found.degrees_of_freedom,
         made.u_max.um(),
-    );
+        warmth_text(found),
+    )
+}
+
+/// What warmth does, a line each.
+pub(super) fn warmth_text(found: &Identified) -> String {
+    let mut text = String::new();
     for it in &found.expansions {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
         text += &format!(
@@ -148,7 +155,17 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
 }
 
 pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
-    let found = &made.found;
+    let mut value = found_value(&made.found);
+    value["geometry"] = json!(made.id);
+    value["references"] = json!(made.references);
+    value["lines"] = json!(made.lines);
+    value["journal"] = json!(made.journal);
+    value["u_tool_max_um"] = json!(made.u_max.um());
+    value
+}
+
+/// How well the readings agree, and what warmth does.
+pub(super) fn found_value(found: &Identified) -> Value {
     let expansions = found.expansions.iter().map(|it| {
         json!({"axis": it.plan.axis.to_string(), "ppm_per_k": it.per_kelvin * 1e6,
                "u_ppm_per_k": it.u * 1e6})
@@ -158,13 +175,8 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
                "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
     });
     json!({
-        "geometry": made.id,
-        "references": made.references,
-        "lines": made.lines,
-        "journal": made.journal,
         "degrees_of_freedom": found.degrees_of_freedom,
         "birge_ratio": found.birge_ratio,
-        "u_tool_max_um": made.u_max.um(),
         "expansions": expansions.collect::<Vec<_>>(),
         "bends": bends.collect::<Vec<_>>(),
     })

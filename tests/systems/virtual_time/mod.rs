@@ -13,3 +13,4 @@ mod volumetric;
 mod volumetric_day;
 mod volumetric_kept;
 mod volumetric_line;
+mod volumetric_resume;

@@ -44,8 +44,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Content, Entry, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
-    VolumeRead, VolumeReferencesEntry,
+    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
+    SCHEMA_VERSION, Store, VolumeRead, VolumeReferencesEntry,
 };
 
 /// What it is called where progress is told.
@@ -153,7 +153,11 @@ impl Machine {
             config_hash: head.config_hash,
             axis: head.axis,
             drive: head.drive,
-            instrument: self.instrument_record(instrument),
+            // It is brought along: who it is shows when it is switched on.
+            instrument: InstrumentRecord {
+                identity: String::new(),
+                ..self.instrument_record(instrument)
+            },
             started: utc_now(),
             calibration,
             targets_m: Vec::new(),

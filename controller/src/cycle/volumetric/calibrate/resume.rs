@@ -23,9 +23,9 @@ use crate::store::{
 };
 
 /// How far from where it was interrupted the machine may be in temperature when nothing is to tell
-/// what warmth does, in standard uncertainties of a thermometer: half of what lines must at least
-/// differ by to tell it.
-const ALIKE: f64 = 5.0;
+/// what warmth does, in standard uncertainties of a thermometer. Lines must differ by as much to
+/// tell it (`compensator::volumetric::identify`): closer ones count as read at one warmth.
+const ALIKE: f64 = 10.0;
 
 /// A new journal, or one that is continued after its last whole line.
 pub(super) fn open(
