@@ -27,6 +27,30 @@ const NODE_MM: f64 = 25.0;
 /// How long the tool stands before it is judged.
 pub const STAND: Duration = Duration::from_millis(300);
 
+/// Heartbeats so rare that hours without SYNC cost little.
+pub fn calm(text: String) -> String {
+    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
+        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .replace(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
+        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+}
+
+/// Few nodes and short averages, for tests of what is done rather than of how well it is measured.
+pub fn quick(text: String) -> String {
+    let text = text.replace(
+        "step_mm = 25.0\nsamples = 50",
+        "step_mm = 50.0\nsamples = 10",
+    );
+    let text = text.replace(
+        "step_mm = 50.0\nsettle_ms = 100.0",
+        "step_mm = 100.0\nsettle_ms = 50.0",
+    );
+    calm(text.replace("average_samples = 60", "average_samples = 20"))
+}
+
 /// An error of the tool: along x, y, z.
 pub type Off = [Metres; 3];
 

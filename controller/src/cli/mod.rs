@@ -16,6 +16,7 @@ mod session;
 mod table;
 mod verbs;
 mod volume;
+mod volume_fit;
 mod volumetric;
 
 use std::path::PathBuf;

@@ -2,11 +2,12 @@
 
 use core::time::Duration;
 
+use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified,
-    WarmUp,
+    GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    VolumetricVerified, WarmUp,
 };
 use truestage::engine::{CsvError, Live, read_path};
 use truestage::ports::Use;
@@ -17,7 +18,7 @@ use units::Metres;
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
-use super::verbs::parse_target;
+use super::verbs::{journal_to_resume, parse_target};
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, RunArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
@@ -85,10 +86,10 @@ fn referenced_value(taken: &VolumetricReferenced) -> Value {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    if args.resume.is_some() || args.accept_drift {
+    if args.accept_drift {
         return Err(Failure::Usage {
-            what: "a calibration of three axes is neither resumed nor judged by its closure".into(),
-            help: "start it again without --resume and --accept-drift".into(),
+            what: "a calibration of three axes is not judged by its closure".into(),
+            help: "start it again without --accept-drift".into(),
         });
     }
     let warm_up = match args.warm_up_min {
@@ -105,7 +106,8 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let mut operator = Terminal::new(args.yes, output)?;
     let run = |machine: &mut Machine, store: &Store| {
-        machine.calibrate_volumetric(store, warm_up, &mut operator)
+        let resume = journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)?;
+        machine.calibrate_volumetric(store, warm_up, resume.as_deref(), &mut operator)
     };
     let machine = &args.axis.machine;
     let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
@@ -119,15 +121,21 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     let birge = found
         .birge_ratio
         .map_or("–".into(), |it| format!("{it:.2}"));
-    let mut text = format!(
+    format!(
         "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
-         of what was stated\n  tool: standard uncertainty {:.3} µm at most",
+         of what was stated\n  tool: standard uncertainty {:.3} µm at most{}",
         short(&made.id),
         short(&made.references),
         made.lines,
         found.degrees_of_freedom,
         made.u_max.um(),
-    );
+        warmth_text(found),
+    )
+}
+
+/// What warmth does, a line each.
+pub(super) fn warmth_text(found: &Identified) -> String {
+    let mut text = String::new();
     for it in &found.expansions {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
         text += &format!(
@@ -147,7 +155,17 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
 }
 
 pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
-    let found = &made.found;
+    let mut value = found_value(&made.found);
+    value["geometry"] = json!(made.id);
+    value["references"] = json!(made.references);
+    value["lines"] = json!(made.lines);
+    value["journal"] = json!(made.journal);
+    value["u_tool_max_um"] = json!(made.u_max.um());
+    value
+}
+
+/// How well the readings agree, and what warmth does.
+pub(super) fn found_value(found: &Identified) -> Value {
     let expansions = found.expansions.iter().map(|it| {
         json!({"axis": it.plan.axis.to_string(), "ppm_per_k": it.per_kelvin * 1e6,
                "u_ppm_per_k": it.u * 1e6})
@@ -157,12 +175,8 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
                "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
     });
     json!({
-        "geometry": made.id,
-        "references": made.references,
-        "lines": made.lines,
         "degrees_of_freedom": found.degrees_of_freedom,
         "birge_ratio": found.birge_ratio,
-        "u_tool_max_um": made.u_max.um(),
         "expansions": expansions.collect::<Vec<_>>(),
         "bends": bends.collect::<Vec<_>>(),
     })
@@ -227,6 +241,7 @@ pub(super) fn verified_value(verified: &VolumetricVerified) -> Value {
     json!({
         "range_um": verified.range.um(),
         "limit_um": verified.limit.um(),
+        "journal": verified.journal,
         "points": points.collect::<Vec<_>>(),
     })
 }

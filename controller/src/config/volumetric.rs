@@ -257,7 +257,14 @@ pub struct VolumetricCalibrateConfig {
     pub settle_ms: f64,
     pub average_samples: u32,
     pub detector_samples: u32,
+    #[serde(default = "resume_limit_um")]
+    pub resume_limit_um: f64,
     pub second_tool_offset_mm: Option<[f64; 3]>,
+}
+
+/// What a calibration that is continued may find changed along an axis.
+const fn resume_limit_um() -> f64 {
+    10.0
 }
 
 /// Which line is read to judge the correction.

@@ -17,6 +17,7 @@ mod lease;
 mod plate;
 mod pose;
 mod record;
+mod volume;
 
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,13 @@ pub use record::{
     ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
     StrokeRecord,
 };
+pub use volume::{
+    BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
+    VolumeCheckEntry, VolumePlanEntry, VolumeRead, VolumeReferencesEntry,
+};
+
+pub(crate) use record::{AXES, error_name};
+pub(crate) use volume::{metres, point};
 
 pub(crate) use atomic::write_new_or_replace;
 

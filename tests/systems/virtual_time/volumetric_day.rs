@@ -5,23 +5,12 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use tests::volume::{Frame, Off, Volume, good, percentile_95, spread};
+use tests::volume::{Frame, Off, Volume, calm, good, percentile_95, spread};
 use truestage::cycle::volumetric::WarmUp;
 use units::{Metres, Time};
 
 /// How long the day is.
 const DAY_H: f64 = 8.0;
-
-/// Heartbeats so rare that hours without SYNC cost little.
-pub(super) fn calm(text: String) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
-}
 
 /// What one day came to.
 #[derive(Default)]
@@ -56,7 +45,7 @@ fn day_of_calibrated(seed: u64, stretches: u32, places: u32) -> Day {
     let made = volume
         .bench
         .machine
-        .calibrate_volumetric(&store, warm_up, &mut hand);
+        .calibrate_volumetric(&store, warm_up, None, &mut hand);
     let made = good(made);
     eprintln!(
         "seed {seed}: {} lines, birge {:?}, {} dof, u {:.3} um, at {:.2} h, {:?}",

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use tests::volume::{Off, Volume, good, percentile_95, size, spread};
+use tests::volume::{Off, Volume, calm, good, percentile_95, size, spread};
 use truestage::store::MemoryName;
 use units::{Metres, Time};
 
@@ -11,17 +11,6 @@ const TOOL: &str = "tool_offset_mm = [0.0, 0.0, -100.0]";
 
 /// When what is deliberate begins.
 const BEGINS_S: f64 = 360.0;
-
-/// Heartbeats so rare that hours without SYNC cost little.
-fn calm(text: String) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
-}
 
 /// With its errors known and the detectors' references taken.
 fn known(seed: u64, machine: impl Fn(String) -> String, deliberate: &str, own: &str) -> Volume {

@@ -2,11 +2,9 @@
 
 use core::time::Duration;
 
-use tests::volume::{Frame, TRAVEL_MM, Volume, good, percentile_95, spread};
+use tests::volume::{Frame, TRAVEL_MM, Volume, calm, good, percentile_95, spread};
 use truestage::cycle::volumetric::WarmUp;
 use units::Metres;
-
-use super::volumetric_day::calm;
 
 /// Where the volume begins.
 const LOW_MM: [f64; 3] = [0.0, 100.0, 50.0];

@@ -106,6 +106,46 @@ pub enum VolumetricFailure {
         /// How long.
         waited: Duration,
     },
+    /// A journal that does not say how its readings are evaluated.
+    #[error(
+        "this journal does not say how errors of three axes are found from it; give one of \
+         `calibrate` of such a machine"
+    )]
+    NoPlan,
+    /// A calibration is to be continued, but its references hold no more.
+    #[error(
+        "axis {axis}: along its way the detectors of the {what} see changes that differ by {:.2} um, more \
+         than {:.2} um (resume_limit_um), since the references of this run were taken; the machine \
+         has changed, or a detector was moved: start a new calibration without --resume", seen.um(),
+         limit.um()
+    )]
+    Moved {
+        /// Along which axis.
+        axis: Axis,
+        /// Of what.
+        what: &'static str,
+        /// Largest minus smallest change.
+        seen: Metres,
+        /// What it may be.
+        limit: Metres,
+    },
+    /// A calibration is to be continued on a machine that is colder or warmer.
+    #[error(
+        "thermometer {index} (in the order of [[volumetric.temperature]]) shows {seen:.2} C, it showed \
+         {before:.2} C when this run was interrupted; without lines that are read warm it may be \
+         {limit:.2} K more or less: let the machine become as warm as it was, or start a new \
+         calibration with --warm-up-min"
+    )]
+    OtherWarmth {
+        /// Which, from 1.
+        index: usize,
+        /// In the last line that is whole, °C.
+        before: f64,
+        /// Now, °C.
+        seen: f64,
+        /// By how much they may differ, kelvin.
+        limit: f64,
+    },
     /// Readings that do not tell the errors.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
@@ -240,6 +280,7 @@ impl VolumetricFailure {
             | Self::Volume(_)
             | Self::Influence(_)
             | Self::Path { .. }
+            | Self::NoPlan
             | Self::Roll(_) => 2,
             Self::OutOfTolerance { .. } => 5,
             Self::NoReference { .. }
@@ -250,6 +291,8 @@ impl VolumetricFailure {
             | Self::NoTemperature { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
+            | Self::Moved { .. }
+            | Self::OtherWarmth { .. }
             | Self::Identify(_)
             | Self::Conditions(_)
             | Self::NoCorrection(_)

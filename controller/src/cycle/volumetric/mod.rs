@@ -25,7 +25,7 @@ mod state;
 mod verify;
 mod zero;
 
-pub use calibrate::{VolumetricCalibrated, WarmUp};
+pub use calibrate::{VolumetricCalibrated, VolumetricEvaluated, WarmUp, volume_plan};
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
 pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};

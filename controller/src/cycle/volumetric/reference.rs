@@ -22,8 +22,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord, RecordHead,
-    Store,
+    AXES, BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord,
+    RecordHead, Store,
 };
 
 /// How long an axis stands before its detectors count.
@@ -34,8 +34,6 @@ const SAMPLE_LIMIT: Duration = Duration::from_millis(500);
 const ON_THE_SLIDE: &str = "on the slide";
 const AT_THE_END: &str = "at the end of the beam";
 const OF_THE_ROLL: &str = "of the roll";
-/// Letters of the axes in files.
-const LETTERS: [char; 3] = ['x', 'y', 'z'];
 
 /// What the detectors read, and how warm the machine was meanwhile.
 #[derive(Clone, Debug)]
@@ -130,20 +128,22 @@ impl Machine {
         let geometry = geometry.ok_or(VolumetricFailure::NoGeometry)?;
         store.load(&geometry)?.geometry(&geometry)?;
         let references = self.take_references()?;
-        self.keep_references(store, &geometry, references)
+        self.keep_references(store, &geometry, references, "reference")
     }
 
-    /// Stores `references` as those of the errors called `geometry`, and activates them.
+    /// Stores `references`, which come from `source`, as those of the errors called `geometry`, and
+    /// activates them.
     pub(super) fn keep_references(
         &self,
         store: &Store,
         geometry: &str,
         mut references: References,
+        source: &str,
     ) -> Result<VolumetricReferenced, Failure> {
         references.content.geometry = geometry.to_owned();
         let head = RecordHead {
             created: utc_now(),
-            source: "reference".into(),
+            source: source.to_owned(),
             ..self.this_volume(REFERENCES)?
         };
         let content = Content::BeamReferences(references.content.clone());
@@ -412,7 +412,7 @@ impl Stops {
             record(name, &self.nodes, values.collect(), u.collect())
         };
         Ok(BeamRecord {
-            axis: LETTERS[axis.index()],
+            axis: AXES[axis.index()],
             slider: [function(0)?, function(1)?],
             end_m: config.end.as_ref().map(|_| end),
         })

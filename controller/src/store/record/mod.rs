@@ -25,6 +25,9 @@ pub use volumetric::{
 };
 pub use warmth::{BendRecord, ExpansionRecord};
 
+pub(crate) use volumetric::error_name;
+pub(crate) use warmth::AXES;
+
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

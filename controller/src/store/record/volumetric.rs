@@ -122,6 +122,11 @@ fn error_names() -> impl Iterator<Item = ErrorName> {
     pairs.flat_map(|(axis, it)| [ErrorName::Along(axis, it), ErrorName::About(axis, it)])
 }
 
+/// The error function that a file calls so; `None` for a name that is none.
+pub(crate) fn error_name(text: &str) -> Option<ErrorName> {
+    error_names().find(|it| it.to_string() == text)
+}
+
 impl GeometryContent {
     /// The name of this kind.
     pub const KIND: &'static str = "volumetric_geometry";
@@ -157,7 +162,7 @@ impl GeometryContent {
     pub fn errors(&self, id: &str) -> Result<[AxisErrors; 3], StoreError> {
         let mut axes: [AxisErrors; 3] = Default::default();
         for record in &self.functions {
-            let name = error_names().find(|it| it.to_string() == record.name);
+            let name = error_name(&record.name);
             let taken = match name {
                 Some(ErrorName::Along(axis, it)) => axes[axis.index()].along[it.index()]
                     .replace(record.function(id)?)

@@ -9,7 +9,8 @@ use units::Metres;
 
 use super::super::{StoreError, short};
 
-pub(super) const AXES: [char; 3] = ['x', 'y', 'z'];
+/// Letters of the axes in files.
+pub(crate) const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// A guide that bends when it is warmer on one side.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
