@@ -366,8 +366,9 @@ impl Session<'_> {
             let (low, high) = (low.along(axis).value(), high.along(axis).value());
             Metres(0.0_f64.clamp(low, high))
         });
-        self.design
-            .plan(self.nodes(), Point::new(zero[0], zero[1], zero[2]))
+        let shape = function_shape(self.config.compensation.interpolation);
+        let zero = Point::new(zero[0], zero[1], zero[2]);
+        self.design.plan(self.nodes(), zero, shape)
     }
 
     fn plan(&self, is_warm: bool) -> Plan {
