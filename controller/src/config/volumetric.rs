@@ -92,6 +92,7 @@ pub struct BeamConfig {
     pub source_mm: Option<f64>,
     pub end_mm: Option<f64>,
     pub translation_share: Option<f64>,
+    pub standard_uncertainty_um: Option<f64>,
     pub slider: BeamDetectorConfig,
     pub end: Option<BeamDetectorConfig>,
 }
@@ -159,6 +160,7 @@ pub struct RollConfig {
     pub base_mm: f64,
     pub inclination_deg: f64,
     pub roll_max_arcsec: f64,
+    pub standard_uncertainty_arcsec: Option<f64>,
     pub age_max_ms: f64,
     pub speed_max_arcsec_per_s: f64,
     pub noise_max_arcsec: f64,

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use tests::volume::{Off, Volume, calm, good, percentile_95, size, spread};
+use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
 use truestage::store::MemoryName;
 use units::{Metres, Time};
 
@@ -54,13 +54,6 @@ fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
     pairs
         .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
         .collect()
-}
-
-fn largest(errors: &[Off]) -> Metres {
-    errors
-        .iter()
-        .map(|it| size(*it))
-        .fold(Metres(0.0), |a, b| a.max(b))
 }
 
 /// The x guide bows by 15 um, and its slide pitches along: the first memory lets the tool follow.

@@ -44,7 +44,7 @@ fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
     let store = volume.bench.store.clone();
     let mut hand = volume.bench.emulated.clone();
     let machine = &mut volume.bench.machine;
-    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), &mut hand));
+    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand));
 
     let mut later = zeroed();
     later.inherit(&volume);

@@ -137,10 +137,8 @@ impl VolumetricCorrection {
             influences: influences(&own.influence)?,
             memories: state.memories,
             reaction: own.feed.as_ref().map(|it| it.reaction),
-            u_displacement: noise(own),
-            u_roll: own.roll.as_ref().map_or(Radians::ZERO, |it| {
-                Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
-            }),
+            u_displacement: u_displacement(own),
+            u_roll: own.roll.as_ref().map_or(Radians::ZERO, u_roll),
         })
     }
 
@@ -337,7 +335,8 @@ impl Correction for VolumetricCorrection {
     }
 }
 
-/// `noise_max` is how far two samples can be apart: so many standard deviations.
+/// `noise_max` is how far two samples can be apart: so many standard deviations. What is stated
+/// where nobody says more of a detector.
 const NOISE_RANGE: f64 = 3.0;
 
 fn per_axis(point: Point) -> PerAxis<Metres> {
@@ -348,11 +347,19 @@ fn per_axis(point: Point) -> PerAxis<Metres> {
     values
 }
 
-/// The worst standard deviation of a detector on a slide.
-fn noise(config: &VolumetricConfig) -> Metres {
-    let sliders = config.beam.each().into_iter().flatten();
-    let each = sliders.map(|it| Metres::from_um(it.slider.noise_max_um / NOISE_RANGE));
+/// Of a displacement by the worst of the beams.
+fn u_displacement(config: &VolumetricConfig) -> Metres {
+    let beams = config.beam.each().into_iter().flatten();
+    let each = beams.map(|it| {
+        let noise_um = it.slider.noise_max_um / NOISE_RANGE;
+        Metres::from_um(it.standard_uncertainty_um.unwrap_or(noise_um))
+    });
     each.fold(Metres::ZERO, Quantity::max)
+}
+
+fn u_roll(config: &RollConfig) -> Radians {
+    let noise_arcsec = config.noise_max_arcsec / NOISE_RANGE;
+    Radians::from_arcsec(config.standard_uncertainty_arcsec.unwrap_or(noise_arcsec))
 }
 
 fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {

@@ -48,7 +48,7 @@ impl VolumetricEvaluated {
     pub fn of(read: &VolumeRead, shape: Shape) -> Result<Self, Failure> {
         let entry = read.plan.as_ref().ok_or(VolumetricFailure::NoPlan)?;
         let wrong = || VolumetricFailure::NoPlan;
-        let (plan, observations) = plan_of(entry, read).ok_or_else(wrong)?;
+        let (plan, observations) = plan_of(entry, read, shape).ok_or_else(wrong)?;
         let found = plan.identify(&observations);
         let found = found.map_err(VolumetricFailure::from)?;
         let axes = found.axis_errors(shape);
@@ -118,7 +118,11 @@ fn references(read: &VolumeRead) -> Vec<Celsius> {
 
 /// What is to be found, and from what; lines that are not whole are left out. `None` when something
 /// is called what it is not.
-fn plan_of(entry: &VolumePlanEntry, read: &VolumeRead) -> Option<(Plan, Vec<Observation>)> {
+fn plan_of(
+    entry: &VolumePlanEntry,
+    read: &VolumeRead,
+    shape: Shape,
+) -> Option<(Plan, Vec<Observation>)> {
     let whole = read.whole.iter();
     let whole: Vec<_> = whole.filter(|it| it.line < entry.lines.len()).collect();
     let mut observations = Vec::new();
@@ -144,6 +148,7 @@ fn plan_of(entry: &VolumePlanEntry, read: &VolumeRead) -> Option<(Plan, Vec<Obse
     let plan = Plan {
         chain: entry.chain.parse().ok()?,
         functions: functions.collect::<Option<_>>()?,
+        shape,
         squarenesses: SquarenessName::ALL.to_vec(),
         runs: runs.collect(),
         zero: point(entry.zero_m),

@@ -5,7 +5,9 @@ use compensator::volumetric::model::ErrorName;
 use compensator::volumetric::{Axis, Point};
 use units::Metres;
 
-use crate::assemble::{bend_plans, point_of_mm, volume_axis, volumetric_chain, work_volume};
+use crate::assemble::{
+    bend_plans, function_shape, point_of_mm, volume_axis, volumetric_chain, work_volume,
+};
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
 use crate::cycle::volumetric::VolumetricFailure;
 use crate::store::{
@@ -35,7 +37,8 @@ pub fn volume_plan(
     let design = standard_design(chain, &volume, &tools, rolls);
     let nodes = nodes(config, own);
     let zero = zero_of(config);
-    let plan = design.plan(nodes, zero);
+    let shape = function_shape(config.compensation.interpolation);
+    let plan = design.plan(nodes, zero, shape);
     let angles = plan.runs.iter().map(|it| it.alignment.map(|it| it.angle));
     let cold = design.lines.iter().zip(angles);
     let cold = cold.map(|(line, angle)| entry(config, nodes, line, angle, false));
