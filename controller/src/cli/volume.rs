@@ -143,6 +143,24 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
             plan.axis, plan.towards
         );
     }
+    text + &unknown_text(made)
+}
+
+/// What nobody knows after this calibration, and what would tell it.
+fn unknown_text(made: &VolumetricCalibrated) -> String {
+    let mut text = String::new();
+    for it in &made.unknown_bends {
+        text += &format!(
+            "\n  guide of {} bends towards {}: not measured, for all lines were read at one warmth; it is not \
+             corrected and in no uncertainty: calibrate with --warm-up-min",
+            it.axis, it.towards
+        );
+    }
+    for name in &made.without_effect {
+        text += &format!(
+            "\n  {name}: taken as zero, no tool given shows it: give second_tool_offset_mm"
+        );
+    }
     text
 }
 
@@ -156,7 +174,14 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
         json!({"axis": it.plan.axis.to_string(), "towards": it.plan.towards.to_string(),
                "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
     });
+    let unknown = made
+        .unknown_bends
+        .iter()
+        .map(|it| json!({"axis": it.axis.to_string(), "towards": it.towards.to_string()}));
+    let without_effect = made.without_effect.iter().map(ToString::to_string);
     json!({
+        "unknown_bends": unknown.collect::<Vec<_>>(),
+        "taken_as_zero": without_effect.collect::<Vec<_>>(),
         "geometry": made.id,
         "references": made.references,
         "lines": made.lines,
@@ -281,10 +306,14 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 
 fn live_text(live: &Live) -> String {
     let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
-        let (offset, u) = (live.offset[k].um(), live.uncertainty[k].um());
+        let offset = live.offset[k].um();
+        let u = match live.uncertainty[k].um() {
+            known if known.is_finite() => format!("{known:.3} µm"),
+            _ => "unknown".into(),
+        };
         let set_point = (live.nominal[k] + live.offset[k]).mm();
         format!(
-            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u:.3} µm",
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
             live.nominal[k].mm()
         )
     });

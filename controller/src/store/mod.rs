@@ -32,7 +32,7 @@ pub use record::{
     ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
     IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
     ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
-    StrokeRecord,
+    StrokeRecord, UnknownRecord,
 };
 
 pub(crate) use atomic::write_new_or_replace;

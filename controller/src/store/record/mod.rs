@@ -23,7 +23,7 @@ pub use volumetric::{
     BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
     MemoryRecord, StateMemoryContent,
 };
-pub use warmth::{BendRecord, ExpansionRecord};
+pub use warmth::{BendRecord, ExpansionRecord, UnknownRecord};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.

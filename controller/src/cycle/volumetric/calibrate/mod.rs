@@ -2,33 +2,37 @@
 //! warmth does, warm; one identification of all of them with its covariance.
 //!
 //! The references of the detectors are taken first: what the tables hold for is the machine as it
-//! was then. While lines are read it goes on warming up. What the detectors see of that is taken
-//! off each reading where it is made; expansions and bends are found with the errors, by what the
-//! thermometers showed at each line. Straightnesses are those that the detectors read along their
+//! was then. While lines are read it goes on warming up. What the detectors see of that, and what
+//! temperatures are known to do by the configuration, is taken off each reading where it is made
+//! (`known`). With warm lines expansions and bends are found with the errors, by what the
+//! thermometers showed at each line; without, expansions are those of the configuration and guides
+//! that bend are not known to: the result says so. Straightnesses are those that the detectors read along their
 //! beams, where there are beams; a beam is straighter than what a straightedge tells.
 //!
 //! A result that cannot be applied is refused before it is stored.
 
+mod known;
 mod own;
 
 use core::time::Duration;
 
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{
-    ExpansionPlan, Identified, Observation, Optics, Plan, Reading, RunSetup, StandardDesign,
-    StandardLine, ThermalPlan, standard_design,
+    BendPlan, Identified, Observation, Optics, Plan, RunSetup, StandardDesign, StandardLine,
+    ThermalPlan, standard_design,
 };
-use compensator::volumetric::model::{Machine as Model, Thermal, VolumetricModel};
+use compensator::volumetric::model::ErrorName;
 use compensator::volumetric::online::{BeamReference, MovingState};
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres, Radians};
 
 use super::line::{LineOperator, LineOptics, LineReadout, LineTask};
 use super::reference::References;
+use super::thermometers::Thermometry;
 use super::{GEOMETRY, VolumetricCorrection, VolumetricFailure, VolumetricState};
 use crate::assemble::{
-    beam_drift, bend_plans, function_shape, model_limits, point_of_mm, thermal, volume_axis,
-    volumetric_chain, work_volume,
+    beam_drift, bend_plans, function_shape, point_of_mm, thermal, volume_axis, volumetric_chain,
+    work_volume,
 };
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
 use crate::cycle::utc_now;
@@ -37,8 +41,9 @@ use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
     BendRecord, CalibrationRecord, Content, ExpansionRecord, GeometryContent, InstrumentRecord,
-    RecordHead, Store,
+    RecordHead, Store, UnknownRecord,
 };
+use known::{Known, expansion_plans};
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -48,7 +53,8 @@ const PLACES: u32 = 4;
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmUp {
-    /// It is not wanted: what warmth does is taken from the configuration.
+    /// It is not wanted: what scales and structure do in warmth is taken from the configuration, and
+    /// how guides bend stays unknown.
     None,
     /// Something else warms it for so long, while the axes are switched off.
     Idle(Duration),
@@ -69,6 +75,11 @@ pub struct VolumetricCalibrated {
     pub found: Identified,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
+    /// Guides that bend by the configuration, by how much nobody knows: no warm lines told it. They
+    /// are not corrected, and no uncertainty counts them.
+    pub unknown_bends: Vec<BendPlan>,
+    /// Errors that no line sees, because they move nothing with the tools given: taken as zero.
+    pub without_effect: Vec<ErrorName>,
 }
 
 /// What is known of the machine when its lines are read.
@@ -78,8 +89,8 @@ struct Session<'a> {
     references: References,
     beams: [Option<BeamReference>; 3],
     roll: Option<Function<Radians>>,
-    /// What detectors alone make of a place: without any table.
-    live: VolumetricModel,
+    known: Known,
+    thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
     design: StandardDesign,
     runs: Runs,
@@ -108,7 +119,8 @@ impl Machine {
         warm_up: WarmUp,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricCalibrated, Failure> {
-        let mut session = self.calibration_session(operator)?;
+        let is_warm = warm_up != WarmUp::None;
+        let mut session = self.calibration_session(is_warm, operator)?;
         let lines = session.design.lines.clone();
         let warm: Vec<StandardLine> = match warm_up {
             WarmUp::None => Vec::new(),
@@ -143,11 +155,12 @@ impl Machine {
         self.end_lines(session.operator)?;
         self.observer
             .progress(Stage::Calibrate, WHOLE, total, total);
-        self.conclude(store, session, !warm.is_empty())
+        self.conclude(store, session, is_warm)
     }
 
     fn calibration_session<'a>(
         &mut self,
+        is_warm: bool,
         operator: &'a mut dyn LineOperator,
     ) -> Result<Session<'a>, Failure> {
         let config = self.volumetric_config()?.clone();
@@ -162,24 +175,9 @@ impl Machine {
         tools.extend(own.second_tool_offset_mm.map(point_of_mm));
         let rolls = Axis::ALL.map(|axis| roll_axis == Some(axis));
         let design = standard_design(chain, &volume, &tools, rolls);
-        let live = VolumetricModel::new(
-            Model {
-                chain,
-                volume,
-                axes: Default::default(),
-                squareness: Default::default(),
-                thermal: Thermal::default(),
-                tool_max: Metres::from_mm(config.tool_max_mm),
-                displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-                roll_max: config
-                    .roll
-                    .as_ref()
-                    .map_or(Radians(0.0), |it| Radians::from_arcsec(it.roll_max_arcsec)),
-            },
-            model_limits(&config.compensation),
-        );
-        let live = live.map_err(VolumetricFailure::from)?;
         let references = self.take_references()?;
+        let known = Known::new(&config, &references.temperatures, is_warm)?;
+        let thermometry = Thermometry::new(self.config(), &config.temperature);
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             if let Some(drift) = beam.and_then(beam_drift) {
@@ -193,7 +191,8 @@ impl Machine {
             references,
             beams,
             roll,
-            live,
+            known,
+            thermometry,
             operator,
             design,
             runs: Runs::default(),
@@ -235,11 +234,11 @@ impl Machine {
         for at in line.points(session.points_of(line)) {
             let read = self.read_line(&set_up, at)?;
             let (state, temperatures) = self.state_now(session, at)?;
-            for (sum, celsius) in shown.iter_mut().zip(temperatures) {
+            for (sum, celsius) in shown.iter_mut().zip(&temperatures) {
                 sum.push(celsius.value());
             }
             let mut observation = read.observation(run);
-            observation.reading = session.without_live(&observation, &state)?;
+            observation.reading = session.known.without(&observation, &state, &temperatures)?;
             session.runs.observations.push(observation);
         }
         let mean = |it: &Vec<f64>| Celsius(it.iter().sum::<f64>() / it.len() as f64);
@@ -251,7 +250,7 @@ impl Machine {
     /// What the detectors see beyond their references, and what the thermometers show.
     fn state_now(
         &mut self,
-        session: &Session<'_>,
+        session: &mut Session<'_>,
         at: Point,
     ) -> Result<(MovingState, Vec<Celsius>), Failure> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
@@ -273,7 +272,10 @@ impl Machine {
             let roll = self.roll_of(axis, position, config, &seen)?;
             state.roll[axis.index()] = roll - reference.at(position);
         }
-        Ok((state, self.temperatures_of(&session.config, &seen)?))
+        for still in &seen {
+            session.thermometry.add(still.now, &still.temperatures)?;
+        }
+        Ok((state, session.thermometry.take()))
     }
 
     fn become_warm(&mut self, how: WarmUp) -> Result<(), Failure> {
@@ -325,6 +327,9 @@ impl Machine {
         content.bends = found.bends.iter().map(BendRecord::of).collect();
         content.expansions = found.expansions.iter().map(ExpansionRecord::of).collect();
         content.drives = self.volume_drives(&session.config);
+        let unknown_bends = session.unknown_bends(&found);
+        let without_effect = session.design.without_effect.clone();
+        content.unknown = UnknownRecord::of(&unknown_bends, &without_effect);
         let head = RecordHead {
             created: utc_now(),
             source: format!("calibrate, {} lines", session.runs.setups.len()),
@@ -346,6 +351,8 @@ impl Machine {
             lines,
             found,
             u_max,
+            unknown_bends,
+            without_effect,
         })
     }
 }
@@ -377,16 +384,11 @@ impl Session<'_> {
         if !is_warm || known.channels.is_empty() {
             return plan;
         }
-        let expansions = Axis::ALL.into_iter().filter_map(|axis| {
-            let of_axis = |it: &usize| known.channels[*it].expansion[axis.index()] != 0.0;
-            let thermometers: Vec<usize> = (0..known.channels.len()).filter(of_axis).collect();
-            (!thermometers.is_empty()).then_some(ExpansionPlan { axis, thermometers })
-        });
         plan.thermal = ThermalPlan {
             references: self.references.temperatures.clone(),
             runs: self.runs.temperatures.clone(),
             u: known.channels.iter().map(|it| it.u).fold(0.0, f64::max),
-            expansions: expansions.collect(),
+            expansions: expansion_plans(&self.config),
             bends: bend_plans(&self.config),
             fixed: known.fixed,
         };
@@ -403,32 +405,12 @@ impl Session<'_> {
         moved.map(|it| nodes[it.index()]).max().unwrap_or(2)
     }
 
-    /// The reading as it would be, had the detectors seen nothing beyond their references.
-    fn without_live(
-        &self,
-        observation: &Observation,
-        state: &MovingState,
-    ) -> Result<Reading, VolumetricFailure> {
-        let Reading::Length {
-            along,
-            deviation,
-            u,
-        } = observation.reading
-        else {
-            return Ok(observation.reading);
-        };
-        let now = self.live.conditions(observation.tool, &[], state)?;
-        let seen = self.live.deviation(observation.at, &now)?;
-        let part = Axis::ALL
-            .into_iter()
-            .map(|it| seen.along(it) * along[it.index()]);
-        let part = part.fold(Metres(0.0), |sum, it| sum + it);
-        let deviation = deviation - part;
-        Ok(Reading::Length {
-            along,
-            deviation,
-            u,
-        })
+    /// Guides that bend by the configuration, but of which no bow was found.
+    fn unknown_bends(&self, found: &Identified) -> Vec<BendPlan> {
+        let is_known = |it: &BendPlan| found.bends.iter().any(|found| found.plan == *it);
+        let mut bends = bend_plans(&self.config);
+        bends.retain(|it| !is_known(it));
+        bends
     }
 
     /// At the tool in use, over places all over the volume.
