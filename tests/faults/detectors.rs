@@ -56,8 +56,7 @@ fn standing(reaction: &'static str) -> (Bench, Seen) {
     let quick = |text: String| {
         let text = text.replace("reaction = \"fade_out\"", name);
         let text = text.replace("fade_out_s = 60.0", fade);
-        let text = text.replace("blend_s = 2.0", "blend_s = 0.5");
-        text.replace("smoothing_s = 5.0", "smoothing_s = 1.0")
+        text.replace("blend_s = 2.0", "blend_s = 0.5")
     };
     let mut bench = Bench::shaped(&VOLUMETRIC, 7, quick, |text| text);
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));

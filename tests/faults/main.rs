@@ -19,4 +19,5 @@ mod serial;
 mod start;
 mod stopping;
 mod storm;
+mod thermometers;
 mod witness;

@@ -286,6 +286,7 @@ impl Volume {
                     high_m: travel,
                     bow_m_per_k: slope * travel / 4.0,
                     standard_uncertainty_m_per_k: 0.0,
+                    sideways: false,
                 }
             });
             each.collect()

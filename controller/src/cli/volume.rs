@@ -11,7 +11,7 @@ use truestage::cycle::volumetric::{
 };
 use truestage::engine::{CsvError, Live, read_path};
 use truestage::ports::Use;
-use truestage::store::{MemoryName, short};
+use truestage::store::{MemoryName, UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
 use units::Metres;
 
@@ -129,7 +129,7 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
         made.lines,
         found.degrees_of_freedom,
         made.u_max.um(),
-        warmth_text(found),
+        warmth_text(found) + &unknown_text(&made.unknown),
     )
 }
 
@@ -154,6 +154,23 @@ pub(super) fn warmth_text(found: &Identified) -> String {
     text
 }
 
+/// What nobody knows after this calibration, and what would tell it.
+pub(super) fn unknown_text(unknown: &UnknownRecord) -> String {
+    let mut text = String::new();
+    for [axis, towards] in &unknown.bends {
+        text += &format!(
+            "\n  guide of {axis} bends towards {towards}: not measured, for all lines were read at one warmth; it \
+             is not corrected and in no uncertainty: calibrate with --warm-up-min"
+        );
+    }
+    for name in &unknown.without_effect {
+        text += &format!(
+            "\n  {name}: taken as zero, no tool given shows it: give second_tool_offset_mm"
+        );
+    }
+    text
+}
+
 pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
     let mut value = found_value(&made.found);
     value["geometry"] = json!(made.id);
@@ -161,7 +178,15 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
     value["lines"] = json!(made.lines);
     value["journal"] = json!(made.journal);
     value["u_tool_max_um"] = json!(made.u_max.um());
+    add_unknown(&mut value, &made.unknown);
     value
+}
+
+pub(super) fn add_unknown(value: &mut Value, unknown: &UnknownRecord) {
+    let bends = unknown.bends.iter();
+    let bends = bends.map(|[axis, towards]| json!({"axis": axis, "towards": towards}));
+    value["unknown_bends"] = bends.collect();
+    value["taken_as_zero"] = json!(unknown.without_effect);
 }
 
 /// How well the readings agree, and what warmth does.
@@ -296,10 +321,14 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 
 fn live_text(live: &Live) -> String {
     let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
-        let (offset, u) = (live.offset[k].um(), live.uncertainty[k].um());
+        let offset = live.offset[k].um();
+        let u = match live.uncertainty[k].um() {
+            known if known.is_finite() => format!("{known:.3} µm"),
+            _ => "unknown".into(),
+        };
         let set_point = (live.nominal[k] + live.offset[k]).mm();
         format!(
-            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u:.3} µm",
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
             live.nominal[k].mm()
         )
     });

@@ -71,7 +71,7 @@ pub(super) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
     let evaluated = VolumetricEvaluated::of(&given.read, shape);
     let evaluated = evaluated.map_err(|it| placed(it, &args.data, &given.rows))?;
     let found = &evaluated.found;
-    let content = evaluated.content();
+    let content = evaluated.content(own);
     let birge = found.birge_ratio;
     let birge = birge.map_or("–".into(), |it| format!("{it:.2}"));
     let mut text = format!(
@@ -82,12 +82,13 @@ pub(super) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
         found.degrees_of_freedom,
         evaluated.u_max.um(),
         shown(&content),
-        warmth_text(found),
+        warmth_text(found) + &unknown_text(&content.unknown),
     );
     let mut value = found_value(found);
     value["lines"] = json!(evaluated.lines);
     value["readings"] = json!(evaluated.readings);
     value["u_tool_max_um"] = json!(evaluated.u_max.um());
+    add_unknown(&mut value, &content.unknown);
     value["functions"] = json!(content.functions);
     let arcsec = |it: f64| Radians(it).arcsec();
     value["squareness_arcsec"] = json!(content.squareness_rad.map(arcsec));

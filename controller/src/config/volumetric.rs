@@ -247,6 +247,7 @@ pub struct FeedConfig {
 pub struct ReferenceConfig {
     pub step_mm: f64,
     pub samples: u32,
+    pub warmth_tolerance_k: Option<f64>,
 }
 
 /// How lines are read to learn the errors.

@@ -70,7 +70,7 @@ pub enum Validity {
 pub struct Corrected {
     /// To be added to each axis's set-point.
     pub offset: PerAxis<Metres>,
-    /// The standard uncertainty of each.
+    /// The standard uncertainty of each; counts while the correction is valid.
     pub uncertainty: PerAxis<Metres>,
     /// Whether to do so.
     pub validity: Validity,
@@ -148,7 +148,7 @@ impl Applied {
         }
     }
 
-    /// The uncertainty that the correction gives, and whether it is followed.
+    /// What the correction gives, its uncertainty not a number unless it is valid, and whether it is followed.
     pub(super) const fn last(&self) -> (&Corrected, bool) {
         (&self.last, self.following)
     }
@@ -156,6 +156,12 @@ impl Applied {
     /// How often a correction was cut off or could not be followed.
     pub(super) const fn limited(&self) -> u64 {
         self.limited
+    }
+
+    /// The last offset stays; how far it is from right nobody knows any more.
+    const fn keep(&mut self, validity: Validity) {
+        self.last.validity = validity;
+        self.last.uncertainty = [Metres(f64::NAN); AXES_MAX];
     }
 
     /// What to add at `observed.now`; with the reason to stop, if there is one.
@@ -173,13 +179,13 @@ impl Applied {
                 }
                 self.last = wanted;
             }
-            Validity::Hold => self.last.validity = Validity::Hold,
+            Validity::Hold => self.keep(Validity::Hold),
             Validity::FadeOut => {
-                self.last.validity = Validity::FadeOut;
+                self.keep(Validity::FadeOut);
                 follow = false;
             }
             Validity::Stop(reason) => {
-                self.last.validity = wanted.validity;
+                self.keep(wanted.validity);
                 // While it stops, the correction stays as it is.
                 stop = Some(reason).filter(|_| self.enabled);
             }

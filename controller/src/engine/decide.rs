@@ -126,7 +126,7 @@ pub struct Live {
     pub nominal: PerAxis<Metres>,
     /// What is added to that.
     pub offset: PerAxis<Metres>,
-    /// The standard uncertainty of the correction.
+    /// The standard uncertainty of the correction; not a number (NaN) unless it is valid.
     pub uncertainty: PerAxis<Metres>,
     /// What the correction says of itself.
     pub validity: Validity,

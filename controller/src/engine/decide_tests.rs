@@ -445,6 +445,8 @@ fn a_correction_never_steps_the_set_point() {
     bench.desk.swap(said(5.0, Validity::FadeOut)).unwrap();
     bench.periods(20);
     assert_eq!(bench.last(0), Metres::ZERO);
+    let u = bench.desk.live().unwrap().uncertainty[0];
+    assert!(u.value().is_nan(), "{u} of what nobody knows");
     for step in bench.sent.windows(2) {
         let um = (step[1][0] - step[0][0]).um().abs();
         assert!(um <= SLEW_UM + 1e-9, "{um} um in one period");

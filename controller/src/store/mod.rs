@@ -33,7 +33,7 @@ pub use record::{
     ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
     IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
     ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
-    StrokeRecord,
+    StrokeRecord, UnknownRecord,
 };
 pub use volume::{
     BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,

@@ -157,6 +157,14 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.output
     }
 
+    /// How far the values given out last are from what was wanted then, by the largest: not zero
+    /// while one blends into the other or fades out.
+    pub fn left(&self) -> Q {
+        let each = self.output.iter().zip(&self.held);
+        let each = each.map(|(output, held)| (*output - *held).abs());
+        each.fold(Q::ZERO, Q::max)
+    }
+
     fn good(&mut self, now: Time, value: [Q; N]) {
         let confirm = self.settings.confirm.max(1);
         match self.state {

@@ -106,6 +106,13 @@ impl AxisMonitor {
         )
     }
 
+    /// How far the values given out last still are from what is wanted, the shift of the beam
+    /// included, which counts in full.
+    pub fn left(&self) -> Metres {
+        let end = self.end.as_ref().map(|it| it.feed.left());
+        self.feed.left() + end.unwrap_or(Metres::ZERO)
+    }
+
     /// The feed, to switch it on or off.
     pub fn feed_mut(&mut self) -> &mut Feed<Metres, 2> {
         &mut self.feed

@@ -328,6 +328,9 @@ fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     judge.within("reference.step_mm", reference.step_mm, 0.1, 1e3);
     let samples = f64::from(reference.samples);
     judge.within("reference.samples", samples, 1.0, 1e4);
+    if let Some(kelvin) = reference.warmth_tolerance_k {
+        judge.within("reference.warmth_tolerance_k", kelvin, 1e-3, 100.0);
+    }
 }
 
 fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {

@@ -21,7 +21,8 @@ use compensator::volumetric::{Axis, NoCorrection, Point};
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 use super::VolumetricFailure;
-use super::inputs::{RollReader, Thermometer, confirmed_by_samples, place_of_voltage, sample};
+use super::inputs::{RollReader, confirmed_by_samples, place_of_voltage, sample};
+use super::thermometers::Thermometers;
 use crate::assemble::{
     beam_detector, feed_settings, influences, model_limits, point_of_mm, thermal, volume_axis,
     volumetric_chain, work_volume,
@@ -79,7 +80,7 @@ pub struct VolumetricCorrection {
     tool: Point,
     beams: [Option<WatchedBeam>; 3],
     roll: Option<WatchedRoll>,
-    thermometers: Vec<Thermometer>,
+    thermometers: Option<Thermometers>,
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
@@ -120,10 +121,13 @@ impl VolumetricCorrection {
             Some(roll) => Some(watched_roll(config, own, roll, state.roll)?),
             None => None,
         };
-        let mut thermometers = Vec::new();
-        for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
-            thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
-        }
+        let thermometers = match &*own.temperature {
+            [] => None,
+            each => {
+                let thermal = &model.machine().thermal;
+                Some(Thermometers::new(config, each, feed(own)?, thermal))
+            }
+        };
         let bends = model.machine().thermal.bends.clone();
         Ok(Self {
             model,
@@ -239,40 +243,46 @@ impl VolumetricCorrection {
             core::iter::once(slider).chain(end)
         });
         let roll = self.roll.iter().map(|it| it.feed.status());
-        let thermometers = self.thermometers.iter().map(Thermometer::status);
+        let thermometers = self.thermometers.iter().flat_map(Thermometers::statuses);
         beams.chain(roll).chain(thermometers)
     }
 
-    fn beams_are_good(&self) -> bool {
+    /// Of a displacement that nobody sees nothing is known but that it is no larger than the
+    /// largest permitted; one that blends in is off by what is left of that.
+    fn u_displacement(&self) -> Metres {
+        let largest = self.model.machine().displacement_max / 3.0_f64.sqrt();
         let beams = self.beams.iter().flatten();
-        let mut statuses = beams.flat_map(|it| {
+        let each = beams.map(|it| {
             let (slider, end) = it.monitor.status();
-            core::iter::once(slider).chain(end)
+            if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
+                let left = it.monitor.left().value();
+                Metres(self.u_displacement.value().hypot(left))
+            } else {
+                largest
+            }
         });
-        statuses.all(|it| it == FeedStatus::Good)
+        each.fold(self.u_displacement, Quantity::max)
     }
 
-    /// The standard uncertainties at `command`. Of a displacement that nobody sees nothing is
-    /// known but that it is no larger than the largest permitted.
+    /// Likewise of a roll.
+    fn u_roll(&self) -> Radians {
+        match &self.roll {
+            Some(roll) if roll.feed.status() == FeedStatus::Good => {
+                Radians(self.u_roll.value().hypot(roll.feed.left().value()))
+            }
+            Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
+            None => self.u_roll,
+        }
+    }
+
+    /// The standard uncertainties at `command`.
     fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
-        let machine = self.model.machine();
-        let u_displacement = if self.beams_are_good() {
-            self.u_displacement
-        } else {
-            machine.displacement_max / 3.0_f64.sqrt()
-        };
-        let roll_is_good = self
-            .roll
-            .iter()
-            .all(|it| it.feed.status() == FeedStatus::Good);
-        let u_roll = if roll_is_good {
-            self.u_roll
-        } else {
-            machine.roll_max / 3.0_f64.sqrt()
-        };
-        let u = self
-            .model
-            .standard_uncertainty(command, now, u_displacement, u_roll);
+        let (u_displacement, u_roll) = (self.u_displacement(), self.u_roll());
+        let temperatures = self.thermometers.as_ref();
+        let u_temperatures = temperatures.map_or(&[][..], Thermometers::u_kelvin);
+        let u =
+            self.model
+                .standard_uncertainty(command, now, u_displacement, u_roll, u_temperatures);
         u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
     }
 
@@ -289,11 +299,11 @@ impl VolumetricCorrection {
     }
 }
 
-/// No offset, and why.
+/// No offset, and why: how far that is from right nobody knows.
 const fn nothing(validity: Validity) -> Corrected {
     Corrected {
         offset: [Metres(0.0); AXES_MAX],
-        uncertainty: [Metres(0.0); AXES_MAX],
+        uncertainty: [Metres(f64::NAN); AXES_MAX],
         validity,
     }
 }
@@ -305,8 +315,9 @@ impl Correction for VolumetricCorrection {
         };
         let (target, actual) = (Point::new(x, y, z), Point::new(x_now, y_now, z_now));
         let state = self.moving_state(observed, actual);
-        for (value, thermometer) in self.temperatures.iter_mut().zip(&mut self.thermometers) {
-            *value = thermometer.advance(observed);
+        if let Some(thermometers) = &mut self.thermometers {
+            let shown = thermometers.advance(observed);
+            self.temperatures.copy_from_slice(shown);
         }
         if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
             return nothing(Validity::Stop("a detector or thermometer is in trouble"));

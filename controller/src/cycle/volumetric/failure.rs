@@ -7,7 +7,7 @@ use compensator::volumetric::identify::IdentifyError;
 use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
 use compensator::volumetric::online::{RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
-use units::{Metres, MetresPerSecond, Radians};
+use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 use crate::assemble::BeamDetectorError;
 use crate::engine::{Cause, PushError};
@@ -87,13 +87,58 @@ pub enum VolumetricFailure {
         /// What is wrong.
         source: Trouble,
     },
-    /// A thermometer that shows nothing.
+    /// A thermometer that shows nothing to be relied upon.
     #[error(
-        "thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; no references were stored"
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) says nothing to be relied \
+        upon: {source}; nothing was stored: look after it and its wires, and begin again"
     )]
     NoTemperature {
-        /// Which, from 1.
+        /// Which, from 0.
         index: usize,
+        /// What is wrong.
+        source: Trouble,
+    },
+    /// A machine that is not as warm as when its errors were measured.
+    #[error(
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {:.2} °C, but {:.2} °C \
+        when the errors {geometry} were measured, more than {limit_k:.2} K apart: references taken now \
+        would count what warmth does as nothing. Let the machine come to that temperature (by rest, or by \
+        moving), or calibrate again; what was in use stays in use", now.value(), then.value()
+    )]
+    OtherWarmth {
+        /// Which, from 0.
+        index: usize,
+        /// What it showed when the errors were measured.
+        then: Celsius,
+        /// What it shows now.
+        now: Celsius,
+        /// How far apart they may be.
+        limit_k: f64,
+        /// Which errors.
+        geometry: String,
+    },
+    /// Likewise of the difference across a guide.
+    #[error(
+        "the guide of {axis}: thermometer {over} shows {now_k:+.2} K more than {under} (counted from 0), but \
+        {then_k:+.2} K when the errors {geometry} were measured, more than {limit_k:.2} K apart: references \
+        taken now would count its bending as nothing. Let the machine come to that state (by rest, or by \
+        moving), or calibrate again; what was in use stays in use"
+    )]
+    OtherGradient {
+        /// Whose guide.
+        axis: Axis,
+        /// The thermometer over its neutral plane, from 0.
+        over: usize,
+        /// The one under it.
+        under: usize,
+        /// The difference when the errors were measured, in kelvin.
+        then_k: f64,
+        /// The difference now.
+        now_k: f64,
+        /// How far apart they may be.
+        limit_k: f64,
+        /// Which errors.
+        geometry: String,
     },
     /// Samples that do not come.
     #[error("the measuring modules sent {seen} of {expected} samples in {:.1} s; do they sample (every_syncs)?",
@@ -131,13 +176,13 @@ pub enum VolumetricFailure {
     },
     /// A calibration is to be continued on a machine that is colder or warmer.
     #[error(
-        "thermometer {index} (in the order of [[volumetric.temperature]]) shows {seen:.2} C, it showed \
-         {before:.2} C when this run was interrupted; without lines that are read warm it may be \
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {seen:.2} °C, it showed \
+         {before:.2} °C when this run was interrupted; without lines that are read warm it may be \
          {limit:.2} K more or less: let the machine become as warm as it was, or start a new \
          calibration with --warm-up-min"
     )]
-    OtherWarmth {
-        /// Which, from 1.
+    WarmthSince {
+        /// Which, from 0.
         index: usize,
         /// In the last line that is whole, °C.
         before: f64,
@@ -289,10 +334,12 @@ impl VolumetricFailure {
             | Self::OtherReferences { .. }
             | Self::Blind { .. }
             | Self::NoTemperature { .. }
+            | Self::OtherWarmth { .. }
+            | Self::OtherGradient { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
             | Self::Moved { .. }
-            | Self::OtherWarmth { .. }
+            | Self::WarmthSince { .. }
             | Self::Identify(_)
             | Self::Conditions(_)
             | Self::NoCorrection(_)

@@ -23,7 +23,7 @@ pub use volumetric::{
     BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
     MemoryRecord, StateMemoryContent,
 };
-pub use warmth::{BendRecord, ExpansionRecord};
+pub use warmth::{BendRecord, ExpansionRecord, UnknownRecord};
 
 pub(crate) use volumetric::error_name;
 pub(crate) use warmth::AXES;

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
 use super::super::{StoreError, short};
-use super::warmth::{AXES, BendRecord, ExpansionRecord};
+use super::warmth::{AXES, BendRecord, ExpansionRecord, UnknownRecord};
 use super::{CalibrationRecord, Content, IdentityRecord};
 
 /// How a function runs between its nodes.
@@ -113,6 +113,9 @@ pub struct GeometryContent {
     /// Who the drives of x, y and z were; empty where the errors were measured elsewhere.
     #[serde(default)]
     pub drives: Vec<IdentityRecord>,
+    /// What was not found of what there is.
+    #[serde(default)]
+    pub unknown: UnknownRecord,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -152,6 +155,7 @@ impl GeometryContent {
             bends: Vec::new(),
             expansions: Vec::new(),
             drives: Vec::new(),
+            unknown: UnknownRecord::default(),
         }
     }
 
@@ -218,9 +222,10 @@ impl GeometryContent {
     pub(super) fn summary(&self) -> String {
         let largest = self.squareness_rad.iter().map(|it| it.abs());
         format!(
-            "{} error functions, squareness up to {:.2} arcsec",
+            "{} error functions, squareness up to {:.2} arcsec{}",
             self.functions.len(),
-            Radians(largest.fold(0.0, f64::max)).arcsec()
+            Radians(largest.fold(0.0, f64::max)).arcsec(),
+            self.unknown.summary()
         )
     }
 }

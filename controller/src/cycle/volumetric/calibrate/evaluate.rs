@@ -6,17 +6,17 @@ use compensator::volumetric::identify::{
     Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, Observation, Plan, RunSetup,
     SquarenessName, ThermalPlan,
 };
-use compensator::volumetric::model::AxisErrors;
+use compensator::volumetric::model::{AxisErrors, ErrorName};
 use units::{Celsius, Metres};
 
 use super::plan::axis_of;
-use crate::assemble::beam_drift;
-use crate::config::MachineConfig;
+use crate::assemble::{beam_drift, bend_plans};
+use crate::config::{MachineConfig, VolumetricConfig};
 use crate::cycle::volumetric::{VolumetricCorrection, VolumetricFailure, VolumetricState};
 use crate::failure::Failure;
 use crate::store::{
     AXES, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent, IdentityRecord,
-    LineEntry, VolumePlanEntry, VolumeRead, error_name, point,
+    LineEntry, UnknownRecord, VolumePlanEntry, VolumeRead, error_name, point,
 };
 
 /// Places between which the uncertainty of the tool is looked for, along each axis.
@@ -38,6 +38,8 @@ pub struct VolumetricEvaluated {
     /// The largest standard uncertainty of the tool in use, in the volume.
     pub u_max: Metres,
     drives: Vec<IdentityRecord>,
+    /// Errors that move nothing with the tools given: taken as zero.
+    without_effect: Vec<ErrorName>,
 }
 
 impl VolumetricEvaluated {
@@ -62,17 +64,22 @@ impl VolumetricEvaluated {
             lines: plan.runs.len(),
             readings: observations.len(),
             drives: entry.drives.clone(),
+            without_effect: without_effect(&plan),
         })
     }
 
-    /// As it is stored.
-    pub fn content(&self) -> GeometryContent {
+    /// As it is stored, with what stays unknown of a machine of `config`.
+    pub fn content(&self, config: &VolumetricConfig) -> GeometryContent {
         let found = &self.found;
+        let is_known = |it: &BendPlan| found.bends.iter().any(|found| found.plan == *it);
+        let mut unknown = bend_plans(config);
+        unknown.retain(|it| !is_known(it));
         let of = (&self.axes, &found.squareness, &self.temperatures);
         GeometryContent {
             bends: found.bends.iter().map(BendRecord::of).collect(),
             expansions: found.expansions.iter().map(ExpansionRecord::of).collect(),
             drives: self.drives.clone(),
+            unknown: UnknownRecord::of(&unknown, &self.without_effect),
             ..GeometryContent::new(of.0, of.1, of.2)
         }
     }
@@ -109,6 +116,17 @@ impl VolumetricEvaluated {
         VolumetricCorrection::new(config, state)?;
         Ok(())
     }
+}
+
+/// The errors that are not looked for.
+fn without_effect(plan: &Plan) -> Vec<ErrorName> {
+    let pairs = Axis::ALL
+        .into_iter()
+        .flat_map(|axis| Axis::ALL.map(|it| (axis, it)));
+    let names =
+        pairs.flat_map(|(axis, it)| [ErrorName::Along(axis, it), ErrorName::About(axis, it)]);
+    let is_planned = |name: &ErrorName| plan.functions.iter().any(|it| it.name == *name);
+    names.filter(|it| !is_planned(it)).collect()
 }
 
 fn references(read: &VolumeRead) -> Vec<Celsius> {

@@ -2,9 +2,11 @@
 //! warmth does, warm; one identification of all of them with its covariance.
 //!
 //! The references of the detectors are taken first: what the tables hold for is the machine as it
-//! was then. While lines are read it goes on warming up. What the detectors see of that is taken
-//! off each reading where it is made; expansions and bends are found with the errors, by what the
-//! thermometers showed at each line. Straightnesses are those that the detectors read along their
+//! was then. While lines are read it goes on warming up. What the detectors see of that, and what
+//! temperatures are known to do by the configuration, is taken off each reading where it is made
+//! (`known`). With warm lines expansions and bends are found with the errors, by what the thermometers
+//! showed at each line; without, expansions are those of the configuration and how guides bend stays
+//! unknown: the result says so. Straightnesses are those that the detectors read along their
 //! beams, where there are beams; a beam is straighter than what a straightedge tells.
 //!
 //! Every reading is written down when it is made. A run that was interrupted is continued at its
@@ -14,6 +16,7 @@
 //! A result that cannot be applied is refused before it is stored.
 
 mod evaluate;
+mod known;
 mod own;
 mod plan;
 mod readings;
@@ -25,7 +28,6 @@ use std::path::{Path, PathBuf};
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{Identified, StandardLine};
-use compensator::volumetric::model::{Machine as Model, Thermal, VolumetricModel};
 use compensator::volumetric::online::BeamReference;
 use units::{Metres, Radians};
 
@@ -34,10 +36,9 @@ pub use plan::volume_plan;
 
 use super::line::LineOperator;
 use super::reference::References;
+use super::thermometers::Thermometry;
 use super::{GEOMETRY, VolumetricFailure};
-use crate::assemble::{
-    beam_drift, function_shape, model_limits, point_of_mm, volumetric_chain, work_volume,
-};
+use crate::assemble::{beam_drift, function_shape, point_of_mm};
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
 use crate::cycle::{note_failure, utc_now};
 use crate::failure::Failure;
@@ -45,8 +46,10 @@ use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
     CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
-    SCHEMA_VERSION, Store, VolumeRead, VolumeReferencesEntry,
+    SCHEMA_VERSION, Store, UnknownRecord, VolumeRead, VolumeReferencesEntry,
 };
+
+use known::Known;
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -54,7 +57,8 @@ const WHOLE: &str = "volume";
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmUp {
-    /// It is not wanted: what warmth does is taken from the configuration.
+    /// It is not wanted: what scales and structure do in warmth is taken from the configuration, and
+    /// how guides bend stays unknown.
     None,
     /// Something else warms it for so long, while the axes are switched off.
     Idle(Duration),
@@ -75,6 +79,9 @@ pub struct VolumetricCalibrated {
     pub found: Identified,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
+    /// What stays unknown: guides that bend by the configuration, by how much nobody knows, for no
+    /// warm lines told it; errors that no line sees.
+    pub unknown: UnknownRecord,
     /// Where every reading is.
     pub journal: PathBuf,
 }
@@ -86,8 +93,8 @@ struct Session<'a> {
     references: References,
     beams: [Option<BeamReference>; 3],
     roll: Option<Function<Radians>>,
-    /// What detectors alone make of a place: without any table.
-    live: VolumetricModel,
+    known: Known,
+    thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
     /// All lines, as in the plan.
     lines: Vec<StandardLine>,
@@ -205,7 +212,6 @@ impl Machine {
         let section = "calibrate";
         let own = config.calibrate.clone();
         let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
-        let live = model_of_detectors(&config)?;
         let taken = self.take_references()?;
         let entry = match read.references.take() {
             Some(kept) => {
@@ -225,6 +231,12 @@ impl Machine {
         };
         let references = References::from(&entry);
         read.references = Some(entry);
+        let is_warm = read
+            .plan
+            .iter()
+            .any(|plan| plan.lines.iter().any(|it| it.warm));
+        let known = Known::new(&config, &references.temperatures, is_warm)?;
+        let thermometry = Thermometry::new(self.config(), &config.temperature);
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             if let Some(drift) = beam.and_then(beam_drift) {
@@ -238,7 +250,8 @@ impl Machine {
             references,
             beams,
             roll,
-            live,
+            known,
+            thermometry,
             operator,
             lines,
             read,
@@ -284,7 +297,9 @@ impl Machine {
             instrument: self.instrument_record(&session.own.instrument),
             ..self.this_volume(GEOMETRY)?
         };
-        let content = Content::VolumetricGeometry(evaluated.content());
+        let content = evaluated.content(&session.config);
+        let unknown = content.unknown.clone();
+        let content = Content::VolumetricGeometry(content);
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
         store.activate(GEOMETRY, &id)?;
@@ -294,29 +309,10 @@ impl Machine {
             lines: evaluated.lines,
             found: evaluated.found,
             u_max: evaluated.u_max,
+            unknown,
             journal: journal.path().to_owned(),
         })
     }
-}
-
-/// What detectors alone make of a place: without any table.
-fn model_of_detectors(config: &VolumetricConfig) -> Result<VolumetricModel, VolumetricFailure> {
-    let roll_max = config.roll.as_ref();
-    let roll_max = roll_max.map(|it| Radians::from_arcsec(it.roll_max_arcsec));
-    let model = Model {
-        chain: volumetric_chain(config)?,
-        volume: work_volume(config)?,
-        axes: Default::default(),
-        squareness: Default::default(),
-        thermal: Thermal::default(),
-        tool_max: Metres::from_mm(config.tool_max_mm),
-        displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-        roll_max: roll_max.unwrap_or(Radians::ZERO),
-    };
-    Ok(VolumetricModel::new(
-        model,
-        model_limits(&config.compensation),
-    )?)
 }
 
 impl Session<'_> {

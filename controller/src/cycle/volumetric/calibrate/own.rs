@@ -48,7 +48,7 @@ impl Session<'_> {
         let u_mean = record.slider[place].standard_uncertainties_si.as_ref();
         let stops = self.stops_at_nodes(axis, &record.slider[place].positions_m);
         let first = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
-        let chain = self.live.machine().chain;
+        let chain = self.known.chain();
         let each = stops.into_iter().map(|(index, position)| {
             let strayed = reference.slider(position)[place];
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
@@ -77,7 +77,7 @@ impl Session<'_> {
         let record = self.references.content.roll.as_ref()?;
         let stops = self.stops_at_nodes(axis, &record.positions_m);
         let u = record.standard_uncertainties_si.as_ref();
-        let sense = self.live.machine().chain.sense(axis);
+        let sense = self.known.chain().sense(axis);
         let each = stops.into_iter().map(|(index, position)| {
             let u = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             Observation {

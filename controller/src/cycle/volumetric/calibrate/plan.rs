@@ -5,6 +5,7 @@ use compensator::volumetric::model::ErrorName;
 use compensator::volumetric::{Axis, Point};
 use units::Metres;
 
+use super::known::expansion_plans;
 use crate::assemble::{
     bend_plans, function_shape, point_of_mm, volume_axis, volumetric_chain, work_volume,
 };
@@ -142,13 +143,12 @@ fn entry(
 
 /// What warmth does, as far as it is to be found.
 fn of_warmth(config: &VolumetricConfig) -> VolumePlanEntry {
-    let expansions = Axis::ALL.into_iter().filter_map(|axis| {
-        let channels = config.temperature.iter().enumerate();
-        let of_axis = channels.filter(|(_, it)| it.expansion_ppm_per_k[axis.index()] != 0.0);
-        let thermometers: Vec<usize> = of_axis.map(|(at, _)| at).collect();
-        let axis = AXES[axis.index()];
-        (!thermometers.is_empty()).then_some(ExpansionEntry { axis, thermometers })
-    });
+    let expansions = expansion_plans(config)
+        .into_iter()
+        .map(|it| ExpansionEntry {
+            axis: AXES[it.axis.index()],
+            thermometers: it.thermometers,
+        });
     let bends = bend_plans(config).into_iter().map(|it| BendEntry {
         axis: AXES[it.axis.index()],
         towards: AXES[it.towards.index()],

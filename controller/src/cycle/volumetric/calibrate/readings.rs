@@ -2,14 +2,13 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::identify::{Observation, Optics, Reading};
+use compensator::volumetric::identify::{Observation, Optics};
 use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres};
 
 use super::Session;
 use crate::assemble::volume_axis;
-use crate::cycle::volumetric::VolumetricFailure;
 use crate::cycle::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -77,14 +76,15 @@ impl Machine {
                 sum.push(celsius.value());
             }
             let observation = read.observation(number);
-            let reading = session.without_live(&observation, &state)?;
+            let reading = session.known.without(&observation, &state, &temperatures)?;
             let beyond = Observation {
                 reading,
                 ..observation
             };
-            let deviation_si = LineReadingEntry::of(number, &beyond).read_si;
+            let beyond = LineReadingEntry::of(number, &beyond);
             let entry = LineReadingEntry {
-                deviation_si,
+                deviation_si: beyond.read_si,
+                u_si: beyond.u_si,
                 scatter_m: Some(read.scatter.value()),
                 sideways_m: state.sideways.map(|it| it.map(Metres::value)),
                 roll_rad: state.roll.map(|it| it.value()),
@@ -101,7 +101,7 @@ impl Machine {
     /// What the detectors see beyond their references, and what the thermometers show.
     fn state_now(
         &mut self,
-        session: &Session<'_>,
+        session: &mut Session<'_>,
         at: Point,
     ) -> Result<(MovingState, Vec<Celsius>), Failure> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
@@ -123,7 +123,10 @@ impl Machine {
             let roll = self.roll_of(axis, position, config, &seen)?;
             state.roll[axis.index()] = roll - reference.at(position);
         }
-        Ok((state, self.temperatures_of(&session.config, &seen)?))
+        for still in &seen {
+            session.thermometry.add(still.now, &still.temperatures)?;
+        }
+        Ok((state, session.thermometry.take()))
     }
 }
 
@@ -138,33 +141,5 @@ impl Session<'_> {
     fn points_of(&self, at: usize) -> usize {
         let plan = self.read.plan.as_ref();
         plan.map_or(2, |it| it.lines[at].points)
-    }
-
-    /// The reading as it would be, had the detectors seen nothing beyond their references.
-    fn without_live(
-        &self,
-        observation: &Observation,
-        state: &MovingState,
-    ) -> Result<Reading, VolumetricFailure> {
-        let Reading::Length {
-            along,
-            deviation,
-            u,
-        } = observation.reading
-        else {
-            return Ok(observation.reading);
-        };
-        let now = self.live.conditions(observation.tool, &[], state)?;
-        let seen = self.live.deviation(observation.at, &now)?;
-        let part = Axis::ALL
-            .into_iter()
-            .map(|it| seen.along(it) * along[it.index()]);
-        let part = part.fold(Metres(0.0), |sum, it| sum + it);
-        let deviation = deviation - part;
-        Ok(Reading::Length {
-            along,
-            deviation,
-            u,
-        })
     }
 }

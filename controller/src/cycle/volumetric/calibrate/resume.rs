@@ -174,8 +174,8 @@ fn same_warmth(
         // A comparison with NaN is false, so that it is refused too.
         let is_alike = difference <= limit;
         if !is_alike {
-            return Err(VolumetricFailure::OtherWarmth {
-                index: at + 1,
+            return Err(VolumetricFailure::WarmthSince {
+                index: at,
                 before: *before,
                 seen: seen.value(),
                 limit,
