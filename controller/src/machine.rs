@@ -316,9 +316,20 @@ impl Machine {
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
+        self.require_supervised(at, step)?;
         let now = self.now();
         self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
+    }
+
+    /// Nothing begins to move while alarms do not count: after a stop, the machine is started
+    /// again first.
+    pub(crate) fn require_supervised(&self, at: usize, step: &'static str) -> Result<(), Failure> {
+        if self.supervision == Supervision::On {
+            return Ok(());
+        }
+        let device = self.device_name(at);
+        Err(Failure::NotStarted { device, step })
     }
 
     /// Gives `command` to drive number `at`, whatever it moves, and waits until it is done.
@@ -329,6 +340,9 @@ impl Machine {
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
+        if let DriveCommand::Enable | DriveCommand::EnterCyclic { .. } = command {
+            self.require_supervised(at, step)?;
+        }
         let now = self.now();
         self.drive_mut(at).control(now, command);
         self.await_outcome(at, step, limit)

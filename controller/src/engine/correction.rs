@@ -5,10 +5,13 @@
 //! are slewed, and one that has nothing to say is held or faded out. The slope along an axis is
 //! proved where a table is loaded; at run time the rate is its limit times the speed.
 
-use compensator::apply::SlewedCorrection;
+use core::time::Duration;
+
+use compensator::apply::{Alarm, SlewedCorrection};
 use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
 
-use super::{AXES_MAX, PerAxis};
+use super::decide::Cause;
+use super::{AXES_MAX, Lack, PerAxis};
 
 /// Analog channels that a correction sees at most.
 pub const CHANNELS_MAX: usize = 32;
@@ -52,17 +55,28 @@ pub struct Observed<'a> {
 }
 
 /// How far a correction can be relied upon now.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Validity {
     /// It is right.
     #[default]
     Valid,
+    /// As right as it can be without this; its uncertainty says how right.
+    Without(Lack),
     /// It cannot be known for the moment: the last one stays.
     Hold,
     /// It cannot be known for longer: it goes back to zero at the limited rate.
     FadeOut,
     /// The machine must not go on without it: a controlled stop, for this reason.
     Stop(&'static str),
+    /// The machine must not go on without this: a controlled stop.
+    Lost(Lack),
+}
+
+impl Validity {
+    /// Whether what the correction says is to be added.
+    const fn is_followed(&self) -> bool {
+        matches!(self, Self::Valid | Self::Without(_))
+    }
 }
 
 /// What a correction says.
@@ -110,11 +124,18 @@ pub(super) struct Applied {
     /// What the slewing works towards: enabled, and not fading.
     following: bool,
     limited: u64,
+    period: Duration,
+    /// Periods decided, as a time: a pause between two of them must not be worth a step.
+    slewed_until: Time,
 }
 
 impl Applied {
     /// Switched off.
-    pub(super) fn new(correction: Box<dyn Correction>, limits: &PerAxis<CorrectionLimits>) -> Self {
+    pub(super) fn new(
+        correction: Box<dyn Correction>,
+        limits: &PerAxis<CorrectionLimits>,
+        period: Duration,
+    ) -> Self {
         Self {
             correction,
             slewed: core::array::from_fn(|axis| {
@@ -124,7 +145,14 @@ impl Applied {
             enabled: false,
             following: false,
             limited: 0,
+            period,
+            slewed_until: Time::ZERO,
         }
+    }
+
+    /// After a pause another correction may be wanted than before it.
+    pub(super) fn begin(&mut self) {
+        self.expect_jump();
     }
 
     /// What was added last.
@@ -162,13 +190,16 @@ impl Applied {
     pub(super) fn advance(
         &mut self,
         observed: &Observed<'_>,
-    ) -> (PerAxis<Metres>, Option<&'static str>) {
-        let wanted = self.correction.correct(observed);
+    ) -> (PerAxis<Metres>, Option<Cause>) {
+        let mut wanted = self.correction.correct(observed);
+        if wanted.validity.is_followed() && !wanted.offset.iter().all(|it| it.is_finite()) {
+            wanted.validity = Validity::Stop("it is not a number");
+        }
         let mut stop = None;
         let mut follow = self.enabled;
         match wanted.validity {
-            Validity::Valid => {
-                if self.last.validity != Validity::Valid {
+            Validity::Valid | Validity::Without(_) => {
+                if !self.last.validity.is_followed() {
                     self.expect_jump();
                 }
                 self.last = wanted;
@@ -180,8 +211,11 @@ impl Applied {
             }
             Validity::Stop(reason) => {
                 self.last.validity = wanted.validity;
-                // While it stops, the correction stays as it is.
-                stop = Some(reason).filter(|_| self.enabled);
+                stop = Some(Cause::Correction { reason });
+            }
+            Validity::Lost(lack) => {
+                self.last.validity = wanted.validity;
+                stop = Some(Cause::CorrectionLost { lack });
             }
         }
         if core::mem::replace(&mut self.following, follow) != follow {
@@ -193,11 +227,18 @@ impl Applied {
                 }
             }
         }
+        self.slewed_until += self.period;
         let mut offset = [Metres::ZERO; AXES_MAX];
         for (axis, slewed) in self.slewed.iter_mut().enumerate() {
-            offset[axis] = slewed.advance(observed.now, self.last.offset[axis]);
+            offset[axis] = slewed.advance(self.slewed_until, self.last.offset[axis]);
             self.limited += u64::from(slewed.alarm().is_some());
         }
-        (offset, stop)
+        // While it stops, the correction stays as it is.
+        (offset, stop.filter(|_| self.enabled))
+    }
+
+    /// What of the last correction was cut off, or could not be followed in time.
+    pub(super) fn alarms(&self) -> PerAxis<Option<Alarm>> {
+        core::array::from_fn(|axis| self.slewed[axis].alarm())
     }
 }

@@ -6,13 +6,14 @@
 
 use core::time::Duration;
 
+use compensator::apply::Alarm;
 use rtrb::{Consumer, Producer};
 use units::{Metres, Time};
 
 use super::correction::{Applied, Channel, Correction, Observed, ThermometerSample, Validity};
 use super::motion::{Moment, Motion};
 use super::path::{Differences, Item};
-use super::{AXES_MAX, AxisLimits, PerAxis};
+use super::{AXES_MAX, AxisLimits, Lack, PerAxis};
 
 /// So many samples of an axis in a row may be missing before it is not safe to go on.
 const MISSING_MAX: u32 = 3;
@@ -31,7 +32,7 @@ pub(super) enum Command {
 }
 
 /// What the loop is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     /// The axes hold their set-points and wait for a path or a move.
     Holding,
@@ -46,7 +47,7 @@ pub enum State {
 }
 
 /// Why the loop came to rest in a controlled way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Cause {
     /// The path came to its end.
     #[error("the path is done")]
@@ -83,6 +84,12 @@ pub enum Cause {
     Correction {
         /// Why.
         reason: &'static str,
+    },
+    /// What the correction is computed from is lost, and nothing may be done without it.
+    #[error("the correction failed: {lack}; all axes were stopped together")]
+    CorrectionLost {
+        /// What, and why.
+        lack: Lack,
     },
 }
 
@@ -132,6 +139,10 @@ pub struct Live {
     pub validity: Validity,
     /// Whether the correction is switched on and followed.
     pub corrected: bool,
+    /// What of it was cut off, or could not be followed as fast as it changed.
+    pub alarms: PerAxis<Option<Alarm>>,
+    /// Whether it would have led out of the soft limits, and was cut off there.
+    pub clamped: PerAxis<bool>,
 }
 
 /// What the core counts.
@@ -212,6 +223,7 @@ impl Core {
     /// Begins at rest, with the set-points that the drives hold: what was added to them when the
     /// axes were last moved is in these, and is not added twice.
     pub(super) fn begin(&mut self, held: PerAxis<Metres>) {
+        self.applied.begin();
         let added = self.applied.current();
         let nominal = core::array::from_fn(|axis| held[axis] - added[axis]);
         self.nominal = Differences::at_rest(nominal);
@@ -219,6 +231,14 @@ impl Core {
         (self.missing, self.deviating) = ([0; AXES_MAX], [0; AXES_MAX]);
         self.actual = held;
         self.history = [held; ANSWER_PERIODS + 1];
+    }
+
+    /// What was ordered or written for a motion that failed is never driven in a later one.
+    pub(super) fn forget_orders(&mut self) {
+        for _ in 0..self.lines.path.slots() {
+            self.next_item();
+        }
+        while self.lines.commands.pop().is_ok() {}
     }
 
     pub(super) const fn state(&self) -> State {
@@ -255,13 +275,13 @@ impl Core {
             temperatures: heard.temperatures,
         };
         let (offset, refused) = self.applied.advance(&observed);
-        if let Some(reason) = refused {
-            self.stop(Cause::Correction { reason })?;
+        if let Some(cause) = refused {
+            self.stop(cause)?;
         }
-        let set_point = self.limited(&nominal, &offset);
+        let (set_point, clamped) = self.limited(&nominal, &offset);
         self.history.rotate_right(1);
         self.history[0] = set_point;
-        self.tell(heard.now, &nominal, &offset);
+        self.tell(heard.now, &nominal, &offset, clamped);
         Ok(set_point)
     }
 
@@ -465,19 +485,30 @@ impl Core {
     }
 
     /// A correction never leads out of the soft limits.
-    fn limited(&mut self, nominal: &PerAxis<Metres>, offset: &PerAxis<Metres>) -> PerAxis<Metres> {
-        let mut set_point = *nominal;
+    fn limited(
+        &mut self,
+        nominal: &PerAxis<Metres>,
+        offset: &PerAxis<Metres>,
+    ) -> (PerAxis<Metres>, PerAxis<bool>) {
+        let (mut set_point, mut clamped) = (*nominal, [false; AXES_MAX]);
         for axis in 0..self.axes {
             let AxisLimits { min, max, .. } = self.limits[axis];
             let wanted = nominal[axis] + offset[axis];
             set_point[axis] = wanted.max(min).min(max);
-            self.counts.clamped += u64::from(set_point[axis] != wanted);
+            clamped[axis] = set_point[axis] != wanted;
+            self.counts.clamped += u64::from(clamped[axis]);
         }
-        set_point
+        (set_point, clamped)
     }
 
     /// A full line means that nobody looks: what is older is as good.
-    fn tell(&mut self, at: Time, nominal: &PerAxis<Metres>, offset: &PerAxis<Metres>) {
+    fn tell(
+        &mut self,
+        at: Time,
+        nominal: &PerAxis<Metres>,
+        offset: &PerAxis<Metres>,
+        clamped: PerAxis<bool>,
+    ) {
         let (said, corrected) = self.applied.last();
         let _ = self.lines.live.push(Live {
             at,
@@ -489,6 +520,8 @@ impl Core {
             uncertainty: said.uncertainty,
             validity: said.validity,
             corrected,
+            alarms: self.applied.alarms(),
+            clamped,
         });
     }
 }

@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use compensator::apply::Alarm;
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Time};
 
 use super::decide::{Heard, Trouble};
@@ -430,9 +431,8 @@ fn a_correction_never_steps_the_set_point() {
     bench.desk.swap(said(500.0, Validity::Valid)).unwrap();
     bench.periods(40);
     assert_eq!(bench.last(0), Metres::from_um(30.0), "the size is limited");
-    bench.desk.swap(said(f64::NAN, Validity::Valid)).unwrap();
-    bench.periods(5);
-    assert_eq!(bench.last(0), Metres::from_um(30.0), "not a number: held");
+    let alarm = bench.desk.live().unwrap().alarms[0];
+    assert!(matches!(alarm, Some(Alarm::Size { .. })), "{alarm:?}");
     bench.desk.swap(said(5.0, Validity::Hold)).unwrap();
     bench.periods(5);
     assert!(bench.last(0) <= Metres::from_um(30.0));
@@ -450,6 +450,41 @@ fn a_correction_never_steps_the_set_point() {
         assert!(um <= SLEW_UM + 1e-9, "{um} um in one period");
     }
     assert!(bench.engine.counts().corrections_limited > 0);
+}
+
+#[test]
+fn a_correction_that_is_no_number_stops_the_machine() {
+    let mut bench = Bench::with(said(10.0, Validity::Valid));
+    bench.desk.correct(true).unwrap();
+    bench.desk.move_to(&mm(20.0, 0.0)).unwrap();
+    bench.periods(60);
+    bench.desk.swap(said(f64::NAN, Validity::Valid)).unwrap();
+    let cause = bench.until_rest();
+    assert!(cause.to_string().contains("not a number"), "{cause}");
+    let live = bench.desk.live().unwrap();
+    assert_eq!(live.offset[0], Metres::from_um(10.0), "held meanwhile");
+    bench.check_smooth();
+}
+
+#[test]
+fn a_pause_between_two_motions_is_not_worth_a_step() {
+    let mut bench = Bench::with(said(25.0, Validity::Valid));
+    bench.periods(3);
+    for on in [true, false] {
+        bench.now += Duration::from_secs(10);
+        bench.engine.core.begin(bench.sent[bench.sent.len() - 1]);
+        bench.desk.correct(on).unwrap();
+        bench.periods(8);
+        // Held up in the middle of it.
+        bench.now += Duration::from_secs(1);
+        bench.periods(20);
+        assert_eq!(bench.last(0).um(), if on { 25.0 } else { 0.0 });
+    }
+    for step in bench.sent.windows(2) {
+        let um = (step[1][0] - step[0][0]).um().abs();
+        assert!(um <= SLEW_UM + 1e-9, "{um} um in one period");
+    }
+    assert_eq!(bench.engine.counts().corrections_limited, 0, "announced");
 }
 
 #[test]

@@ -72,20 +72,33 @@ impl Machine {
         engine: &mut Engine,
         host: &mut dyn FnMut(),
     ) -> Result<Cause, Failure> {
+        let outcome = self.follow_to_rest(engine, host);
+        if outcome.is_err() {
+            engine.core.forget_orders();
+        }
+        outcome
+    }
+
+    fn follow_to_rest(
+        &mut self,
+        engine: &mut Engine,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
         for axis in engine.axes.clone() {
             self.require_zeroed(&axis)?;
         }
         let mut seats = self.seats(engine)?;
+        self.require_supervised(seats.drive[0], "following set-points")?;
         self.await_rest(engine, &seats)?;
+        self.require_inside(engine, &seats)?;
+        // Locking memory takes its time, and so does letting it go: never between two SYNCs.
+        let granted = engine.real_time.then(RealTime::ask);
+        let text = granted.as_ref().map(ToString::to_string);
+        engine.timing.scheduling = text.unwrap_or_default();
         let held = self.enter_cyclic(engine, &seats)?;
         engine.core.begin(held);
-        let outcome = self.with_own_sync(|machine| {
-            let granted = engine.real_time.then(RealTime::ask);
-            engine.timing.scheduling = granted
-                .as_ref()
-                .map_or_else(String::new, |it| it.to_string());
-            machine.run_periods(engine, &mut seats, host)
-        });
+        let outcome =
+            self.with_own_sync(|machine| machine.run_periods(engine, &mut seats, host));
         let cause = outcome?;
         // A drive that changes its mode while it moves may do anything.
         self.await_rest(engine, &seats)?;
@@ -121,6 +134,26 @@ impl Machine {
             correction,
             Duration::from_secs_f64(period_ms * 1e-3),
         ))
+    }
+
+    /// The loop's SYNC goes out on every CAN bus, also those that carry none of its axes.
+    pub(super) fn require_one_sync(&self, expected: Duration) -> Result<(), Failure> {
+        let buses = self.config.can.iter();
+        let mut others = buses.filter_map(|(bus, it)| {
+            let seen = Duration::from_secs_f64(it.sync_period_ms * 1e-3);
+            (seen != expected).then(|| (bus.clone(), seen))
+        });
+        match others.next() {
+            None => Ok(()),
+            Some((bus, seen)) => {
+                let periods = EngineFailure::Periods {
+                    bus,
+                    expected,
+                    seen,
+                };
+                Err(periods.into())
+            }
+        }
     }
 
     fn seats(&self, engine: &Engine) -> Result<Seats, Failure> {
@@ -161,6 +194,27 @@ impl Machine {
             && device.reading().is_none_or(|it| !it.at_rest)
     }
 
+    /// The first set-point of an axis beyond its soft limits would be the limit: a step.
+    fn require_inside(&self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
+        for (axis, at) in engine.axes.iter().zip(seats.drive) {
+            if let Some(reading) = self.axes[at].device.reading() {
+                self.require_place(axis, reading.position)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// As near as a move ends counts as inside.
+    fn require_place(&self, axis: &str, at: Metres) -> Result<(), Failure> {
+        let (min, max) = self.soft_limits(axis)?;
+        let window = Metres::from_um(self.axis_config(axis)?.position_window_um);
+        if min - window <= at && at <= max + window {
+            return Ok(());
+        }
+        let axis = axis.to_owned();
+        Err(EngineFailure::Outside { axis, at, min, max }.into())
+    }
+
     /// Every drive in the mode, enabled, and what each holds.
     fn enter_cyclic(&mut self, engine: &Engine, seats: &Seats) -> Result<PerAxis<Metres>, Failure> {
         let period = engine.period;
@@ -177,11 +231,12 @@ impl Machine {
             held[axis] = position.ok_or_else(|| EngineFailure::NotCyclic {
                 axis: engine.axes[axis].clone(),
             })?;
+            self.require_place(&engine.axes[axis], held[axis])?;
         }
         Ok(held)
     }
 
-    /// SYNC is sent here instead of by the transport, and given back afterwards, come what may.
+    /// SYNC is sent here instead of by the transport, and given back however the loop ends.
     fn with_own_sync<R>(
         &mut self,
         run: impl FnOnce(&mut Self) -> Result<R, Failure>,
@@ -417,7 +472,8 @@ impl Machine {
     }
 
     /// The quick stop command to every drive and the SYNC at which it counts, now. What a port
-    /// does not take is left to the drives' watch on our heartbeat.
+    /// does not take is left to the drives' watch on our heartbeat. Nothing moves any more until
+    /// the machine is started again ([`Machine::require_supervised`]).
     fn quick_stop_together(&mut self, seats: &Seats) {
         self.supervision = Supervision::Stopping;
         self.outbox.clear();

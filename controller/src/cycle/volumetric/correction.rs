@@ -30,7 +30,9 @@ use crate::config::{
     BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
     ReactionName, RollConfig, VolumetricConfig,
 };
-use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
+use crate::engine::{
+    AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Source, Validity,
+};
 
 /// As what a machine was calibrated: its errors, and what its detectors read then.
 #[derive(Clone, Debug, Default)]
@@ -245,13 +247,19 @@ impl VolumetricCorrection {
     }
 
     /// What stands behind each value that is used.
-    fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
-        let beams = self.beams.iter().flatten().flat_map(|it| {
+    fn statuses(&self) -> impl Iterator<Item = (Source, FeedStatus)> {
+        let beams = Axis::ALL.into_iter().zip(&self.beams);
+        let beams = beams.filter_map(|(axis, it)| Some((axis, it.as_ref()?)));
+        let beams = beams.flat_map(|(axis, it)| {
             let (slider, end) = it.monitor.status();
-            core::iter::once(slider).chain(end)
+            let end = end.map(|it| (Source::EndOfTravel(axis), it));
+            core::iter::once((Source::Slide(axis), slider)).chain(end)
         });
-        let roll = self.roll.iter().map(|it| it.feed.status());
-        let thermometers = self.thermometers.iter().map(Thermometer::status);
+        let roll = self.roll.iter();
+        let roll = roll.map(|it| (Source::Roll(it.axis), it.feed.status()));
+        let thermometers = self.thermometers.iter().enumerate();
+        let thermometers =
+            thermometers.map(|(at, it)| (Source::Thermometer(at + 1), it.status()));
         beams.chain(roll).chain(thermometers)
     }
 
@@ -320,9 +328,13 @@ impl Correction for VolumetricCorrection {
         for (value, thermometer) in self.temperatures.iter_mut().zip(&mut self.thermometers) {
             *value = thermometer.advance(observed);
         }
-        if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
-            return nothing(Validity::Stop("a detector or thermometer is in trouble"));
-        }
+        let validity = match Lack::worst(self.statuses()) {
+            None => Validity::Valid,
+            Some(lack) if matches!(lack.status, FeedStatus::Stop(_)) => {
+                return nothing(Validity::Lost(lack));
+            }
+            Some(lack) => Validity::Without(lack),
+        };
         let Ok(now) = self.model.conditions(self.tool, &self.temperatures, &state) else {
             return self.without();
         };
@@ -334,7 +346,7 @@ impl Correction for VolumetricCorrection {
             Ok(command) => Corrected {
                 offset: per_axis(command - inside),
                 uncertainty: self.uncertainty(command, &now),
-                validity: Validity::Valid,
+                validity,
             },
             Err(NoCorrection::Outside { .. }) => {
                 nothing(Validity::Stop("the path leaves the calibrated volume"))
