@@ -119,6 +119,8 @@ pub struct Machine {
     /// The instrument or camera whose readings a procedure needs now: only its alarms count.
     pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
+    /// Warnings for which there is no time now: whoever takes them may make their writer wait.
+    pub(crate) held_back: Option<Vec<String>>,
     pub(crate) stop: StopRequest,
 }
 
@@ -153,6 +155,7 @@ impl Machine {
             started_instruments: BTreeSet::new(),
             instrument_in_use: None,
             observer: Box::new(Silent),
+            held_back: None,
             stop: StopRequest::default(),
         }
     }

@@ -48,7 +48,14 @@ fn main() {
         println!("{}", costs());
         return;
     }
-    let [how @ ("follow" | "show"), machine, bus, seconds, ref periods_ms @ ..] = words[..] else {
+    let [
+        how @ ("follow" | "show"),
+        machine,
+        bus,
+        seconds,
+        ref periods_ms @ ..,
+    ] = words[..]
+    else {
         eprintln!("cycle: run by tests/bench/run, or as `cycle show screws pty 60 2.0 5.0 20.0`");
         return;
     };

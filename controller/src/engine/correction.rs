@@ -5,12 +5,13 @@
 //! are slewed, and one that has nothing to say is held or faded out. The slope along an axis is
 //! proved where a table is loaded; at run time the rate is its limit times the speed.
 
+use core::any::Any;
 use core::time::Duration;
 
 use compensator::apply::{Alarm, SlewedCorrection};
 use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
 
-use super::decide::Cause;
+use super::account::Cause;
 use super::{AXES_MAX, Lack, PerAxis};
 
 /// Analog channels that a correction sees at most.
@@ -94,6 +95,15 @@ pub struct Corrected {
 pub trait Correction: Send {
     /// The correction for the next SYNC.
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected;
+
+    /// Itself, for the correction that takes over from it; `None` when there is nothing to be had.
+    fn as_any(&self) -> Option<&dyn Any> {
+        None
+    }
+
+    /// Takes over from the correction that was in use until now: what that one knows of the same
+    /// detectors needs not be waited for again.
+    fn take_over(&mut self, _before: &dyn Any) {}
 }
 
 /// Corrects nothing.
@@ -165,8 +175,11 @@ impl Applied {
     }
 
     /// Another correction from now on; the one before is handed back.
-    pub(super) fn swap(&mut self, correction: Box<dyn Correction>) -> Box<dyn Correction> {
+    pub(super) fn swap(&mut self, mut correction: Box<dyn Correction>) -> Box<dyn Correction> {
         self.expect_jump();
+        if let Some(before) = self.correction.as_any() {
+            correction.take_over(before);
+        }
         core::mem::replace(&mut self.correction, correction)
     }
 
@@ -187,10 +200,7 @@ impl Applied {
     }
 
     /// What to add at `observed.now`; with the reason to stop, if there is one.
-    pub(super) fn advance(
-        &mut self,
-        observed: &Observed<'_>,
-    ) -> (PerAxis<Metres>, Option<Cause>) {
+    pub(super) fn advance(&mut self, observed: &Observed<'_>) -> (PerAxis<Metres>, Option<Cause>) {
         let mut wanted = self.correction.correct(observed);
         if wanted.validity.is_followed() && !wanted.offset.iter().all(|it| it.is_finite()) {
             wanted.validity = Validity::Stop("it is not a number");

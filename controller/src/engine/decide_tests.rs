@@ -5,7 +5,7 @@ use core::time::Duration;
 use compensator::apply::Alarm;
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Time};
 
-use super::decide::{Heard, Trouble};
+use super::account::{Command, Heard, Trouble};
 use super::*;
 
 const PERIOD: Duration = Duration::from_millis(2);
@@ -293,6 +293,56 @@ fn a_move_puts_an_end_to_a_path_and_its_rest_is_never_driven() {
     assert_eq!(bench.engine.state(), State::Holding);
     assert_eq!([bench.last(0), bench.last(1)], mm(0.0, 0.0));
     bench.check_smooth();
+}
+
+#[test]
+fn another_path_follows_the_first_and_one_that_was_stopped() {
+    let mut bench = Bench::new();
+    let go = |bench: &mut Bench, periods: u32| {
+        circle(periods).for_each(|point| bench.desk.path.push(&point).unwrap());
+        bench.desk.path.finish().unwrap();
+    };
+    go(&mut bench, 200);
+    bench.desk.path.begin().unwrap();
+    go(&mut bench, 220);
+    for _ in 0..2 {
+        assert_eq!(bench.until_rest(), Cause::PathDone);
+        assert_eq!([bench.last(0), bench.last(1)], mm(10.0, 20.0));
+        bench.engine.core.begin(bench.sent[bench.sent.len() - 1]);
+    }
+    // One that is stopped: what its writer still writes of it is not driven, and said.
+    bench.desk.path.begin().unwrap();
+    for point in circle(300).take(200) {
+        bench.desk.path.push(&point).unwrap();
+    }
+    assert_eq!(bench.until_rest(), Cause::RanDry);
+    let stopped = bench.sent[bench.sent.len() - 1];
+    bench.engine.core.begin(stopped);
+    for point in circle(300).skip(200) {
+        bench.desk.path.push(&point).unwrap();
+    }
+    bench.desk.path.finish().unwrap();
+    assert_eq!(bench.until_rest(), Cause::GivenUp);
+    assert_eq!(bench.sent[bench.sent.len() - 1], stopped);
+    bench.engine.core.begin(stopped);
+    bench.desk.path.begin().unwrap();
+    go(&mut bench, 200);
+    assert_eq!(bench.until_rest(), Cause::PathDone);
+    bench.check_smooth();
+}
+
+#[test]
+fn a_target_without_a_way_stops_the_axes() {
+    let mut bench = Bench::new();
+    bench.desk.move_to(&mm(50.0, 5.0)).unwrap();
+    bench.periods(60);
+    // Past the desk, which would have refused it.
+    let mut beyond = [Metres::ZERO; AXES_MAX];
+    beyond[1] = Metres::from_mm(99.0);
+    bench.desk.order(Command::MoveTo(beyond)).unwrap();
+    assert_eq!(bench.until_rest(), Cause::PathRefused { axis: 1 });
+    bench.check_smooth();
+    assert!(bench.last(0) < Metres::from_mm(40.0));
 }
 
 #[test]

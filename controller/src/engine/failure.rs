@@ -95,13 +95,16 @@ pub enum EngineFailure {
     /// An axis stopped answering.
     #[error(
         "axis {axis}: no position for {periods} SYNC periods; all drives were stopped at once; \
-         check its cable and power"
+         check its cable and power{}",
+        late_answers(*late)
     )]
     Missing {
         /// Which axis.
         axis: String,
         /// For so long.
         periods: u32,
+        /// How many positions of any axis came, so far, after half of their period.
+        late: u64,
     },
     /// An axis is not where it was sent.
     #[error(
@@ -143,6 +146,17 @@ pub enum EngineFailure {
     /// Nobody takes orders any more.
     #[error("the engine has ended, or too many orders wait")]
     NotTaken,
+}
+
+/// A few are the rest of what came before the loop began.
+fn late_answers(late: u64) -> String {
+    if late < 3 {
+        return String::new();
+    }
+    format!(
+        "; {late} positions came after half of their SYNC period, too late for its decision: is the \
+         bus, an adapter or the computer too slow for this period?"
+    )
 }
 
 impl EngineFailure {

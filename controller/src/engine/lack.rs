@@ -47,22 +47,26 @@ pub struct Lack {
 impl Lack {
     /// Of `sources`, the one that matters most; `None` when all are good.
     pub(crate) fn worst(sources: impl Iterator<Item = (Source, FeedStatus)>) -> Option<Self> {
-        let weight = |status: &FeedStatus| match status {
+        let each = sources.map(|(source, status)| Self { source, status });
+        let lacking = each.filter(|it| it.weight() > 0);
+        lacking.reduce(|worst, it| worst.worse_of(Some(it)))
+    }
+
+    /// Of two, the one that matters more; this one when they are alike.
+    pub fn worse_of(self, other: Option<Self>) -> Self {
+        other
+            .filter(|it| it.weight() > self.weight())
+            .unwrap_or(self)
+    }
+
+    const fn weight(&self) -> u8 {
+        match self.status {
             FeedStatus::Good | FeedStatus::Off => 0,
             FeedStatus::Tolerated(_) => 1,
             FeedStatus::Held(_) | FeedStatus::Faded(_) => 2,
             FeedStatus::Waiting(_) => 3,
             FeedStatus::Stop(_) => 4,
-        };
-        let lacking = sources.filter(|(_, status)| weight(status) > 0);
-        let worst = lacking.reduce(|worst, it| {
-            if weight(&it.1) > weight(&worst.1) {
-                it
-            } else {
-                worst
-            }
-        });
-        worst.map(|(source, status)| Self { source, status })
+        }
     }
 
     /// Whether the machine's configuration says how to go on without it, and that is done.
@@ -102,7 +106,10 @@ mod tests {
         let worst = Lack::worst(all.into_iter()).unwrap();
         let text = worst.to_string();
         assert_eq!(worst.source, Source::EndOfTravel(Axis::Y), "{text}");
-        assert!(text.contains("axis y") && text.contains("blocked"), "{text}");
+        assert!(
+            text.contains("axis y") && text.contains("blocked"),
+            "{text}"
+        );
         let held = Lack::worst(all[..2].iter().copied()).unwrap();
         assert!(held.is_made_up_for() && held.to_string().contains("thermometer 3"));
         assert_eq!(Lack::worst(all[..1].iter().copied()), None);

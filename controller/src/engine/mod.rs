@@ -16,12 +16,14 @@
 //! The host holds a [`Desk`], from any thread: a bounded queue of points, orders, and what the
 //! loop did lately. All of it passes through rings without locks. Linear axes only.
 
+mod account;
 mod correction;
 mod csv;
 mod decide;
 #[cfg(test)]
 mod decide_tests;
 mod failure;
+mod hear;
 mod histogram;
 mod lack;
 mod motion;
@@ -35,12 +37,12 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
+pub use account::{Cause, Counts, Live, State};
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
     THERMOMETERS_MAX, ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, read_path};
-pub use decide::{Cause, Counts, Live, State};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use lack::{Lack, Source};
@@ -51,8 +53,9 @@ pub use tables::TableCorrection;
 
 use crate::failure::Failure;
 use crate::machine::Machine;
+use account::Command;
 use correction::Applied;
-use decide::{Command, Core, Lines};
+use decide::{Core, Lines};
 
 /// How many axes move together at most.
 pub const AXES_MAX: usize = 8;

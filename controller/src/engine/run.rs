@@ -6,20 +6,21 @@
 //! (heartbeat, emergency, power state, following error, implausible position) ends the loop as it
 //! ends any procedure, but here with the quick stop command to every drive in the same period.
 //!
-//! A period that begins late is counted. Late by more than a period (times the patience of a
+//! A period that begins late is counted. Late by more than half a period: the next SYNCs are
+//! counted from this one, so that two are never closer than half a period. Late by more than a period (times the patience of a
 //! machine in simulated time): the drives have missed a SYNC, the queued path is dropped, and the
 //! axes are stopped together.
 
 use core::time::Duration;
 
-use drivers::device::{AxisReading, DriveCommand};
+use drivers::device::DriveCommand;
 use drivers::transport::real_time::RealTime;
 use drivers::transport::{Payload, Port, SendError};
 use drivers::wire::canopen::sync::emit_sync;
 use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
-use super::decide::{Heard, Trouble};
+use super::account::Trouble;
 use super::pace::Pace;
 use super::{
     AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
@@ -36,14 +37,14 @@ const CHANGE_LIMIT: Duration = Duration::from_secs(10);
 const REST_LIMIT: Duration = Duration::from_secs(5);
 
 /// Where the engine's axes are among the machine's devices.
-struct Seats {
-    count: usize,
+pub(super) struct Seats {
+    pub(super) count: usize,
     /// By the engine's order of axes, the number of the drive.
-    drive: PerAxis<usize>,
+    pub(super) drive: PerAxis<usize>,
     /// The buses that carry SYNC.
     buses: Vec<Port>,
-    channels: [Option<Channel>; CHANNELS_MAX],
-    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+    pub(super) channels: [Option<Channel>; CHANNELS_MAX],
+    pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
 }
 
 impl Machine {
@@ -97,9 +98,9 @@ impl Machine {
         engine.timing.scheduling = text.unwrap_or_default();
         let held = self.enter_cyclic(engine, &seats)?;
         engine.core.begin(held);
-        let outcome =
-            self.with_own_sync(|machine| machine.run_periods(engine, &mut seats, host));
-        let cause = outcome?;
+        let cause = self.holding_back(|machine| {
+            machine.with_own_sync(|it| it.run_periods(engine, &mut seats, host))
+        })?;
         // A drive that changes its mode while it moves may do anything.
         self.await_rest(engine, &seats)?;
         for at in &seats.drive[..seats.count] {
@@ -287,7 +288,8 @@ impl Machine {
         let answered = self.now();
         self.fire_deadlines(answered);
         self.judge_alarms()?;
-        let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), trouble);
+        let late_answers = engine.timing.late_answers;
+        let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), late_answers, trouble);
         if late > 0 {
             engine.core.overrun(late).map_err(judged)?;
         }
@@ -325,6 +327,11 @@ impl Machine {
             engine.timing.overruns += 1;
             engine.timing.skipped += u64::from(missed);
             pace.deadline += period * missed;
+        }
+        if now.since(pace.deadline) > period / 2 {
+            // The next SYNC on the old grid would come close behind this one.
+            pace.deadline = now;
+            engine.timing.shifted += 1;
         }
         self.send_syncs(seats)
             .map_err(|source| self.not_sent(source, "SYNC"))?;
@@ -369,72 +376,13 @@ impl Machine {
             };
             let was_complete = complete;
             self.take(&arrival)?;
-            if !was_complete {
+            if arrival.at < synced {
+                let is_late = seats.drive[..seats.count]
+                    .iter()
+                    .any(|at| self.answer(*at, arrival.at).is_some());
+                engine.timing.late_answers += u64::from(is_late);
+            } else if !was_complete {
                 engine.timing.answers.note(arrival.at.since(synced));
-            }
-        }
-    }
-
-    /// The newest sample of drive number `at`, if it came after the SYNC.
-    fn answer(&self, at: usize, synced: Time) -> Option<AxisReading> {
-        let reading = self.axes[at].device.reading()?;
-        (reading.at >= synced).then_some(reading)
-    }
-
-    fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
-        let mut actual = [None; AXES_MAX];
-        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
-            let reading = self.answer(*at, synced);
-            *actual = reading.map(|it| it.position);
-        }
-        self.hear_channels(&mut seats.channels);
-        self.hear_temperatures(&mut seats.temperatures);
-        Heard {
-            now,
-            actual,
-            channels: &seats.channels,
-            temperatures: &seats.temperatures,
-        }
-    }
-
-    /// Puts the newest sample of each analog channel into its place, in the order of the
-    /// modules' names.
-    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
-        // A module without a sample keeps its places: its channels would else be taken for
-        // those of the next one. What it said last stays, as old as it is.
-        let mut first = 0;
-        for analog in &self.analogs {
-            let own = channels.iter_mut().skip(first);
-            first += analog.device.channels();
-            let Some(sample) = analog.device.reading() else {
-                continue;
-            };
-            let values = sample.volts.iter().zip(&sample.saturated);
-            for (place, (volts, saturated)) in own.zip(values) {
-                *place = Some(Channel {
-                    at: sample.at,
-                    volts: *volts,
-                    saturated: *saturated,
-                });
-            }
-        }
-    }
-
-    /// Likewise of the thermometers.
-    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
-        let modules = self.analogs.iter();
-        let mut first = 0;
-        for module in modules.filter_map(|it| it.device.thermometers()) {
-            let own = temperatures.iter_mut().skip(first);
-            first += module.sensors();
-            let Some(sample) = module.temperatures() else {
-                continue;
-            };
-            for (place, celsius) in own.zip(&sample.celsius) {
-                *place = Some(ThermometerSample {
-                    at: sample.at,
-                    celsius: *celsius,
-                });
             }
         }
     }
@@ -490,11 +438,12 @@ fn engine_axes(axes: &[String]) -> impl Fn(usize) -> String + '_ {
     |axis| axes.get(axis).cloned().unwrap_or_default()
 }
 
-fn trouble_to_failure(name: impl Fn(usize) -> String, trouble: Trouble) -> Failure {
+fn trouble_to_failure(name: impl Fn(usize) -> String, late: u64, trouble: Trouble) -> Failure {
     match trouble {
         Trouble::Missing { axis, periods } => EngineFailure::Missing {
             axis: name(axis),
             periods,
+            late,
         },
         Trouble::Deviates { axis, lag, limit } => EngineFailure::Deviates {
             axis: name(axis),

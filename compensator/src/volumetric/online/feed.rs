@@ -175,6 +175,22 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.jump = true;
     }
 
+    /// Goes on where `before`, a feed of the same detector, has got to; if another value is wanted
+    /// from now on, it is blended to.
+    pub fn take_over(&mut self, before: &Self) {
+        *self = Self {
+            settings: self.settings,
+            jump: true,
+            ..before.clone()
+        };
+    }
+
+    /// The same values count from elsewhere: all of them are larger by `by`.
+    pub fn shift(&mut self, by: [Q; N]) {
+        self.held = core::array::from_fn(|i| self.held[i] + by[i]);
+        self.output = core::array::from_fn(|i| self.output[i] + by[i]);
+    }
+
     /// What stands behind the values given out last.
     pub fn status(&self) -> FeedStatus {
         self.status

@@ -375,6 +375,22 @@ fn a_detector_that_was_never_believed_is_not_waited_for_for_ever() {
 }
 
 #[test]
+fn a_feed_that_takes_over_goes_on_and_blends_to_what_it_wants() {
+    let mut before = feed(Reaction::Hold);
+    before.advance(ms(0), Ok([um(8.0)]));
+    before.advance(ms(20), Ok([um(8.0)]));
+    let mut after = feed(Reaction::Hold);
+    after.take_over(&before);
+    assert_eq!(after.status(), FeedStatus::Good);
+    check_um(after.advance(ms(21), Ok([um(-2.0)]))[0], 8.0);
+    check_um(after.advance(ms(26), Ok([um(-2.0)]))[0], 3.0);
+    let mut shifted = feed(Reaction::Hold);
+    shifted.take_over(&before);
+    shifted.shift([um(100.0)]);
+    check_um(shifted.advance(ms(21), Err(BLOCKED))[0], 108.0);
+}
+
+#[test]
 fn a_reference_that_is_exchanged_is_blended_to() {
     let mut feed = feed(Reaction::Hold);
     feed.advance(ms(0), Ok([um(8.0)]));

@@ -9,6 +9,10 @@
 //! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
 //! old: a reference is wrong by its slope times the way since then.
 
+mod sources;
+
+use core::any::Any;
+
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
 use compensator::volumetric::model::{
@@ -30,9 +34,7 @@ use crate::config::{
     BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
     ReactionName, RollConfig, VolumetricConfig,
 };
-use crate::engine::{
-    AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Source, Validity,
-};
+use crate::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
 
 /// As what a machine was calibrated: its errors, and what its detectors read then.
 #[derive(Clone, Debug, Default)]
@@ -246,23 +248,6 @@ impl VolumetricCorrection {
         Point::new(inside(Axis::X), inside(Axis::Y), inside(Axis::Z))
     }
 
-    /// What stands behind each value that is used.
-    fn statuses(&self) -> impl Iterator<Item = (Source, FeedStatus)> {
-        let beams = Axis::ALL.into_iter().zip(&self.beams);
-        let beams = beams.filter_map(|(axis, it)| Some((axis, it.as_ref()?)));
-        let beams = beams.flat_map(|(axis, it)| {
-            let (slider, end) = it.monitor.status();
-            let end = end.map(|it| (Source::EndOfTravel(axis), it));
-            core::iter::once((Source::Slide(axis), slider)).chain(end)
-        });
-        let roll = self.roll.iter();
-        let roll = roll.map(|it| (Source::Roll(it.axis), it.feed.status()));
-        let thermometers = self.thermometers.iter().enumerate();
-        let thermometers =
-            thermometers.map(|(at, it)| (Source::Thermometer(at + 1), it.status()));
-        beams.chain(roll).chain(thermometers)
-    }
-
     fn beams_are_good(&self) -> bool {
         let beams = self.beams.iter().flatten();
         let mut statuses = beams.flat_map(|it| {
@@ -319,6 +304,14 @@ const fn nothing(validity: Validity) -> Corrected {
 }
 
 impl Correction for VolumetricCorrection {
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
+    }
+
+    fn take_over(&mut self, before: &dyn Any) {
+        self.go_on_from(before);
+    }
+
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected {
         let (&[x, y, z], &[x_now, y_now, z_now]) = (observed.nominal, observed.actual) else {
             return nothing(Validity::Stop("the engine does not move three axes"));

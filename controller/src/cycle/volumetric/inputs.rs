@@ -166,4 +166,15 @@ impl Thermometer {
     pub(super) fn status(&self) -> FeedStatus {
         self.feed.status()
     }
+
+    /// Whether both are the same one.
+    pub(super) const fn is_of(&self, other: &Self) -> bool {
+        self.place == other.place
+    }
+
+    /// Goes on with what `before` showed, whatever it counted from.
+    pub(super) fn take_over(&mut self, before: &Self) {
+        self.feed.take_over(&before.feed);
+        self.feed.shift([before.reference - self.reference]);
+    }
 }

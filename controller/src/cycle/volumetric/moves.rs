@@ -114,6 +114,8 @@ impl Machine {
         watch: &mut dyn FnMut(&Live),
     ) -> Result<(), Failure> {
         let Mover { engine, desk } = mover;
+        let begun = desk.path.begin();
+        begun.map_err(|source| VolumetricFailure::Path { source })?;
         let mut left: VecDeque<_> = points.into();
         let mut refused = None;
         let mut finished = false;
