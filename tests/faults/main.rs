@@ -6,6 +6,7 @@
 
 mod bus;
 mod cyclic;
+mod cyclic_again;
 mod cyclic_host;
 mod detectors;
 mod drive;

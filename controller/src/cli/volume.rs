@@ -9,7 +9,7 @@ use truestage::cycle::volumetric::{
     GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
     VolumetricVerified, WarmUp,
 };
-use truestage::engine::{CsvError, Live, read_path};
+use truestage::engine::{CsvError, Lack, Live, Validity, read_path};
 use truestage::ports::Use;
 use truestage::store::{MemoryName, UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
@@ -362,34 +362,78 @@ pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
             help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
         })?;
         machine.correct_volume(&mut mover, is_corrected)?;
-        let mut largest = [Metres(0.0); 3];
+        let mut corrected = CorrectedPath::default();
         let count = points.len();
-        machine.drive_along(&mut mover, points, &mut |live| {
-            for (largest, offset) in largest.iter_mut().zip(live.offset) {
-                *largest = largest.max(offset.abs());
-            }
-        })?;
-        Ok((
-            is_corrected,
-            count,
-            largest,
-            mover.engine().timing().to_string(),
-        ))
+        machine.drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
+        let timing = mover.engine().timing().to_string();
+        Ok((is_corrected.then_some(corrected), count, timing))
     };
-    let ((is_corrected, count, largest, timing), counters) =
+    let ((corrected, count, timing), counters) =
         with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
-    let largest = largest.map(|it| it.um());
-    let text = format!(
-        "{count} points followed, {}\n{timing}",
-        if is_corrected {
-            format!("largest corrections {largest:.3?} µm")
-        } else {
-            "uncorrected: the errors were never measured".into()
-        }
-    );
-    let value = json!({"points": count, "corrected": is_corrected,
-                       "largest_correction_um": largest, "counters": counters});
+    let said = match &corrected {
+        Some(corrected) => corrected.text(),
+        None => "uncorrected: the errors were never measured".into(),
+    };
+    let text = format!("{count} points followed, {said}\n{timing}");
+    let mut value = json!({"points": count, "corrected": corrected.is_some(),
+                           "counters": counters});
+    if let Some(corrected) = &corrected {
+        corrected.write_into(&mut value);
+    }
     output.result(&text, &value)
+}
+
+/// What the correction said along a path.
+#[derive(Default)]
+struct CorrectedPath {
+    largest: [Metres; 3],
+    u: [Metres; 3],
+    periods: u64,
+    /// The worst that it had to do without, and for how many periods.
+    without: Option<Lack>,
+    degraded: u64,
+    limited: u64,
+}
+
+impl CorrectedPath {
+    fn note(&mut self, live: &Live) {
+        self.periods += 1;
+        for axis in 0..3 {
+            self.largest[axis] = self.largest[axis].max(live.offset[axis].abs());
+            self.u[axis] = self.u[axis].max(live.uncertainty[axis]);
+        }
+        if let Validity::Without(lack) = live.validity {
+            self.without = Some(lack.worse_of(self.without));
+        }
+        self.degraded += u64::from(live.validity != Validity::Valid);
+        let is_limited = live.alarms.iter().any(Option::is_some) || live.clamped.contains(&true);
+        self.limited += u64::from(is_limited);
+    }
+
+    fn text(&self) -> String {
+        let (largest, u) = (self.largest.map(|it| it.um()), self.u.map(|it| it.um()));
+        let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
+        if self.degraded > 0 {
+            let (degraded, periods) = (self.degraded, self.periods);
+            text += &format!("\nnot all was known in {degraded} of {periods} periods");
+        }
+        if let Some(lack) = &self.without {
+            text += &format!("; without {lack}");
+        }
+        if self.limited > 0 {
+            let limited = self.limited;
+            text += &format!("\nthe correction was limited in {limited} periods");
+        }
+        text
+    }
+
+    fn write_into(&self, value: &mut Value) {
+        value["largest_correction_um"] = json!(self.largest.map(|it| it.um()));
+        value["u_max_um"] = json!(self.u.map(|it| it.um()));
+        value["periods_degraded"] = json!(self.degraded);
+        value["without"] = json!(self.without.map(|it| it.to_string()));
+        value["periods_limited"] = json!(self.limited);
+    }
 }
 
 pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {

@@ -149,7 +149,8 @@ fn the_journal_alone_gives_the_stored_errors_again() {
     let again = again.unwrap_or_else(|failure| panic!("{failure}"));
     let stored = volume.bench.store.load(&made.id).expect("it was stored");
     let stored = stored.geometry(&made.id).expect("it is one");
-    assert_eq!(&again.content(), stored);
+    let config = good(volume.bench.machine.volumetric_config());
+    assert_eq!(&again.content(config), stored);
     assert_eq!((again.lines, again.u_max), (made.lines, made.u_max));
     let source = made
         .journal

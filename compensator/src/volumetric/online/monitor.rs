@@ -91,6 +91,15 @@ impl AxisMonitor {
         }
     }
 
+    /// Goes on with what `before`, which watched the same axis, has seen; another reference or other
+    /// memories are blended to.
+    pub fn take_over(&mut self, before: &Self) {
+        self.feed.take_over(&before.feed);
+        if let (Some(own), Some(before)) = (&mut self.end, &before.end) {
+            own.feed.take_over(&before.feed);
+        }
+    }
+
     /// The displacement by the last samples, memories and smoothing not counted; `None` when the
     /// slider's detector had no good one. A recorder takes this less what is compensated.
     pub fn displacement(&self) -> Option<Displacement> {

@@ -9,6 +9,10 @@
 //! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
 //! old: a reference is wrong by its slope times the way since then.
 
+mod sources;
+
+use core::any::Any;
+
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
 use compensator::volumetric::model::{
@@ -31,7 +35,7 @@ use crate::config::{
     BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
     ReactionName, RollConfig, VolumetricConfig,
 };
-use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
+use crate::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
 
 /// As what a machine was calibrated: its errors, and what its detectors read then.
 #[derive(Clone, Debug, Default)]
@@ -236,17 +240,6 @@ impl VolumetricCorrection {
         }
     }
 
-    /// What stands behind each value that is used.
-    fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
-        let beams = self.beams.iter().flatten().flat_map(|it| {
-            let (slider, end) = it.monitor.status();
-            core::iter::once(slider).chain(end)
-        });
-        let roll = self.roll.iter().map(|it| it.feed.status());
-        let thermometers = self.thermometers.iter().flat_map(Thermometers::statuses);
-        beams.chain(roll).chain(thermometers)
-    }
-
     /// Of a displacement that nobody sees nothing is known but that it is no larger than the
     /// largest permitted; one that blends in is off by what is left of that.
     fn u_displacement(&self) -> Metres {
@@ -309,6 +302,14 @@ const fn nothing(validity: Validity) -> Corrected {
 }
 
 impl Correction for VolumetricCorrection {
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
+    }
+
+    fn take_over(&mut self, before: &dyn Any) {
+        self.go_on_from(before);
+    }
+
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected {
         let (&[x, y, z], &[x_now, y_now, z_now]) = (observed.nominal, observed.actual) else {
             return nothing(Validity::Stop("the engine does not move three axes"));
@@ -319,9 +320,13 @@ impl Correction for VolumetricCorrection {
             let shown = thermometers.advance(observed);
             self.temperatures.copy_from_slice(shown);
         }
-        if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
-            return nothing(Validity::Stop("a detector or thermometer is in trouble"));
-        }
+        let validity = match Lack::worst(self.statuses()) {
+            None => Validity::Valid,
+            Some(lack) if matches!(lack.status, FeedStatus::Stop(_)) => {
+                return nothing(Validity::Lost(lack));
+            }
+            Some(lack) => Validity::Without(lack),
+        };
         let Ok(now) = self.model.conditions(self.tool, &self.temperatures, &state) else {
             return self.without();
         };
@@ -334,7 +339,7 @@ impl Correction for VolumetricCorrection {
             Ok(command) => Corrected {
                 offset: per_axis(command - inside),
                 uncertainty: self.uncertainty(command, &now),
-                validity: Validity::Valid,
+                validity,
             },
             Err(NoCorrection::Outside { .. }) => {
                 nothing(Validity::Stop("the path leaves the calibrated volume"))

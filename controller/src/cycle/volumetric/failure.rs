@@ -10,7 +10,7 @@ use compensator::volumetric::{Axis, NoCorrection, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 use crate::assemble::BeamDetectorError;
-use crate::engine::{Cause, PushError};
+use crate::engine::{Cause, Lack, PushError};
 
 /// Why three axes are not corrected, or not zeroed.
 #[derive(Debug, thiserror::Error)]
@@ -249,6 +249,18 @@ pub enum VolumetricFailure {
         /// What the axes reach.
         axes: MetresPerSecond,
     },
+    /// The correction was to be switched on, and something that it is computed from is missing.
+    #[error("not corrected: {lack}; the machine was not moved")]
+    Lacking {
+        /// What, and why.
+        lack: Lack,
+    },
+    /// The correction was to be switched on, and cannot be known.
+    #[error(
+        "not corrected: the detectors report more than the correction was proven for; the machine \
+         was not moved; look for what has shifted, or calibrate again"
+    )]
+    NotProven,
     /// A line without a direction, or with optics that look along it.
     #[error(
         "this line has no direction, or its optics do not look across it; nothing was moved: give \
@@ -348,6 +360,8 @@ impl VolumetricFailure {
             Self::NoSamples { .. }
             | Self::NoLight { .. }
             | Self::NotThere { .. }
+            | Self::Lacking { .. }
+            | Self::NotProven
             | Self::ImpossibleReading { .. }
             | Self::ImpossibleTilt { .. } => 4,
         }

@@ -318,7 +318,7 @@ impl Machine {
             }
             self.tick(deadline)?;
             let oldest = self.analogs.iter();
-            let oldest = oldest.map(|it| it.device.reading().map_or(Time::ZERO, |it| it.at));
+            let oldest = oldest.map(|it| it.device.last_sample().unwrap_or(Time::ZERO));
             let oldest = oldest.min().unwrap_or(Time::ZERO);
             if oldest <= last {
                 continue;

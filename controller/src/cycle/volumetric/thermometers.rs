@@ -133,6 +133,20 @@ impl Thermometers {
         &self.u_kelvin
     }
 
+    /// Goes on with what the same thermometers showed `before`, whatever that counted from.
+    pub(super) fn take_over(&mut self, before: &Self) {
+        for (at, own) in self.each.iter_mut().enumerate() {
+            let mut known = before.each.iter().zip(&before.channels);
+            let same = known.find(|(it, _)| it.reader.place == own.reader.place);
+            let Some((same, channel)) = same else {
+                continue;
+            };
+            own.feed.take_over(&same.feed);
+            let reference = self.channels[at].reference;
+            own.feed.shift([channel.reference - reference]);
+        }
+    }
+
     pub(super) fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
         self.each.iter().map(|it| it.feed.status())
     }
