@@ -1,6 +1,7 @@
 //! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
 
 use core::time::Duration;
+use std::path::Path;
 
 use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
@@ -15,11 +16,12 @@ use truestage::store::{MemoryName, UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
 use units::Metres;
 
+use super::data::read;
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
 use super::verbs::{journal_to_resume, parse_target};
-use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, RunArgs, VerifyArgs};
+use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);
@@ -343,11 +345,8 @@ fn live_value(live: &Live) -> Value {
     axes.collect()
 }
 
-pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
-    let path = std::fs::read_to_string(&args.path).map_err(|source| Failure::File {
-        path: args.path.clone(),
-        source,
-    })?;
+pub(super) fn run(machine: &MachineArgs, file: &Path, output: Output) -> Ended {
+    let path = read(file)?;
     let follow = |machine: &mut Machine, store: &Store| {
         let stored = machine.stored_mover(store)?;
         let is_corrected = stored.is_some();
@@ -358,7 +357,7 @@ pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
         let engine = mover.engine();
         let points = read_path(&path, engine.axes(), engine.period());
         let points = points.map_err(|source: CsvError| Failure::Usage {
-            what: format!("{}: {source}", args.path.display()),
+            what: format!("{}: {source}", file.display()),
             help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
         })?;
         machine.correct_volume(&mut mover, is_corrected)?;
@@ -369,7 +368,7 @@ pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
         Ok((is_corrected.then_some(corrected), count, timing))
     };
     let ((corrected, count, timing), counters) =
-        with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
+        with_zeroed_volume(machine, "run", Use::Motion, output, follow)?;
     let said = match &corrected {
         Some(corrected) => corrected.text(),
         None => "uncorrected: the errors were never measured".into(),
