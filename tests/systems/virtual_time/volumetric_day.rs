@@ -337,9 +337,9 @@ fn a_machine_calibrated_by_itself_keeps_its_tool_on_the_path_another_day() {
 }
 
 /// 2000 random places at standstill for each of twenty machines, on as many threads as there are
-/// processors: `cargo test --release -p tests --test systems twenty -- --ignored --nocapture`.
+/// processors: `cargo test --release -p tests --test systems twenty_machines -- --ignored --nocapture`.
 #[test]
-#[ignore = "a quarter of an hour in release, docs/benchmarks.md says what it came to"]
+#[ignore = "ten minutes in release; docs/benchmarks.md says what it came to"]
 fn twenty_machines_calibrated_by_themselves_keep_their_tools_on_the_path() {
     let days = days_of_calibrated(PLACES.div_ceil(DAY_H as usize + 1));
     eprintln!("{HEAD}");
