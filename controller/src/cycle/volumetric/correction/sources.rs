@@ -6,7 +6,6 @@ use core::any::Any;
 use compensator::volumetric::Axis;
 use compensator::volumetric::online::FeedStatus;
 
-use super::super::inputs::Thermometer;
 use super::VolumetricCorrection;
 use crate::engine::Source;
 
