@@ -2,16 +2,16 @@
 //!
 //! `cargo run --example stream -- machine.toml path.csv` (`time_s,x_mm`)
 #![expect(clippy::print_stdout, reason = "an example shows what it reads")]
-use std::time::Duration;
 use truestage::engine::{Engine, State, read_path};
-use truestage::{Failure, Machine, Store, config, ports};
+use truestage::{Failure, Machine, Store, config, ports, store::Lease};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().collect();
     let loaded = config::load(words[1].as_ref())?;
+    let store = Store::new(&loaded.config.machine.data_dir, &loaded.config.machine.name);
+    let _lease = Lease::take(&store, "stream")?;
     let ports = ports::open(&loaded.config, &Default::default(), ports::Use::Motion, 1.0)?;
     let mut machine = Machine::new(&loaded, Box::new(ports));
-    let store = Store::new(&loaded.config.machine.data_dir, &loaded.config.machine.name);
     let path = std::fs::read_to_string(&words[2])?;
     Ok(machine.guarded(|machine| -> Result<(), Failure> {
         machine.start()?;
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             while !matches!(desk.live().map(|it| it.state), Some(State::Stopped(_))) {
                 let written = desk.path.write(&mut points);
                 written.unwrap_or_else(|error| panic!("{error}"));
-                std::thread::sleep(Duration::from_millis(20));
+                std::thread::sleep(std::time::Duration::from_millis(20));
                 let Some(live) = desk.live() else { continue };
                 let (offset, u) = (live.offset[0].um(), live.uncertainty[0].um());
                 println!("x {:.6} mm, {offset:+.3} ± {u:.3} um", live.actual[0].mm());

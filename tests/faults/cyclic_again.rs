@@ -131,9 +131,12 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     let id = bench.emulated.simulation_mut().inject(coasting).unwrap();
     let machine = &mut bench.machine;
     let rested = machine.now() + Duration::from_secs(1);
-    let told = machine.run_until(rested);
-    assert!(matches!(told, Err(Failure::Alarm { .. })), "{told:?}");
-    machine.run_until(rested).unwrap();
+    let mut told = 0;
+    while let Err(failure) = machine.run_until(rested) {
+        assert!(matches!(failure, Failure::Alarm { .. }), "{failure}");
+        told += 1;
+    }
+    assert!(told > 0);
     assert_eq!(bench.emulated.simulation().fault_deliveries(id), 1);
     let outside = here(&bench);
     assert!(outside > Metres::from_mm(63.4), "{outside}");

@@ -390,6 +390,30 @@ fn a_correction_that_is_exchanged_on_the_way_leaves_nothing_out_meanwhile() {
     }
 }
 
+/// All samples of a module lost, not one frame of each: that is a device in trouble, like a drive.
+#[test]
+fn a_module_that_falls_silent_is_an_alarm_whatever_its_detectors_do() {
+    let (mut bench, seen) = standing("hold");
+    let state = risen(&bench, &seen);
+    let correction = VolumetricCorrection::new(&bench.loaded.config, state);
+    let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
+    let mover = bench.machine.volumetric_mover(correction);
+    let mut mover = mover.unwrap_or_else(|it| panic!("{it}"));
+    let silent = Fault::StopPdos {
+        node: "beams_x".into(),
+    };
+    let silent = FaultConfig::permanent(silent);
+    let id = bench.emulated.simulation_mut().inject(silent);
+    let id = id.expect("it is there");
+    let failure = bench.machine.correct_volume(&mut mover, true);
+    let failure = failure.map(drop).unwrap_err();
+    assert!(bench.emulated.simulation().fault_deliveries(id) > 0);
+    assert!(
+        matches!(&failure, Failure::Alarm { device, .. } if device == "beams_x"),
+        "{failure}"
+    );
+}
+
 /// A module with thermometers alone never says a voltage.
 #[test]
 fn a_module_of_thermometers_alone_is_heard() {

@@ -295,38 +295,50 @@ fn a_move_puts_an_end_to_a_path_and_its_rest_is_never_driven() {
     bench.check_smooth();
 }
 
+/// From 10 to 15 mm, from rest to rest.
+fn line(periods: u32) -> impl Iterator<Item = [Metres; 2]> {
+    use std::f64::consts::TAU;
+    (0..=periods).map(move |at| {
+        let u = f64::from(at) / f64::from(periods);
+        mm(10.0 + 5.0 * (u - (TAU * u).sin() / TAU), 20.0)
+    })
+}
+
 #[test]
 fn another_path_follows_the_first_and_one_that_was_stopped() {
     let mut bench = Bench::new();
-    let go = |bench: &mut Bench, periods: u32| {
-        circle(periods).for_each(|point| bench.desk.path.push(&point).unwrap());
+    let go = |bench: &mut Bench| {
+        line(200).for_each(|point| bench.desk.path.push(&point).unwrap());
         bench.desk.path.finish().unwrap();
     };
-    go(&mut bench, 200);
+    let again = |bench: &mut Bench| {
+        let here = bench.sent[bench.sent.len() - 1];
+        bench.engine.core.begin(here);
+        here
+    };
+    go(&mut bench);
     bench.desk.path.begin().unwrap();
-    go(&mut bench, 220);
+    go(&mut bench);
     for _ in 0..2 {
         assert_eq!(bench.until_rest(), Cause::PathDone);
-        assert_eq!([bench.last(0), bench.last(1)], mm(10.0, 20.0));
-        bench.engine.core.begin(bench.sent[bench.sent.len() - 1]);
+        assert_eq!([bench.last(0), bench.last(1)], mm(15.0, 20.0));
+        again(&mut bench);
     }
     // One that is stopped: what its writer still writes of it is not driven, and said.
     bench.desk.path.begin().unwrap();
-    for point in circle(300).take(200) {
+    for point in line(200).take(100) {
         bench.desk.path.push(&point).unwrap();
     }
     assert_eq!(bench.until_rest(), Cause::RanDry);
-    let stopped = bench.sent[bench.sent.len() - 1];
-    bench.engine.core.begin(stopped);
-    for point in circle(300).skip(200) {
+    let stopped = again(&mut bench);
+    for point in line(200).skip(100) {
         bench.desk.path.push(&point).unwrap();
     }
     bench.desk.path.finish().unwrap();
     assert_eq!(bench.until_rest(), Cause::GivenUp);
-    assert_eq!(bench.sent[bench.sent.len() - 1], stopped);
-    bench.engine.core.begin(stopped);
+    assert_eq!(again(&mut bench), stopped);
     bench.desk.path.begin().unwrap();
-    go(&mut bench, 200);
+    go(&mut bench);
     assert_eq!(bench.until_rest(), Cause::PathDone);
     bench.check_smooth();
 }
@@ -515,7 +527,6 @@ fn a_correction_that_is_no_number_stops_the_machine() {
     assert!(cause.to_string().contains("not a number"), "{cause}");
     let live = bench.desk.live().unwrap();
     assert_eq!(live.offset[0], Metres::from_um(10.0), "held meanwhile");
-    bench.check_smooth();
 }
 
 #[test]
@@ -530,7 +541,12 @@ fn a_pause_between_two_motions_is_not_worth_a_step() {
         // Held up in the middle of it.
         bench.now += Duration::from_secs(1);
         bench.periods(20);
-        assert_eq!(bench.last(0).um(), if on { 25.0 } else { 0.0 });
+        let all = if on {
+            Metres::from_um(25.0)
+        } else {
+            Metres::ZERO
+        };
+        assert_eq!(bench.last(0), all);
     }
     for step in bench.sent.windows(2) {
         let um = (step[1][0] - step[0][0]).um().abs();

@@ -1,9 +1,9 @@
 //! The cyclic engine: one set-point for several drives at every SYNC (CiA 402, mode 8), with a
 //! correction computed in the same period from what the machine sees.
 //!
-//! - `decide` decides one period: samples judged, path or motion, correction, set-points, and when
+//! - `account` has what the loop is asked and what it says; `decide` decides one period: samples judged, path or motion, correction, set-points, and when
 //!   to stop. Sans-io, of fixed size.
-//! - `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
+//! - `hear` collects what was heard of one SYNC. `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
 //!   send. It runs in the thread that calls it (docs/decisions/0014).
 //! - `path` and `csv` write paths, `motion` plans moves and stops, `correction` limits what is
 //!   added, `histogram` counts times.
