@@ -9,7 +9,7 @@ use compensator::volumetric::Point;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::volume::{Off, Volume, good, point_mm, size};
 use truestage::Failure;
-use truestage::cycle::volumetric::{VolumetricFailure, VolumetricState};
+use truestage::cycle::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
 use truestage::engine::{Cause, Live};
 use units::{Metres, Quantity, Time};
 
@@ -277,4 +277,28 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
         assert!(moved < Metres::from_um(0.5), "{}: {moved}", stood.text);
         assert!(last.live.uncertainty[0].value().is_nan(), "nobody knows");
     }
+}
+
+/// References taken now would count 2 K of bending and of films as nothing.
+#[test]
+fn references_are_not_taken_of_a_machine_that_is_warmer_than_it_was() {
+    let mut volume = warm("hold");
+    let store = volume.bench.store.clone();
+    let before = store.active(REFERENCES).expect("it can be read").current;
+    let here = volume.truth(|truth| truth.scales());
+    let refused = volume.bench.machine.reference_volumetric(&store);
+    let refused = refused.expect_err("it is warmer");
+    let text = refused.to_string();
+    assert!(
+        text.contains("thermometer 0") && text.contains("0.20 K"),
+        "{text}"
+    );
+    assert_eq!(refused.exit_code(), 3);
+    let moved = volume.truth(|truth| truth.scales());
+    let moved = (0..3).map(|k| (moved[k] - here[k]).abs());
+    assert!(moved.fold(Metres(0.0), Quantity::max) < Metres::from_um(100.0));
+    assert_eq!(
+        store.active(REFERENCES).expect("it can be read").current,
+        before
+    );
 }

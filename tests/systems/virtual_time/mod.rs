@@ -10,6 +10,7 @@ mod rotary;
 mod rotary_table;
 mod serial_zero;
 mod volumetric;
+mod volumetric_cold;
 mod volumetric_day;
 mod volumetric_kept;
 mod volumetric_kinds;

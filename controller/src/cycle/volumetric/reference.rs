@@ -505,4 +505,47 @@ mod tests {
         let mm: Vec<f64> = stops.iter().map(|it| it.mm()).collect();
         assert_eq!(mm, [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
     }
+
+    /// The second and third thermometers are over and under y's guide by the configuration.
+    #[test]
+    fn a_machine_as_warm_as_it_was_is_told_from_another() {
+        let text = include_str!("../../../../configs/machines/volumetric.toml");
+        let config = crate::config::parse(text, "m").unwrap().config;
+        let mut config = config.volumetric.unwrap();
+        let then = [20.0, 20.5, 21.0, 21.0, 20.0, 20.0].map(Celsius);
+        let now = |at: usize, by: f64| {
+            let mut now = then;
+            now[at] += Celsius(by);
+            now
+        };
+        let check = |config: &VolumetricConfig, now: &[Celsius]| {
+            check_warmth(config, "0123456789abcdef", &then, now)
+        };
+        assert!(check(&config, &now(1, 0.19)).is_ok());
+        let refused = check(&config, &now(1, -0.3)).unwrap_err().to_string();
+        for word in [
+            "thermometer 1 ",
+            "20.20 °C",
+            "20.50 °C",
+            "0.20 K",
+            "0123456789ab",
+        ] {
+            assert!(refused.contains(word), "{word}: {refused}");
+        }
+        // Each within its tolerance, but the guide bends by their difference.
+        let mut across = now(2, 0.15);
+        across[3] -= Celsius(0.15);
+        let refused = check(&config, &across).unwrap_err();
+        let VolumetricFailure::OtherGradient { axis, over, .. } = &refused else {
+            panic!("{refused}")
+        };
+        assert_eq!((*axis, *over), (Axis::Y, 2));
+        assert!(refused.to_string().contains("+0.30 K"), "{refused}");
+        if let Some(reference) = &mut config.reference {
+            reference.warmth_tolerance_k = Some(0.5);
+        }
+        assert!(check(&config, &across).is_ok());
+        let fewer = check(&config, &then[..5]);
+        assert!(matches!(fewer, Err(VolumetricFailure::Temperatures { .. })));
+    }
 }

@@ -128,7 +128,7 @@ impl Thermometers {
         farthest / 3.0_f64.sqrt()
     }
 
-    /// Its standard uncertainties, in kelvin.
+    /// The standard uncertainties of what was given out last, in kelvin.
     pub(super) fn u_kelvin(&self) -> &[f64] {
         &self.u_kelvin
     }
@@ -201,5 +201,223 @@ impl Thermometry {
         let count = f64::from(core::mem::take(&mut self.count));
         let mean = |sum: &mut f64| Celsius(core::mem::take(sum) / count);
         self.sums.iter_mut().map(mean).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use super::*;
+    use crate::assemble::thermal;
+    use crate::config::VolumetricConfig;
+
+    const SHIPPED: &str = include_str!("../../../../configs/machines/volumetric.toml");
+    const REFERENCES: [Celsius; 6] = [Celsius(20.0); 6];
+    const PERIOD: Duration = Duration::from_millis(20);
+
+    /// What the thermometers show; they are on one module, whose sample came just now.
+    type Shown = [Option<Celsius>; 6];
+
+    fn shipped() -> (MachineConfig, VolumetricConfig) {
+        let quick = SHIPPED.replace("fade_out_s = 60.0", "fade_out_s = 1.0");
+        let config = crate::config::parse(&quick, "m").unwrap().config;
+        let own = config.volumetric.clone().unwrap();
+        (config, own)
+    }
+
+    fn samples(shown: &Shown, at: Time) -> Vec<Option<ThermometerSample>> {
+        let sample = |celsius: &Option<Celsius>| {
+            let celsius = *celsius;
+            Some(ThermometerSample { at, celsius })
+        };
+        shown.iter().map(sample).collect()
+    }
+
+    /// The shipped thermometers in a warm machine, and the time.
+    struct Warm {
+        thermometers: Thermometers,
+        now: Time,
+        shown: Vec<Celsius>,
+    }
+
+    impl Warm {
+        fn new() -> Self {
+            let (config, own) = shipped();
+            let feed = own.feed.clone().unwrap();
+            let thermal = thermal(&own, &REFERENCES);
+            let thermometers = Thermometers::new(&config, &own.temperature, &feed, &thermal);
+            let mut warm = Self {
+                thermometers,
+                now: Time::ZERO,
+                shown: REFERENCES.to_vec(),
+            };
+            warm.run(300, |_| [Some(Celsius(22.0)); 6]);
+            assert_eq!(warm.shown, [Celsius(22.0); 6]);
+            assert_eq!(warm.thermometers.u_kelvin(), [0.03; 6]);
+            warm
+        }
+
+        /// So many periods with what is shown in each; no two of a pair ever part, nothing jumps.
+        #[track_caller]
+        fn run(&mut self, periods: u32, each: impl Fn(u32) -> Shown) {
+            for period in 0..periods {
+                self.now += PERIOD;
+                let temperatures = samples(&each(period), self.now);
+                let observed = Observed {
+                    now: self.now,
+                    nominal: &[],
+                    actual: &[],
+                    channels: &[],
+                    temperatures: &temperatures,
+                };
+                let before = core::mem::take(&mut self.shown);
+                self.shown = self.thermometers.advance(&observed).to_vec();
+                for pair in self.shown.chunks(2) {
+                    assert_eq!(pair[0], pair[1], "in period {period}: {:?}", self.shown);
+                }
+                for (before, now) in before.iter().zip(&self.shown) {
+                    let jump = (*now - *before).abs();
+                    assert!(jump.value() < 0.05, "{jump} in period {period}");
+                }
+            }
+        }
+    }
+
+    /// One of a pair in trouble: the pair fades and returns, the others stay as they are.
+    #[test]
+    fn a_pair_goes_and_comes_back_together_whatever_befalls_one_of_it() {
+        let good = Some(Celsius(22.0));
+        // No sensor, below what can be, faster than it can be.
+        for bad in [None, Some(Celsius(5.0)), Some(Celsius(25.0))] {
+            let mut warm = Warm::new();
+            warm.run(200, |_| [bad, good, good, good, good, good]);
+            assert_eq!(warm.shown[..2], REFERENCES[..2]);
+            assert_eq!(warm.shown[2..], [Celsius(22.0); 4]);
+            let u = warm.thermometers.u_kelvin();
+            // From 20 to 35 °C, evenly.
+            let unknown = 15.0 / 3.0_f64.sqrt();
+            assert!(u[..2].iter().all(|it| (it - unknown).abs() < 1e-9), "{u:?}");
+            assert_eq!(u[2..], [0.03; 4]);
+            let troubled = warm.thermometers.statuses();
+            let troubled = troubled.filter(|it| matches!(it, FeedStatus::Faded(_)));
+            assert_eq!(troubled.count(), 2);
+            warm.run(150, |_| [good; 6]);
+            // Half way back it is nearly a kelvin off, and says so.
+            let (shown, u) = (warm.shown[0], warm.thermometers.u_kelvin()[0]);
+            assert!((21.0..21.9).contains(&shown.value()), "{shown}");
+            assert!(
+                (u - (22.0 - shown.value())).abs() < 0.01,
+                "{u} K at {shown}"
+            );
+            warm.run(150, |_| [good; 6]);
+            assert_eq!(warm.shown, [Celsius(22.0); 6]);
+            assert_eq!(warm.thermometers.u_kelvin(), [0.03; 6]);
+        }
+    }
+
+    /// A spike each second, and never ten good samples between two that are bad.
+    #[test]
+    fn a_pair_is_not_believed_while_one_of_it_flickers() {
+        let mut warm = Warm::new();
+        let good = Some(Celsius(22.0));
+        let flickers = |period: u32| {
+            if period.is_multiple_of(50) {
+                None
+            } else {
+                good
+            }
+        };
+        warm.run(400, |period| {
+            [good, flickers(period), good, good, good, good]
+        });
+        assert_eq!(warm.shown[..2], REFERENCES[..2]);
+        assert_eq!(warm.shown[2..], [Celsius(22.0); 4]);
+    }
+
+    /// All of them: one module sends nothing any more.
+    #[test]
+    fn thermometers_whose_samples_are_old_fade_together() {
+        let mut warm = Warm::new();
+        let last = samples(&[Some(Celsius(22.0)); 6], warm.now);
+        for _ in 0..200 {
+            warm.now += PERIOD;
+            let observed = Observed {
+                now: warm.now,
+                nominal: &[],
+                actual: &[],
+                channels: &[],
+                temperatures: &last,
+            };
+            let shown = warm.thermometers.advance(&observed);
+            assert!(shown.iter().all(|it| *it == shown[0]), "{shown:?}");
+        }
+        // A second until a sample is old, 0.2 s of patience, a second to fade.
+        assert_eq!(warm.thermometers.shown, REFERENCES);
+    }
+
+    /// The sample with which it fails, and why.
+    #[track_caller]
+    fn fails(shown: &[Shown], index: usize, says: fn(&Trouble) -> bool) {
+        let (config, own) = shipped();
+        let mut thermometry = Thermometry::new(&config, &own.temperature);
+        let mut now = Time::ZERO;
+        for (at, it) in shown.iter().enumerate() {
+            now += PERIOD;
+            let added = thermometry.add(now, &samples(it, now));
+            let is_last = at + 1 == shown.len();
+            match added {
+                Ok(()) => assert!(!is_last, "it was believed"),
+                Err(VolumetricFailure::NoTemperature {
+                    index: seen,
+                    source,
+                }) => {
+                    assert!(is_last && seen == index && says(&source), "{at}: {source}");
+                }
+                Err(failure) => panic!("{failure}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_spike_or_what_cannot_be_never_gets_into_a_mean() {
+        let good = [Some(Celsius(21.0)); 6];
+        let with = |celsius: Option<Celsius>| {
+            let mut shown = good;
+            shown[4] = celsius;
+            shown
+        };
+        let spike = with(Some(Celsius(21.5)));
+        fails(&[good, good, spike], 4, |it| {
+            matches!(it, Trouble::Jumped { .. })
+        });
+        let cold = with(Some(Celsius(9.9)));
+        fails(&[good, cold], 4, |it| {
+            matches!(it, Trouble::Implausible { .. })
+        });
+        fails(&[with(None)], 4, |it| {
+            matches!(it, Trouble::Implausible { .. })
+        });
+    }
+
+    #[test]
+    fn means_begin_anew_and_what_was_shown_last_still_counts() {
+        let (config, own) = shipped();
+        let mut thermometry = Thermometry::new(&config, &own.temperature);
+        assert!(thermometry.is_empty());
+        for celsius in [21.0, 21.1, 21.2] {
+            let shown = samples(&[Some(Celsius(celsius)); 6], Time::from_seconds(1.0));
+            let added = thermometry.add(Time::from_seconds(1.0), &shown);
+            added.unwrap_or_else(|failure| panic!("{failure}"));
+        }
+        let means = thermometry.take();
+        assert!(means.iter().all(|it| (it.value() - 21.1).abs() < 1e-9));
+        assert!(thermometry.is_empty());
+        let later = Time::from_seconds(2.0);
+        let far = samples(&[Some(Celsius(23.0)); 6], later);
+        assert!(thermometry.add(later, &far).is_err(), "1 K per minute");
+        let old = Time::from_seconds(4.0);
+        let refused = thermometry.add(old, &far);
+        assert!(refused.is_err(), "two seconds old");
     }
 }

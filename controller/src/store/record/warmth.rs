@@ -156,3 +156,49 @@ impl ExpansionRecord {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bend(sideways: bool) -> IdentifiedBend {
+        IdentifiedBend {
+            plan: BendPlan {
+                axis: Axis::X,
+                towards: Axis::Z,
+                over: 0,
+                under: Some(1),
+                low: Metres(0.0),
+                high: Metres(0.5),
+                sideways,
+            },
+            bow: Metres::from_um(4.0),
+            u: Metres::from_um(0.1),
+        }
+    }
+
+    #[test]
+    fn a_bend_comes_back_as_it_was_planned_also_from_earlier_files() {
+        for sideways in [false, true] {
+            let record = BendRecord::of(&bend(sideways));
+            let text = serde_json::to_string(&record).unwrap();
+            let read: BendRecord = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.found("id").unwrap(), bend(sideways));
+            let earlier = text.replace(&format!(",\"sideways\":{sideways}"), "");
+            assert_ne!(earlier, text);
+            let read: BendRecord = serde_json::from_str(&earlier).unwrap();
+            assert_eq!(read.found("id").unwrap(), bend(false));
+        }
+    }
+
+    #[test]
+    fn what_nobody_knows_is_named() {
+        let roll = ErrorName::About(Axis::Z, Axis::Z);
+        let unknown = UnknownRecord::of(&[bend(false).plan], &[roll]);
+        assert_eq!(unknown.bends, [['x', 'z']]);
+        let text = unknown.summary();
+        assert!(text.contains("bending of x unknown"), "{text}");
+        assert!(text.contains("e_cz taken as zero"), "{text}");
+        assert_eq!(UnknownRecord::default().summary(), "");
+    }
+}
