@@ -157,7 +157,9 @@ struct VerifyArgs {
 /// What is done with the state memories of three axes.
 #[derive(Debug, Subcommand)]
 enum MemoryCommand {
-    /// Zero, then record the present state: it is kept from now on.
+    /// Zero, then record the present state at stops along each axis, before parts are made: all
+    /// parts from now on are made with the state of this hour. Nothing is corrected meanwhile, so
+    /// it is not the state of a part that was made before; `run --first-part` records that.
     Record(MemoryArgs),
     /// Keep nothing by it any more; nothing moves.
     Clear(MemoryArgs),
@@ -168,7 +170,7 @@ enum MemoryCommand {
 struct MemoryArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// What the machine was built with, or what the first part was made with beyond that.
+    /// What the machine was built with, or what all parts are to be made with beyond that.
     #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
     memory: MemoryChoice,
 }
@@ -195,6 +197,10 @@ struct RunArgs {
     machine: MachineArgs,
     /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
     path: PathBuf,
+    /// The first of several parts: what the detectors see meanwhile is not corrected but recorded
+    /// as the second memory, and all later parts are made with it, like this one.
+    #[arg(long)]
+    first_part: bool,
 }
 
 /// Which way round a rotary axis goes.
@@ -341,6 +347,19 @@ mod tests {
             panic!("another verb")
         };
         assert_eq!(args.resume, Some("a.jsonl".into()));
+    }
+
+    #[test]
+    fn a_first_part_is_made_when_asked_for_only() {
+        for (words, expected) in [
+            (&["run", "m.toml", "part.csv"][..], false),
+            (&["run", "m.toml", "part.csv", "--first-part"][..], true),
+        ] {
+            let Command::Run(args) = parsed(words) else {
+                panic!("another verb")
+            };
+            assert_eq!(args.first_part, expected);
+        }
     }
 
     #[test]

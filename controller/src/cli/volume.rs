@@ -5,8 +5,8 @@ use core::time::Duration;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced, VolumetricVerified,
-    WarmUp,
+    Remembered, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    VolumetricVerified, WarmUp,
 };
 use truestage::engine::{CsvError, Live, read_path};
 use truestage::ports::Use;
@@ -299,53 +299,95 @@ fn live_value(live: &Live) -> Value {
     axes.collect()
 }
 
+/// How a path was followed.
+struct Followed {
+    count: usize,
+    is_corrected: bool,
+    largest: [Metres; 3],
+    timing: String,
+    /// What later parts are made with, when this was the first.
+    kept: Option<Remembered>,
+}
+
 pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
     let path = std::fs::read_to_string(&args.path).map_err(|source| Failure::File {
         path: args.path.clone(),
         source,
     })?;
-    let follow = |machine: &mut Machine, store: &Store| {
-        let stored = machine.stored_mover(store)?;
-        let is_corrected = stored.is_some();
-        let mut mover = match stored {
-            Some(mover) => mover,
-            None => machine.volumetric_mover(Box::new(truestage::engine::NoCorrection))?,
-        };
-        let engine = mover.engine();
-        let points = read_path(&path, engine.axes(), engine.period());
-        let points = points.map_err(|source: CsvError| Failure::Usage {
-            what: format!("{}: {source}", args.path.display()),
-            help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
-        })?;
-        machine.correct_volume(&mut mover, is_corrected)?;
-        let mut largest = [Metres(0.0); 3];
-        let count = points.len();
-        machine.drive_along(&mut mover, points, &mut |live| {
-            for (largest, offset) in largest.iter_mut().zip(live.offset) {
-                *largest = largest.max(offset.abs());
-            }
-        })?;
-        Ok((
-            is_corrected,
-            count,
-            largest,
-            mover.engine().timing().to_string(),
-        ))
-    };
-    let ((is_corrected, count, largest, timing), counters) =
+    let follow = |machine: &mut Machine, store: &Store| followed(machine, store, args, &path);
+    let (followed, counters) =
         with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
-    let largest = largest.map(|it| it.um());
-    let text = format!(
-        "{count} points followed, {}\n{timing}",
-        if is_corrected {
+    let largest = followed.largest.map(|it| it.um());
+    let mut text = format!(
+        "{} points followed, {}\n{}",
+        followed.count,
+        if followed.is_corrected {
             format!("largest corrections {largest:.3?} µm")
         } else {
             "uncorrected: the errors were never measured".into()
-        }
+        },
+        followed.timing
     );
-    let value = json!({"points": count, "corrected": is_corrected,
-                       "largest_correction_um": largest, "counters": counters});
+    let mut value = json!({"points": followed.count, "corrected": followed.is_corrected,
+                           "largest_correction_um": largest, "counters": counters});
+    if let Some(kept) = &followed.kept {
+        text += &format!(
+            "\nmade without what the detectors saw; {} keeps that: all later parts are made with it\n{}",
+            short(&kept.id),
+            kept_text(kept)
+        );
+        value["memory"] = kept_value(kept);
+    }
     output.result(&text, &value)
+}
+
+fn followed(
+    machine: &mut Machine,
+    store: &Store,
+    args: &RunArgs,
+    path: &str,
+) -> Result<Followed, Failure> {
+    let (mover, part) = match args.first_part {
+        true => {
+            let (mover, part) = machine.first_part(store)?;
+            (Some(mover), Some(part))
+        }
+        false => (machine.stored_mover(store)?, None),
+    };
+    let is_corrected = mover.is_some();
+    let mut mover = match mover {
+        Some(mover) => mover,
+        None => machine.volumetric_mover(Box::new(truestage::engine::NoCorrection))?,
+    };
+    let engine = mover.engine();
+    let points = read_path(path, engine.axes(), engine.period());
+    let points = points.map_err(|source: CsvError| Failure::Usage {
+        what: format!("{}: {source}", args.path.display()),
+        help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
+    })?;
+    machine.correct_volume(&mut mover, is_corrected)?;
+    if let Some(part) = &part {
+        part.recorder.listen();
+    }
+    let mut largest = [Metres(0.0); 3];
+    let count = points.len();
+    machine.drive_along(&mut mover, points, &mut |live| {
+        for (largest, offset) in largest.iter_mut().zip(live.offset) {
+            *largest = largest.max(offset.abs());
+        }
+    })?;
+    let timing = mover.engine().timing().to_string();
+    let kept = match part {
+        Some(part) => Some(machine.keep_part(store, mover, part)?),
+        None => None,
+    };
+    Ok(Followed {
+        count,
+        is_corrected,
+        largest,
+        timing,
+        kept,
+    })
 }
 
 pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
@@ -353,28 +395,61 @@ pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
     let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
     let (kept, counters) =
         with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
-    let axes = Axis::ALL
-        .into_iter()
-        .filter(|it| kept.map.of[it.index()].is_some());
-    let axes: Vec<String> = axes.map(|it| it.to_string()).collect();
     let text = format!(
-        "{} keeps the present state of {} from now on",
+        "{} keeps the present state: all parts from now on are made with it\n{}",
         short(&kept.id),
-        axes.join(", ")
+        kept_text(&kept)
     );
-    output.result(
-        &text,
-        &json!({"memory": kept.id, "axes": axes, "counters": counters}),
+    let mut value = kept_value(&kept);
+    value["counters"] = counters;
+    output.result(&text, &value)
+}
+
+fn kept_text(kept: &Remembered) -> String {
+    let axes = Axis::ALL.into_iter().zip(kept.covers);
+    let axes = axes.filter_map(|(axis, covers)| {
+        let (from, to) = covers?;
+        Some(format!("{axis} {:.3} to {:.3} mm", from.mm(), to.mm()))
+    });
+    let axes: Vec<String> = axes.collect();
+    format!(
+        "recorded along {}; beyond, the ends hold{}",
+        axes.join(", "),
+        foreign_text(kept.foreign.as_deref())
     )
+}
+
+/// A second memory that no longer fits the first.
+fn foreign_text(foreign: Option<&str>) -> String {
+    let foreign = foreign.map(short);
+    foreign.map_or_else(String::new, |it| {
+        format!(
+            "\nthe second memory {it} counts beyond another first one: before the next part record it \
+             again (`truestage memory record`) or clear it (`truestage memory clear`)"
+        )
+    })
+}
+
+fn kept_value(kept: &Remembered) -> Value {
+    let axes = Axis::ALL.into_iter().zip(kept.covers);
+    let axes = axes.filter_map(|(axis, covers)| {
+        let (from, to) = covers?;
+        Some(json!({"axis": axis.to_string(), "from_mm": from.mm(), "to_mm": to.mm()}))
+    });
+    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "foreign_second": kept.foreign})
 }
 
 pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
     let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
-    let before = session.machine.clear_memory(&session.store, which)?;
+    let (before, foreign) = session.machine.clear_memory(&session.store, which)?;
     let text = match &before {
         Some(id) => format!("{} is kept no more", short(id)),
         None => "nothing was kept".into(),
     };
-    output.result(&text, &json!({"cleared": before}))
+    let text = text + &foreign_text(foreign.as_deref());
+    output.result(
+        &text,
+        &json!({"cleared": before, "foreign_second": foreign}),
+    )
 }

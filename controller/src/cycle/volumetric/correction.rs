@@ -1,13 +1,15 @@
 //! What the cyclic engine adds to each set-point of three axes (system S4).
 //!
-//! In every period: detectors → displacement from the reference, freed of the beam's drift → less
-//! what the memories keep → feed, so that nothing jumps → model, with roll and temperatures → exact
-//! inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
+//! In every period: detectors → displacement from the reference, freed of the beam's drift and of
+//! what a detector beside its slide's zero sees of tilts → less what the memories keep → feed, so that
+//! nothing jumps → model, with roll and temperatures → exact inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
 //! slews from one correction to the next; that the rate is enough at the axes' full speed is proven
 //! when the correction is made. Nothing is allocated in a period.
 //!
 //! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
 //! old: a reference is wrong by its slope times the way since then.
+
+use core::time::Duration;
 
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
@@ -15,10 +17,11 @@ use compensator::volumetric::model::{
     AxisErrors, Conditions, Machine as Model, Squareness, ThermalBend, VolumetricModel,
 };
 use compensator::volumetric::online::{
-    AxisMonitor, BeamReference, EndOfTravel, Feed, FeedStatus, Influences, Memories, MovingState,
+    AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
+    MovingState, StateRecorder,
 };
 use compensator::volumetric::{Axis, NoCorrection, Point};
-use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
+use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians, Time};
 
 use super::VolumetricFailure;
 use super::inputs::{RollReader, Thermometer, confirmed_by_samples, place_of_voltage, sample};
@@ -60,7 +63,7 @@ struct WatchedBeam {
     slider: [usize; 4],
     end: Option<[usize; 4]>,
     /// Where the detector sits on the slide: there it sees the slide's tilts too.
-    place: Point,
+    lever: DetectorLever,
 }
 
 /// The roll of one slide.
@@ -83,9 +86,6 @@ pub struct VolumetricCorrection {
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
-    bends: Vec<ThermalBend>,
-    /// The temperatures at which no guide bends beyond its tables.
-    references: Vec<Celsius>,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
     /// Of a displacement by detectors that are believed.
@@ -113,7 +113,13 @@ impl VolumetricCorrection {
             if let Some(beam) = beam {
                 let reference = state.beams[axis.index()].clone();
                 let reference = reference.ok_or(VolumetricFailure::NoReference { axis })?;
-                beams[axis.index()] = Some(watched_beam(config, own, axis, beam, reference)?);
+                let lever = lever(
+                    axis,
+                    beam,
+                    &model.machine().thermal.bends,
+                    &state.temperatures,
+                );
+                beams[axis.index()] = Some(watched_beam(config, own, beam, reference, lever)?);
             }
         }
         let roll = match &own.roll {
@@ -124,15 +130,12 @@ impl VolumetricCorrection {
         for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
             thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
         }
-        let bends = model.machine().thermal.bends.clone();
         Ok(Self {
             model,
             tool: point_of_mm(own.tool_offset_mm),
             beams,
             roll,
             thermometers,
-            bends,
-            references: state.temperatures.clone(),
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
@@ -171,26 +174,38 @@ impl VolumetricCorrection {
         &self.model
     }
 
+    /// Watches displacements without compensating them from now on: the machine is made to be as it
+    /// is this hour. Tables, roll and temperatures go on. To be said before it is in use.
+    #[must_use]
+    pub fn leaving_displacements(mut self) -> Self {
+        for beam in self.beams.iter_mut().flatten() {
+            let now = Time::ZERO;
+            beam.monitor.feed_mut().disable(now, Duration::ZERO);
+        }
+        self
+    }
+
+    /// Tells `recorder` what displacements the machine was left with in the last period at
+    /// `actual`, beyond what the first memory keeps. Allocates nothing.
+    pub(super) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
+        for axis in Axis::ALL {
+            let beam = self.beams[axis.index()].as_ref();
+            let Some(left) = beam.and_then(|it| it.monitor.left()) else {
+                continue;
+            };
+            let position = actual.along(axis);
+            recorder.record(
+                axis,
+                position,
+                self.memories.beyond_first(axis, position, left),
+            );
+        }
+    }
+
     /// What the detectors say at `actual`, as it enters the model.
     fn moving_state(&mut self, observed: &Observed<'_>, actual: Point) -> MovingState {
         let mut state = MovingState::default();
-        for axis in Axis::ALL {
-            let Some(beam) = &mut self.beams[axis.index()] else {
-                continue;
-            };
-            let slider = sample(observed.channels, &beam.slider);
-            let end = beam.end.and_then(|it| sample(observed.channels, &it));
-            let seen = beam.monitor.advance(
-                observed.now,
-                actual.along(axis),
-                slider.as_ref(),
-                end.as_ref(),
-                &self.memories,
-            );
-            let factors = &self.influences.of[axis.index()];
-            state.sideways[axis.index()] =
-                core::array::from_fn(|k| seen[k] * factors[k].at(actual));
-        }
+        // Tilts come first: a detector beside its slide's zero sees them too.
         if let Some(roll) = &mut self.roll {
             let position = actual.along(roll.axis);
             let seen = roll.reader.read(observed);
@@ -198,40 +213,24 @@ impl VolumetricCorrection {
             state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
         }
         for axis in Axis::ALL {
-            self.take_off_tilts(&mut state, axis, actual);
+            let Some(beam) = &mut self.beams[axis.index()] else {
+                continue;
+            };
+            let (position, roll) = (actual.along(axis), state.roll[axis.index()]);
+            let slider = sample(observed.channels, &beam.slider);
+            let end = beam.end.and_then(|it| sample(observed.channels, &it));
+            let seen = beam.monitor.advance(
+                observed.now,
+                position,
+                (slider.as_ref(), end.as_ref()),
+                beam.lever.seen(position, roll, &self.temperatures),
+                &self.memories,
+            );
+            let factors = &self.influences.of[axis.index()];
+            state.sideways[axis.index()] =
+                core::array::from_fn(|k| seen[k] * factors[k].at(actual));
         }
         state
-    }
-
-    /// A detector that sits beside its slide's zero also sees the slide tilt: by its roll, and
-    /// where the guide bends. That is no displacement of the slide.
-    fn take_off_tilts(&self, state: &mut MovingState, axis: Axis, actual: Point) {
-        let Some(beam) = &self.beams[axis.index()] else {
-            return;
-        };
-        let mut turn = [0.0; 3];
-        turn[axis.index()] = state.roll[axis.index()].value();
-        for bend in self.bends.iter().filter(|it| it.axis == axis) {
-            let above = |at: usize| (self.temperatures[at] - self.references[at]).value();
-            let gradient = above(bend.over) - bend.under.map_or(0.0, above);
-            let (low, high) = (bend.low.value(), bend.high.value());
-            let way = low + high - 2.0 * actual.along(axis).value();
-            let slope = bend.bow.value() * gradient * 4.0 * way / ((high - low) * (high - low));
-            // From the axis towards the bow, about the third direction by the right hand.
-            let (from, to) = (axis.index(), bend.towards.index());
-            let sense = if (from + 1) % 3 == to { 1.0 } else { -1.0 };
-            turn[3 - from - to] += sense * slope;
-        }
-        let [x, y, z] = Axis::ALL.map(|it| beam.place.along(it).value());
-        let seen = [
-            turn[1] * z - turn[2] * y,
-            turn[2] * x - turn[0] * z,
-            turn[0] * y - turn[1] * x,
-        ];
-        let sideways = &mut state.sideways[axis.index()];
-        for (value, direction) in sideways.iter_mut().zip(axis.others()) {
-            *value -= Metres(seen[direction.index()]);
-        }
     }
 
     /// What stands behind each value that is used.
@@ -306,10 +305,10 @@ impl Correction for VolumetricCorrection {
             return nothing(Validity::Stop("the engine does not move three axes"));
         };
         let (target, actual) = (Point::new(x, y, z), Point::new(x_now, y_now, z_now));
-        let state = self.moving_state(observed, actual);
         for (value, thermometer) in self.temperatures.iter_mut().zip(&mut self.thermometers) {
             *value = thermometer.advance(observed);
         }
+        let state = self.moving_state(observed, actual);
         if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
             return nothing(Validity::Stop("a detector or thermometer is in trouble"));
         }
@@ -389,8 +388,19 @@ fn model(
     )?)
 }
 
+/// Where the detector on the slide of `axis` sits, and what tilts that slide beyond `references`.
+pub(super) fn lever(
+    axis: Axis,
+    beam: &BeamConfig,
+    bends: &[ThermalBend],
+    references: &[Celsius],
+) -> DetectorLever {
+    let place = point_of_mm(beam.slider.place_mm);
+    DetectorLever::new(axis, place, bends, references)
+}
+
 /// The bends found, within what the configuration permits.
-fn bends(
+pub(super) fn bends(
     config: &VolumetricConfig,
     state: &VolumetricState,
 ) -> Result<Vec<ThermalBend>, VolumetricFailure> {
@@ -427,10 +437,11 @@ fn check_speed(
 fn watched_beam(
     config: &MachineConfig,
     volumetric: &VolumetricConfig,
-    axis: Axis,
     beam: &BeamConfig,
     reference: BeamReference,
+    lever: DetectorLever,
 ) -> Result<WatchedBeam, VolumetricFailure> {
+    let axis = lever.axis();
     let common = feed(volumetric)?;
     let places = |it: &BeamDetectorConfig| {
         it.channels
@@ -455,7 +466,7 @@ fn watched_beam(
         monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
         slider: places(&beam.slider),
         end: beam.end.as_ref().map(places),
-        place: point_of_mm(beam.slider.place_mm),
+        lever,
     })
 }
 

@@ -85,6 +85,7 @@ impl BendRecord {
                 low: Metres(self.low_m),
                 high: Metres(self.high_m),
                 sideways: false,
+                seen_from: None,
             },
             bow: Metres(self.bow_m_per_k),
             u: Metres(self.standard_uncertainty_m_per_k),

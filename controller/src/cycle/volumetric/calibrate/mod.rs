@@ -23,8 +23,9 @@ use compensator::volumetric::online::{BeamReference, MovingState};
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres, Radians};
 
+use super::correction::lever;
 use super::line::{LineOperator, LineOptics, LineReadout, LineTask};
-use super::reference::References;
+use super::reference::{References, stretches};
 use super::{GEOMETRY, VolumetricCorrection, VolumetricFailure, VolumetricState};
 use crate::assemble::{
     beam_drift, bend_plans, function_shape, model_limits, point_of_mm, thermal, volume_axis,
@@ -256,6 +257,12 @@ impl Machine {
     ) -> Result<(MovingState, Vec<Celsius>), Failure> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
         let mut state = MovingState::default();
+        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
+            let axis = volume_axis(config.axis);
+            let position = at.along(axis);
+            let roll = self.roll_of(axis, position, config, &seen)?;
+            state.roll[axis.index()] = roll - reference.at(position);
+        }
         for axis in Axis::ALL {
             let beam = session.config.beam.each()[axis.index()];
             let (Some(beam), Some(reference)) = (beam, &session.beams[axis.index()]) else {
@@ -265,13 +272,11 @@ impl Machine {
             let places = self.places_of_beam(axis, position, beam, &seen)?;
             let end = places.1.unwrap_or_else(|| reference.end());
             let shift = reference.beam_shift(end);
-            state.sideways[axis.index()] = reference.displacement(position, places.0, shift);
-        }
-        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
-            let axis = volume_axis(config.axis);
-            let position = at.along(axis);
-            let roll = self.roll_of(axis, position, config, &seen)?;
-            state.roll[axis.index()] = roll - reference.at(position);
+            // How guides bend is still to be found: what the detector sees of that is part of the
+            // unknown (`BendPlan::seen_from`).
+            let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
+            let whole = reference.displacement(position, places.0, shift);
+            state.sideways[axis.index()] = core::array::from_fn(|k| whole[k] - tilts[k]);
         }
         Ok((state, self.temperatures_of(&session.config, &seen)?))
     }
@@ -352,10 +357,7 @@ impl Machine {
 
 impl Session<'_> {
     fn nodes(&self) -> [usize; 3] {
-        core::array::from_fn(|k| {
-            let span = self.config.high_mm[k] - self.config.low_mm[k];
-            (span / self.own.step_mm).ceil().max(2.0) as usize + 1
-        })
+        Axis::ALL.map(|axis| stretches(&self.config, axis, self.own.step_mm) as usize + 1)
     }
 
     fn plan_of_cold(&self) -> Plan {
