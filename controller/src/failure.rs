@@ -134,6 +134,17 @@ pub enum Failure {
         /// Which axis.
         axis: String,
     },
+    /// The machine was stopped, or was never started: nobody would heed its alarms.
+    #[error(
+        "{device}: not moved ({step}): the machine was stopped, and its alarms are not heeded \
+         until it is started again (`Machine::start`)"
+    )]
+    NotStarted {
+        /// The drive.
+        device: String,
+        /// What was asked of it.
+        step: &'static str,
+    },
     /// The verb needs something the configuration does not have.
     #[error("axis {axis}: the configuration has no section `{section}` for it")]
     NotConfigured {
@@ -458,6 +469,7 @@ impl Failure {
             | Self::Emulator(EmulatedError::Config(_) | EmulatedError::NoPort { .. }) => 2,
             Self::SoftLimit { .. }
             | Self::NotZeroed { .. }
+            | Self::NotStarted { .. }
             | Self::Store(_)
             | Self::Compensation { .. }
             | Self::ScrewCompensation { .. }

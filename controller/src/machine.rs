@@ -119,6 +119,8 @@ pub struct Machine {
     /// The instrument or camera whose readings a procedure needs now: only its alarms count.
     pub(crate) instrument_in_use: Option<String>,
     pub(crate) observer: Box<dyn Observer>,
+    /// Warnings for which there is no time now: whoever takes them may make their writer wait.
+    pub(crate) held_back: Option<Vec<String>>,
     pub(crate) stop: StopRequest,
 }
 
@@ -153,6 +155,7 @@ impl Machine {
             started_instruments: BTreeSet::new(),
             instrument_in_use: None,
             observer: Box::new(Silent),
+            held_back: None,
             stop: StopRequest::default(),
         }
     }
@@ -316,9 +319,20 @@ impl Machine {
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
+        self.require_supervised(at, step)?;
         let now = self.now();
         self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
+    }
+
+    /// Nothing begins to move while alarms do not count: after a stop, the machine is started
+    /// again first.
+    pub(crate) fn require_supervised(&self, at: usize, step: &'static str) -> Result<(), Failure> {
+        if self.supervision == Supervision::On {
+            return Ok(());
+        }
+        let device = self.device_name(at);
+        Err(Failure::NotStarted { device, step })
     }
 
     /// Gives `command` to drive number `at`, whatever it moves, and waits until it is done.
@@ -329,6 +343,9 @@ impl Machine {
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
+        if let DriveCommand::Enable | DriveCommand::EnterCyclic { .. } = command {
+            self.require_supervised(at, step)?;
+        }
         let now = self.now();
         self.drive_mut(at).control(now, command);
         self.await_outcome(at, step, limit)

@@ -67,7 +67,7 @@ impl Machine {
             .find(|it| is_old(it.device.reading().map(|it| it.at)));
         let module = || {
             let modules = self.analogs.iter();
-            let mut silent = modules.filter(|it| is_old(it.device.reading().map(|it| it.at)));
+            let mut silent = modules.filter(|it| is_old(it.device.last_sample()));
             silent.next().map(|it| it.name.clone())
         };
         axis.map(|it| it.name.clone()).or_else(module)

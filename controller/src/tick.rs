@@ -12,6 +12,9 @@ use units::Time;
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
 
+/// So many warnings are kept for later.
+const WARNINGS_HELD: usize = 32;
+
 impl Machine {
     /// Lets the machine live until something happened or the clock reaches `until`.
     ///
@@ -108,7 +111,7 @@ impl Machine {
                 let port = self.port_name(arrival.port);
                 let text =
                     format!("{port}: {frames} received frames were lost; is the host overloaded?");
-                self.observer.warning(&text);
+                self.warn(text);
                 Ok(())
             }
             Input::Link(LinkState::Up) | Input::Payload(_) => Ok(()),
@@ -125,8 +128,29 @@ impl Machine {
             _ => return,
         };
         let port = self.port_name(port);
-        let text = format!("{port}: {state}; check cable, termination and shield");
-        self.observer.warning(&text);
+        self.warn(format!(
+            "{port}: {state}; check cable, termination and shield"
+        ));
+    }
+
+    /// Tells the observer, or keeps it for later while a loop must not wait for him.
+    fn warn(&mut self, text: String) {
+        match &mut self.held_back {
+            None => self.observer.warning(&text),
+            Some(held) if held.len() < held.capacity() => held.push(text),
+            // As many as anybody reads.
+            Some(_) => {}
+        }
+    }
+
+    /// Runs `procedure` without telling the observer anything meanwhile.
+    pub(crate) fn holding_back<R>(&mut self, procedure: impl FnOnce(&mut Self) -> R) -> R {
+        self.held_back = Some(Vec::with_capacity(WARNINGS_HELD));
+        let result = procedure(self);
+        for text in self.held_back.take().unwrap_or_default() {
+            self.observer.warning(&text);
+        }
+        result
     }
 
     pub(crate) fn fire_deadlines(&mut self, now: Time) {

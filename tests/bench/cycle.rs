@@ -92,14 +92,14 @@ impl Place {
 
     fn stand(self, period_ms: &str) -> Stand {
         let period = format!("sync_period_ms = {period_ms}");
-        let setup = setup_of(self.axes).in_real_time();
-        // Modules' samples must not get older when SYNC is rarer.
-        let often = match period_ms.parse::<f64>().unwrap() {
-            ms if ms > 5.0 => "every_syncs = 2",
-            _ => "every_syncs = 10",
-        };
-        let setup = setup.machine("sync_period_ms = 2.0", &period);
-        Stand::new(self.rig, &setup.machine("every_syncs = 10", often))
+        let mut setup = setup_of(self.axes)
+            .in_real_time()
+            .machine("sync_period_ms = 2.0", &period);
+        if is_volumetric(self.axes) && period_ms.parse::<f64>().unwrap() > 5.0 {
+            // Modules' samples must not get older when SYNC is rarer.
+            setup = setup.machine("every_syncs = 10", "every_syncs = 2");
+        }
+        Stand::new(self.rig, &setup)
     }
 }
 

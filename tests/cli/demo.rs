@@ -11,9 +11,28 @@ use crate::programs::{live_rigs, one_machine, speed, truestage};
 /// their places in what it prints, and a page.
 #[track_caller]
 fn check(machine: &str, found: &str, left: [&str; 2], limit: f64) {
+    let Some((said, page)) = shown(machine) else {
+        return;
+    };
+    let number = |place: &str| number(&said, place);
+    for left in left {
+        let (found, left) = (number(found), number(left));
+        assert!(left < found / 3.0, "{found} as found, {left} as left");
+        assert!(left < limit, "{left}");
+    }
+    assert!(page.contains("<svg"));
+}
+
+fn number(said: &Value, place: &str) -> f64 {
+    let value = said.pointer(place).and_then(Value::as_f64);
+    value.unwrap_or_else(|| panic!("{place} is no number in {said:#}"))
+}
+
+/// What the demonstration of `machine` prints, and its page; `None` where it is not shown.
+fn shown(machine: &str) -> Option<(Value, String)> {
     // On CAN it would be the same ptys again.
     if !live_rigs().any(|rig| rig == Rig::Pty) {
-        return;
+        return None;
     }
     let _turn = one_machine();
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -28,18 +47,10 @@ fn check(machine: &str, found: &str, left: [&str; 2], limit: f64) {
         ".",
     ];
     let said = truestage(folder.path(), &words).with_code(0);
-    let number = |place: &str| {
-        let value = said.pointer(place).and_then(Value::as_f64);
-        value.unwrap_or_else(|| panic!("{place} is no number in {said:#}"))
-    };
-    for left in left {
-        let (found, left) = (number(found), number(left));
-        assert!(left < found / 3.0, "{found} as found, {left} as left");
-        assert!(left < limit, "{left}");
-    }
     let report = said["report"].as_str().expect("it names its page");
     let page = std::fs::read_to_string(folder.path().join(Path::new(report)));
-    assert!(page.expect("the page is there").contains("<svg"));
+    let page = page.expect("the page is there");
+    Some((said, page))
 }
 
 #[test]
@@ -66,4 +77,40 @@ fn the_rotary_table_shows_its_cycle() {
         "/verified_after_power_cycle/as_left/largest_arcsec",
     ];
     check("rotary", "/verified/as_found/largest_arcsec", left, 0.3);
+}
+
+/// The errors of the machine and their drift by far exceed what is left of them when it is corrected
+/// by what it sees; its tables alone drift away.
+#[test]
+fn three_axes_show_their_day() {
+    let Some((said, page)) = shown("volumetric") else {
+        return;
+    };
+    let hours = said["hours"].as_array().expect("a list");
+    assert_eq!(hours.len(), 9);
+    let of = |hour: usize, state: &str| number(&said, &format!("/hours/{hour}/{state}"));
+    for hour in 0..=8 {
+        let (found, live) = (of(hour, "as_found_um"), of(hour, "corrected_um"));
+        assert!(
+            live < found / 3.0 && live < 2.0,
+            "{hour} h: {found}, {live}"
+        );
+    }
+    let (morning, evening) = (of(0, "by_tables_um"), of(8, "by_tables_um"));
+    assert!(
+        evening > 3.0 * of(8, "corrected_um"),
+        "{morning}, {evening}"
+    );
+    assert!(evening > morning, "{morning}, {evening}");
+    let parts = [
+        "hour (h)",
+        "as found",
+        "tables alone",
+        "corrected live",
+        "e_xx",
+        "Squareness",
+    ];
+    for part in parts.into_iter().chain(["<polygon", "thermometer (°C)"]) {
+        assert!(page.contains(part), "`{part}` is not on the page");
+    }
 }

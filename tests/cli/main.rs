@@ -9,3 +9,5 @@ mod rotary;
 mod screw;
 mod table;
 mod verbs;
+mod volumetric;
+mod volumetric_live;

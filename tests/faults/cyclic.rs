@@ -335,7 +335,15 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
         within: PERIOD * 4,
         rest: BY_ITSELF,
     };
-    check(scene, &wanted);
+    let mut played = check(scene, &wanted);
+    let machine = &mut played.bench.machine;
+    assert!(!machine.is_zeroed("x"));
+    machine.start().unwrap();
+    let refused = machine.move_to("x", Metres::ZERO);
+    assert!(
+        matches!(refused, Err(Failure::NotZeroed { .. })),
+        "{refused:?}"
+    );
 }
 
 #[test]

@@ -36,6 +36,23 @@ fn a_computer_that_is_held_up_for_a_moment_stops_in_a_controlled_way() {
     assert_eq!(seen.controlwords().find(early), None);
 }
 
+/// Three quarters of a period late: the next SYNC keeps its distance, and the path goes on.
+#[test]
+fn a_sync_that_leaves_late_is_not_followed_at_once_by_the_next() {
+    let played = following().stall(PERIOD.mul_f64(1.75)).play();
+    played.result.as_ref().unwrap();
+    assert!(played.seen().has_stalled());
+    assert_eq!(played.cause, Some(Cause::PathDone));
+    let seen = played.seen();
+    let syncs = seen.sent.iter();
+    let syncs = syncs.filter(|(_, it)| it.standard_id() == Some(0x080));
+    let times: Vec<_> = syncs.map(|(at, _)| *at).collect();
+    let gaps = times.windows(2).map(|it| it[1] - it[0]);
+    let (least, most) = (gaps.clone().min().unwrap(), gaps.max().unwrap());
+    assert!(least > PERIOD.mul_f64(0.9), "{least:?}");
+    assert!(most > PERIOD.mul_f64(1.7), "{most:?}");
+}
+
 /// Longer than the drives bear: they stop themselves, and the computer is named, not the drives.
 #[test]
 fn a_computer_that_is_held_up_for_long_is_named_as_the_cause() {

@@ -10,13 +10,16 @@ use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::{BeamReference, Sample};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
+use tests::volume::{Volume, good};
 use tests::{Bench, VOLUMETRIC};
-use truestage::assemble;
 use truestage::config::BeamDetectorConfig;
 use truestage::cycle::volumetric::{VolumetricCorrection, VolumetricState};
 use truestage::engine::{
-    Cause, Channel, Corrected, Correction, Engine, Live, Observed, ThermometerSample,
+    Cause, Channel, Corrected, Correction, Engine, Live, Observed, Source, ThermometerSample,
+    Validity,
 };
+use truestage::observer::{Observer, Stage};
+use truestage::{Failure, assemble};
 use units::{Celsius, Metres, Quantity, Radians};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -56,8 +59,7 @@ fn standing(reaction: &'static str) -> (Bench, Seen) {
     let quick = |text: String| {
         let text = text.replace("reaction = \"fade_out\"", name);
         let text = text.replace("fade_out_s = 60.0", fade);
-        let text = text.replace("blend_s = 2.0", "blend_s = 0.5");
-        text.replace("smoothing_s = 5.0", "smoothing_s = 1.0")
+        text.replace("blend_s = 2.0", "blend_s = 0.5")
     };
     let mut bench = Bench::shaped(&VOLUMETRIC, 7, quick, |text| text);
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));
@@ -283,10 +285,12 @@ fn a_knocked_beam_is_not_believed() {
 fn a_detector_in_trouble_stops_the_machine_where_that_is_wanted() {
     for fault in [x_blocked(), x_bright(), x_stale()] {
         let day = play("stop", fault, 2 * SECOND);
-        let Cause::Correction { reason } = day.cause else {
+        let Cause::CorrectionLost { lack } = day.cause else {
             panic!("{}", day.cause)
         };
-        assert!(reason.contains("detector"), "{reason}");
+        // A beam knocked off or a module that is stale takes both detectors of the beam.
+        let of_x = [Source::Slide(Axis::X), Source::EndOfTravel(Axis::X)];
+        assert!(of_x.contains(&lack.source), "{lack}");
         // 200 ms of patience, 100 ms until a sample is old, and some periods.
         let stopped = day.lives.len();
         let soon = FAULT_AT + 100..=FAULT_AT + 170;
@@ -294,6 +298,118 @@ fn a_detector_in_trouble_stops_the_machine_where_that_is_wanted() {
         let last = day.lives.last().expect("there were some");
         assert!((last.offset[2].um() + 20.0).abs() < 1.0);
     }
+}
+
+/// The shutter of x is closed before the correction is switched on: what does the machine say?
+fn switched_on_blind(reaction: &'static str) -> (Result<Live, Failure>, Vec<String>) {
+    let (mut bench, seen) = standing(reaction);
+    let state = risen(&bench, &seen);
+    let fault = FaultConfig::permanent(x_blocked());
+    let id = bench.emulated.simulation_mut().inject(fault);
+    let id = id.expect("its port is there");
+    let correction = VolumetricCorrection::new(&bench.loaded.config, state);
+    let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
+    let told = Arc::new(Mutex::new(Vec::new()));
+    bench.machine.observe(Box::new(Told(Arc::clone(&told))));
+    let mover = bench.machine.volumetric_mover(correction);
+    let mut mover = mover.unwrap_or_else(|it| panic!("{it}"));
+    let outcome = bench.machine.correct_volume(&mut mover, true);
+    assert!(bench.emulated.simulation().fault_deliveries(id) > 0);
+    let told = told.lock().expect("nobody panics with it").clone();
+    (outcome, told)
+}
+
+/// Keeps the warnings.
+struct Told(Arc<Mutex<Vec<String>>>);
+
+impl Observer for Told {
+    fn progress(&mut self, _: Stage, _: &str, _: u64, _: u64) {}
+
+    fn warning(&mut self, text: &str) {
+        let mut told = self.0.lock().expect("nobody panics with it");
+        told.push(text.to_owned());
+    }
+}
+
+#[test]
+fn a_detector_that_is_blind_from_the_beginning_is_never_passed_over_in_silence() {
+    for reaction in ["stop", "hold"] {
+        let (outcome, _) = switched_on_blind(reaction);
+        let text = outcome.map(drop).unwrap_err().to_string();
+        for word in ["axis x: the detector on its slide", "beam is blocked"] {
+            assert!(
+                text.contains(word),
+                "{reaction}: `{word}` is not in: {text}"
+            );
+        }
+    }
+    let (outcome, told) = switched_on_blind("fade_out");
+    let live = outcome.unwrap_or_else(|it| panic!("{it}"));
+    let Validity::Without(lack) = live.validity else {
+        panic!("{:?}", live.validity)
+    };
+    assert_eq!(lack.source, Source::Slide(Axis::X));
+    assert!(live.uncertainty[2] > Metres::from_um(10.0));
+    let named = |it: &String| it.contains("axis x") && it.contains("faded out");
+    assert!(told.iter().any(named), "{told:?}");
+}
+
+/// The same machine with another correction from one period to the next: what the detectors said
+/// stays in it.
+#[test]
+fn a_correction_that_is_exchanged_on_the_way_leaves_nothing_out_meanwhile() {
+    let (mut bench, seen) = standing("hold");
+    let state = risen(&bench, &seen);
+    let make = || {
+        let correction = VolumetricCorrection::new(&bench.loaded.config, state.clone());
+        Box::new(correction.unwrap_or_else(|it| panic!("{it}")))
+    };
+    let (first, second) = (make(), make());
+    let (mut engine, mut desk) =
+        Engine::new(&bench.machine, &AXES, first).unwrap_or_else(|it| panic!("{it}"));
+    desk.correct(true).expect("it listens");
+    let (mut second, mut offsets) = (Some(second), Vec::new());
+    let outcome = bench.machine.follow_with(&mut engine, &mut || {
+        let Some(live) = desk.live() else {
+            return;
+        };
+        offsets.push(live.offset[2].um());
+        match offsets.len() {
+            FAULT_AT => {
+                let second = second.take().expect("once");
+                desk.swap(second).expect("it listens");
+            }
+            END_AT => desk.stop().expect("it runs"),
+            _ => {}
+        }
+    });
+    assert_eq!(outcome.unwrap_or_else(|it| panic!("{it}")), Cause::Asked);
+    assert!(second.is_none());
+    for (at, um) in offsets.iter().enumerate().skip(FAULT_AT - 10) {
+        assert!((um + 20.0).abs() < 1.0, "{um} um in period {at}");
+    }
+}
+
+/// A module with thermometers alone never says a voltage.
+#[test]
+fn a_module_of_thermometers_alone_is_heard() {
+    let cold = |text: String| {
+        let from = text.find("[volumetric.roll]").expect("it has some");
+        let to = text
+            .find("# Over and under the neutral")
+            .expect("it is said");
+        let text = text[..from].to_owned() + &text[to..];
+        let own = "channels = [0, 1]              # the roll detectors of the x slide\n\
+                   full_scale_v = [3.2, 3.2]\n";
+        assert!(text.contains(own));
+        text.replace(own, "")
+    };
+    let mut volume = Volume::zeroed(7, cold, |text| text);
+    good(volume.bench.machine.idle(Duration::from_secs(2)));
+    volume.know_errors();
+    let store = volume.bench.store.clone();
+    let taken = good(volume.bench.machine.reference_volumetric(&store));
+    assert_eq!(taken.references.temperatures.len(), 6);
 }
 
 /// Another axis's trouble takes nothing from what the others see.

@@ -6,6 +6,7 @@
 
 mod bus;
 mod cyclic;
+mod cyclic_again;
 mod cyclic_host;
 mod detectors;
 mod drive;
@@ -19,4 +20,5 @@ mod serial;
 mod start;
 mod stopping;
 mod storm;
+mod thermometers;
 mod witness;

@@ -12,6 +12,7 @@ mod group;
 mod hand;
 mod interface;
 mod pose_judge;
+mod random;
 mod rig;
 mod slcan_hub;
 mod stand;
@@ -25,6 +26,7 @@ pub use group::{Group, Start};
 pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
+pub use random::random;
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC,
     machine_config, rigs, shipped_config,

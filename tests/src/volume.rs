@@ -1,5 +1,7 @@
 //! Three axes on the bench, judged by the plant's truth.
 
+mod frame;
+
 use core::time::Duration;
 
 use compensator::volumetric::function::{Function, Shape};
@@ -16,9 +18,11 @@ use truestage::store::{
     BendRecord, CalibrationRecord, Content, GeometryContent, MemoryName, RecordHead,
     StateMemoryContent,
 };
-use units::{Celsius, Metres, Radians};
+use units::{Celsius, Metres, Radians, Time};
 
-use crate::{Bench, VOLUMETRIC};
+use crate::{Bench, VOLUMETRIC, random};
+
+pub use frame::Frame;
 
 /// How far the axes go.
 pub const TRAVEL_MM: [f64; 3] = [500.0, 400.0, 300.0];
@@ -27,6 +31,30 @@ const NODE_MM: f64 = 25.0;
 /// How long the tool stands before it is judged.
 pub const STAND: Duration = Duration::from_millis(300);
 
+/// Heartbeats so rare that hours without SYNC cost little.
+pub fn calm(text: String) -> String {
+    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
+        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .replace(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
+        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+}
+
+/// Few nodes and short averages, for tests of what is done rather than of how well it is measured.
+pub fn quick(text: String) -> String {
+    let text = text.replace(
+        "step_mm = 25.0\nsamples = 50",
+        "step_mm = 50.0\nsamples = 10",
+    );
+    let text = text.replace(
+        "step_mm = 50.0\nsettle_ms = 100.0",
+        "step_mm = 100.0\nsettle_ms = 50.0",
+    );
+    calm(text.replace("average_samples = 60", "average_samples = 20"))
+}
+
 /// An error of the tool: along x, y, z.
 pub type Off = [Metres; 3];
 
@@ -34,6 +62,15 @@ pub type Off = [Metres; 3];
 pub struct Volume {
     /// The machine and its emulation.
     pub bench: Bench,
+}
+
+/// How far the tool is off where it stands, and what the correction says of itself there.
+#[derive(Clone, Copy, Debug)]
+pub struct Stood {
+    /// By how much it is off.
+    pub off: Off,
+    /// The standard uncertainties that are stated.
+    pub stated: Off,
 }
 
 /// A point given in millimetres.
@@ -59,90 +96,27 @@ pub fn spread(first: u32, count: u32) -> Vec<[f64; 3]> {
     each.collect()
 }
 
-/// Where a machine's own frame lies in that of its truth: a shift and small turns. No calibration
-/// can know it; whoever mounts a workpiece sets it up in the machine's frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Frame {
-    shift: [f64; 3],
-    turn: [f64; 3],
+/// `count` random places all over the volume, each with the same chance; `seed` says which.
+pub fn random_places(seed: u64, count: usize) -> Vec<[f64; 3]> {
+    let mut state = seed;
+    let mut place = || TRAVEL_MM.map(|travel| travel * random(&mut state));
+    (0..count).map(|_| place()).collect()
 }
 
-impl Frame {
-    /// The frame that explains most of `errors` at `places`, by least squares.
-    ///
-    /// # Panics
-    /// When the places do not span a volume.
-    pub fn of(places: &[[f64; 3]], errors: &[Off]) -> Self {
-        // Normal equations of error = shift + turn × place.
-        let (mut normal, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
-        for (mm, error) in places.iter().zip(errors) {
-            for (row, value) in rows(*mm).iter().zip(error) {
-                for i in 0..6 {
-                    right[i] += row[i] * value.value();
-                    for k in 0..6 {
-                        normal[i][k] += row[i] * row[k];
-                    }
-                }
-            }
-        }
-        let [a, b, c, d, e, f] = solved(normal, right);
-        Self {
-            shift: [a, b, c],
-            turn: [d, e, f],
-        }
+/// The same places, from each to the nearest that is left.
+pub fn by_short_ways(mut places: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+    let square = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|k| (a[k] - b[k]).powi(2)).sum() };
+    let mut way = Vec::with_capacity(places.len());
+    let mut here = [0.0; 3];
+    loop {
+        let left = places.iter().enumerate();
+        let nearest = left.min_by(|a, b| square(*a.1, here).total_cmp(&square(*b.1, here)));
+        let Some((at, _)) = nearest else {
+            return way;
+        };
+        here = places.swap_remove(at);
+        way.push(here);
     }
-
-    /// The error at a place as seen in this frame.
-    pub fn seen(&self, mm: [f64; 3], error: Off) -> Off {
-        let own = [self.shift, self.turn].concat();
-        let rows = rows(mm);
-        core::array::from_fn(|k| {
-            let part: f64 = rows[k].iter().zip(&own).map(|(a, b)| a * b).sum();
-            error[k] - Metres(part)
-        })
-    }
-
-    /// All of them.
-    pub fn all_seen(&self, places: &[[f64; 3]], errors: &[Off]) -> Vec<Off> {
-        let pairs = places.iter().zip(errors);
-        pairs.map(|(mm, error)| self.seen(*mm, *error)).collect()
-    }
-}
-
-/// Along x, y and z, by shift and turn.
-fn rows(mm: [f64; 3]) -> [[f64; 6]; 3] {
-    let [x, y, z] = mm.map(|it| it * 1e-3);
-    [
-        [1.0, 0.0, 0.0, 0.0, z, -y],
-        [0.0, 1.0, 0.0, -z, 0.0, x],
-        [0.0, 0.0, 1.0, y, -x, 0.0],
-    ]
-}
-
-/// By elimination with pivots.
-fn solved(mut matrix: [[f64; 6]; 6], mut right: [f64; 6]) -> [f64; 6] {
-    for i in 0..6 {
-        let size = |row: &usize| matrix[*row][i].abs();
-        let pivot = (i..6).max_by(|a, b| size(a).total_cmp(&size(b)));
-        let pivot = pivot.expect("there are rows left");
-        matrix.swap(i, pivot);
-        right.swap(i, pivot);
-        assert!(matrix[i][i].abs() > 1e-12, "the places span no volume");
-        for row in i + 1..6 {
-            let factor = matrix[row][i] / matrix[i][i];
-            let own = matrix[i];
-            for (value, own) in matrix[row].iter_mut().zip(own) {
-                *value -= factor * own;
-            }
-            right[row] -= factor * right[i];
-        }
-    }
-    let mut solution = [0.0; 6];
-    for i in (0..6).rev() {
-        let known: f64 = (i + 1..6).map(|k| matrix[i][k] * solution[k]).sum();
-        solution[i] = (right[i] - known) / matrix[i][i];
-    }
-    solution
 }
 
 /// How large an error is.
@@ -158,6 +132,23 @@ pub fn percentile_95(errors: &[Off]) -> Metres {
     let mut sizes: Vec<f64> = errors.iter().map(|it| size(*it).value()).collect();
     sizes.sort_by(f64::total_cmp);
     Metres(sizes[(sizes.len() * 95).div_ceil(100) - 1])
+}
+
+/// The largest of the errors.
+pub fn largest(errors: &[Off]) -> Metres {
+    let sizes = errors.iter().map(|it| size(*it));
+    sizes.fold(Metres(0.0), |a, b| a.max(b))
+}
+
+/// ISO 230-1's way to tell a volumetric error: how far the deviations along x, y and z range, the
+/// largest of the three.
+pub fn largest_range(errors: &[Off]) -> Metres {
+    let range = |k: usize| {
+        let along = errors.iter().map(|it| it[k].value());
+        let high = along.clone().fold(f64::NEG_INFINITY, f64::max);
+        high - along.fold(f64::INFINITY, f64::min)
+    };
+    Metres((0..3).map(range).fold(0.0, f64::max))
 }
 
 /// Whatever failed, in its own words.
@@ -221,9 +212,16 @@ impl Volume {
 
     /// By how much the tool would be off, were nothing corrected.
     pub fn uncorrected(&self, places: &[[f64; 3]]) -> Vec<Off> {
-        let of =
-            |truth: VolumetricTruth<'_>, mm: &[f64; 3]| truth.deviation_for(each(point_mm(*mm)));
-        self.truth(|truth| places.iter().map(|mm| of(truth, mm)).collect())
+        self.uncorrected_at(places, self.bench.machine.now())
+    }
+
+    /// The same at another time: errors and heat do not depend on what the machine does.
+    pub fn uncorrected_at(&self, places: &[[f64; 3]], now: Time) -> Vec<Off> {
+        self.truth(|truth| {
+            let truth = truth.at(now);
+            let of = |mm: &[f64; 3]| truth.deviation_for(each(point_mm(*mm)));
+            places.iter().map(of).collect()
+        })
     }
 
     /// What a perfect calibration would find now, stored as the errors in use.
@@ -288,6 +286,7 @@ impl Volume {
                     high_m: travel,
                     bow_m_per_k: slope * travel / 4.0,
                     standard_uncertainty_m_per_k: 0.0,
+                    sideways: false,
                 }
             });
             each.collect()
@@ -396,6 +395,17 @@ impl Volume {
         places: &[[f64; 3]],
         along: &mut Vec<([f64; 3], Off)>,
     ) -> Vec<Off> {
+        let stood = self.stand_at(mover, places, along);
+        stood.into_iter().map(|it| it.off).collect()
+    }
+
+    /// The same, with what the correction says of itself.
+    pub fn stand_at(
+        &mut self,
+        mover: &mut Mover,
+        places: &[[f64; 3]],
+        along: &mut Vec<([f64; 3], Off)>,
+    ) -> Vec<Stood> {
         let emulated = self.bench.emulated.clone();
         let mut watch = |live: &Live| {
             if !live.cycle.is_multiple_of(64) {
@@ -409,14 +419,16 @@ impl Volume {
             let off = core::array::from_fn(|k| is[k] - should[k]);
             along.push((nominal.map(|it| it.mm()), off));
         };
-        let mut errors = Vec::new();
-        for mm in places {
+        let stand = |mm: &[f64; 3]| {
             let target = point_mm(*mm);
             let machine = &mut self.bench.machine;
-            good(machine.drive_watched(mover, target, STAND, &mut watch));
-            errors.push(self.off(target));
-        }
-        errors
+            let live = good(machine.drive_watched(mover, target, STAND, &mut watch));
+            Stood {
+                off: self.off(target),
+                stated: core::array::from_fn(|k| live.uncertainty[k]),
+            }
+        };
+        places.iter().map(stand).collect()
     }
 
     /// By how much the tool would be off now at `places`, corrected by the tables of `state`

@@ -195,4 +195,7 @@ pub enum Fault {
     /// Something that only data of a rotary table can have.
     #[error(transparent)]
     Rotary(#[from] super::RotaryFault),
+    /// Something that only data of three axes can have.
+    #[error(transparent)]
+    Volume(#[from] super::VolumeFault),
 }

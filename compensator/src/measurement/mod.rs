@@ -3,7 +3,8 @@
 //! A [`LinearSeries`] is what an external instrument measured at targets of a linear axis; a
 //! [`HallSeries`] is a sweep of the two Hall sensors of system S5; a [`StrokeSeries`] is what the
 //! screws of a platform (system S1) really did when told to make strokes; a [`RotarySeries`] is
-//! what a rotary table read of a plate's lines in several placements of the plate (system S2).
+//! what a rotary table read of a plate's lines in several placements of the plate (system S2); a
+//! [`VolumeSeries`] is what lines of three axes read (system S4).
 //! Whoever holds one knows that every number is finite and every point in its place; nothing is
 //! guessed or repaired.
 //!
@@ -23,6 +24,7 @@ mod fault;
 mod rotary;
 mod stroke;
 mod table;
+mod volume;
 
 use std::collections::BTreeSet;
 
@@ -32,6 +34,7 @@ pub use fault::{DataError, Fault};
 pub use rotary::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
 pub use stroke::{AxisStrokes, Stroke, StrokeError, StrokeSeries};
 use table::{Format, Table};
+pub use volume::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
 
 /// One target reached once, and where the instrument saw the point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,6 +28,21 @@ impl Format {
         columns: &["axis", "approach", "stroke_um", "deviation_um"],
         header: "axis,approach,stroke_um,deviation_um",
     };
+    pub(super) const VOLUME: Self = Self {
+        columns: &[
+            "line",
+            "reads",
+            "x_mm",
+            "y_mm",
+            "z_mm",
+            "tool_x_mm",
+            "tool_y_mm",
+            "tool_z_mm",
+            "deviation",
+            "u",
+        ],
+        header: "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u",
+    };
 }
 
 struct Cell {

@@ -12,6 +12,7 @@ use compensator::measurement::{HallSeries, LinearSeries};
 use drivers::device::Identity;
 use serde_json::json;
 use truestage::cycle::utc_now;
+use truestage::cycle::volumetric::VolumetricFailure;
 use truestage::store::{
     CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
     RecordHead, SCHEMA_VERSION, Store, short,
@@ -19,7 +20,7 @@ use truestage::store::{
 use truestage::{Failure, assemble, config, json as to_json, text};
 
 use super::output::{Ended, Output};
-use super::{rotary, screw};
+use super::{rotary, screw, volume_fit};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FitCommand {
@@ -43,6 +44,9 @@ pub(super) enum FitCommand {
     Screw(screw::ScrewArgs),
     /// A rotary table's error, from columns offset,line,deviation_arcsec.
     Rotary(rotary::RotaryArgs),
+    /// The errors of three axes, from the journal of a calibration or from columns
+    /// line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u.
+    Volumetric(volume_fit::VolumetricArgs),
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Failure> {
@@ -70,6 +74,7 @@ pub(super) fn fit(command: &FitCommand, output: Output) -> Ended {
         FitCommand::Hall { data } => hall(data, output),
         FitCommand::Screw(args) => screw::run(args, output),
         FitCommand::Rotary(args) => rotary::fit(args, output),
+        FitCommand::Volumetric(args) => volume_fit::fit(args, output),
     }
 }
 
@@ -169,6 +174,20 @@ pub(super) fn rotary_head_of(
     Ok(RecordHead {
         resolution_rad: Some(TAU / f64::from(it.counts_per_turn)),
         ..head(loaded, axis, &it.identity.configured(), data)
+    })
+}
+
+/// The same of three axes, whose record is called `pointer`.
+pub(super) fn volume_head_of(
+    loaded: &config::Loaded,
+    pointer: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let volumetric = loaded.config.volumetric.as_ref();
+    let [first, ..] = &volumetric.ok_or(VolumetricFailure::None)?.axes;
+    Ok(RecordHead {
+        axis: pointer.to_owned(),
+        ..head_of(loaded, first, data)?
     })
 }
 

@@ -7,6 +7,7 @@ mod kind;
 mod operator;
 mod output;
 mod page;
+mod part;
 mod platform;
 mod progress;
 mod rotary;
@@ -16,6 +17,7 @@ mod session;
 mod table;
 mod verbs;
 mod volume;
+mod volume_fit;
 mod volumetric;
 
 use std::path::PathBuf;
@@ -304,9 +306,9 @@ pub(crate) fn main() -> ExitCode {
             })
         }
         Command::Reference(args) => volume::reference(&args, output),
-        Command::Run(args) => volume::run(&args, output),
-        Command::Memory(MemoryCommand::Record(args)) => volume::memory_record(&args, output),
-        Command::Memory(MemoryCommand::Clear(args)) => volume::memory_clear(&args, output),
+        Command::Run(args) => part::run(&args, output),
+        Command::Memory(MemoryCommand::Record(args)) => part::memory_record(&args, output),
+        Command::Memory(MemoryCommand::Clear(args)) => part::memory_clear(&args, output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => rotary::plan(&command, output),

@@ -34,11 +34,12 @@ impl Terminal {
             }
             false => {
                 return Err(Failure::Usage {
-                    what: "somebody must turn the plate, and there is no terminal to ask at; \
-                           nothing was moved"
-                        .into(),
-                    help: "run it in a terminal, or with --yes where the plate is turned without \
-                           being waited for"
+                    what:
+                        "somebody must turn the plate or set lines up, and there is no terminal to \
+                           ask at; nothing was moved"
+                            .into(),
+                    help: "run it in a terminal, or with --yes where that is done without being \
+                           waited for"
                         .into(),
                 });
             }

@@ -28,6 +28,8 @@ pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
         platform(&args.run, &journal)?
     } else if journal.plate_plan.is_some() {
         report::rotary::render(&journal, &made_from(&args.run)?)
+    } else if journal.volume.plan.is_some() || journal.volume.check.is_some() {
+        report::volumetric::render(&journal, &made_from(&args.run)?)
     } else {
         axis(&journal)?
     };

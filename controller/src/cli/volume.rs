@@ -2,29 +2,30 @@
 
 use core::time::Duration;
 
+use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    Remembered, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
     VolumetricVerified, WarmUp,
 };
-use truestage::engine::{CsvError, Live, read_path};
+use truestage::engine::Live;
 use truestage::ports::Use;
-use truestage::store::{MemoryName, short};
+use truestage::store::{UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
 use units::Metres;
 
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
-use super::verbs::parse_target;
-use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, RunArgs, VerifyArgs};
+use super::verbs::{journal_to_resume, parse_target};
+use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);
 
 /// Starts the machine, zeroes it, runs `procedure`, switches off.
-fn with_zeroed_volume<R>(
+pub(super) fn with_zeroed_volume<R>(
     args: &MachineArgs,
     verb: &str,
     purpose: Use,
@@ -85,10 +86,10 @@ fn referenced_value(taken: &VolumetricReferenced) -> Value {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    if args.resume.is_some() || args.accept_drift {
+    if args.accept_drift {
         return Err(Failure::Usage {
-            what: "a calibration of three axes is neither resumed nor judged by its closure".into(),
-            help: "start it again without --resume and --accept-drift".into(),
+            what: "a calibration of three axes is not judged by its closure".into(),
+            help: "start it again without --accept-drift".into(),
         });
     }
     let warm_up = match args.warm_up_min {
@@ -105,7 +106,8 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let mut operator = Terminal::new(args.yes, output)?;
     let run = |machine: &mut Machine, store: &Store| {
-        machine.calibrate_volumetric(store, warm_up, &mut operator)
+        let resume = journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)?;
+        machine.calibrate_volumetric(store, warm_up, resume.as_deref(), &mut operator)
     };
     let machine = &args.axis.machine;
     let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
@@ -119,15 +121,21 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     let birge = found
         .birge_ratio
         .map_or("–".into(), |it| format!("{it:.2}"));
-    let mut text = format!(
+    format!(
         "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
-         of what was stated\n  tool: standard uncertainty {:.3} µm at most",
+         of what was stated\n  tool: standard uncertainty {:.3} µm at most{}",
         short(&made.id),
         short(&made.references),
         made.lines,
         found.degrees_of_freedom,
         made.u_max.um(),
-    );
+        warmth_text(found) + &unknown_text(&made.unknown),
+    )
+}
+
+/// What warmth does, a line each.
+pub(super) fn warmth_text(found: &Identified) -> String {
+    let mut text = String::new();
     for it in &found.expansions {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
         text += &format!(
@@ -146,8 +154,43 @@ pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     text
 }
 
+/// What nobody knows after this calibration, and what would tell it.
+pub(super) fn unknown_text(unknown: &UnknownRecord) -> String {
+    let mut text = String::new();
+    for [axis, towards] in &unknown.bends {
+        text += &format!(
+            "\n  guide of {axis} bends towards {towards}: not measured, for all lines were read at one warmth; it \
+             is not corrected and in no uncertainty: calibrate with --warm-up-min"
+        );
+    }
+    for name in &unknown.without_effect {
+        text += &format!(
+            "\n  {name}: taken as zero, no tool given shows it: give second_tool_offset_mm"
+        );
+    }
+    text
+}
+
 pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
-    let found = &made.found;
+    let mut value = found_value(&made.found);
+    value["geometry"] = json!(made.id);
+    value["references"] = json!(made.references);
+    value["lines"] = json!(made.lines);
+    value["journal"] = json!(made.journal);
+    value["u_tool_max_um"] = json!(made.u_max.um());
+    add_unknown(&mut value, &made.unknown);
+    value
+}
+
+pub(super) fn add_unknown(value: &mut Value, unknown: &UnknownRecord) {
+    let bends = unknown.bends.iter();
+    let bends = bends.map(|[axis, towards]| json!({"axis": axis, "towards": towards}));
+    value["unknown_bends"] = bends.collect();
+    value["taken_as_zero"] = json!(unknown.without_effect);
+}
+
+/// How well the readings agree, and what warmth does.
+pub(super) fn found_value(found: &Identified) -> Value {
     let expansions = found.expansions.iter().map(|it| {
         json!({"axis": it.plan.axis.to_string(), "ppm_per_k": it.per_kelvin * 1e6,
                "u_ppm_per_k": it.u * 1e6})
@@ -157,12 +200,8 @@ pub(super) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
                "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
     });
     json!({
-        "geometry": made.id,
-        "references": made.references,
-        "lines": made.lines,
         "degrees_of_freedom": found.degrees_of_freedom,
         "birge_ratio": found.birge_ratio,
-        "u_tool_max_um": made.u_max.um(),
         "expansions": expansions.collect::<Vec<_>>(),
         "bends": bends.collect::<Vec<_>>(),
     })
@@ -227,6 +266,7 @@ pub(super) fn verified_value(verified: &VolumetricVerified) -> Value {
     json!({
         "range_um": verified.range.um(),
         "limit_um": verified.limit.um(),
+        "journal": verified.journal,
         "points": points.collect::<Vec<_>>(),
     })
 }
@@ -281,10 +321,14 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 
 fn live_text(live: &Live) -> String {
     let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
-        let (offset, u) = (live.offset[k].um(), live.uncertainty[k].um());
+        let offset = live.offset[k].um();
+        let u = match live.uncertainty[k].um() {
+            known if known.is_finite() => format!("{known:.3} µm"),
+            _ => "unknown".into(),
+        };
         let set_point = (live.nominal[k] + live.offset[k]).mm();
         format!(
-            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u:.3} µm",
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
             live.nominal[k].mm()
         )
     });
@@ -297,159 +341,4 @@ fn live_value(live: &Live) -> Value {
                "u_um": live.uncertainty[k].um()})
     });
     axes.collect()
-}
-
-/// How a path was followed.
-struct Followed {
-    count: usize,
-    is_corrected: bool,
-    largest: [Metres; 3],
-    timing: String,
-    /// What later parts are made with, when this was the first.
-    kept: Option<Remembered>,
-}
-
-pub(super) fn run(args: &RunArgs, output: Output) -> Ended {
-    let path = std::fs::read_to_string(&args.path).map_err(|source| Failure::File {
-        path: args.path.clone(),
-        source,
-    })?;
-    let follow = |machine: &mut Machine, store: &Store| followed(machine, store, args, &path);
-    let (followed, counters) =
-        with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
-    let largest = followed.largest.map(|it| it.um());
-    let mut text = format!(
-        "{} points followed, {}\n{}",
-        followed.count,
-        if followed.is_corrected {
-            format!("largest corrections {largest:.3?} µm")
-        } else {
-            "uncorrected: the errors were never measured".into()
-        },
-        followed.timing
-    );
-    let mut value = json!({"points": followed.count, "corrected": followed.is_corrected,
-                           "largest_correction_um": largest, "counters": counters});
-    if let Some(kept) = &followed.kept {
-        text += &format!(
-            "\nmade without what the detectors saw; {} keeps that: all later parts are made with it\n{}",
-            short(&kept.id),
-            kept_text(kept)
-        );
-        value["memory"] = kept_value(kept);
-    }
-    output.result(&text, &value)
-}
-
-fn followed(
-    machine: &mut Machine,
-    store: &Store,
-    args: &RunArgs,
-    path: &str,
-) -> Result<Followed, Failure> {
-    let (mover, part) = match args.first_part {
-        true => {
-            let (mover, part) = machine.first_part(store)?;
-            (Some(mover), Some(part))
-        }
-        false => (machine.stored_mover(store)?, None),
-    };
-    let is_corrected = mover.is_some();
-    let mut mover = match mover {
-        Some(mover) => mover,
-        None => machine.volumetric_mover(Box::new(truestage::engine::NoCorrection))?,
-    };
-    let engine = mover.engine();
-    let points = read_path(path, engine.axes(), engine.period());
-    let points = points.map_err(|source: CsvError| Failure::Usage {
-        what: format!("{}: {source}", args.path.display()),
-        help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
-    })?;
-    machine.correct_volume(&mut mover, is_corrected)?;
-    if let Some(part) = &part {
-        part.recorder.listen();
-    }
-    let mut largest = [Metres(0.0); 3];
-    let count = points.len();
-    machine.drive_along(&mut mover, points, &mut |live| {
-        for (largest, offset) in largest.iter_mut().zip(live.offset) {
-            *largest = largest.max(offset.abs());
-        }
-    })?;
-    let timing = mover.engine().timing().to_string();
-    let kept = match part {
-        Some(part) => Some(machine.keep_part(store, mover, part)?),
-        None => None,
-    };
-    Ok(Followed {
-        count,
-        is_corrected,
-        largest,
-        timing,
-        kept,
-    })
-}
-
-pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
-    let (kept, counters) =
-        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
-    let text = format!(
-        "{} keeps the present state: all parts from now on are made with it\n{}",
-        short(&kept.id),
-        kept_text(&kept)
-    );
-    let mut value = kept_value(&kept);
-    value["counters"] = counters;
-    output.result(&text, &value)
-}
-
-fn kept_text(kept: &Remembered) -> String {
-    let axes = Axis::ALL.into_iter().zip(kept.covers);
-    let axes = axes.filter_map(|(axis, covers)| {
-        let (from, to) = covers?;
-        Some(format!("{axis} {:.3} to {:.3} mm", from.mm(), to.mm()))
-    });
-    let axes: Vec<String> = axes.collect();
-    format!(
-        "recorded along {}; beyond, the ends hold{}",
-        axes.join(", "),
-        foreign_text(kept.foreign.as_deref())
-    )
-}
-
-/// A second memory that no longer fits the first.
-fn foreign_text(foreign: Option<&str>) -> String {
-    let foreign = foreign.map(short);
-    foreign.map_or_else(String::new, |it| {
-        format!(
-            "\nthe second memory {it} counts beyond another first one: before the next part record it \
-             again (`truestage memory record`) or clear it (`truestage memory clear`)"
-        )
-    })
-}
-
-fn kept_value(kept: &Remembered) -> Value {
-    let axes = Axis::ALL.into_iter().zip(kept.covers);
-    let axes = axes.filter_map(|(axis, covers)| {
-        let (from, to) = covers?;
-        Some(json!({"axis": axis.to_string(), "from_mm": from.mm(), "to_mm": to.mm()}))
-    });
-    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "foreign_second": kept.foreign})
-}
-
-pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
-    let (before, foreign) = session.machine.clear_memory(&session.store, which)?;
-    let text = match &before {
-        Some(id) => format!("{} is kept no more", short(id)),
-        None => "nothing was kept".into(),
-    };
-    let text = text + &foreign_text(foreign.as_deref());
-    output.result(
-        &text,
-        &json!({"cleared": before, "foreign_second": foreign}),
-    )
 }

@@ -276,6 +276,21 @@ mod tests {
         assert!(found.help.contains("`soft_min_mm`"), "{found}");
     }
 
+    /// 1875 us are no 255 units of anything: every `follow` would fail.
+    #[test]
+    fn a_period_that_a_drive_cannot_be_told_is_refused_when_it_is_loaded() {
+        let cyclic = "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
+                      deviation_limit_um = 1000.0\n[axis.x.identity]";
+        let text = LINEAR.replace("[axis.x.identity]", cyclic);
+        let with =
+            |ms: &str| text.replace("sync_period_ms = 5.0", &format!("sync_period_ms = {ms}"));
+        parse(&with("5.0"), "m.toml").unwrap_or_else(|error| panic!("{error}"));
+        let found = &findings(&with("1.875"))[0];
+        assert!(found.cause.contains("0x60C2"), "{found}");
+        assert!(found.help.ends_with("to 1.88"), "{found}");
+        parse(&with("1.88"), "m.toml").unwrap_or_else(|error| panic!("{error}"));
+    }
+
     #[test]
     fn a_missing_key_is_named() {
         let text = LINEAR.replace("resolution_nm = 10.0", "#");

@@ -92,6 +92,7 @@ pub struct BeamConfig {
     pub source_mm: Option<f64>,
     pub end_mm: Option<f64>,
     pub translation_share: Option<f64>,
+    pub standard_uncertainty_um: Option<f64>,
     pub slider: BeamDetectorConfig,
     pub end: Option<BeamDetectorConfig>,
 }
@@ -159,6 +160,7 @@ pub struct RollConfig {
     pub base_mm: f64,
     pub inclination_deg: f64,
     pub roll_max_arcsec: f64,
+    pub standard_uncertainty_arcsec: Option<f64>,
     pub age_max_ms: f64,
     pub speed_max_arcsec_per_s: f64,
     pub noise_max_arcsec: f64,
@@ -245,6 +247,7 @@ pub struct FeedConfig {
 pub struct ReferenceConfig {
     pub step_mm: f64,
     pub samples: u32,
+    pub warmth_tolerance_k: Option<f64>,
 }
 
 /// How lines are read to learn the errors.
@@ -257,7 +260,14 @@ pub struct VolumetricCalibrateConfig {
     pub settle_ms: f64,
     pub average_samples: u32,
     pub detector_samples: u32,
+    #[serde(default = "resume_limit_um")]
+    pub resume_limit_um: f64,
     pub second_tool_offset_mm: Option<[f64; 3]>,
+}
+
+/// What a calibration that is continued may find changed along an axis.
+const fn resume_limit_um() -> f64 {
+    10.0
 }
 
 /// Which line is read to judge the correction.

@@ -193,7 +193,7 @@ impl Machine {
             .unwrap_or_default()
     }
 
-    fn instrument_record(&self, name: &str) -> InstrumentRecord {
+    pub(in crate::cycle) fn instrument_record(&self, name: &str) -> InstrumentRecord {
         let config = &self.config.instrument[name];
         let unit = &self.instruments[self.instrument_index(name)];
         InstrumentRecord {

@@ -5,10 +5,14 @@
 //! are slewed, and one that has nothing to say is held or faded out. The slope along an axis is
 //! proved where a table is loaded; at run time the rate is its limit times the speed.
 
-use compensator::apply::SlewedCorrection;
+use core::any::Any;
+use core::time::Duration;
+
+use compensator::apply::{Alarm, SlewedCorrection};
 use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
 
-use super::{AXES_MAX, PerAxis};
+use super::account::Cause;
+use super::{AXES_MAX, Lack, PerAxis};
 
 /// Analog channels that a correction sees at most.
 pub const CHANNELS_MAX: usize = 32;
@@ -52,17 +56,28 @@ pub struct Observed<'a> {
 }
 
 /// How far a correction can be relied upon now.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Validity {
     /// It is right.
     #[default]
     Valid,
+    /// As right as it can be without this; its uncertainty says how right.
+    Without(Lack),
     /// It cannot be known for the moment: the last one stays.
     Hold,
     /// It cannot be known for longer: it goes back to zero at the limited rate.
     FadeOut,
     /// The machine must not go on without it: a controlled stop, for this reason.
     Stop(&'static str),
+    /// The machine must not go on without this: a controlled stop.
+    Lost(Lack),
+}
+
+impl Validity {
+    /// Whether what the correction says is to be added.
+    const fn is_followed(&self) -> bool {
+        matches!(self, Self::Valid | Self::Without(_))
+    }
 }
 
 /// What a correction says.
@@ -70,7 +85,7 @@ pub enum Validity {
 pub struct Corrected {
     /// To be added to each axis's set-point.
     pub offset: PerAxis<Metres>,
-    /// The standard uncertainty of each.
+    /// The standard uncertainty of each; counts while the correction is valid, or as valid as it can be.
     pub uncertainty: PerAxis<Metres>,
     /// Whether to do so.
     pub validity: Validity,
@@ -80,6 +95,15 @@ pub struct Corrected {
 pub trait Correction: Send {
     /// The correction for the next SYNC.
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected;
+
+    /// Itself, for the correction that takes over from it; `None` when there is nothing to be had.
+    fn as_any(&self) -> Option<&dyn Any> {
+        None
+    }
+
+    /// Takes over from the correction that was in use until now: what that one knows of the same
+    /// detectors needs not be waited for again.
+    fn take_over(&mut self, _before: &dyn Any) {}
 }
 
 /// Corrects nothing.
@@ -110,11 +134,18 @@ pub(super) struct Applied {
     /// What the slewing works towards: enabled, and not fading.
     following: bool,
     limited: u64,
+    period: Duration,
+    /// Periods decided, as a time: a pause between two of them must not be worth a step.
+    slewed_until: Time,
 }
 
 impl Applied {
     /// Switched off.
-    pub(super) fn new(correction: Box<dyn Correction>, limits: &PerAxis<CorrectionLimits>) -> Self {
+    pub(super) fn new(
+        correction: Box<dyn Correction>,
+        limits: &PerAxis<CorrectionLimits>,
+        period: Duration,
+    ) -> Self {
         Self {
             correction,
             slewed: core::array::from_fn(|axis| {
@@ -124,7 +155,14 @@ impl Applied {
             enabled: false,
             following: false,
             limited: 0,
+            period,
+            slewed_until: Time::ZERO,
         }
+    }
+
+    /// After a pause another correction may be wanted than before it.
+    pub(super) fn begin(&mut self) {
+        self.expect_jump();
     }
 
     /// What was added last.
@@ -137,8 +175,11 @@ impl Applied {
     }
 
     /// Another correction from now on; the one before is handed back.
-    pub(super) fn swap(&mut self, correction: Box<dyn Correction>) -> Box<dyn Correction> {
+    pub(super) fn swap(&mut self, mut correction: Box<dyn Correction>) -> Box<dyn Correction> {
         self.expect_jump();
+        if let Some(before) = self.correction.as_any() {
+            correction.take_over(before);
+        }
         core::mem::replace(&mut self.correction, correction)
     }
 
@@ -148,7 +189,8 @@ impl Applied {
         }
     }
 
-    /// The uncertainty that the correction gives, and whether it is followed.
+    /// What the correction gives, its uncertainty not a number unless it has one to give, and whether it
+    /// is followed.
     pub(super) const fn last(&self) -> (&Corrected, bool) {
         (&self.last, self.following)
     }
@@ -158,30 +200,39 @@ impl Applied {
         self.limited
     }
 
+    /// The last offset stays; how far it is from right nobody knows any more.
+    const fn keep(&mut self, validity: Validity) {
+        self.last.validity = validity;
+        self.last.uncertainty = [Metres(f64::NAN); AXES_MAX];
+    }
+
     /// What to add at `observed.now`; with the reason to stop, if there is one.
-    pub(super) fn advance(
-        &mut self,
-        observed: &Observed<'_>,
-    ) -> (PerAxis<Metres>, Option<&'static str>) {
-        let wanted = self.correction.correct(observed);
+    pub(super) fn advance(&mut self, observed: &Observed<'_>) -> (PerAxis<Metres>, Option<Cause>) {
+        let mut wanted = self.correction.correct(observed);
+        if wanted.validity.is_followed() && !wanted.offset.iter().all(|it| it.is_finite()) {
+            wanted.validity = Validity::Stop("it is not a number");
+        }
         let mut stop = None;
         let mut follow = self.enabled;
         match wanted.validity {
-            Validity::Valid => {
-                if self.last.validity != Validity::Valid {
+            Validity::Valid | Validity::Without(_) => {
+                if !self.last.validity.is_followed() {
                     self.expect_jump();
                 }
                 self.last = wanted;
             }
-            Validity::Hold => self.last.validity = Validity::Hold,
+            Validity::Hold => self.keep(Validity::Hold),
             Validity::FadeOut => {
-                self.last.validity = Validity::FadeOut;
+                self.keep(Validity::FadeOut);
                 follow = false;
             }
             Validity::Stop(reason) => {
-                self.last.validity = wanted.validity;
-                // While it stops, the correction stays as it is.
-                stop = Some(reason).filter(|_| self.enabled);
+                self.keep(wanted.validity);
+                stop = Some(Cause::Correction { reason });
+            }
+            Validity::Lost(lack) => {
+                self.keep(wanted.validity);
+                stop = Some(Cause::CorrectionLost { lack });
             }
         }
         if core::mem::replace(&mut self.following, follow) != follow {
@@ -193,11 +244,18 @@ impl Applied {
                 }
             }
         }
+        self.slewed_until += self.period;
         let mut offset = [Metres::ZERO; AXES_MAX];
         for (axis, slewed) in self.slewed.iter_mut().enumerate() {
-            offset[axis] = slewed.advance(observed.now, self.last.offset[axis]);
+            offset[axis] = slewed.advance(self.slewed_until, self.last.offset[axis]);
             self.limited += u64::from(slewed.alarm().is_some());
         }
-        (offset, stop)
+        // While it stops, the correction stays as it is.
+        (offset, stop.filter(|_| self.enabled))
+    }
+
+    /// What of the last correction was cut off, or could not be followed in time.
+    pub(super) fn alarms(&self) -> PerAxis<Option<Alarm>> {
+        core::array::from_fn(|axis| self.slewed[axis].alarm())
     }
 }

@@ -9,7 +9,8 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer};
 use units::{Metres, Time};
 
-use super::correction::{Applied, Channel, Correction, Observed, ThermometerSample, Validity};
+use super::account::{Cause, Command, Counts, Heard, Live, State, Trouble};
+use super::correction::{Applied, Correction, Observed};
 use super::motion::{Moment, Motion};
 use super::path::{Differences, Item};
 use super::{AXES_MAX, AxisLimits, PerAxis};
@@ -21,131 +22,6 @@ const MISSING_MAX: u32 = 3;
 const ANSWER_PERIODS: usize = 3;
 /// So many samples in a row must be too far from the set-point.
 const DEVIATING_MAX: u32 = 2;
-
-/// What the host asks of the loop.
-pub(super) enum Command {
-    Stop,
-    Correct(bool),
-    Swap(Box<dyn Correction>),
-    MoveTo(PerAxis<Metres>),
-}
-
-/// What the loop is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// The axes hold their set-points and wait for a path or a move.
-    Holding,
-    /// On the way to a target, or to the first point of a path.
-    Moving,
-    /// Along the path.
-    Following,
-    /// All axes together come to rest, because of this.
-    Stopping(Cause),
-    /// At rest, because of this: the loop ends.
-    Stopped(Cause),
-}
-
-/// Why the loop came to rest in a controlled way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Cause {
-    /// The path came to its end.
-    #[error("the path is done")]
-    PathDone,
-    /// The host asked for it.
-    #[error("stopped as asked")]
-    Asked,
-    /// The queue was empty before the path was finished.
-    #[error(
-        "the path queue ran dry and all axes were stopped together; write further ahead, or \
-         finish the path"
-    )]
-    RanDry,
-    /// Whoever writes the path is gone.
-    #[error("whoever writes the path is gone; all axes were stopped together")]
-    HostGone,
-    /// A point was outside the limits, although it had been checked.
-    #[error("a path point of axis number {axis} is outside the limits; all axes were stopped")]
-    PathRefused {
-        /// Which axis, in the order of the engine's axes.
-        axis: usize,
-    },
-    /// The computer was late by more than a period; what was queued is not replayed.
-    #[error(
-        "the loop was late by {periods} periods (the computer was held up): the queued path was \
-         dropped, all axes were stopped together"
-    )]
-    Overrun {
-        /// How many SYNCs were missed.
-        periods: u32,
-    },
-    /// The correction cannot be known, and nothing may be done without it.
-    #[error("the correction failed: {reason}; all axes were stopped together")]
-    Correction {
-        /// Why.
-        reason: &'static str,
-    },
-}
-
-/// What makes it unsafe to go on at all: quick stop of every drive in the same period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Trouble {
-    /// No sample of an axis for so many periods.
-    Missing { axis: usize, periods: u32 },
-    /// An axis is not where its set-points are.
-    Deviates {
-        axis: usize,
-        lag: Metres,
-        limit: Metres,
-    },
-    /// No way to stop was found.
-    NoStop,
-}
-
-/// What was heard after one SYNC.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Heard<'a> {
-    pub(super) now: Time,
-    /// Where each axis was; `None` when it did not answer this SYNC.
-    pub(super) actual: PerAxis<Option<Metres>>,
-    pub(super) channels: &'a [Option<Channel>],
-    pub(super) temperatures: &'a [Option<ThermometerSample>],
-}
-
-/// One period of the loop, for whoever watches.
-#[derive(Clone, Copy, Debug)]
-pub struct Live {
-    /// When it was decided.
-    pub at: Time,
-    /// The number of the SYNC.
-    pub cycle: u64,
-    /// What the loop is doing.
-    pub state: State,
-    /// Where each axis was.
-    pub actual: PerAxis<Metres>,
-    /// Where the path wants it next.
-    pub nominal: PerAxis<Metres>,
-    /// What is added to that.
-    pub offset: PerAxis<Metres>,
-    /// The standard uncertainty of the correction.
-    pub uncertainty: PerAxis<Metres>,
-    /// What the correction says of itself.
-    pub validity: Validity,
-    /// Whether the correction is switched on and followed.
-    pub corrected: bool,
-}
-
-/// What the core counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// SYNC periods decided.
-    pub cycles: u64,
-    /// Samples that did not come; the last one was held.
-    pub missing: u64,
-    /// Periods in which a correction was limited in size or rate.
-    pub corrections_limited: u64,
-    /// Set-points that a correction would have put outside the soft limits.
-    pub clamped: u64,
-}
 
 /// The channels between the host and the loop, as the loop holds them.
 pub(super) struct Lines {
@@ -169,6 +45,8 @@ pub(super) struct Core {
     approaching: bool,
     /// Whether the queue holds, or will hold, the rest of a path that was begun.
     path_open: bool,
+    /// Whether the rest that it may hold is of a path given up before this motion began.
+    is_rest: bool,
     nominal: Differences,
     applied: Applied,
     state: State,
@@ -198,6 +76,7 @@ impl Core {
             elapsed: Duration::ZERO,
             approaching: false,
             path_open: false,
+            is_rest: false,
             nominal: Differences::at_rest(nowhere),
             applied,
             state: State::Holding,
@@ -212,13 +91,21 @@ impl Core {
     /// Begins at rest, with the set-points that the drives hold: what was added to them when the
     /// axes were last moved is in these, and is not added twice.
     pub(super) fn begin(&mut self, held: PerAxis<Metres>) {
+        self.applied.begin();
         let added = self.applied.current();
         let nominal = core::array::from_fn(|axis| held[axis] - added[axis]);
         self.nominal = Differences::at_rest(nominal);
         self.state = State::Holding;
+        self.is_rest = self.path_open;
         (self.missing, self.deviating) = ([0; AXES_MAX], [0; AXES_MAX]);
         self.actual = held;
         self.history = [held; ANSWER_PERIODS + 1];
+    }
+
+    /// What was ordered or written for a motion that failed is never driven in a later one.
+    pub(super) fn forget_orders(&mut self) {
+        self.drop_all();
+        while self.lines.commands.pop().is_ok() {}
     }
 
     pub(super) const fn state(&self) -> State {
@@ -255,13 +142,13 @@ impl Core {
             temperatures: heard.temperatures,
         };
         let (offset, refused) = self.applied.advance(&observed);
-        if let Some(reason) = refused {
-            self.stop(Cause::Correction { reason })?;
+        if let Some(cause) = refused {
+            self.stop(cause)?;
         }
-        let set_point = self.limited(&nominal, &offset);
+        let (set_point, clamped) = self.limited(&nominal, &offset);
         self.history.rotate_right(1);
         self.history[0] = set_point;
-        self.tell(heard.now, &nominal, &offset);
+        self.tell(heard.now, &nominal, &offset, clamped);
         Ok(set_point)
     }
 
@@ -282,7 +169,10 @@ impl Core {
                 self.state = State::Stopping(cause);
             }
         }
-        self.drop_path();
+        // Behind the end of a path there may be another one already.
+        if cause != Cause::PathDone {
+            self.drop_all();
+        }
         Ok(())
     }
 
@@ -297,18 +187,28 @@ impl Core {
     }
 
     /// What waits is old: it must not be driven later. The queue's size bounds this.
-    fn drop_path(&mut self) {
+    fn drop_all(&mut self) {
         self.approaching = false;
         for _ in 0..self.lines.path.slots() {
-            if self.next_item() == Some(Item::End) {
-                break;
+            self.next_item();
+        }
+    }
+
+    /// The rest of a path that was given up; says whether its end was among it.
+    fn drop_rest(&mut self) -> bool {
+        for _ in 0..self.lines.path.slots() {
+            match self.next_item() {
+                Some(Item::End) => return true,
+                Some(Item::Begin) | None => return false,
+                Some(Item::Point(_)) => {}
             }
         }
+        false
     }
 
     fn next_item(&mut self) -> Option<Item> {
         let item = self.lines.path.pop().ok()?;
-        self.path_open = item != Item::End;
+        self.path_open = matches!(item, Item::Point(_));
         Some(item)
     }
 
@@ -364,7 +264,7 @@ impl Core {
                         core::mem::forget(before);
                     }
                 }
-                Command::MoveTo(target) => self.begin_move(&target),
+                Command::MoveTo(target) => self.begin_move(&target)?,
             }
         }
         if self.lines.commands.is_abandoned() && self.lines.path.is_abandoned() {
@@ -377,36 +277,43 @@ impl Core {
     }
 
     /// On the fly: from whatever the axes do now. A target that cannot be is refused where it is
-    /// given; here it changes nothing.
-    fn begin_move(&mut self, target: &PerAxis<Metres>) {
+    /// given; one for which there is no way all the same stops the axes, because the plan that
+    /// they followed is lost.
+    fn begin_move(&mut self, target: &PerAxis<Metres>) -> Result<(), Trouble> {
         if let State::Stopping(_) | State::Stopped(_) = self.state {
-            return;
+            return Ok(());
         }
         let from = self.moment();
-        if self.motion.plan_to(&from, target).is_ok() {
-            self.drop_path();
-            self.elapsed = Duration::ZERO;
-            self.nominal = Differences::of(from);
-            self.state = State::Moving;
+        if let Err(error) = self.motion.plan_to(&from, target) {
+            return self.stop(Cause::of_refusal(&error));
         }
+        self.drop_all();
+        self.elapsed = Duration::ZERO;
+        self.nominal = Differences::of(from);
+        self.state = State::Moving;
+        Ok(())
     }
 
     fn advance(&mut self) -> Result<(), Trouble> {
         match self.state {
             // The rest of a path that a move has put an end to.
-            State::Holding if self.path_open => self.drop_path(),
+            State::Holding if self.path_open => {
+                if self.drop_rest() && self.is_rest {
+                    self.state = State::Stopped(Cause::GivenUp);
+                }
+            }
             State::Holding => match self.next_item() {
                 Some(Item::Point(first)) => {
                     let from = self.moment();
-                    if self.motion.plan_to(&from, &first).is_err() {
-                        return self.stop(Cause::PathRefused { axis: 0 });
+                    if let Err(error) = self.motion.plan_to(&from, &first) {
+                        return self.stop(Cause::of_refusal(&error));
                     }
                     self.elapsed = Duration::ZERO;
                     self.approaching = true;
                     self.state = State::Moving;
                 }
                 Some(Item::End) => self.state = State::Stopped(Cause::PathDone),
-                None => {}
+                Some(Item::Begin) | None => {}
             },
             State::Moving => {
                 self.go_along_the_plan();
@@ -439,7 +346,7 @@ impl Core {
     fn follow(&mut self) -> Result<(), Trouble> {
         let point = match self.next_item() {
             Some(Item::Point(point)) => point,
-            Some(Item::End) => {
+            Some(Item::End | Item::Begin) => {
                 self.stop(Cause::PathDone)?;
                 return self.advance();
             }
@@ -465,19 +372,30 @@ impl Core {
     }
 
     /// A correction never leads out of the soft limits.
-    fn limited(&mut self, nominal: &PerAxis<Metres>, offset: &PerAxis<Metres>) -> PerAxis<Metres> {
-        let mut set_point = *nominal;
+    fn limited(
+        &mut self,
+        nominal: &PerAxis<Metres>,
+        offset: &PerAxis<Metres>,
+    ) -> (PerAxis<Metres>, PerAxis<bool>) {
+        let (mut set_point, mut clamped) = (*nominal, [false; AXES_MAX]);
         for axis in 0..self.axes {
             let AxisLimits { min, max, .. } = self.limits[axis];
             let wanted = nominal[axis] + offset[axis];
             set_point[axis] = wanted.max(min).min(max);
-            self.counts.clamped += u64::from(set_point[axis] != wanted);
+            clamped[axis] = set_point[axis] != wanted;
+            self.counts.clamped += u64::from(clamped[axis]);
         }
-        set_point
+        (set_point, clamped)
     }
 
     /// A full line means that nobody looks: what is older is as good.
-    fn tell(&mut self, at: Time, nominal: &PerAxis<Metres>, offset: &PerAxis<Metres>) {
+    fn tell(
+        &mut self,
+        at: Time,
+        nominal: &PerAxis<Metres>,
+        offset: &PerAxis<Metres>,
+        clamped: PerAxis<bool>,
+    ) {
         let (said, corrected) = self.applied.last();
         let _ = self.lines.live.push(Live {
             at,
@@ -489,6 +407,8 @@ impl Core {
             uncertainty: said.uncertainty,
             validity: said.validity,
             corrected,
+            alarms: self.applied.alarms(),
+            clamped,
         });
     }
 }

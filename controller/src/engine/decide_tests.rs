@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
+use compensator::apply::Alarm;
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Time};
 
-use super::decide::{Heard, Trouble};
+use super::account::{Command, Heard, Trouble};
 use super::*;
 
 const PERIOD: Duration = Duration::from_millis(2);
@@ -295,6 +296,56 @@ fn a_move_puts_an_end_to_a_path_and_its_rest_is_never_driven() {
 }
 
 #[test]
+fn another_path_follows_the_first_and_one_that_was_stopped() {
+    let mut bench = Bench::new();
+    let go = |bench: &mut Bench, periods: u32| {
+        circle(periods).for_each(|point| bench.desk.path.push(&point).unwrap());
+        bench.desk.path.finish().unwrap();
+    };
+    go(&mut bench, 200);
+    bench.desk.path.begin().unwrap();
+    go(&mut bench, 220);
+    for _ in 0..2 {
+        assert_eq!(bench.until_rest(), Cause::PathDone);
+        assert_eq!([bench.last(0), bench.last(1)], mm(10.0, 20.0));
+        bench.engine.core.begin(bench.sent[bench.sent.len() - 1]);
+    }
+    // One that is stopped: what its writer still writes of it is not driven, and said.
+    bench.desk.path.begin().unwrap();
+    for point in circle(300).take(200) {
+        bench.desk.path.push(&point).unwrap();
+    }
+    assert_eq!(bench.until_rest(), Cause::RanDry);
+    let stopped = bench.sent[bench.sent.len() - 1];
+    bench.engine.core.begin(stopped);
+    for point in circle(300).skip(200) {
+        bench.desk.path.push(&point).unwrap();
+    }
+    bench.desk.path.finish().unwrap();
+    assert_eq!(bench.until_rest(), Cause::GivenUp);
+    assert_eq!(bench.sent[bench.sent.len() - 1], stopped);
+    bench.engine.core.begin(stopped);
+    bench.desk.path.begin().unwrap();
+    go(&mut bench, 200);
+    assert_eq!(bench.until_rest(), Cause::PathDone);
+    bench.check_smooth();
+}
+
+#[test]
+fn a_target_without_a_way_stops_the_axes() {
+    let mut bench = Bench::new();
+    bench.desk.move_to(&mm(50.0, 5.0)).unwrap();
+    bench.periods(60);
+    // Past the desk, which would have refused it.
+    let mut beyond = [Metres::ZERO; AXES_MAX];
+    beyond[1] = Metres::from_mm(99.0);
+    bench.desk.order(Command::MoveTo(beyond)).unwrap();
+    assert_eq!(bench.until_rest(), Cause::PathRefused { axis: 1 });
+    bench.check_smooth();
+    assert!(bench.last(0) < Metres::from_mm(40.0));
+}
+
+#[test]
 fn one_lost_sample_is_held_and_three_are_not_safe() {
     let mut bench = Bench::new();
     bench.periods(3);
@@ -430,9 +481,8 @@ fn a_correction_never_steps_the_set_point() {
     bench.desk.swap(said(500.0, Validity::Valid)).unwrap();
     bench.periods(40);
     assert_eq!(bench.last(0), Metres::from_um(30.0), "the size is limited");
-    bench.desk.swap(said(f64::NAN, Validity::Valid)).unwrap();
-    bench.periods(5);
-    assert_eq!(bench.last(0), Metres::from_um(30.0), "not a number: held");
+    let alarm = bench.desk.live().unwrap().alarms[0];
+    assert!(matches!(alarm, Some(Alarm::Size { .. })), "{alarm:?}");
     bench.desk.swap(said(5.0, Validity::Hold)).unwrap();
     bench.periods(5);
     assert!(bench.last(0) <= Metres::from_um(30.0));
@@ -445,11 +495,48 @@ fn a_correction_never_steps_the_set_point() {
     bench.desk.swap(said(5.0, Validity::FadeOut)).unwrap();
     bench.periods(20);
     assert_eq!(bench.last(0), Metres::ZERO);
+    let u = bench.desk.live().unwrap().uncertainty[0];
+    assert!(u.value().is_nan(), "{u} of what nobody knows");
     for step in bench.sent.windows(2) {
         let um = (step[1][0] - step[0][0]).um().abs();
         assert!(um <= SLEW_UM + 1e-9, "{um} um in one period");
     }
     assert!(bench.engine.counts().corrections_limited > 0);
+}
+
+#[test]
+fn a_correction_that_is_no_number_stops_the_machine() {
+    let mut bench = Bench::with(said(10.0, Validity::Valid));
+    bench.desk.correct(true).unwrap();
+    bench.desk.move_to(&mm(20.0, 0.0)).unwrap();
+    bench.periods(60);
+    bench.desk.swap(said(f64::NAN, Validity::Valid)).unwrap();
+    let cause = bench.until_rest();
+    assert!(cause.to_string().contains("not a number"), "{cause}");
+    let live = bench.desk.live().unwrap();
+    assert_eq!(live.offset[0], Metres::from_um(10.0), "held meanwhile");
+    bench.check_smooth();
+}
+
+#[test]
+fn a_pause_between_two_motions_is_not_worth_a_step() {
+    let mut bench = Bench::with(said(25.0, Validity::Valid));
+    bench.periods(3);
+    for on in [true, false] {
+        bench.now += Duration::from_secs(10);
+        bench.engine.core.begin(bench.sent[bench.sent.len() - 1]);
+        bench.desk.correct(on).unwrap();
+        bench.periods(8);
+        // Held up in the middle of it.
+        bench.now += Duration::from_secs(1);
+        bench.periods(20);
+        assert_eq!(bench.last(0).um(), if on { 25.0 } else { 0.0 });
+    }
+    for step in bench.sent.windows(2) {
+        let um = (step[1][0] - step[0][0]).um().abs();
+        assert!(um <= SLEW_UM + 1e-9, "{um} um in one period");
+    }
+    assert_eq!(bench.engine.counts().corrections_limited, 0, "announced");
 }
 
 #[test]

@@ -22,15 +22,21 @@ pub enum EngineFailure {
         /// Which axis.
         axis: String,
     },
-    /// The axes' buses have different SYNC periods.
-    #[error(
-        "axis {axis}: its bus has a SYNC period of {seen:?}, the others {expected:?}; give all \
-         buses of one motion the same"
-    )]
-    Periods {
+    /// An axis cannot be moved in two ways.
+    #[error("axis {axis}: named twice; name each axis of a motion once")]
+    Twice {
         /// Which axis.
         axis: String,
-        /// The first axis's period.
+    },
+    /// The machine's buses have different SYNC periods.
+    #[error(
+        "[can.{bus}]: a SYNC period of {seen:?}, the axes that move together have {expected:?}, and \
+         their SYNC is sent on every CAN bus; give all of them the same sync_period_ms"
+    )]
+    Periods {
+        /// The bus with another period.
+        bus: String,
+        /// The axes' period.
         expected: Duration,
         /// This one's.
         seen: Duration,
@@ -45,6 +51,22 @@ pub enum EngineFailure {
         axis: String,
         /// How long was waited.
         waited: Duration,
+    },
+    /// An axis stands where its set-points may not lead.
+    #[error(
+        "axis {axis}: stands at {:.6} mm, outside the soft limits {:.3} to {:.3} mm; nothing was \
+         moved; move it back with `truestage move`, which zeroes it first",
+        at.mm(), min.mm(), max.mm()
+    )]
+    Outside {
+        /// Which axis.
+        axis: String,
+        /// Where it stands.
+        at: Metres,
+        /// The lower limit.
+        min: Metres,
+        /// The upper limit.
+        max: Metres,
     },
     /// A drive does not say what it holds.
     #[error("axis {axis}: its drive is not in the cyclic mode any more")]
@@ -73,13 +95,16 @@ pub enum EngineFailure {
     /// An axis stopped answering.
     #[error(
         "axis {axis}: no position for {periods} SYNC periods; all drives were stopped at once; \
-         check its cable and power"
+         check its cable and power{}",
+        late_answers(*late)
     )]
     Missing {
         /// Which axis.
         axis: String,
         /// For so long.
         periods: u32,
+        /// How many positions of any axis came, so far, after half of their period.
+        late: u64,
     },
     /// An axis is not where it was sent.
     #[error(
@@ -123,15 +148,27 @@ pub enum EngineFailure {
     NotTaken,
 }
 
+/// A few are the rest of what came before the loop began.
+fn late_answers(late: u64) -> String {
+    if late < 3 {
+        return String::new();
+    }
+    format!(
+        "; {late} positions came after half of their SYNC period, too late for its decision: is the \
+         bus, an adapter or the computer too slow for this period?"
+    )
+}
+
 impl EngineFailure {
     /// As [`crate::Failure::exit_code`].
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Axes { .. }
             | Self::NotConfigured { .. }
+            | Self::Twice { .. }
             | Self::Periods { .. }
             | Self::CorrectionLimit { .. } => 2,
-            Self::Motion(_) => 3,
+            Self::Outside { .. } | Self::Motion(_) => 3,
             Self::NotAtRest { .. }
             | Self::NotCyclic { .. }
             | Self::Missing { .. }

@@ -16,13 +16,16 @@
 //! The host holds a [`Desk`], from any thread: a bounded queue of points, orders, and what the
 //! loop did lately. All of it passes through rings without locks. Linear axes only.
 
+mod account;
 mod correction;
 mod csv;
 mod decide;
 #[cfg(test)]
 mod decide_tests;
 mod failure;
+mod hear;
 mod histogram;
+mod lack;
 mod motion;
 mod pace;
 mod path;
@@ -34,14 +37,15 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
+pub use account::{Cause, Counts, Live, State};
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
     THERMOMETERS_MAX, ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, read_path};
-pub use decide::{Cause, Counts, Live, State};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
+pub use lack::{Lack, Source};
 pub use motion::{Moment, Motion, MotionError};
 pub use pace::Timing;
 pub use path::{PathError, PathFault, PathWriter, PushError};
@@ -49,8 +53,9 @@ pub use tables::TableCorrection;
 
 use crate::failure::Failure;
 use crate::machine::Machine;
+use account::Command;
 use correction::Applied;
-use decide::{Command, Core, Lines};
+use decide::{Core, Lines};
 
 /// How many axes move together at most.
 pub const AXES_MAX: usize = 8;
@@ -106,7 +111,8 @@ impl Engine {
     /// correction is switched off to begin with.
     ///
     /// # Errors
-    /// When there is no such axis, it is not configured for this, or the SYNC periods differ.
+    /// When there is no such axis, or it is named twice, it is not configured for this, or the
+    /// machine's CAN buses have different SYNC periods: the loop sends SYNC on all of them.
     pub fn new(
         machine: &Machine,
         axes: &[&str],
@@ -120,24 +126,16 @@ impl Engine {
             size: Metres::ZERO,
             rate: MetresPerSecond::ZERO,
         }; AXES_MAX];
-        let mut common = None;
+        let mut period = Duration::ZERO;
         for (at, name) in axes.iter().enumerate() {
-            let (axis_limits, correction_limits, period) = machine.cyclic_limits(name)?;
-            (limits[at], of_correction[at]) = (axis_limits, correction_limits);
-            let expected = *common.get_or_insert(period);
-            if expected != period {
-                let axis = (*name).to_owned();
-                let seen = period;
-                return Err(EngineFailure::Periods {
-                    axis,
-                    expected,
-                    seen,
-                }
-                .into());
-            }
+            (limits[at], of_correction[at], period) = machine.cyclic_limits(name)?;
         }
         let names: Vec<String> = axes.iter().map(|name| (*name).to_owned()).collect();
-        let period = common.unwrap_or_default();
+        if let Some(twice) = (1..names.len()).find(|at| names[..*at].contains(&names[*at])) {
+            let axis = names[twice].clone();
+            return Err(EngineFailure::Twice { axis }.into());
+        }
+        machine.require_one_sync(period)?;
         Ok(Self::assemble(
             names,
             period,
@@ -164,7 +162,7 @@ impl Engine {
             retired,
             live,
         };
-        let applied = Applied::new(correction, of_correction);
+        let applied = Applied::new(correction, of_correction, period);
         let desk = Desk {
             path: PathWriter::new(axes.clone(), period, limits, points),
             commands: orders,

@@ -22,10 +22,14 @@ pub struct Timing {
     pub answers: Histogram,
     /// From the last answer to the last set-point sent.
     pub work: Histogram,
+    /// Positions that came after half of their period: too late for its decision.
+    pub late_answers: u64,
     /// SYNCs that left more than a period late.
     pub overruns: u64,
     /// SYNCs left out because of that.
     pub skipped: u64,
+    /// How often the grid of SYNCs was begun anew, because one left more than half a period late.
+    pub shifted: u64,
     /// What the system granted; empty when nothing was asked for.
     pub scheduling: String,
 }
@@ -37,8 +41,10 @@ impl Timing {
         self.jitter.add(&other.jitter);
         self.answers.add(&other.answers);
         self.work.add(&other.work);
+        self.late_answers += other.late_answers;
         self.overruns += other.overruns;
         self.skipped += other.skipped;
+        self.shifted += other.shifted;
         self.scheduling.clone_from(&other.scheduling);
     }
 }
@@ -51,8 +57,8 @@ impl fmt::Display for Timing {
         writeln!(f, "work      {}", self.work)?;
         write!(
             f,
-            "overruns  {}, SYNCs left out {}",
-            self.overruns, self.skipped
+            "overruns  {}, SYNCs left out {}, put off {}",
+            self.overruns, self.skipped, self.shifted
         )?;
         if !self.scheduling.is_empty() {
             write!(f, "\nthread    {}", self.scheduling)?;

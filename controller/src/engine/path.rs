@@ -6,7 +6,8 @@
 //! whoever writes, the loop can stop from the last point that it has.
 //!
 //! A path begins at rest at its first point; the loop goes there first. It ends with
-//! [`PathWriter::finish`]; a queue that is empty before that has run dry.
+//! [`PathWriter::finish`]; a queue that is empty before that has run dry. The next one begins with
+//! [`PathWriter::begin`]: also after a stop, which gives up the path that it interrupts.
 
 use core::time::Duration;
 
@@ -22,6 +23,8 @@ const ROUNDING: f64 = 1.01;
 /// What waits in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Item {
+    /// Another path; what was not driven of the one before is not driven any more.
+    Begin,
     Point(PerAxis<Metres>),
     End,
 }
@@ -95,7 +98,7 @@ pub enum PushError {
     #[error("the path queue is full; try again a few periods later")]
     Full,
     /// The path is finished already.
-    #[error("the path was finished; nothing can follow")]
+    #[error("the path was finished; begin another one")]
     Finished,
     /// It has too few or too many axes.
     #[error("a point of {seen} axes, the engine moves {expected}")]
@@ -208,6 +211,22 @@ impl PathWriter {
     /// How many points the queue takes now.
     pub fn room(&self) -> usize {
         self.queue.slots()
+    }
+
+    /// Begins another path, from rest at its first point: behind the end of the one before, for
+    /// the next [`Machine::follow`](crate::Machine::follow), or after a stop, which has put an end to
+    /// the one before.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub fn begin(&mut self) -> Result<(), PushError> {
+        if self.last.is_some() || self.finished {
+            self.enqueue(Item::Begin)?;
+        }
+        self.last = None;
+        self.points = 0;
+        self.finished = false;
+        Ok(())
     }
 
     /// Appends where the axes shall be one period after the last point.

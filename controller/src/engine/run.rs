@@ -6,20 +6,21 @@
 //! (heartbeat, emergency, power state, following error, implausible position) ends the loop as it
 //! ends any procedure, but here with the quick stop command to every drive in the same period.
 //!
-//! A period that begins late is counted. Late by more than a period (times the patience of a
+//! A period that begins late is counted. Late by more than half a period: the next SYNCs are
+//! counted from this one, so that two are never closer than half a period. Late by more than a period (times the patience of a
 //! machine in simulated time): the drives have missed a SYNC, the queued path is dropped, and the
 //! axes are stopped together.
 
 use core::time::Duration;
 
-use drivers::device::{AxisReading, DriveCommand};
+use drivers::device::DriveCommand;
 use drivers::transport::real_time::RealTime;
 use drivers::transport::{Payload, Port, SendError};
 use drivers::wire::canopen::sync::emit_sync;
 use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
 
-use super::decide::{Heard, Trouble};
+use super::account::Trouble;
 use super::pace::Pace;
 use super::{
     AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
@@ -36,14 +37,14 @@ const CHANGE_LIMIT: Duration = Duration::from_secs(10);
 const REST_LIMIT: Duration = Duration::from_secs(5);
 
 /// Where the engine's axes are among the machine's devices.
-struct Seats {
-    count: usize,
+pub(super) struct Seats {
+    pub(super) count: usize,
     /// By the engine's order of axes, the number of the drive.
-    drive: PerAxis<usize>,
+    pub(super) drive: PerAxis<usize>,
     /// The buses that carry SYNC.
     buses: Vec<Port>,
-    channels: [Option<Channel>; CHANNELS_MAX],
-    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+    pub(super) channels: [Option<Channel>; CHANNELS_MAX],
+    pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
 }
 
 impl Machine {
@@ -72,21 +73,34 @@ impl Machine {
         engine: &mut Engine,
         host: &mut dyn FnMut(),
     ) -> Result<Cause, Failure> {
+        let outcome = self.follow_to_rest(engine, host);
+        if outcome.is_err() {
+            engine.core.forget_orders();
+        }
+        outcome
+    }
+
+    fn follow_to_rest(
+        &mut self,
+        engine: &mut Engine,
+        host: &mut dyn FnMut(),
+    ) -> Result<Cause, Failure> {
         for axis in engine.axes.clone() {
             self.require_zeroed(&axis)?;
         }
         let mut seats = self.seats(engine)?;
+        self.require_supervised(seats.drive[0], "following set-points")?;
         self.await_rest(engine, &seats)?;
+        self.require_inside(engine, &seats)?;
+        // Locking memory takes its time, and so does letting it go: never between two SYNCs.
+        let granted = engine.real_time.then(RealTime::ask);
+        let text = granted.as_ref().map(ToString::to_string);
+        engine.timing.scheduling = text.unwrap_or_default();
         let held = self.enter_cyclic(engine, &seats)?;
         engine.core.begin(held);
-        let outcome = self.with_own_sync(|machine| {
-            let granted = engine.real_time.then(RealTime::ask);
-            engine.timing.scheduling = granted
-                .as_ref()
-                .map_or_else(String::new, |it| it.to_string());
-            machine.run_periods(engine, &mut seats, host)
-        });
-        let cause = outcome?;
+        let cause = self.holding_back(|machine| {
+            machine.with_own_sync(|it| it.run_periods(engine, &mut seats, host))
+        })?;
         // A drive that changes its mode while it moves may do anything.
         self.await_rest(engine, &seats)?;
         for at in &seats.drive[..seats.count] {
@@ -121,6 +135,26 @@ impl Machine {
             correction,
             Duration::from_secs_f64(period_ms * 1e-3),
         ))
+    }
+
+    /// The loop's SYNC goes out on every CAN bus, also those that carry none of its axes.
+    pub(super) fn require_one_sync(&self, expected: Duration) -> Result<(), Failure> {
+        let buses = self.config.can.iter();
+        let mut others = buses.filter_map(|(bus, it)| {
+            let seen = Duration::from_secs_f64(it.sync_period_ms * 1e-3);
+            (seen != expected).then(|| (bus.clone(), seen))
+        });
+        match others.next() {
+            None => Ok(()),
+            Some((bus, seen)) => {
+                let periods = EngineFailure::Periods {
+                    bus,
+                    expected,
+                    seen,
+                };
+                Err(periods.into())
+            }
+        }
     }
 
     fn seats(&self, engine: &Engine) -> Result<Seats, Failure> {
@@ -161,6 +195,27 @@ impl Machine {
             && device.reading().is_none_or(|it| !it.at_rest)
     }
 
+    /// The first set-point of an axis beyond its soft limits would be the limit: a step.
+    fn require_inside(&self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
+        for (axis, at) in engine.axes.iter().zip(seats.drive) {
+            if let Some(reading) = self.axes[at].device.reading() {
+                self.require_place(axis, reading.position)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// As near as a move ends counts as inside.
+    fn require_place(&self, axis: &str, at: Metres) -> Result<(), Failure> {
+        let (min, max) = self.soft_limits(axis)?;
+        let window = Metres::from_um(self.axis_config(axis)?.position_window_um);
+        if min - window <= at && at <= max + window {
+            return Ok(());
+        }
+        let axis = axis.to_owned();
+        Err(EngineFailure::Outside { axis, at, min, max }.into())
+    }
+
     /// Every drive in the mode, enabled, and what each holds.
     fn enter_cyclic(&mut self, engine: &Engine, seats: &Seats) -> Result<PerAxis<Metres>, Failure> {
         let period = engine.period;
@@ -177,11 +232,12 @@ impl Machine {
             held[axis] = position.ok_or_else(|| EngineFailure::NotCyclic {
                 axis: engine.axes[axis].clone(),
             })?;
+            self.require_place(&engine.axes[axis], held[axis])?;
         }
         Ok(held)
     }
 
-    /// SYNC is sent here instead of by the transport, and given back afterwards, come what may.
+    /// SYNC is sent here instead of by the transport, and given back however the loop ends.
     fn with_own_sync<R>(
         &mut self,
         run: impl FnOnce(&mut Self) -> Result<R, Failure>,
@@ -232,7 +288,8 @@ impl Machine {
         let answered = self.now();
         self.fire_deadlines(answered);
         self.judge_alarms()?;
-        let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), trouble);
+        let late_answers = engine.timing.late_answers;
+        let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), late_answers, trouble);
         if late > 0 {
             engine.core.overrun(late).map_err(judged)?;
         }
@@ -270,6 +327,11 @@ impl Machine {
             engine.timing.overruns += 1;
             engine.timing.skipped += u64::from(missed);
             pace.deadline += period * missed;
+        }
+        if now.since(pace.deadline) > period / 2 {
+            // The next SYNC on the old grid would come close behind this one.
+            pace.deadline = now;
+            engine.timing.shifted += 1;
         }
         self.send_syncs(seats)
             .map_err(|source| self.not_sent(source, "SYNC"))?;
@@ -314,72 +376,13 @@ impl Machine {
             };
             let was_complete = complete;
             self.take(&arrival)?;
-            if !was_complete {
+            if arrival.at < synced {
+                let is_late = seats.drive[..seats.count]
+                    .iter()
+                    .any(|at| self.answer(*at, arrival.at).is_some());
+                engine.timing.late_answers += u64::from(is_late);
+            } else if !was_complete {
                 engine.timing.answers.note(arrival.at.since(synced));
-            }
-        }
-    }
-
-    /// The newest sample of drive number `at`, if it came after the SYNC.
-    fn answer(&self, at: usize, synced: Time) -> Option<AxisReading> {
-        let reading = self.axes[at].device.reading()?;
-        (reading.at >= synced).then_some(reading)
-    }
-
-    fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
-        let mut actual = [None; AXES_MAX];
-        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
-            let reading = self.answer(*at, synced);
-            *actual = reading.map(|it| it.position);
-        }
-        self.hear_channels(&mut seats.channels);
-        self.hear_temperatures(&mut seats.temperatures);
-        Heard {
-            now,
-            actual,
-            channels: &seats.channels,
-            temperatures: &seats.temperatures,
-        }
-    }
-
-    /// Puts the newest sample of each analog channel into its place, in the order of the
-    /// modules' names.
-    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
-        // A module without a sample keeps its places: its channels would else be taken for
-        // those of the next one. What it said last stays, as old as it is.
-        let mut first = 0;
-        for analog in &self.analogs {
-            let own = channels.iter_mut().skip(first);
-            first += analog.device.channels();
-            let Some(sample) = analog.device.reading() else {
-                continue;
-            };
-            let values = sample.volts.iter().zip(&sample.saturated);
-            for (place, (volts, saturated)) in own.zip(values) {
-                *place = Some(Channel {
-                    at: sample.at,
-                    volts: *volts,
-                    saturated: *saturated,
-                });
-            }
-        }
-    }
-
-    /// Likewise of the thermometers.
-    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
-        let modules = self.analogs.iter();
-        let mut first = 0;
-        for module in modules.filter_map(|it| it.device.thermometers()) {
-            let own = temperatures.iter_mut().skip(first);
-            first += module.sensors();
-            let Some(sample) = module.temperatures() else {
-                continue;
-            };
-            for (place, celsius) in own.zip(&sample.celsius) {
-                *place = Some(ThermometerSample {
-                    at: sample.at,
-                    celsius: *celsius,
-                });
             }
         }
     }
@@ -417,7 +420,8 @@ impl Machine {
     }
 
     /// The quick stop command to every drive and the SYNC at which it counts, now. What a port
-    /// does not take is left to the drives' watch on our heartbeat.
+    /// does not take is left to the drives' watch on our heartbeat. Nothing moves any more until
+    /// the machine is started again ([`Machine::require_supervised`]).
     fn quick_stop_together(&mut self, seats: &Seats) {
         self.supervision = Supervision::Stopping;
         self.outbox.clear();
@@ -434,11 +438,12 @@ fn engine_axes(axes: &[String]) -> impl Fn(usize) -> String + '_ {
     |axis| axes.get(axis).cloned().unwrap_or_default()
 }
 
-fn trouble_to_failure(name: impl Fn(usize) -> String, trouble: Trouble) -> Failure {
+fn trouble_to_failure(name: impl Fn(usize) -> String, late: u64, trouble: Trouble) -> Failure {
     match trouble {
         Trouble::Missing { axis, periods } => EngineFailure::Missing {
             axis: name(axis),
             periods,
+            late,
         },
         Trouble::Deviates { axis, lag, limit } => EngineFailure::Deviates {
             axis: name(axis),

@@ -10,11 +10,16 @@ pub(super) const BLUE: &str = "#0b66c3";
 pub(super) const ORANGE: &str = "#c2410c";
 pub(super) const GREEN: &str = "#4d7c0f";
 
+/// For series that have no colour of their own.
+pub(super) const COLOURS: [&str; 6] = [BLUE, ORANGE, GREEN, "#7e22ce", "#0f766e", "#475569"];
+
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
     Dots,
     Line,
+    /// The area that the points go round.
+    Band,
 }
 
 /// A series of points; a line without a name is not in the legend.
@@ -33,15 +38,31 @@ pub(super) fn chart(
     series: &[Series],
     limit: Option<f64>,
 ) -> String {
+    let limits: Vec<f64> = limit.into_iter().flat_map(|it| [it, -it]).collect();
+    let shown = limits.iter().copied().chain([0.0]);
+    drawn(title, labels, series, shown, &limits)
+}
+
+/// The same of values that lie far from zero, which is not shown.
+pub(super) fn chart_about(title: &str, labels: (&str, &str), series: &[Series]) -> String {
+    drawn(title, labels, series, core::iter::empty(), &[])
+}
+
+fn drawn(
+    title: &str,
+    labels: (&str, &str),
+    series: &[Series],
+    shown: impl Iterator<Item = f64>,
+    limits: &[f64],
+) -> String {
     let points = || series.iter().flat_map(|it| it.points.iter());
-    let limits = || limit.into_iter().flat_map(|it| [it, -it]);
     let axes = Axes {
         x: padded(points().map(|it| it.0), 0.02),
-        y: padded(points().map(|it| it.1).chain(limits()).chain([0.0]), 0.06),
+        y: padded(points().map(|it| it.1).chain(shown), 0.06),
     };
     let mut svg = opened(title, HEIGHT);
     svg += &grid(&axes, labels);
-    for limit in limits() {
+    for limit in limits.iter().copied() {
         let (y, right) = (axes.py(limit), WIDTH - RIGHT);
         let _ = write!(
             svg,
@@ -53,6 +74,7 @@ pub(super) fn chart(
         svg += &match it.mark {
             Mark::Dots => dots(&axes, it),
             Mark::Line => line(&axes, it),
+            Mark::Band => band(&axes, it),
         };
     }
     svg += &legend(series);
@@ -75,14 +97,21 @@ fn dots(axes: &Axes, series: &Series) -> String {
     })
 }
 
+fn places(axes: &Axes, series: &Series) -> String {
+    let points = series.points.iter();
+    points.fold(String::new(), |mut text, (x, y)| {
+        let _ = write!(text, "{:.1},{:.1} ", axes.px(*x), axes.py(*y));
+        text
+    })
+}
+
+fn band(axes: &Axes, series: &Series) -> String {
+    let (points, colour) = (places(axes, series), series.colour);
+    format!("<polygon points=\"{points}\" fill=\"{colour}\" opacity=\".22\"/>")
+}
+
 fn line(axes: &Axes, series: &Series) -> String {
-    let points = series
-        .points
-        .iter()
-        .fold(String::new(), |mut text, (x, y)| {
-            let _ = write!(text, "{:.1},{:.1} ", axes.px(*x), axes.py(*y));
-            text
-        });
+    let points = places(axes, series);
     let colour = series.colour;
     format!(
         "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>"
@@ -91,13 +120,16 @@ fn line(axes: &Axes, series: &Series) -> String {
 
 fn legend(series: &[Series]) -> String {
     let named: Vec<_> = series.iter().filter(|it| !it.name.is_empty()).collect();
-    let width = 150.0;
+    // What the y axis is stands at its left.
+    let room = WIDTH - RIGHT - LEFT - 300.0;
+    let width = (room / named.len().max(1) as f64).min(150.0);
     let first = WIDTH - RIGHT - width * named.len() as f64;
     let mut svg = String::from("<g font-size=\"12\">");
     for (at, it) in named.iter().enumerate() {
         let mark = match it.mark {
             Mark::Dots => '●',
             Mark::Line => '—',
+            Mark::Band => '▒',
         };
         let (x, colour) = (first + width * at as f64, it.colour);
         let name = escape(it.name);

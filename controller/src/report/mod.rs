@@ -4,6 +4,7 @@ mod chart;
 pub mod platform;
 pub mod rotary;
 mod svg;
+pub mod volumetric;
 
 use core::fmt::Write as _;
 
@@ -70,9 +71,8 @@ pub fn render(page: &Page<'_>) -> String {
             Content::LinearErrorTable(content) => linear_table(content),
             Content::RotaryErrorTable(content) => rotary_table(content),
             Content::ScrewModel(content) => screw_table(content),
-            Content::VolumetricGeometry(_)
-            | Content::BeamReferences(_)
-            | Content::StateMemory(_) => {
+            Content::VolumetricGeometry(content) => volumetric::geometry(content),
+            Content::BeamReferences(_) | Content::StateMemory(_) => {
                 format!("<p>{}</p>", escape(&calibration.content.summary()))
             }
         };

@@ -12,6 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
+use super::volume::{
+    LineReadEntry, LineReadingEntry, VolumeCheckEntry, VolumePlanEntry, VolumeRead,
+    VolumeReferencesEntry,
+};
 use super::{SCHEMA_VERSION, StoreError, io_error};
 
 /// What a run is: written first.
@@ -127,6 +131,16 @@ pub enum Entry {
         /// By how many lines the plate was to be turned.
         offset: f64,
     },
+    /// How the errors of three axes are to be found: the second line of such a run.
+    VolumePlan(VolumePlanEntry),
+    /// What their detectors read before the first line.
+    VolumeReferences(VolumeReferencesEntry),
+    /// A reading of a line.
+    LineReading(LineReadingEntry),
+    /// A line was read to its end.
+    LineRead(LineReadEntry),
+    /// Which line a verification of three axes reads: the second line of such a run.
+    VolumeCheck(VolumeCheckEntry),
     /// A run is whole, and the place of its datum still reads what it should.
     Closed(ClosureEntry),
     /// The run was continued here after an interruption.
@@ -259,6 +273,8 @@ pub struct ReadJournal {
     pub placements: Vec<PlacementEntry>,
     /// What a verification with it found.
     pub judged: Option<JudgedEntry>,
+    /// Of three axes.
+    pub volume: VolumeRead,
     /// Whether the run was finished.
     pub complete: bool,
     /// Why it ended before, as the operator was told, unless it was continued.
@@ -285,6 +301,7 @@ impl ReadJournal {
             .collect();
         let placed = |offset: f64| self.placements.iter().any(|it| it.offset == offset);
         self.sweeps.retain(|it| placed(it.offset));
+        self.volume.keep_whole_lines();
     }
 
     fn forget_placement(&mut self, offset: f64) {
@@ -421,6 +438,7 @@ fn take(
                 sweeps: Vec::new(),
                 placements: Vec::new(),
                 judged: None,
+                volume: VolumeRead::default(),
                 complete: false,
                 failure: None,
                 valid_bytes: 0,
@@ -438,6 +456,11 @@ fn take(
         (Entry::Sweep(sweep), Some(read)) => read.sweeps.push(sweep),
         (Entry::Placed(placement), Some(read)) => read.placements.push(placement),
         (Entry::Judged(judged), Some(read)) => read.judged = Some(judged),
+        (Entry::VolumePlan(plan), Some(read)) => read.volume.plan = Some(plan),
+        (Entry::VolumeReferences(it), Some(read)) => read.volume.references = Some(it),
+        (Entry::LineReading(reading), Some(read)) => read.volume.readings.push(reading),
+        (Entry::LineRead(line), Some(read)) => read.volume.whole.push(line),
+        (Entry::VolumeCheck(check), Some(read)) => read.volume.check = Some(check),
         (Entry::Misplaced { offset }, Some(read)) => read.forget_placement(offset),
         (Entry::Resumed { .. }, Some(read)) => {
             read.complete = false;

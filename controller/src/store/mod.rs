@@ -17,6 +17,7 @@ mod lease;
 mod plate;
 mod pose;
 mod record;
+mod volume;
 
 use std::path::{Path, PathBuf};
 
@@ -32,8 +33,15 @@ pub use record::{
     ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
     IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
     ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
-    StrokeRecord,
+    StrokeRecord, UnknownRecord,
 };
+pub use volume::{
+    BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
+    VolumeCheckEntry, VolumePlanEntry, VolumeRead, VolumeReferencesEntry,
+};
+
+pub(crate) use record::{AXES, error_name};
+pub(crate) use volume::{metres, point};
 
 pub(crate) use atomic::write_new_or_replace;
 

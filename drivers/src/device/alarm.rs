@@ -56,6 +56,18 @@ pub enum Alarm {
     /// The drive says its following error left the window.
     #[error("{node}: following error outside its window; blocked or overloaded?")]
     FollowingError { node: NodeId },
+    /// In cyclic synchronous position: the drive is enabled and follows its set-points no more.
+    #[error(
+        "{node}: the drive does not follow its set-points any more (0x6041 bit 12); was it halted, \
+         or given another command?"
+    )]
+    NotFollowing { node: NodeId },
+    /// In cyclic synchronous position: the drive limits what it was sent.
+    #[error(
+        "{node}: the drive limits its set-points (0x6041 bit 11); limit switch, or soft limit, speed \
+         or torque limit of its own?"
+    )]
+    InternalLimit { node: NodeId },
     /// The axis goes the other way than its drive wants it to.
     #[error(
         "{node}: the axis runs in the wrong direction: wanted {wanted:+.3}, went {moved:+.3}; motor \

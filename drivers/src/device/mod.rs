@@ -235,6 +235,15 @@ pub trait AnalogInput: Device {
     fn thermometers(&self) -> Option<&dyn TemperatureInput> {
         None
     }
+
+    /// When it sampled last, whatever it measures; `None` before the first sample.
+    fn last_sample(&self) -> Option<Time> {
+        let thermometers = self.thermometers().and_then(TemperatureInput::temperatures);
+        match self.channels() {
+            0 => thermometers.map(|it| it.at),
+            _ => self.reading().map(|it| it.at),
+        }
+    }
 }
 
 /// One sample of all channels.

@@ -179,6 +179,8 @@ pub enum Fault {
     InputStuck { channel: usize },
     /// An analog input has the wrong polarity.
     InputInverted { channel: usize },
+    /// An analog input shows so much more than it should: volts, or degrees of a thermometer.
+    InputShifted { channel: usize, by: f64 },
     /// Analog inputs 0 and 1 are exchanged.
     InputsSwapped,
     /// Random bytes come before an answer.

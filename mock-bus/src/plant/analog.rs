@@ -14,6 +14,8 @@ pub enum InputFault {
     Stuck,
     /// The two wires of the sensor are exchanged.
     Inverted,
+    /// It shows so much more than it should.
+    Shifted(f64),
 }
 
 /// A floating input settles here, as the bias current of a multiplexer leaves it.
@@ -47,6 +49,7 @@ impl Input {
             Some(InputFault::Rail) => return rail_v,
             Some(InputFault::Open) => OPEN_V,
             Some(InputFault::Inverted) => -sensor_v,
+            Some(InputFault::Shifted(by_v)) => sensor_v + by_v,
             None => sensor_v,
         };
         let noisy_v = seen_v + self.noise_v * self.stream.gaussian();

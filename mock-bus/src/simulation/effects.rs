@@ -113,6 +113,7 @@ impl Simulation {
             Fault::InputOpen { channel } => (channel, InputFault::Open),
             Fault::InputStuck { channel } => (channel, InputFault::Stuck),
             Fault::InputInverted { channel } => (channel, InputFault::Inverted),
+            Fault::InputShifted { channel, by } => (channel, InputFault::Shifted(by)),
             _ => return,
         };
         self.plant.set_input_fault(channel, on.then_some(kind));

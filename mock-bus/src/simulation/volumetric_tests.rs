@@ -372,6 +372,14 @@ fn every_fault_of_a_beam_shows_at_its_module_and_ends() {
     check_fault(Fault::InputOpen { channel: 27 }, 14, |_, during| {
         during[3] == i16::MIN
     });
+    // Hundredths of degrees.
+    let shifted = Fault::InputShifted {
+        channel: 27,
+        by: 3.0,
+    };
+    check_fault(shifted, 14, |before, during| {
+        (during[3] - before[3] - 300).abs() < 5
+    });
 }
 
 #[test]

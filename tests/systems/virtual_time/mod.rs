@@ -14,3 +14,4 @@ mod volumetric_day;
 mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
+mod volumetric_resume;

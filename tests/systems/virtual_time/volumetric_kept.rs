@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::online::Memories;
-use tests::volume::{Off, Volume, good, percentile_95, size, spread};
+use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
 use truestage::cycle::volumetric::{Remembered, VolumetricState};
 use truestage::store::MemoryName;
 use units::{Metres, Time};
@@ -14,17 +14,6 @@ const TOOL: &str = "tool_offset_mm = [0.0, 0.0, -100.0]";
 
 /// When what is deliberate begins.
 const BEGINS_S: f64 = 360.0;
-
-/// Heartbeats so rare that hours without SYNC cost little.
-fn calm(text: String) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
-}
 
 /// With its errors known and the detectors' references taken.
 fn known(seed: u64, machine: impl Fn(String) -> String, deliberate: &str, own: &str) -> Volume {
@@ -68,13 +57,6 @@ fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
     pairs
         .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
         .collect()
-}
-
-fn largest(errors: &[Off]) -> Metres {
-    errors
-        .iter()
-        .map(|it| size(*it))
-        .fold(Metres(0.0), |a, b| a.max(b))
 }
 
 /// The x guide bows by 15 um, and its slide pitches along: the first memory lets the tool follow.
@@ -187,11 +169,26 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("`truestage reference`"), "{refused}");
     good(volume.bench.machine.reference_volumetric(&store));
-    idle_until(&mut volume, 2.0 * 3600.0);
     let record = |volume: &mut Volume, memory| {
         let recorded = volume.bench.machine.record_memory(&store, memory);
         good(recorded)
     };
+    // References that were taken again.
+    record(&mut volume, MemoryName::First);
+    good(volume.bench.machine.reference_volumetric(&store));
+    let refused = refusal(&volume);
+    let told = "`truestage memory record --memory first`";
+    assert!(refused.contains(told), "{refused}");
+    let again = record(&mut volume, MemoryName::First);
+    assert!(
+        kept(&again)
+            .iter()
+            .all(|it| it.abs() < Metres::from_um(1.0))
+    );
+    assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
+    let cleared = volume.bench.machine.clear_memory(&store, MemoryName::First);
+    assert_eq!(good(cleared), (Some(again.id), None));
+    idle_until(&mut volume, 2.0 * 3600.0);
     // All of it is in the second before there is a first.
     let all = record(&mut volume, MemoryName::Second);
     assert!(kept(&all).iter().any(|it| it.abs() > Metres::from_um(3.0)));
@@ -220,19 +217,6 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     let machine = &volume.bench.machine;
     let cleared = good(machine.clear_memory(&store, MemoryName::Second));
     assert_eq!(cleared, (Some(beyond.id), None));
-    assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
-    // References that were taken again.
-    record(&mut volume, MemoryName::First);
-    good(volume.bench.machine.reference_volumetric(&store));
-    let refused = refusal(&volume);
-    let told = "`truestage memory record --memory first`";
-    assert!(refused.contains(told), "{refused}");
-    let again = record(&mut volume, MemoryName::First);
-    assert!(
-        kept(&again)
-            .iter()
-            .all(|it| it.abs() < Metres::from_um(1.0))
-    );
     assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
 }
 

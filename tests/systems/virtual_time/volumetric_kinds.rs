@@ -2,11 +2,9 @@
 
 use core::time::Duration;
 
-use tests::volume::{Frame, TRAVEL_MM, Volume, good, percentile_95, spread};
+use tests::volume::{Frame, TRAVEL_MM, Volume, calm, good, percentile_95, spread};
 use truestage::cycle::volumetric::WarmUp;
 use units::Metres;
-
-use super::volumetric_day::calm;
 
 /// Where the volume begins.
 const LOW_MM: [f64; 3] = [0.0, 100.0, 50.0];
@@ -46,7 +44,7 @@ fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
     let store = volume.bench.store.clone();
     let mut hand = volume.bench.emulated.clone();
     let machine = &mut volume.bench.machine;
-    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), &mut hand));
+    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand));
 
     let mut later = zeroed();
     later.inherit(&volume);

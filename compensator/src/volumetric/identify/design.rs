@@ -6,6 +6,7 @@ use units::Metres;
 use super::thermal::ThermalPlan;
 use super::{Axis, FunctionPlan, IdentifyError, Observation, Plan, Reading, Unknown};
 use crate::volumetric::Point;
+use crate::volumetric::function::{Pieces, Shape};
 use crate::volumetric::model::{ErrorName, Squareness};
 use crate::volumetric::point::{V3, cross};
 
@@ -17,6 +18,8 @@ const AT_THE_END_M: f64 = 1e-9;
 pub(super) struct Block {
     pub(super) name: ErrorName,
     pub(super) nodes: Vec<f64>,
+    /// What a value of 1 at one node alone makes of all places, by node.
+    influences: Vec<Pieces>,
     /// nodes × parameters; its columns keep the conventions.
     pub(super) basis: DMatrix<f64>,
     /// The first of its parameters.
@@ -24,21 +27,30 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// The value at `position` per parameter: straight lines between the nodes.
+    /// The value at `position` per parameter.
     pub(super) fn row(&self, position: f64) -> Vec<f64> {
-        let (i, share) = interval(&self.nodes, position);
-        let of = |column: usize| {
-            let (a, b) = (self.basis[(i, column)], self.basis[(i + 1, column)]);
-            a + share * (b - a)
+        let values: Vec<f64> = self.influences.iter().map(|it| it.at(position)).collect();
+        let column = |column: usize| {
+            let shares = self.basis.column(column).into_iter().zip(&values);
+            shares.map(|(share, value)| share * value).sum()
         };
-        (0..self.basis.ncols()).map(of).collect()
+        (0..self.basis.ncols()).map(column).collect()
     }
 }
 
-fn interval(nodes: &[f64], position: f64) -> (usize, f64) {
-    let after = nodes.partition_point(|it| *it <= position);
-    let i = after.clamp(1, nodes.len() - 1) - 1;
-    (i, (position - nodes[i]) / (nodes[i + 1] - nodes[i]))
+/// What a value of 1 at each node alone makes of all places. Monotone cubics are not the sum of
+/// what their nodes make: straight lines stand for them.
+fn influences(nodes: &[f64], shape: Shape) -> Vec<Pieces> {
+    let shape = match shape {
+        Shape::Linear | Shape::MonotoneCubic => Shape::Linear,
+        Shape::Spline => Shape::Spline,
+    };
+    let of = |node: usize| {
+        let mut values = vec![0.0; nodes.len()];
+        values[node] = 1.0;
+        Pieces::new(nodes, &values, shape).expect("the nodes were checked")
+    };
+    (0..nodes.len()).map(of).collect()
 }
 
 /// The weighted problem.
@@ -281,6 +293,7 @@ fn block(plan: &Plan, function: &FunctionPlan, first: usize) -> Result<Block, Id
         return Err(IdentifyError::Nodes { name, least });
     }
     let count = nodes.len();
+    let influences = influences(&nodes, plan.shape);
     let conditions = if is_straightness {
         let middle = (nodes[0] + nodes[count - 1]) / 2.0;
         let span = nodes[count - 1] - nodes[0];
@@ -296,16 +309,12 @@ fn block(plan: &Plan, function: &FunctionPlan, first: usize) -> Result<Block, Id
         if zero.value() < nodes[0] || zero.value() > nodes[count - 1] {
             return Err(IdentifyError::Zero { name, zero });
         }
-        let (i, share) = interval(&nodes, zero.value());
-        DMatrix::from_fn(1, count, |_, at| match at {
-            it if it == i => 1.0 - share,
-            it if it == i + 1 => share,
-            _ => 0.0,
-        })
+        DMatrix::from_fn(1, count, |_, at| influences[at].at(zero.value()))
     };
     Ok(Block {
         name,
         basis: kernel(&conditions),
+        influences,
         nodes,
         first,
     })

@@ -7,7 +7,7 @@
 //!
 //! | symbol | name here |
 //! |---|---|
-//! | E_XX, E_YX, E_AX … at nodes, straight lines between | [`FunctionPlan`] |
+//! | E_XX, E_YX, E_AX … at nodes, drawn between them as they are when they are used | [`FunctionPlan`], [`Plan::shape`] |
 //! | E_C0Y, E_B0Z, E_A0Z | [`SquarenessName`] |
 //! | what one setting of the instrument leaves open | [`RunSetup`] |
 //! | expansion and bending per kelvin | [`ThermalPlan`] |
@@ -51,6 +51,7 @@ pub use standard::{Optics, Purpose, StandardDesign, StandardLine, standard_desig
 pub use straightness::{ReferenceLine, Straightness, straightness};
 pub use thermal::{BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion, ThermalPlan};
 
+use super::function::Shape;
 use super::model::{Chain, ErrorName};
 use super::{Axis, Point};
 use crate::least_squares::LeastSquaresError;
@@ -116,6 +117,9 @@ pub struct Plan {
     pub chain: Chain,
     /// The functions to be found; the others are taken as zero.
     pub functions: Vec<FunctionPlan>,
+    /// How they run between their nodes, where diagonals are read. Straight lines where a smooth
+    /// machine is drawn by splines later leave readings that no errors explain.
+    pub shape: Shape,
     /// The squarenesses to be found; the others are taken as zero.
     pub squarenesses: Vec<SquarenessName>,
     /// The settings, by their number.

@@ -21,6 +21,7 @@ use units::{Metres, Radians};
 
 use super::diagonals::{body_diagonals, direction, face_diagonals};
 use super::{Alignment, FunctionPlan, Plan, Reading, RunSetup, SquarenessName, ThermalPlan};
+use crate::volumetric::function::Shape;
 use crate::volumetric::model::{Chain, ErrorName};
 use crate::volumetric::{Axis, Point, Volume};
 
@@ -202,8 +203,9 @@ pub fn standard_design(
 }
 
 impl StandardDesign {
-    /// What is to be found by it: nodes at even distances, `nodes` by axis; run n is line n.
-    pub fn plan(&self, nodes: [usize; 3], zero: Point) -> Plan {
+    /// What is to be found by it: nodes at even distances, `nodes` by axis, drawn by `shape`
+    /// between them; run n is line n.
+    pub fn plan(&self, nodes: [usize; 3], zero: Point, shape: Shape) -> Plan {
         let functions = self.names().map(|name| {
             let (ErrorName::Along(axis, _) | ErrorName::About(axis, _)) = name;
             let (low, high) = (
@@ -229,6 +231,7 @@ impl StandardDesign {
         Plan {
             chain: self.chain,
             functions: functions.collect(),
+            shape,
             squarenesses: SquarenessName::ALL.to_vec(),
             runs: self.lines.iter().enumerate().map(setup).collect(),
             zero,

@@ -30,7 +30,7 @@ fn arm() -> Point {
 }
 
 /// ±5 µm and ±3″ that keep the conventions, from one node to the next: worse than any real one.
-fn truth(chain: &str, without: &[ErrorName], chance: &mut Chance) -> VolumetricModel {
+fn truth(chain: &str, without: &[ErrorName], shape: Shape, chance: &mut Chance) -> VolumetricModel {
     let mut axes: [AxisErrors; 3] = Default::default();
     for axis in Axis::ALL {
         let i = axis.index();
@@ -52,9 +52,9 @@ fn truth(chain: &str, without: &[ErrorName], chance: &mut Chance) -> VolumetricM
                 .collect();
             tilts[0] = Radians::ZERO;
             let own = &mut axes[i];
-            own.along[k.index()] = Some(Function::new(&at, &values, Shape::Linear).unwrap());
+            own.along[k.index()] = Some(Function::new(&at, &values, shape).unwrap());
             if !without.contains(&ErrorName::About(axis, k)) {
-                own.about[k.index()] = Some(Function::new(&at, &tilts, Shape::Linear).unwrap());
+                own.about[k.index()] = Some(Function::new(&at, &tilts, shape).unwrap());
             }
         }
     }
@@ -160,8 +160,12 @@ fn the_standard_lines_see_all_of_every_kind_of_chain() {
             let design = design(chain, &tools, rolls);
             assert!(design.without_effect.is_empty(), "{chain}");
             let mut chance = Chance(1);
-            let observations = measure(&truth(chain, &[], &mut chance), &design, &mut chance);
-            let plan = design.plan([5, 4, 4], Point::ZERO);
+            let observations = measure(
+                &truth(chain, &[], Shape::Linear, &mut chance),
+                &design,
+                &mut chance,
+            );
+            let plan = design.plan([5, 4, 4], Point::ZERO, Shape::Linear);
             assert_eq!(plan.functions.len(), 18);
             let seen = plan.observability(&observations).unwrap();
             assert!(seen.is_complete(), "{chain} {rolls:?}: {seen}");
@@ -178,55 +182,76 @@ fn the_standard_lines_see_all_of_every_kind_of_chain() {
 /// an arm. With the tool alone the roll of z, which moves nothing then, is left out.
 #[test]
 fn the_shipped_machines_tool_is_known_to_half_a_micrometre_and_no_better_than_stated() {
-    const SEEDS: u32 = 8;
     let only = design("FXYZ", &[working_tool()], [true, false, false]);
     assert_eq!(only.lines.len(), 21);
     let roll_of_z = ErrorName::About(Axis::Z, Axis::Z);
     assert_eq!(only.without_effect, [roll_of_z]);
     let with_arm = design("FXYZ", &[working_tool(), arm()], [true, false, false]);
     assert_eq!(with_arm.lines.len(), 24);
-    for (design, tools) in [
-        (only, vec![working_tool()]),
-        (with_arm, vec![working_tool(), arm()]),
-    ] {
-        let (mut squares, mut count, mut readings, mut spare) = (0.0, 0.0, 0.0, 0);
-        for seed in 0..SEEDS {
-            let mut chance = Chance(1000 + u64::from(seed));
-            let truth = truth("FXYZ", &design.without_effect, &mut chance);
-            let observations = measure(&truth, &design, &mut chance);
-            let plan = design.plan(NODES, Point::ZERO);
-            let found = plan.identify(&observations).unwrap();
-            readings += found.residuals.iter().map(|it| it * it).sum::<f64>();
-            spare += found.degrees_of_freedom;
-            let mut own = truth.machine().clone();
-            own.axes = found.axis_errors(Shape::Linear).unwrap();
-            own.squareness = found.squareness;
-            let own = model(own);
-            for tool in &tools {
-                let enlarged = found.birge_ratio.unwrap().max(1.0);
-                for at in corners_and_middles() {
-                    let of =
-                        |it: &VolumetricModel| it.deviation(at, &still(it, *tool)).unwrap().array();
-                    let (seen, expected) = (of(&own), of(&truth));
-                    let u = found.standard_uncertainty(at, *tool, &[]).unwrap();
-                    assert!(u.distance().um() / enlarged < 0.5, "{at:?}: {u:?}");
-                    for (k, u) in u.array().into_iter().enumerate() {
-                        // At the origin of the axes with everything zero little is uncertain.
-                        if u > 1e-9 {
-                            squares += ((seen[k] - expected[k]) / u).powi(2);
-                            count += 1.0;
-                        }
+    for shape in [Shape::Linear, Shape::Spline] {
+        expect_as_sure_as_stated(&only, &[working_tool()], shape);
+        expect_as_sure_as_stated(&with_arm, &[working_tool(), arm()], shape);
+    }
+}
+
+/// Identified and used by the shape that the machine has.
+fn expect_as_sure_as_stated(design: &StandardDesign, tools: &[Point], shape: Shape) {
+    const SEEDS: u32 = 8;
+    let (mut squares, mut count, mut readings, mut spare) = (0.0, 0.0, 0.0, 0);
+    for seed in 0..SEEDS {
+        let mut chance = Chance(1000 + u64::from(seed));
+        let truth = truth("FXYZ", &design.without_effect, shape, &mut chance);
+        let observations = measure(&truth, design, &mut chance);
+        let plan = design.plan(NODES, Point::ZERO, shape);
+        let found = plan.identify(&observations).unwrap();
+        readings += found.residuals.iter().map(|it| it * it).sum::<f64>();
+        spare += found.degrees_of_freedom;
+        let mut own = truth.machine().clone();
+        own.axes = found.axis_errors(shape).unwrap();
+        own.squareness = found.squareness;
+        let own = model(own);
+        for tool in tools {
+            let enlarged = found.birge_ratio.unwrap().max(1.0);
+            for at in corners_and_middles() {
+                let of =
+                    |it: &VolumetricModel| it.deviation(at, &still(it, *tool)).unwrap().array();
+                let (seen, expected) = (of(&own), of(&truth));
+                let u = found.standard_uncertainty(at, *tool, &[]).unwrap();
+                assert!(u.distance().um() / enlarged < 0.5, "{at:?}: {u:?}");
+                for (k, u) in u.array().into_iter().enumerate() {
+                    // At the origin of the axes with everything zero little is uncertain.
+                    if u > 1e-9 {
+                        squares += ((seen[k] - expected[k]) / u).powi(2);
+                        count += 1.0;
                     }
                 }
             }
         }
-        // Some 2500 spare readings: 1 ± 0.03 in χ².
-        let birge = readings / f64::from(u32::try_from(spare).unwrap());
-        assert!((0.9..1.1).contains(&birge), "{birge}");
-        // Errors at 27 places depend on each other: some twenty independent ones a seed.
-        let rms = f64::sqrt(squares / count);
-        assert!((0.8..1.2).contains(&rms), "{rms}");
     }
+    // Some 2500 spare readings: 1 ± 0.03 in χ².
+    let birge = readings / f64::from(u32::try_from(spare).unwrap());
+    assert!((0.9..1.1).contains(&birge), "{shape:?}: {birge}");
+    // Errors at 27 places depend on each other: some twenty independent ones a seed.
+    let rms = f64::sqrt(squares / count);
+    assert!((0.8..1.2).contains(&rms), "{shape:?}: {rms}");
+}
+
+/// Diagonals are read between the nodes too.
+#[test]
+fn a_smooth_machine_drawn_by_straight_lines_leaves_readings_that_nothing_explains() {
+    let design = design("FXYZ", &[working_tool(), arm()], [true, false, false]);
+    let mut chance = Chance(3);
+    let truth = truth("FXYZ", &[], Shape::Spline, &mut chance);
+    let observations = measure(&truth, &design, &mut chance);
+    let birge = |shape: Shape| {
+        let found = design
+            .plan(NODES, Point::ZERO, shape)
+            .identify(&observations);
+        found.unwrap().birge_ratio.unwrap()
+    };
+    let (straight, smooth) = (birge(Shape::Linear), birge(Shape::Spline));
+    assert!((0.8..1.2).contains(&smooth), "{smooth}");
+    assert!(straight > 3.0, "{straight}");
 }
 
 /// What each group of lines is there for is unseen without it.
@@ -234,7 +259,7 @@ fn the_shipped_machines_tool_is_known_to_half_a_micrometre_and_no_better_than_st
 fn without_the_lines_for_it_an_error_stays_unseen() {
     let mut chance = Chance(2);
     let whole = design("FXYZ", &[working_tool(), arm()], [false; 3]);
-    let truth = truth("FXYZ", &[], &mut chance);
+    let truth = truth("FXYZ", &[], Shape::Linear, &mut chance);
     let about = |axis| Unknown::Function(ErrorName::About(axis, axis));
     for (purposes, unseen) in [
         (
@@ -258,7 +283,7 @@ fn without_the_lines_for_it_an_error_stays_unseen() {
         fewer.lines.retain(|it| !purposes.contains(&it.purpose));
         assert!(fewer.lines.len() < whole.lines.len());
         let observations = measure(&truth, &fewer, &mut chance);
-        let plan = fewer.plan([5, 4, 4], Point::ZERO);
+        let plan = fewer.plan([5, 4, 4], Point::ZERO, Shape::Linear);
         let seen = plan.observability(&observations).unwrap();
         assert!(!seen.sees(unseen), "{purposes:?}: {seen}");
     }

@@ -111,6 +111,7 @@ pub(super) fn plan(chain: &str, names: &[ErrorName], count: usize, runs: Vec<Run
     Plan {
         chain: chain.parse().unwrap(),
         functions: names.iter().map(function).collect(),
+        shape: Shape::Linear,
         squarenesses: SquarenessName::ALL.to_vec(),
         runs,
         zero: Point::ZERO,

@@ -161,7 +161,7 @@ fn temperatures_expand_grow_and_lean() {
     check_um(model.deviation(at, &now).unwrap(), [8.0 + 0.8, 0.0, 6.0]);
     // 0.1 K: 4 µm/K + 0.4 µm/K along x at once, 3 µm/K along z.
     let u = model
-        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO)
+        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[])
         .unwrap();
     check_um(u, [0.44, 0.0, 0.3]);
     let hot = model.conditions(Point::ZERO, &[Celsius(31.0)], &live);
@@ -254,9 +254,30 @@ fn a_bends_uncertainty_is_that_of_its_bow_and_of_both_thermometers() {
             .conditions(tool, &temperatures, &MovingState::default())
             .unwrap();
         let u = model
-            .standard_uncertainty(Point::ZERO, &now, Metres::ZERO, Radians::ZERO)
+            .standard_uncertainty(Point::ZERO, &now, Metres::ZERO, Radians::ZERO, &[])
             .unwrap();
         check_um(u, [expected, 0.0, 0.0]);
+    }
+}
+
+/// One of two thermometers says nothing, 3.2 µm per kelvin. Alone it would leave 8 K open; but a bend is
+/// refused beyond 3 K, 3/√3 K at most are left open then.
+#[test]
+fn a_thermometer_that_says_nothing_leaves_what_a_bend_is_known_for() {
+    let model = bending("FXYZ", true);
+    let limit = model.machine().thermal.bends[0].gradient_max;
+    let tool = Point::from_mm(0.0, 0.0, -100.0);
+    let now = model
+        .conditions(tool, &[Celsius(20.0); 2], &MovingState::default())
+        .unwrap();
+    for (u_kelvin, expected) in [
+        ([0.05, 0.2], 0.2_f64.hypot(0.05)),
+        ([0.05, 8.0], limit / 3.0_f64.sqrt()),
+        ([8.0, 8.0], limit / 3.0_f64.sqrt()),
+    ] {
+        let (none, roll) = (Metres::ZERO, Radians::ZERO);
+        let u = model.standard_uncertainty(Point::ZERO, &now, none, roll, &u_kelvin);
+        check_um(u.unwrap(), [3.2 * expected, 0.0, 0.0]);
     }
 }
 
@@ -272,7 +293,7 @@ fn an_uncertain_expansion_makes_a_warm_machine_uncertain() {
     for (warm, expected) in [([22.0, 24.0], 1.2), ([22.0, 18.0], 0.0)] {
         let now = model.conditions(Point::ZERO, &warm.map(Celsius), &MovingState::default());
         let u = model
-            .standard_uncertainty(at, &now.unwrap(), Metres::ZERO, Radians::ZERO)
+            .standard_uncertainty(at, &now.unwrap(), Metres::ZERO, Radians::ZERO, &[])
             .unwrap();
         check_um(u, [expected, 0.0, 0.0]);
     }
@@ -333,12 +354,12 @@ fn uncertainties_combine_with_their_levers() {
     let now = still(&model, Point::ZERO);
     let at = Point::from_mm(400.0, 0.0, 0.0);
     let u = model
-        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO)
+        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[])
         .unwrap();
     check_um(u, [0.0, 0.5, 0.0]);
     // Detectors: each sideways direction is displaced by two sliders.
     let u = model
-        .standard_uncertainty(at, &now, um(0.1), Radians::ZERO)
+        .standard_uncertainty(at, &now, um(0.1), Radians::ZERO, &[])
         .unwrap();
     check_um(u, [0.02_f64.sqrt(), 0.27_f64.sqrt(), 0.02_f64.sqrt()]);
 }

@@ -84,6 +84,36 @@ pub struct Thermal {
     pub fixed: Point,
 }
 
+impl Thermal {
+    /// Which channels belong together, by the first one of each group: those that make one effect
+    /// between them (the two of a bend, those whose sum is the expansion along one axis, a growth
+    /// along one direction or one squareness), and those that belong together with one of these.
+    /// One of them alone says something else than all: half an expansion, or a bend where there is
+    /// none.
+    pub fn groups(&self) -> Vec<usize> {
+        let count = self.channels.len();
+        let mut groups: Vec<usize> = (0..count).collect();
+        let mut join = |makes: &dyn Fn(usize) -> bool| {
+            let together: Vec<usize> = (0..count).filter(|it| makes(*it)).collect();
+            let own: Vec<usize> = together.iter().map(|it| groups[*it]).collect();
+            if let Some(first) = own.iter().copied().min() {
+                for group in groups.iter_mut().filter(|it| own.contains(it)) {
+                    *group = first;
+                }
+            }
+        };
+        for k in 0..3 {
+            join(&|it| self.channels[it].expansion[k] != 0.0);
+            join(&|it| self.channels[it].growth.array()[k] != 0.0);
+            join(&|it| self.channels[it].squareness[k] != Radians(0.0));
+        }
+        for bend in &self.bends {
+            join(&|it| bend.share(it) != 0.0);
+        }
+        groups
+    }
+}
+
 fn unit(axis: Axis) -> V3 {
     core::array::from_fn(|k| f64::from(u8::from(k == axis.index())))
 }
@@ -165,6 +195,14 @@ impl ThermalBend {
         kelvin(self.over) - self.under.map_or(0.0, kelvin)
     }
 
+    /// The share of what its channels' uncertainties make of the gradient that can be: one beyond
+    /// what the coefficient is known for is refused, so that it is within that on either side.
+    pub(crate) fn share_within(&self, gradient: f64, u_of_channel: impl Fn(usize) -> f64) -> f64 {
+        let u = u_of_channel(self.over).hypot(self.under.map_or(0.0, u_of_channel));
+        let most = (self.gradient_max + gradient.abs()) / 3.0_f64.sqrt();
+        if u > most { most / u } else { 1.0 }
+    }
+
     /// The largest magnitude of the gradient that channels and this coefficient permit.
     pub(crate) fn gradient_bound(&self, channels: &[ThermalChannel]) -> f64 {
         let extremes = |at: usize| {
@@ -222,5 +260,58 @@ impl ThermalSums {
                 *sum += effect(coefficient);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(expansion: [f64; 3], growth_z_um: f64) -> ThermalChannel {
+        ThermalChannel {
+            reference: Celsius(20.0),
+            low: Celsius(10.0),
+            high: Celsius(30.0),
+            expansion,
+            u_expansion: [0.0; 3],
+            growth: Point::new(Metres(0.0), Metres(0.0), Metres::from_um(growth_z_um)),
+            squareness: [Radians(0.0); 3],
+            u: 0.0,
+        }
+    }
+
+    fn bend(over: usize, under: Option<usize>) -> ThermalBend {
+        ThermalBend {
+            axis: Axis::X,
+            towards: Axis::Z,
+            over,
+            under,
+            bow: Metres::from_um(4.0),
+            u: Metres(0.0),
+            low: Metres(0.0),
+            high: Metres(0.5),
+            gradient_max: 4.0,
+            is_watched: false,
+        }
+    }
+
+    #[test]
+    fn channels_that_make_one_effect_between_them_belong_together() {
+        let none = [0.0; 3];
+        let along = |k: usize| core::array::from_fn(|i| if i == k { 5e-6 } else { 0.0 });
+        let mut thermal = Thermal {
+            channels: vec![channel(none, 0.0); 6],
+            ..Thermal::default()
+        };
+        assert_eq!(thermal.groups(), [0, 1, 2, 3, 4, 5], "nothing joins them");
+        thermal.bends = vec![bend(4, Some(1)), bend(3, None)];
+        assert_eq!(thermal.groups(), [0, 1, 2, 3, 1, 5]);
+        thermal.channels[2] = channel(along(1), 0.0);
+        thermal.channels[4] = channel(along(1), 0.0);
+        assert_eq!(thermal.groups(), [0, 1, 1, 3, 1, 5], "one by the other");
+        thermal.channels[0] = channel(none, 1.0);
+        thermal.channels[1] = channel(none, -1.0);
+        thermal.channels[5] = channel(along(0), 0.0);
+        assert_eq!(thermal.groups(), [0, 0, 0, 3, 0, 5]);
     }
 }

@@ -13,6 +13,10 @@ impl VolumetricModel {
     /// temperatures and thermal coefficients as far as they have one, taken as independent of
     /// each other; with that of the detectors' displacements and rolls.
     ///
+    /// `u_temperatures`, in kelvin by channel, are what the temperatures are known to now; a channel
+    /// beyond their end is as sure as it says of itself. A gradient is never less sure than that it
+    /// is within what its bend is known for.
+    ///
     /// # Errors
     /// When the command is outside the volume by more than the limit of size.
     pub fn standard_uncertainty(
@@ -21,6 +25,7 @@ impl VolumetricModel {
         now: &Conditions,
         u_displacement: Metres,
         u_roll: Radians,
+        u_temperatures: &[f64],
     ) -> Result<Point, NoCorrection> {
         self.commands.check(command)?;
         let mut squares = [0.0; 3];
@@ -56,6 +61,10 @@ impl VolumetricModel {
         }
         let thermal = &self.machine.thermal;
         let way = (command - thermal.fixed).array();
+        let u_of_channel = |at: usize| {
+            let known = u_temperatures.get(at).copied();
+            known.unwrap_or(thermal.channels[at].u)
+        };
         for (at, channel) in thermal.channels.iter().enumerate() {
             let mut one = ThermalSums::default();
             one.add(channel, 1.0, false);
@@ -63,11 +72,13 @@ impl VolumetricModel {
             let scale: V3 = core::array::from_fn(|k| one.expansion[k] * way[k]);
             let mut effect = add(add(lean, scale), one.growth);
             for bend in &thermal.bends {
-                let bows = bend.bow.value() * bend.share(at);
+                let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
+                let within = bend.share_within(gradient, u_of_channel);
+                let bows = bend.bow.value() * bend.share(at) * within;
                 let arc = self.arc_effect(bend, command, now);
                 effect = core::array::from_fn(|k| effect[k] + arc[k] * bows);
             }
-            combine(effect, channel.u);
+            combine(effect, u_of_channel(at));
         }
         for axis in Axis::ALL {
             let k = axis.index();

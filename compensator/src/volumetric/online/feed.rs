@@ -11,6 +11,7 @@
 //! What may fade to zero must be a difference: a temperature goes through a feed as what it is
 //! above its reference.
 
+use core::fmt;
 use core::time::Duration;
 
 use units::{Quantity, Time};
@@ -31,7 +32,8 @@ pub enum Reaction {
 /// How a feed treats its detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FeedSettings {
-    /// How long trouble is tolerated; the last good value stays meanwhile.
+    /// How long trouble is tolerated; the last good value stays meanwhile. A detector that was
+    /// never believed has as long, from the first time that it was asked.
     pub patience: Duration,
     /// What happens then.
     pub reaction: Reaction,
@@ -47,7 +49,8 @@ pub struct FeedSettings {
 /// What stands behind the value a feed gives out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FeedStatus {
-    /// Nothing is believed yet: zero is given out. With the trouble there is, if any.
+    /// Nothing is believed yet: zero is given out. With the trouble there is, if any; beyond what
+    /// is tolerated it is this only by [`Reaction::Hold`], since there is nothing to hold.
     Waiting(Option<Trouble>),
     /// A good value, on the way to it or at it.
     Good,
@@ -57,22 +60,47 @@ pub enum FeedStatus {
     Held(Trouble),
     /// Fading out or faded, by [`Reaction::FadeOut`].
     Faded(Trouble),
-    /// The last good value; the machine is to stop, by [`Reaction::Stop`].
+    /// The last good value, or zero when there was none; the machine is to stop, by [`Reaction::Stop`].
     Stop(Trouble),
     /// Switched off: fading to zero or there.
     Off,
 }
 
+impl fmt::Display for FeedStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Waiting(None) => f.write_str("not believed yet"),
+            Self::Waiting(Some(trouble)) => write!(f, "{trouble}; it was never believed"),
+            Self::Good => f.write_str("good"),
+            Self::Tolerated(trouble) => write!(f, "{trouble}; tolerated so far"),
+            Self::Held(trouble) => write!(f, "{trouble}; its last value is held"),
+            Self::Faded(trouble) => write!(f, "{trouble}; its value has faded out"),
+            Self::Stop(trouble) => write!(f, "{trouble}"),
+            Self::Off => f.write_str("switched off"),
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 enum State {
     Off,
-    /// Nothing is believed yet; with the number of good values in a row.
-    Waiting(u32),
+    /// Nothing is believed yet; since the first value, with the number of good ones in a row.
+    Waiting {
+        since: Option<Time>,
+        good: u32,
+    },
     Good,
     Troubled {
         since: Time,
         good: u32,
     },
+}
+
+impl State {
+    const WAITING: Self = Self::Waiting {
+        since: None,
+        good: 0,
+    };
 }
 
 /// N values of one detector.
@@ -98,7 +126,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     pub fn new(settings: FeedSettings) -> Self {
         Self {
             settings,
-            state: State::Waiting(0),
+            state: State::WAITING,
             status: FeedStatus::Waiting(None),
             jump: false,
             last: Time::ZERO,
@@ -136,7 +164,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     /// Switches on again after [`disable`](Self::disable); nothing when it is on.
     pub fn enable(&mut self) {
         if let State::Off = self.state {
-            self.state = State::Waiting(0);
+            self.state = State::WAITING;
             self.status = FeedStatus::Waiting(None);
         }
     }
@@ -145,6 +173,22 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     /// was exchanged, a memory switched. It is blended to.
     pub fn expect_jump(&mut self) {
         self.jump = true;
+    }
+
+    /// Goes on where `before`, a feed of the same detector, has got to; if another value is wanted
+    /// from now on, it is blended to.
+    pub fn take_over(&mut self, before: &Self) {
+        *self = Self {
+            settings: self.settings,
+            jump: true,
+            ..before.clone()
+        };
+    }
+
+    /// The same values count from elsewhere: all of them are larger by `by`.
+    pub fn shift(&mut self, by: [Q; N]) {
+        self.held = core::array::from_fn(|i| self.held[i] + by[i]);
+        self.output = core::array::from_fn(|i| self.output[i] + by[i]);
     }
 
     /// What stands behind the values given out last.
@@ -157,6 +201,14 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.output
     }
 
+    /// How far the values given out last are from what was wanted then, by the largest: not zero
+    /// while one blends into the other or fades out.
+    pub fn left(&self) -> Q {
+        let each = self.output.iter().zip(&self.held);
+        let each = each.map(|(output, held)| (*output - *held).abs());
+        each.fold(Q::ZERO, Q::max)
+    }
+
     fn good(&mut self, now: Time, value: [Q; N]) {
         let confirm = self.settings.confirm.max(1);
         match self.state {
@@ -165,8 +217,10 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
                 self.smooth(now, value);
                 return;
             }
-            State::Waiting(good) if good + 1 < confirm => {
-                self.state = State::Waiting(good + 1);
+            State::Waiting { since, good } if good + 1 < confirm => {
+                let since = since.or(Some(now));
+                let good = good + 1;
+                self.state = State::Waiting { since, good };
                 return;
             }
             State::Troubled { since, good } if good + 1 < confirm => {
@@ -176,7 +230,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
                 };
                 return;
             }
-            State::Good | State::Waiting(_) | State::Troubled { .. } => {}
+            State::Good | State::Waiting { .. } | State::Troubled { .. } => {}
         }
         self.state = State::Good;
         self.status = FeedStatus::Good;
@@ -187,9 +241,13 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     fn bad(&mut self, now: Time, trouble: Trouble) {
         let since = match self.state {
             State::Off => return,
-            State::Waiting(_) => {
-                self.state = State::Waiting(0);
-                self.status = FeedStatus::Waiting(Some(trouble));
+            State::Waiting { since, .. } => {
+                let since = since.unwrap_or(now);
+                self.state = State::Waiting {
+                    since: Some(since),
+                    good: 0,
+                };
+                self.status = self.never_seen(now, since, trouble);
                 return;
             }
             State::Good => now,
@@ -211,6 +269,17 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
                 FeedStatus::Faded(trouble)
             }
         };
+    }
+
+    /// Of a detector that was in trouble from the beginning: zero is given out as it is.
+    fn never_seen(&self, now: Time, since: Time, trouble: Trouble) -> FeedStatus {
+        let tolerated = now.since(since) < self.settings.patience;
+        match self.settings.reaction {
+            _ if tolerated => FeedStatus::Waiting(Some(trouble)),
+            Reaction::Hold => FeedStatus::Waiting(Some(trouble)),
+            Reaction::FadeOut(_) => FeedStatus::Faded(trouble),
+            Reaction::Stop => FeedStatus::Stop(trouble),
+        }
     }
 
     /// A low pass of first order, whatever the time between two samples.

@@ -91,6 +91,15 @@ impl AxisMonitor {
         }
     }
 
+    /// Goes on with what `before`, which watched the same axis, has seen; another reference or other
+    /// memories are blended to.
+    pub fn take_over(&mut self, before: &Self) {
+        self.feed.take_over(&before.feed);
+        if let (Some(own), Some(before)) = (&mut self.end, &before.end) {
+            own.feed.take_over(&before.feed);
+        }
+    }
+
     /// The displacement by the last samples, memories and smoothing not counted; `None` when the
     /// slider's detector had no good one.
     pub fn displacement(&self) -> Option<Displacement> {
@@ -99,7 +108,7 @@ impl AxisMonitor {
 
     /// The same less what was given out last, to be compensated: what the machine is left with.
     /// That is what a recorder takes.
-    pub fn left(&self) -> Option<Displacement> {
+    pub fn uncompensated(&self) -> Option<Displacement> {
         let seen = self.displacement?;
         Some(difference(seen, self.feed.values()))
     }
@@ -111,6 +120,13 @@ impl AxisMonitor {
             self.feed.status(),
             self.end.as_ref().map(|it| it.feed.status()),
         )
+    }
+
+    /// How far the values given out last still are from what is wanted, the shift of the beam
+    /// included, which counts in full.
+    pub fn left(&self) -> Metres {
+        let end = self.end.as_ref().map(|it| it.feed.left());
+        self.feed.left() + end.unwrap_or(Metres::ZERO)
     }
 
     /// The feed, to switch it on or off.

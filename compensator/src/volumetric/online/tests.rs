@@ -285,14 +285,18 @@ fn an_arrangement_that_cannot_see_a_roll_is_refused() {
     assert!(matches!(seen, Err(RollError::Geometry { .. })), "{seen:?}");
 }
 
-fn feed(reaction: Reaction) -> Feed<Metres, 1> {
-    Feed::new(FeedSettings {
+fn settings(reaction: Reaction) -> FeedSettings {
+    FeedSettings {
         patience: millis(2),
         reaction,
         blend: millis(10),
         confirm: 1,
         smoothing: Duration::ZERO,
-    })
+    }
+}
+
+fn feed(reaction: Reaction) -> Feed<Metres, 1> {
+    Feed::new(settings(reaction))
 }
 
 const BLOCKED: Trouble = Trouble::Blocked {
@@ -341,6 +345,49 @@ fn a_blocked_beam_is_tolerated_and_then_held_faded_or_stops_the_machine() {
             }
         }
     }
+}
+
+/// Blocked from the beginning; what comes and goes before it is believed is trouble as well.
+#[test]
+fn a_detector_that_was_never_believed_is_not_waited_for_for_ever() {
+    let cases = [
+        (Reaction::Hold, FeedStatus::Waiting(Some(BLOCKED))),
+        (Reaction::FadeOut(millis(8)), FeedStatus::Faded(BLOCKED)),
+        (Reaction::Stop, FeedStatus::Stop(BLOCKED)),
+    ];
+    for (reaction, beyond) in cases {
+        let mut feed = Feed::new(FeedSettings {
+            confirm: 2,
+            ..settings(reaction)
+        });
+        let mut check = |at: u64, seen, status| {
+            check_um(feed.advance(ms(at), seen)[0], 0.0);
+            assert_eq!(feed.status(), status);
+        };
+        check(5, Err(BLOCKED), FeedStatus::Waiting(Some(BLOCKED)));
+        check(6, Ok([um(3.0)]), FeedStatus::Waiting(Some(BLOCKED)));
+        check(7, Err(BLOCKED), beyond);
+        check(8, Err(BLOCKED), beyond);
+        check(9, Ok([um(3.0)]), beyond);
+        check(10, Ok([um(3.0)]), FeedStatus::Good);
+        check_um(feed.advance(ms(20), Ok([um(3.0)]))[0], 3.0);
+    }
+}
+
+#[test]
+fn a_feed_that_takes_over_goes_on_and_blends_to_what_it_wants() {
+    let mut before = feed(Reaction::Hold);
+    before.advance(ms(0), Ok([um(8.0)]));
+    before.advance(ms(20), Ok([um(8.0)]));
+    let mut after = feed(Reaction::Hold);
+    after.take_over(&before);
+    assert_eq!(after.status(), FeedStatus::Good);
+    check_um(after.advance(ms(21), Ok([um(-2.0)]))[0], 8.0);
+    check_um(after.advance(ms(26), Ok([um(-2.0)]))[0], 3.0);
+    let mut shifted = feed(Reaction::Hold);
+    shifted.take_over(&before);
+    shifted.shift([um(100.0)]);
+    check_um(shifted.advance(ms(21), Err(BLOCKED))[0], 108.0);
 }
 
 #[test]

@@ -2,17 +2,20 @@
 //! interferometer along a line that no calibration uses.
 
 use core::time::Duration;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::json;
 use truestage::cycle::volumetric::{VerifyBy, VolumetricCalibrated, WarmUp};
 use truestage::emulated::Emulated;
-use truestage::store::Lease;
+use truestage::report::volumetric::{HourOfDay, render_day};
+use truestage::store::{Lease, ReadJournal, read_journal};
 use truestage::{Failure, Machine, Store, config};
 use units::{Metres, Time};
 
-use super::DemoArgs;
+use super::{DemoArgs, write_page};
 use crate::cli::output::{Ended, Output};
+use crate::cli::page::made_from;
 use crate::cli::volume::{calibrated_text, calibrated_value};
 
 /// How long the machine warms up between cold and warm lines.
@@ -26,6 +29,8 @@ struct Hour {
     found: Metres,
     tables: Metres,
     live: Metres,
+    /// Where its readings are, in the same order.
+    journals: [PathBuf; 3],
 }
 
 pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
@@ -51,15 +56,48 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
         machine.start()?;
         machine.zero_volumetric()?;
         output.note("2 calibrate: references, lines by interferometer, cold and 2 h later");
-        let made = machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), &mut hand)?;
+        let made = machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
         output.note(&calibrated_text(&made));
         output.note("3 eight hours: deviations along a line that no calibration uses");
         let hours = day(machine, &store, &mut hand, output)?;
         machine.shut_down()?;
         Ok((made, hours))
     })?;
+    let report = write_report(&store, &made, &hours)?;
     let wall = started.elapsed();
-    output.result(&text_of(&hours, wall), &value_of(&made, &hours, wall))
+    let text = format!(
+        "{}\nreport       {}",
+        text_of(&hours, wall),
+        report.display()
+    );
+    let mut value = value_of(&made, &hours, wall);
+    value["report"] = json!(report);
+    output.result(&text, &value)
+}
+
+/// One page: the day, and the calibration before it.
+fn write_report(
+    store: &Store,
+    made: &VolumetricCalibrated,
+    hours: &[Hour],
+) -> Result<PathBuf, Failure> {
+    let read = |path: &Path| read_journal(path).map_err(Failure::from);
+    let calibrated = read(&made.journal)?;
+    let mut runs: Vec<[ReadJournal; 3]> = Vec::new();
+    for hour in hours {
+        let [found, tables, live] = &hour.journals;
+        runs.push([read(found)?, read(tables)?, read(live)?]);
+    }
+    let day: Vec<_> = hours
+        .iter()
+        .zip(&runs)
+        .map(|(hour, runs)| HourOfDay {
+            hour: f64::from(hour.hour),
+            runs: runs.each_ref(),
+        })
+        .collect();
+    let html = render_day(&day, &calibrated, &made_from(&made.journal)?);
+    write_page(store, &calibrated, &html)
 }
 
 /// Hours without SYNC cost the less, the rarer heartbeats are.
@@ -87,12 +125,16 @@ fn day(
         if until > Time::ZERO && !pause.is_zero() {
             machine.idle(pause)?;
         }
-        let mut range = |by| Ok::<_, Failure>(machine.verify_volumetric(store, by, hand)?.range);
+        let mut verified = |by| machine.verify_volumetric(store, by, hand);
+        let found = verified(VerifyBy::AsFound)?;
+        let tables = verified(VerifyBy::Tables)?;
+        let live = verified(VerifyBy::Everything)?;
         let seen = Hour {
             hour,
-            found: range(VerifyBy::AsFound)?,
-            tables: range(VerifyBy::Tables)?,
-            live: range(VerifyBy::Everything)?,
+            found: found.range,
+            tables: tables.range,
+            live: live.range,
+            journals: [found.journal, tables.journal, live.journal],
         };
         output.note(&line_of(&seen));
         hours.push(seen);

@@ -1,6 +1,9 @@
 //! Whether an axis makes sense, and its device has what it needs and nothing else.
 
+use core::time::Duration;
 use std::collections::BTreeMap;
+
+use drivers::device::cia402::{interpolation_period, period_from};
 
 use super::judge::{Finding, Judge};
 use super::{check_heartbeat, check_watch};
@@ -163,10 +166,38 @@ fn check_cyclic(judge: &mut Judge<'_>, axis: &AxisConfig, cyclic: &CyclicConfig)
     }
 }
 
+/// Every drive is told the SYNC period as so many units of a power of ten.
+fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
+    let bus = axis.bus.as_ref().and_then(|it| config.can.get(it));
+    let Some(period_ms) = bus.map(|it| it.sync_period_ms) else {
+        return;
+    };
+    let period = Duration::try_from_secs_f64(period_ms * 1e-3).unwrap_or_default();
+    if interpolation_period(period).is_some() {
+        return;
+    }
+    let help = match period_from(period) {
+        Some(next) => format!(
+            "set sync_period_ms of its bus to {}",
+            next.as_nanos() as f64 / 1e6
+        ),
+        None => "shorten sync_period_ms of its bus".into(),
+    };
+    judge.say(
+        "cyclic",
+        format!(
+            "the SYNC period of {period_ms} ms cannot be told to a drive: 0x60C2 takes 1 to 255 times \
+             1, 0.1, 0.01 or 0.001 ms"
+        ),
+        help,
+    );
+}
+
 fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
     check_needed(judge, "cia402", &can_keys(axis)[..CAN_KEYS_NEEDED]);
     if let Some(cyclic) = &axis.cyclic {
         check_cyclic(judge, axis, cyclic);
+        check_period(judge, config, axis);
     }
     if let Some(bus) = &axis.bus {
         judge.known("bus", bus, &config.can, "CAN bus");

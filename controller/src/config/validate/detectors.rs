@@ -58,6 +58,9 @@ fn check_beams<'a>(
 fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
     let places = beam.drift != BeamDriftName::Translating;
     let share = beam.drift == BeamDriftName::Mixed;
+    if let Some(um) = beam.standard_uncertainty_um {
+        judge.within("standard_uncertainty_um", um, 0.0, 1e3);
+    }
     for (key, is_there, needed) in [
         ("source_mm", beam.source_mm.is_some(), places),
         ("end_mm", beam.end_mm.is_some(), places),
@@ -219,6 +222,9 @@ fn check_roll<'a>(
     let speed = roll.speed_max_arcsec_per_s;
     judge.within("speed_max_arcsec_per_s", speed, 1e-6, 1e6);
     judge.within("noise_max_arcsec", roll.noise_max_arcsec, 1e-6, 1e6);
+    if let Some(arcsec) = roll.standard_uncertainty_arcsec {
+        judge.within("standard_uncertainty_arcsec", arcsec, 0.0, 1e3);
+    }
     if let Err(error) = assemble::roll_optics(roll) {
         let help = "2 × height_mm must differ from base_mm × tan(inclination_deg)";
         judge.say("", error.to_string(), help);

@@ -19,6 +19,7 @@ use self::cycle::check_cycle;
 pub(super) use self::judge::Finding;
 use self::judge::Judge;
 use self::rotary::check_rotaries;
+use drivers::device::cia402::period_from;
 use drivers::protocol::bus_load::BusLoadError;
 
 use super::model::{CanBus, CanTransport, InstrumentConfig, MachineConfig};
@@ -256,7 +257,9 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
                 BusLoadError::DoesNotFit {
                     shortest_period, ..
                 } => {
-                    format!("{:.2} ms would fit", shortest_period.as_secs_f64() * 1e3)
+                    // What a drive can be told (0x60C2), so that the advice can be followed.
+                    let fits = period_from(shortest_period).unwrap_or(shortest_period);
+                    format!("{} ms would fit", fits.as_nanos() as f64 / 1e6)
                 }
                 BusLoadError::NoRoom { .. } | BusLoadError::Senseless { .. } => String::new(),
             };

@@ -250,6 +250,8 @@ fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &V
         judge.within("calibrate.average_samples", samples, 1.0, 1e5);
         let samples = f64::from(own.detector_samples);
         judge.within("calibrate.detector_samples", samples, 1.0, 1e4);
+        let limit = own.resume_limit_um;
+        judge.within("calibrate.resume_limit_um", limit, 0.01, 1e3);
         let second = own.second_tool_offset_mm.unwrap_or_default();
         for mm in second {
             let most = volumetric.tool_max_mm;
@@ -326,6 +328,9 @@ fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     judge.within("reference.step_mm", reference.step_mm, 0.1, 1e3);
     let samples = f64::from(reference.samples);
     judge.within("reference.samples", samples, 1.0, 1e4);
+    if let Some(kelvin) = reference.warmth_tolerance_k {
+        judge.within("reference.warmth_tolerance_k", kelvin, 1e-3, 100.0);
+    }
 }
 
 fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {

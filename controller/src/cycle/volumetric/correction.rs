@@ -9,7 +9,9 @@
 //! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
 //! old: a reference is wrong by its slope times the way since then.
 
-use core::time::Duration;
+mod sources;
+
+use core::any::Any;
 
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
@@ -18,13 +20,14 @@ use compensator::volumetric::model::{
 };
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
-    MovingState, StateRecorder,
+    MovingState,
 };
 use compensator::volumetric::{Axis, NoCorrection, Point};
-use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians, Time};
+use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 use super::VolumetricFailure;
-use super::inputs::{RollReader, Thermometer, confirmed_by_samples, place_of_voltage, sample};
+use super::inputs::{RollReader, confirmed_by_samples, place_of_voltage, sample};
+use super::thermometers::Thermometers;
 use crate::assemble::{
     beam_detector, feed_settings, influences, model_limits, point_of_mm, thermal, volume_axis,
     volumetric_chain, work_volume,
@@ -33,7 +36,7 @@ use crate::config::{
     BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
     ReactionName, RollConfig, VolumetricConfig,
 };
-use crate::engine::{AXES_MAX, Corrected, Correction, Observed, PerAxis, Validity};
+use crate::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
 
 /// As what a machine was calibrated: its errors, and what its detectors read then.
 #[derive(Clone, Debug, Default)]
@@ -82,7 +85,7 @@ pub struct VolumetricCorrection {
     tool: Point,
     beams: [Option<WatchedBeam>; 3],
     roll: Option<WatchedRoll>,
-    thermometers: Vec<Thermometer>,
+    thermometers: Option<Thermometers>,
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
@@ -126,10 +129,13 @@ impl VolumetricCorrection {
             Some(roll) => Some(watched_roll(config, own, roll, state.roll)?),
             None => None,
         };
-        let mut thermometers = Vec::new();
-        for (it, reference) in own.temperature.iter().zip(&state.temperatures) {
-            thermometers.push(Thermometer::new(config, it, feed(own)?, *reference));
-        }
+        let thermometers = match &*own.temperature {
+            [] => None,
+            each => {
+                let thermal = &model.machine().thermal;
+                Some(Thermometers::new(config, each, feed(own)?, thermal))
+            }
+        };
         Ok(Self {
             model,
             tool: point_of_mm(own.tool_offset_mm),
@@ -140,10 +146,8 @@ impl VolumetricCorrection {
             influences: influences(&own.influence)?,
             memories: state.memories,
             reaction: own.feed.as_ref().map(|it| it.reaction),
-            u_displacement: noise(own),
-            u_roll: own.roll.as_ref().map_or(Radians::ZERO, |it| {
-                Radians::from_arcsec(it.noise_max_arcsec / NOISE_RANGE)
-            }),
+            u_displacement: u_displacement(own),
+            u_roll: own.roll.as_ref().map_or(Radians::ZERO, u_roll),
         })
     }
 
@@ -172,34 +176,6 @@ impl VolumetricCorrection {
     /// The model in use.
     pub const fn model(&self) -> &VolumetricModel {
         &self.model
-    }
-
-    /// Watches displacements without compensating them from now on: the machine is made to be as it
-    /// is this hour. Tables, roll and temperatures go on. To be said before it is in use.
-    #[must_use]
-    pub fn leaving_displacements(mut self) -> Self {
-        for beam in self.beams.iter_mut().flatten() {
-            let now = Time::ZERO;
-            beam.monitor.feed_mut().disable(now, Duration::ZERO);
-        }
-        self
-    }
-
-    /// Tells `recorder` what displacements the machine was left with in the last period at
-    /// `actual`, beyond what the first memory keeps. Allocates nothing.
-    pub(super) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
-        for axis in Axis::ALL {
-            let beam = self.beams[axis.index()].as_ref();
-            let Some(left) = beam.and_then(|it| it.monitor.left()) else {
-                continue;
-            };
-            let position = actual.along(axis);
-            recorder.record(
-                axis,
-                position,
-                self.memories.beyond_first(axis, position, left),
-            );
-        }
     }
 
     /// What the detectors say at `actual`, as it enters the model.
@@ -233,47 +209,42 @@ impl VolumetricCorrection {
         state
     }
 
-    /// What stands behind each value that is used.
-    fn statuses(&self) -> impl Iterator<Item = FeedStatus> {
-        let beams = self.beams.iter().flatten().flat_map(|it| {
-            let (slider, end) = it.monitor.status();
-            core::iter::once(slider).chain(end)
-        });
-        let roll = self.roll.iter().map(|it| it.feed.status());
-        let thermometers = self.thermometers.iter().map(Thermometer::status);
-        beams.chain(roll).chain(thermometers)
-    }
-
-    fn beams_are_good(&self) -> bool {
+    /// Of a displacement that nobody sees nothing is known but that it is no larger than the
+    /// largest permitted; one that blends in is off by what is left of that.
+    fn u_displacement(&self) -> Metres {
+        let largest = self.model.machine().displacement_max / 3.0_f64.sqrt();
         let beams = self.beams.iter().flatten();
-        let mut statuses = beams.flat_map(|it| {
+        let each = beams.map(|it| {
             let (slider, end) = it.monitor.status();
-            core::iter::once(slider).chain(end)
+            if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
+                let left = it.monitor.left().value();
+                Metres(self.u_displacement.value().hypot(left))
+            } else {
+                largest
+            }
         });
-        statuses.all(|it| it == FeedStatus::Good)
+        each.fold(self.u_displacement, Quantity::max)
     }
 
-    /// The standard uncertainties at `command`. Of a displacement that nobody sees nothing is
-    /// known but that it is no larger than the largest permitted.
+    /// Likewise of a roll.
+    fn u_roll(&self) -> Radians {
+        match &self.roll {
+            Some(roll) if roll.feed.status() == FeedStatus::Good => {
+                Radians(self.u_roll.value().hypot(roll.feed.left().value()))
+            }
+            Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
+            None => self.u_roll,
+        }
+    }
+
+    /// The standard uncertainties at `command`.
     fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
-        let machine = self.model.machine();
-        let u_displacement = if self.beams_are_good() {
-            self.u_displacement
-        } else {
-            machine.displacement_max / 3.0_f64.sqrt()
-        };
-        let roll_is_good = self
-            .roll
-            .iter()
-            .all(|it| it.feed.status() == FeedStatus::Good);
-        let u_roll = if roll_is_good {
-            self.u_roll
-        } else {
-            machine.roll_max / 3.0_f64.sqrt()
-        };
-        let u = self
-            .model
-            .standard_uncertainty(command, now, u_displacement, u_roll);
+        let (u_displacement, u_roll) = (self.u_displacement(), self.u_roll());
+        let temperatures = self.thermometers.as_ref();
+        let u_temperatures = temperatures.map_or(&[][..], Thermometers::u_kelvin);
+        let u =
+            self.model
+                .standard_uncertainty(command, now, u_displacement, u_roll, u_temperatures);
         u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
     }
 
@@ -290,28 +261,41 @@ impl VolumetricCorrection {
     }
 }
 
-/// No offset, and why.
+/// No offset, and why: how far that is from right nobody knows.
 const fn nothing(validity: Validity) -> Corrected {
     Corrected {
         offset: [Metres(0.0); AXES_MAX],
-        uncertainty: [Metres(0.0); AXES_MAX],
+        uncertainty: [Metres(f64::NAN); AXES_MAX],
         validity,
     }
 }
 
 impl Correction for VolumetricCorrection {
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
+    }
+
+    fn take_over(&mut self, before: &dyn Any) {
+        self.go_on_from(before);
+    }
+
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected {
         let (&[x, y, z], &[x_now, y_now, z_now]) = (observed.nominal, observed.actual) else {
             return nothing(Validity::Stop("the engine does not move three axes"));
         };
         let (target, actual) = (Point::new(x, y, z), Point::new(x_now, y_now, z_now));
-        for (value, thermometer) in self.temperatures.iter_mut().zip(&mut self.thermometers) {
-            *value = thermometer.advance(observed);
+        if let Some(thermometers) = &mut self.thermometers {
+            let shown = thermometers.advance(observed);
+            self.temperatures.copy_from_slice(shown);
         }
         let state = self.moving_state(observed, actual);
-        if self.statuses().any(|it| matches!(it, FeedStatus::Stop(_))) {
-            return nothing(Validity::Stop("a detector or thermometer is in trouble"));
-        }
+        let validity = match Lack::worst(self.statuses()) {
+            None => Validity::Valid,
+            Some(lack) if matches!(lack.status, FeedStatus::Stop(_)) => {
+                return nothing(Validity::Lost(lack));
+            }
+            Some(lack) => Validity::Without(lack),
+        };
         let Ok(now) = self.model.conditions(self.tool, &self.temperatures, &state) else {
             return self.without();
         };
@@ -324,7 +308,7 @@ impl Correction for VolumetricCorrection {
             Ok(command) => Corrected {
                 offset: per_axis(command - inside),
                 uncertainty: self.uncertainty(command, &now),
-                validity: Validity::Valid,
+                validity,
             },
             Err(NoCorrection::Outside { .. }) => {
                 nothing(Validity::Stop("the path leaves the calibrated volume"))
@@ -336,7 +320,8 @@ impl Correction for VolumetricCorrection {
     }
 }
 
-/// `noise_max` is how far two samples can be apart: so many standard deviations.
+/// `noise_max` is how far two samples can be apart: so many standard deviations. What is stated
+/// where nobody says more of a detector.
 const NOISE_RANGE: f64 = 3.0;
 
 fn per_axis(point: Point) -> PerAxis<Metres> {
@@ -347,11 +332,19 @@ fn per_axis(point: Point) -> PerAxis<Metres> {
     values
 }
 
-/// The worst standard deviation of a detector on a slide.
-fn noise(config: &VolumetricConfig) -> Metres {
-    let sliders = config.beam.each().into_iter().flatten();
-    let each = sliders.map(|it| Metres::from_um(it.slider.noise_max_um / NOISE_RANGE));
+/// Of a displacement by the worst of the beams.
+fn u_displacement(config: &VolumetricConfig) -> Metres {
+    let beams = config.beam.each().into_iter().flatten();
+    let each = beams.map(|it| {
+        let noise_um = it.slider.noise_max_um / NOISE_RANGE;
+        Metres::from_um(it.standard_uncertainty_um.unwrap_or(noise_um))
+    });
     each.fold(Metres::ZERO, Quantity::max)
+}
+
+fn u_roll(config: &RollConfig) -> Radians {
+    let noise_arcsec = config.noise_max_arcsec / NOISE_RANGE;
+    Radians::from_arcsec(config.standard_uncertainty_arcsec.unwrap_or(noise_arcsec))
 }
 
 fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {

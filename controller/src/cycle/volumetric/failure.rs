@@ -7,10 +7,10 @@ use compensator::volumetric::identify::IdentifyError;
 use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
 use compensator::volumetric::online::{MemoryError, RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
-use units::{Metres, MetresPerSecond, Radians};
+use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 use crate::assemble::BeamDetectorError;
-use crate::engine::{Cause, PushError};
+use crate::engine::{Cause, Lack, PushError};
 
 /// Why three axes are not corrected, or not zeroed.
 #[derive(Debug, thiserror::Error)]
@@ -115,14 +115,58 @@ pub enum VolumetricFailure {
         /// What is wrong.
         source: Trouble,
     },
-    /// A thermometer that shows nothing.
+    /// A thermometer that shows nothing to be relied upon.
     #[error(
-        "thermometer {index} (in the order of [[volumetric.temperature]]) shows nothing; nothing \
-         was stored"
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) says nothing to be relied \
+        upon: {source}; nothing was stored: look after it and its wires, and begin again"
     )]
     NoTemperature {
-        /// Which, from 1.
+        /// Which, from 0.
         index: usize,
+        /// What is wrong.
+        source: Trouble,
+    },
+    /// A machine that is not as warm as when its errors were measured.
+    #[error(
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {:.2} °C, but {:.2} °C \
+        when the errors {geometry} were measured, more than {limit_k:.2} K apart: references taken now \
+        would count what warmth does as nothing. Let the machine come to that temperature (by rest, or by \
+        moving), or calibrate again; what was in use stays in use", now.value(), then.value()
+    )]
+    OtherWarmth {
+        /// Which, from 0.
+        index: usize,
+        /// What it showed when the errors were measured.
+        then: Celsius,
+        /// What it shows now.
+        now: Celsius,
+        /// How far apart they may be.
+        limit_k: f64,
+        /// Which errors.
+        geometry: String,
+    },
+    /// Likewise of the difference across a guide.
+    #[error(
+        "the guide of {axis}: thermometer {over} shows {now_k:+.2} K more than {under} (counted from 0), but \
+        {then_k:+.2} K when the errors {geometry} were measured, more than {limit_k:.2} K apart: references \
+        taken now would count its bending as nothing. Let the machine come to that state (by rest, or by \
+        moving), or calibrate again; what was in use stays in use"
+    )]
+    OtherGradient {
+        /// Whose guide.
+        axis: Axis,
+        /// The thermometer over its neutral plane, from 0.
+        over: usize,
+        /// The one under it.
+        under: usize,
+        /// The difference when the errors were measured, in kelvin.
+        then_k: f64,
+        /// The difference now.
+        now_k: f64,
+        /// How far apart they may be.
+        limit_k: f64,
+        /// Which errors.
+        geometry: String,
     },
     /// Samples that do not come.
     #[error("the measuring modules sent {seen} of {expected} samples in {:.1} s; do they sample (every_syncs)?",
@@ -134,6 +178,46 @@ pub enum VolumetricFailure {
         expected: usize,
         /// How long.
         waited: Duration,
+    },
+    /// A journal that does not say how its readings are evaluated.
+    #[error(
+        "this journal does not say how errors of three axes are found from it; give one of \
+         `calibrate` of such a machine"
+    )]
+    NoPlan,
+    /// A calibration is to be continued, but its references hold no more.
+    #[error(
+        "axis {axis}: along its way the detectors of the {what} see changes that differ by {:.2} um, more \
+         than {:.2} um (resume_limit_um), since the references of this run were taken; the machine \
+         has changed, or a detector was moved: start a new calibration without --resume", seen.um(),
+         limit.um()
+    )]
+    Moved {
+        /// Along which axis.
+        axis: Axis,
+        /// Of what.
+        what: &'static str,
+        /// Largest minus smallest change.
+        seen: Metres,
+        /// What it may be.
+        limit: Metres,
+    },
+    /// A calibration is to be continued on a machine that is colder or warmer.
+    #[error(
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {seen:.2} °C, it showed \
+         {before:.2} °C when this run was interrupted; without lines that are read warm it may be \
+         {limit:.2} K more or less: let the machine become as warm as it was, or start a new \
+         calibration with --warm-up-min"
+    )]
+    WarmthSince {
+        /// Which, from 0.
+        index: usize,
+        /// In the last line that is whole, °C.
+        before: f64,
+        /// Now, °C.
+        seen: f64,
+        /// By how much they may differ, kelvin.
+        limit: f64,
     },
     /// Readings that do not tell the errors.
     #[error(transparent)]
@@ -193,6 +277,18 @@ pub enum VolumetricFailure {
         /// What the axes reach.
         axes: MetresPerSecond,
     },
+    /// The correction was to be switched on, and something that it is computed from is missing.
+    #[error("not corrected: {lack}; the machine was not moved")]
+    Lacking {
+        /// What, and why.
+        lack: Lack,
+    },
+    /// The correction was to be switched on, and cannot be known.
+    #[error(
+        "not corrected: the detectors report more than the correction was proven for; the machine \
+         was not moved; look for what has shifted, or calibrate again"
+    )]
+    NotProven,
     /// A line without a direction, or with optics that look along it.
     #[error(
         "this line has no direction, or its optics do not look across it; nothing was moved: give \
@@ -269,6 +365,7 @@ impl VolumetricFailure {
             | Self::Volume(_)
             | Self::Influence(_)
             | Self::Path { .. }
+            | Self::NoPlan
             | Self::Roll(_) => 2,
             Self::OutOfTolerance { .. } => 5,
             Self::NoReference { .. }
@@ -279,8 +376,12 @@ impl VolumetricFailure {
             | Self::Memory(_)
             | Self::Blind { .. }
             | Self::NoTemperature { .. }
+            | Self::OtherWarmth { .. }
+            | Self::OtherGradient { .. }
             | Self::NoRollReference
             | Self::Temperatures { .. }
+            | Self::Moved { .. }
+            | Self::WarmthSince { .. }
             | Self::Identify(_)
             | Self::Conditions(_)
             | Self::NoCorrection(_)
@@ -289,6 +390,8 @@ impl VolumetricFailure {
             Self::NoSamples { .. }
             | Self::NoLight { .. }
             | Self::NotThere { .. }
+            | Self::Lacking { .. }
+            | Self::NotProven
             | Self::ImpossibleReading { .. }
             | Self::ImpossibleTilt { .. } => 4,
         }

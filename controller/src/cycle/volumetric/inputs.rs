@@ -2,13 +2,11 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::{
-    Feed, FeedStatus, RollOptics, Sample, TemperatureChannel, Trouble,
-};
-use units::{Celsius, Metres, Radians, Time, Volts};
+use compensator::volumetric::online::{RollOptics, Sample, Trouble};
+use units::{Metres, Radians, Time, Volts};
 
-use crate::assemble::{feed_settings, roll_optics, temperature_settings};
-use crate::config::{AnalogConfig, FeedConfig, MachineConfig, RollConfig, TemperatureConfig};
+use crate::assemble::roll_optics;
+use crate::config::{AnalogConfig, FeedConfig, MachineConfig, RollConfig};
 use crate::engine::{Channel, Observed};
 
 use super::VolumetricFailure;
@@ -124,46 +122,5 @@ impl RollReader {
         }
         self.last = Some((at, roll));
         Ok(roll)
-    }
-}
-
-/// A thermometer on its way into the correction.
-#[derive(Clone, Debug)]
-pub(super) struct Thermometer {
-    place: usize,
-    channel: TemperatureChannel,
-    /// What it showed at the calibration.
-    reference: Celsius,
-    feed: Feed<Celsius, 1>,
-}
-
-impl Thermometer {
-    pub(super) fn new(
-        config: &MachineConfig,
-        temperature: &TemperatureConfig,
-        feed: &FeedConfig,
-        reference: Celsius,
-    ) -> Self {
-        let module = &temperature.analog;
-        let feed = confirmed_by_samples(config, feed, module);
-        Self {
-            place: place_of_temperature(config, module, temperature.channel),
-            channel: TemperatureChannel::new(temperature_settings(temperature)),
-            reference,
-            feed: Feed::new(feed_settings(&feed)),
-        }
-    }
-
-    /// The temperature to reckon with: the reference until there is a better one.
-    pub(super) fn advance(&mut self, observed: &Observed<'_>) -> Celsius {
-        let newest = observed.temperatures.get(self.place).copied().flatten();
-        let newest = newest.map(|it| (it.at, it.celsius.unwrap_or(Celsius(f64::NAN))));
-        let seen = self.channel.read(observed.now, newest);
-        let above = seen.map(|it| [it - self.reference]);
-        self.reference + self.feed.advance(observed.now, above)[0]
-    }
-
-    pub(super) fn status(&self) -> FeedStatus {
-        self.feed.status()
     }
 }

@@ -13,6 +13,7 @@
 //! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
 //! | `line` | lines of the tool's way that a laser interferometer measures: set up, travelled, read |
 //! | `inputs` | where in the engine's channels each detector stands, and whether it is to be believed |
+//! | `thermometers` | likewise of the thermometers, which share their trouble where they belong together |
 
 mod calibrate;
 mod correction;
@@ -24,10 +25,11 @@ mod memory;
 mod moves;
 mod reference;
 mod state;
+mod thermometers;
 mod verify;
 mod zero;
 
-pub use calibrate::{VolumetricCalibrated, WarmUp};
+pub use calibrate::{VolumetricCalibrated, VolumetricEvaluated, WarmUp, volume_plan};
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
 pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};

@@ -9,7 +9,7 @@ use units::Metres;
 use super::VolumetricFailure;
 use crate::assemble::work_volume;
 use crate::config::VolumetricConfig;
-use crate::engine::{Cause, Correction, Desk, Engine, Live, PushError, State};
+use crate::engine::{Cause, Correction, Desk, Engine, Live, PushError, State, Validity};
 use crate::failure::Failure;
 use crate::machine::Machine;
 
@@ -42,20 +42,43 @@ impl Machine {
     }
 
     /// Switches the correction on or off at standstill, and waits until it is all there: each
-    /// detector confirmed, blended in and smoothed. Says what it was in the last period.
+    /// detector confirmed, blended in and smoothed. Says what it was in the last period. What the
+    /// configuration lets it go on without (held, faded out) is told as a warning.
     ///
     /// Outside the volume no correction is known, and with one the machine would stop there: before
     /// it is switched on, axes that stand outside go straight to the nearest place inside.
     ///
     /// # Errors
-    /// Whatever stops the machine, also a correction that must not be done without.
+    /// Whatever stops the machine, also a correction that must not be done without; a detector or
+    /// thermometer that nothing makes up for, such as one that is to be held and never said
+    /// anything.
     pub fn correct_volume(&mut self, mover: &mut Mover, on: bool) -> Result<Live, Failure> {
         if on {
             self.enter_volume()?;
         }
         let rest = settling(self.volumetric_config()?, self);
         mover.desk.correct(on)?;
-        self.hold(mover, None, rest, &mut |_| {})
+        let live = self.hold(mover, None, rest, &mut |_| {})?;
+        if on {
+            self.require_whole(live.validity)?;
+        }
+        Ok(live)
+    }
+
+    fn require_whole(&mut self, validity: Validity) -> Result<(), Failure> {
+        match validity {
+            Validity::Valid => Ok(()),
+            Validity::Without(lack) if lack.is_made_up_for() => {
+                self.observer.warning(&format!("corrected without {lack}"));
+                Ok(())
+            }
+            Validity::Without(lack) | Validity::Lost(lack) => {
+                Err(VolumetricFailure::Lacking { lack }.into())
+            }
+            Validity::Hold | Validity::FadeOut | Validity::Stop(_) => {
+                Err(VolumetricFailure::NotProven.into())
+            }
+        }
     }
 
     fn enter_volume(&mut self) -> Result<(), Failure> {
@@ -115,6 +138,8 @@ impl Machine {
         watch: &mut dyn FnMut(&Live),
     ) -> Result<(), Failure> {
         let Mover { engine, desk } = mover;
+        let begun = desk.path.begin();
+        begun.map_err(|source| VolumetricFailure::Path { source })?;
         let mut left: VecDeque<_> = points.into();
         let mut refused = None;
         let mut finished = false;

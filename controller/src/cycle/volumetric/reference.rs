@@ -12,7 +12,8 @@ use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::{BeamDetector, Displacement, Trouble};
 use units::{Celsius, Metres, Quantity, Radians, Time};
 
-use super::inputs::{RollReader, place_of_temperature, place_of_voltage, sample};
+use super::inputs::{RollReader, place_of_voltage, sample};
+use super::thermometers::Thermometry;
 use super::{GEOMETRY, REFERENCES, VolumetricFailure};
 use crate::assemble::{beam_detector, beam_drift, volume_axis};
 use crate::config::{BeamConfig, BeamDetectorConfig, MachineConfig, RollConfig, VolumetricConfig};
@@ -22,20 +23,24 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord, RecordHead,
-    Store,
+    AXES, BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord,
+    RecordHead, Store, short,
 };
 
 /// How long an axis stands before its detectors count.
 const REST: Duration = Duration::from_millis(50);
 /// How long one sample may take to come.
 const SAMPLE_LIMIT: Duration = Duration::from_millis(500);
+/// Samples of the thermometers by which the machine's warmth is judged.
+const WARMTH_SAMPLES: u32 = 10;
+/// How far a thermometer may be from what it showed when the errors were measured, unless the
+/// configuration says otherwise: guides bend by some micrometres per kelvin, films grow likewise,
+/// and a tenth of a machine's tolerance is some tenths of a micrometre.
+const WARMTH_TOLERANCE_K: f64 = 0.2;
 /// Which detector.
 const ON_THE_SLIDE: &str = "on the slide";
 const AT_THE_END: &str = "at the end of the beam";
 const OF_THE_ROLL: &str = "of the roll";
-/// Letters of the axes in files.
-const LETTERS: [char; 3] = ['x', 'y', 'z'];
 
 /// What the detectors read, and how warm the machine was meanwhile.
 #[derive(Clone, Debug)]
@@ -58,9 +63,9 @@ pub struct VolumetricReferenced {
 /// All channels at one moment of rest.
 #[derive(Clone, Debug)]
 pub(super) struct Still {
-    now: Time,
+    pub(super) now: Time,
     channels: [Option<Channel>; CHANNELS_MAX],
-    temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+    pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
 }
 
 impl Still {
@@ -123,27 +128,41 @@ impl Machine {
     /// warm as it was when its errors were measured.
     ///
     /// # Errors
-    /// When an axis is not zeroed, the errors were never measured, a detector is in trouble, or
-    /// anything stops the machine. What was in use before stays in use then.
+    /// When an axis is not zeroed, the errors were never measured, the machine is warmer or colder
+    /// than they were measured at by more than is permitted, a detector is in trouble, or anything
+    /// stops the machine. What was in use before stays in use then.
     pub fn reference_volumetric(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
         let geometry = store.active(GEOMETRY)?.current;
         let geometry = geometry.ok_or(VolumetricFailure::NoGeometry)?;
-        store.load(&geometry)?.geometry(&geometry)?;
+        let then = store.load(&geometry)?.geometry(&geometry)?.temperatures();
+        let config = self.volumetric_config()?.clone();
+        if !config.temperature.is_empty() {
+            // Before anything moves, and again by what it was while they were taken.
+            let seen = self.watch_at_rest(WARMTH_SAMPLES)?;
+            let mut thermometry = Thermometry::new(self.config(), &config.temperature);
+            for still in &seen {
+                thermometry.add(still.now, &still.temperatures)?;
+            }
+            check_warmth(&config, &geometry, &then, &thermometry.take())?;
+        }
         let references = self.take_references()?;
-        self.keep_references(store, &geometry, references)
+        check_warmth(&config, &geometry, &then, &references.temperatures)?;
+        self.keep_references(store, &geometry, references, "reference")
     }
 
-    /// Stores `references` as those of the errors called `geometry`, and activates them.
+    /// Stores `references`, which come from `source`, as those of the errors called `geometry`, and
+    /// activates them.
     pub(super) fn keep_references(
         &self,
         store: &Store,
         geometry: &str,
         mut references: References,
+        source: &str,
     ) -> Result<VolumetricReferenced, Failure> {
         references.content.geometry = geometry.to_owned();
         let head = RecordHead {
             created: utc_now(),
-            source: "reference".into(),
+            source: source.to_owned(),
             ..self.this_volume(REFERENCES)?
         };
         let content = Content::BeamReferences(references.content.clone());
@@ -159,7 +178,7 @@ impl Machine {
             self.require_zeroed(axis)?;
             self.enable(axis)?;
         }
-        let mut temperatures = vec![Mean::default(); config.temperature.len()];
+        let mut thermometry = Thermometry::new(self.config(), &config.temperature);
         let mut content = BeamReferencesContent::default();
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             let roll = config.roll.as_ref();
@@ -167,7 +186,7 @@ impl Machine {
             if beam.is_none() && roll.is_none() {
                 continue;
             }
-            let stops = self.read_along(&config, axis, beam, roll, &mut temperatures)?;
+            let stops = self.read_along(&config, axis, beam, roll, &mut thermometry)?;
             if let Some(beam) = beam {
                 content.beams.push(stops.beam(axis, beam)?);
             }
@@ -175,14 +194,14 @@ impl Machine {
                 content.roll = Some(stops.roll()?);
             }
         }
-        if temperatures.iter().any(|it| it.count == 0.0) {
-            let seen = self.watch_at_rest(1)?;
-            add_temperatures(self.config(), &config, &seen, &mut temperatures)?;
+        if thermometry.is_empty() && !config.temperature.is_empty() {
+            for still in &self.watch_at_rest(WARMTH_SAMPLES)? {
+                thermometry.add(still.now, &still.temperatures)?;
+            }
         }
-        let temperatures = temperatures.iter().map(|it| Celsius(it.mean())).collect();
         Ok(References {
             content,
-            temperatures,
+            temperatures: thermometry.take(),
         })
     }
 
@@ -192,7 +211,7 @@ impl Machine {
         axis: Axis,
         beam: Option<&BeamConfig>,
         roll: Option<&RollConfig>,
-        temperatures: &mut [Mean],
+        thermometry: &mut Thermometry,
     ) -> Result<Stops, Failure> {
         let section = "reference";
         let own = config.reference;
@@ -227,7 +246,9 @@ impl Machine {
                 let mean = mean_roll(machine, roll, &seen, |it| blind(OF_THE_ROLL, it))?;
                 stops.roll.push(mean);
             }
-            add_temperatures(machine, config, &seen, temperatures)?;
+            for still in &seen {
+                thermometry.add(still.now, &still.temperatures)?;
+            }
         }
         self.observer
             .progress(Stage::Reference, &name, total, total);
@@ -277,17 +298,6 @@ impl Machine {
         Ok(Radians(mean.mean()))
     }
 
-    /// Means of what the thermometers showed at `seen`.
-    pub(super) fn temperatures_of(
-        &self,
-        config: &VolumetricConfig,
-        seen: &[Still],
-    ) -> Result<Vec<Celsius>, VolumetricFailure> {
-        let mut means = vec![Mean::default(); config.temperature.len()];
-        add_temperatures(self.config(), config, seen, &mut means)?;
-        Ok(means.iter().map(|it| Celsius(it.mean())).collect())
-    }
-
     /// So many samples of all modules, each newer than the one before, while nothing moves.
     pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
         let expected = samples as usize;
@@ -308,7 +318,7 @@ impl Machine {
             }
             self.tick(deadline)?;
             let oldest = self.analogs.iter();
-            let oldest = oldest.map(|it| it.device.reading().map_or(Time::ZERO, |it| it.at));
+            let oldest = oldest.map(|it| it.device.last_sample().unwrap_or(Time::ZERO));
             let oldest = oldest.min().unwrap_or(Time::ZERO);
             if oldest <= last {
                 continue;
@@ -385,20 +395,50 @@ fn mean_roll(
     Ok(mean)
 }
 
-fn add_temperatures(
-    machine: &MachineConfig,
+/// Whether the machine is as warm as when its errors were measured, thermometer by thermometer and
+/// across each guide that bends.
+fn check_warmth(
     config: &VolumetricConfig,
-    seen: &[Still],
-    means: &mut [Mean],
+    geometry: &str,
+    then: &[Celsius],
+    now: &[Celsius],
 ) -> Result<(), VolumetricFailure> {
-    let thermometers = config.temperature.iter().zip(means).enumerate();
-    for (index, (thermometer, mean)) in thermometers {
-        let place = place_of_temperature(machine, &thermometer.analog, thermometer.channel);
-        for still in seen {
-            let sample = still.temperatures.get(place).copied().flatten();
-            let celsius = sample.and_then(|it| it.celsius);
-            let celsius = celsius.ok_or(VolumetricFailure::NoTemperature { index: index + 1 })?;
-            mean.add(celsius.value());
+    let (seen, expected) = (then.len(), now.len());
+    if seen != expected {
+        return Err(VolumetricFailure::Temperatures { seen, expected });
+    }
+    let own = config.reference.and_then(|it| it.warmth_tolerance_k);
+    let limit_k = own.unwrap_or(WARMTH_TOLERANCE_K);
+    let geometry = short(geometry);
+    for (index, (then, now)) in then.iter().zip(now).enumerate() {
+        if (*now - *then).abs().value() > limit_k {
+            let (then, now) = (*then, *now);
+            return Err(VolumetricFailure::OtherWarmth {
+                index,
+                then,
+                now,
+                limit_k,
+                geometry,
+            });
+        }
+    }
+    for bend in &config.bend {
+        let Some(under) = bend.under else {
+            continue;
+        };
+        let (axis, over) = (volume_axis(bend.axis), bend.over);
+        let across = |shown: &[Celsius]| (shown[over] - shown[under]).value();
+        let (then_k, now_k) = (across(then), across(now));
+        if (now_k - then_k).abs() > limit_k {
+            return Err(VolumetricFailure::OtherGradient {
+                axis,
+                over,
+                under,
+                then_k,
+                now_k,
+                limit_k,
+                geometry,
+            });
         }
     }
     Ok(())
@@ -422,7 +462,7 @@ impl Stops {
             record(name, &self.nodes, values.collect(), u.collect())
         };
         Ok(BeamRecord {
-            axis: LETTERS[axis.index()],
+            axis: AXES[axis.index()],
             slider: [function(0)?, function(1)?],
             end_m: config.end.as_ref().map(|_| end),
         })

@@ -1,18 +1,23 @@
-//! Verify: a line that no calibration uses, read with the correction on.
+//! Verify: a line that no calibration uses, read with the correction on, and written down.
 
 use core::time::Duration;
+use std::path::PathBuf;
 
 use compensator::volumetric::Point;
 use compensator::volumetric::identify::Reading;
 use units::Metres;
 
-use super::line::{LineOperator, LineOptics, LineReadout, LineTask};
+use super::inputs::place_of_temperature;
+use super::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
 use super::{Mover, VolumetricCorrection, VolumetricFailure};
 use crate::assemble::point_of_mm;
+use crate::config::{VolumetricConfig, VolumetricVerifyConfig};
+use crate::cycle::note_failure;
+use crate::engine::THERMOMETERS_MAX;
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
-use crate::store::Store;
+use crate::store::{Entry, Journal, LineReadingEntry, Store, VolumeCheckEntry, metres};
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -26,6 +31,17 @@ pub enum VerifyBy {
     Tables,
     /// Everything that is stored and seen.
     Everything,
+}
+
+impl VerifyBy {
+    /// As it is called on the page.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::AsFound => "as found",
+            Self::Tables => "by tables alone",
+            Self::Everything => "as left",
+        }
+    }
 }
 
 /// One place of the line.
@@ -48,6 +64,8 @@ pub struct VolumetricVerified {
     pub range: Metres,
     /// What the range may be.
     pub limit: Metres,
+    /// Where every reading is.
+    pub journal: PathBuf,
 }
 
 impl VolumetricVerified {
@@ -71,19 +89,25 @@ impl Machine {
         self.volumetric_mover(Box::new(correction)).map(Some)
     }
 
-    fn mover_by(&self, store: &Store, by: VerifyBy) -> Result<Option<Mover>, Failure> {
+    /// What moves the machine, corrected as `by` says, and the name of the errors it uses.
+    fn mover_by(
+        &self,
+        store: &Store,
+        by: VerifyBy,
+    ) -> Result<(Option<Mover>, Option<String>), Failure> {
         if by == VerifyBy::AsFound {
-            return Ok(None);
+            return Ok((None, None));
         }
         let stored = self.volumetric_state(store)?;
-        let (state, _) = stored.ok_or(VolumetricFailure::NoGeometry)?;
+        let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
         let correction = match by {
             VerifyBy::Tables => VolumetricCorrection::by_tables(self.config(), state)?,
             VerifyBy::AsFound | VerifyBy::Everything => {
                 VolumetricCorrection::new(self.config(), state)?
             }
         };
-        self.volumetric_mover(Box::new(correction)).map(Some)
+        let mover = self.volumetric_mover(Box::new(correction))?;
+        Ok((Some(mover), Some(records.geometry)))
     }
 
     /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
@@ -97,10 +121,39 @@ impl Machine {
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricVerified, Failure> {
         let config = self.volumetric_config()?.clone();
-        let missing = |section| VolumetricFailure::NotConfigured { section };
-        let own = config.verify.ok_or(missing("verify"))?;
-        let calibrate = config.calibrate.ok_or(missing("calibrate"))?;
-        let mut mover = self.mover_by(store, by)?;
+        let section = "verify";
+        let own = config.verify.clone();
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let (mover, geometry) = self.mover_by(store, by)?;
+        let header = self.volume_header("verify", geometry)?;
+        let mut journal = Journal::create(&store.runs(), &header)?;
+        journal.write(&Entry::VolumeCheck(VolumeCheckEntry {
+            state: by.text().to_owned(),
+            from_m: metres(point_of_mm(own.from_mm)),
+            to_m: metres(point_of_mm(own.to_mm)),
+            tool_m: metres(point_of_mm(config.tool_offset_mm)),
+            limit_m: Metres::from_um(own.limit_um).value(),
+        }))?;
+        let points = self
+            .read_verified(&config, &own, mover, operator, &mut journal)
+            .inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        let path = journal.path().to_owned();
+        Ok(judged(points, Metres::from_um(own.limit_um), path))
+    }
+
+    fn read_verified(
+        &mut self,
+        config: &VolumetricConfig,
+        own: &VolumetricVerifyConfig,
+        mut mover: Option<Mover>,
+        operator: &mut dyn LineOperator,
+        journal: &mut Journal,
+    ) -> Result<Vec<VolumetricVerifiedPoint>, Failure> {
+        let section = "calibrate";
+        let calibrate = config.calibrate.as_ref();
+        let calibrate = calibrate.ok_or(VolumetricFailure::NotConfigured { section })?;
         let (from, to) = (point_of_mm(own.from_mm), point_of_mm(own.to_mm));
         let task = LineTask {
             optics: LineOptics::Linear,
@@ -110,7 +163,7 @@ impl Machine {
             step: (1, 1),
         };
         let readout = LineReadout {
-            instrument: calibrate.instrument,
+            instrument: calibrate.instrument.clone(),
             settle: Duration::from_secs_f64(calibrate.settle_ms * 1e-3),
             samples: calibrate.average_samples,
         };
@@ -126,23 +179,62 @@ impl Machine {
             let share = f64::from(n) / f64::from(last);
             let way = to - from;
             let at = from + Point::new(way.x * share, way.y * share, way.z * share);
-            match &mut mover {
-                Some(mover) => drop(self.drive_to(mover, at, readout.settle)?),
-                None => self.go_straight(at)?,
-            }
-            let read = self.read_line_here(&line, at)?;
-            let Reading::Length { deviation, u, .. } = read.reading else {
-                return Err(VolumetricFailure::NotALine.into());
+            let correction = match &mut mover {
+                Some(mover) => Some(self.drive_to(mover, at, readout.settle)?.offset),
+                None => {
+                    self.go_straight(at)?;
+                    None
+                }
             };
-            points.push(VolumetricVerifiedPoint { at, deviation, u });
+            let correction_m = correction.map(|it| core::array::from_fn(|k| it[k].value()));
+            points.push(self.verified_point(config, &line, at, correction_m, journal)?);
         }
         self.end_lines(operator)?;
-        Ok(judged(points, Metres::from_um(own.limit_um)))
+        Ok(points)
+    }
+
+    /// Reads the line where the machine stands.
+    fn verified_point(
+        &mut self,
+        config: &VolumetricConfig,
+        line: &Line,
+        at: Point,
+        correction_m: Option<[f64; 3]>,
+        journal: &mut Journal,
+    ) -> Result<VolumetricVerifiedPoint, Failure> {
+        let read = self.read_line_here(line, at)?;
+        let Reading::Length { deviation, u, .. } = read.reading else {
+            return Err(VolumetricFailure::NotALine.into());
+        };
+        journal.write(&Entry::LineReading(LineReadingEntry {
+            scatter_m: Some(read.scatter.value()),
+            temperatures_c: self.thermometers_now(config),
+            correction_m,
+            at_s: read.when.seconds(),
+            ..LineReadingEntry::of(0, &read.observation(0))
+        }))?;
+        Ok(VolumetricVerifiedPoint { at, deviation, u })
+    }
+
+    /// What the thermometers showed last, °C; a verification does not depend on them.
+    fn thermometers_now(&self, config: &VolumetricConfig) -> Vec<Option<f64>> {
+        let mut shown = [None; THERMOMETERS_MAX];
+        self.hear_temperatures(&mut shown);
+        let each = config.temperature.iter().map(|it| {
+            let place = place_of_temperature(self.config(), &it.analog, it.channel);
+            let sample = shown.get(place).copied().flatten()?;
+            sample.celsius.map(|it| it.value())
+        });
+        each.collect()
     }
 }
 
 /// Deviations count from the first place: the line began before the correction did.
-fn judged(mut points: Vec<VolumetricVerifiedPoint>, limit: Metres) -> VolumetricVerified {
+fn judged(
+    mut points: Vec<VolumetricVerifiedPoint>,
+    limit: Metres,
+    journal: PathBuf,
+) -> VolumetricVerified {
     let first = points.first().map_or(Metres(0.0), |it| it.deviation);
     let (mut low, mut high) = (Metres(0.0), Metres(0.0));
     for it in &mut points {
@@ -153,5 +245,6 @@ fn judged(mut points: Vec<VolumetricVerifiedPoint>, limit: Metres) -> Volumetric
         points,
         range: high - low,
         limit,
+        journal,
     }
 }

@@ -19,7 +19,8 @@ const WHOLE: &str = "volume";
 const REST: Duration = Duration::from_millis(50);
 
 impl Machine {
-    /// Finds the index pulses of all three axes, and brings each axis back to its pulse.
+    /// Finds the index pulses of all three axes, and brings each axis back to its pulse, in the same
+    /// order.
     ///
     /// # Errors
     /// Whatever stops the machine; axes that were not reached are not zeroed then.
@@ -42,8 +43,10 @@ impl Machine {
             self.remember(axis).zeroed = true;
         }
         // Each ran past its pulse before it stopped: whoever goes on finds all of them at rest.
-        for (axis, index_mm) in config.axes.iter().zip(zero.index_mm) {
-            self.move_to(axis, Metres::from_mm(index_mm))?;
+        for name in zero.order {
+            let at = volume_axis(name).index();
+            let axis = &config.axes[at];
+            self.move_to(axis, Metres::from_mm(zero.index_mm[at]))?;
             self.stand_still(axis, REST)?;
         }
         self.observer.progress(Stage::Zero, WHOLE, steps, steps);

@@ -23,7 +23,10 @@ pub use volumetric::{
     BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
     MemoryRecord, StateMemoryContent,
 };
-pub use warmth::{BendRecord, ExpansionRecord};
+pub use warmth::{BendRecord, ExpansionRecord, UnknownRecord};
+
+pub(crate) use volumetric::error_name;
+pub(crate) use warmth::AXES;
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.

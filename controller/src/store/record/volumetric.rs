@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
 use super::super::{StoreError, short};
-use super::warmth::{AXES, BendRecord, ExpansionRecord};
+use super::warmth::{AXES, BendRecord, ExpansionRecord, UnknownRecord};
 use super::{CalibrationRecord, Content, IdentityRecord};
 
 /// How a function runs between its nodes.
@@ -113,6 +113,9 @@ pub struct GeometryContent {
     /// Who the drives of x, y and z were; empty where the errors were measured elsewhere.
     #[serde(default)]
     pub drives: Vec<IdentityRecord>,
+    /// What was not found of what there is.
+    #[serde(default)]
+    pub unknown: UnknownRecord,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -120,6 +123,11 @@ fn error_names() -> impl Iterator<Item = ErrorName> {
         .into_iter()
         .flat_map(|axis| Axis::ALL.into_iter().map(move |it| (axis, it)));
     pairs.flat_map(|(axis, it)| [ErrorName::Along(axis, it), ErrorName::About(axis, it)])
+}
+
+/// The error function that a file calls so; `None` for a name that is none.
+pub(crate) fn error_name(text: &str) -> Option<ErrorName> {
+    error_names().find(|it| it.to_string() == text)
 }
 
 impl GeometryContent {
@@ -147,6 +155,7 @@ impl GeometryContent {
             bends: Vec::new(),
             expansions: Vec::new(),
             drives: Vec::new(),
+            unknown: UnknownRecord::default(),
         }
     }
 
@@ -157,7 +166,7 @@ impl GeometryContent {
     pub fn errors(&self, id: &str) -> Result<[AxisErrors; 3], StoreError> {
         let mut axes: [AxisErrors; 3] = Default::default();
         for record in &self.functions {
-            let name = error_names().find(|it| it.to_string() == record.name);
+            let name = error_name(&record.name);
             let taken = match name {
                 Some(ErrorName::Along(axis, it)) => axes[axis.index()].along[it.index()]
                     .replace(record.function(id)?)
@@ -213,9 +222,10 @@ impl GeometryContent {
     pub(super) fn summary(&self) -> String {
         let largest = self.squareness_rad.iter().map(|it| it.abs());
         format!(
-            "{} error functions, squareness up to {:.2} arcsec",
+            "{} error functions, squareness up to {:.2} arcsec{}",
             self.functions.len(),
-            Radians(largest.fold(0.0, f64::max)).arcsec()
+            Radians(largest.fold(0.0, f64::max)).arcsec(),
+            self.unknown.summary()
         )
     }
 }

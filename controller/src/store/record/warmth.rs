@@ -4,12 +4,14 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::identify::{
     BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion,
 };
+use compensator::volumetric::model::ErrorName;
 use serde::{Deserialize, Serialize};
 use units::Metres;
 
 use super::super::{StoreError, short};
 
-pub(super) const AXES: [char; 3] = ['x', 'y', 'z'];
+/// Letters of the axes in files.
+pub(crate) const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// A guide that bends when it is warmer on one side.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +33,9 @@ pub struct BendRecord {
     pub bow_m_per_k: f64,
     /// Its standard uncertainty.
     pub standard_uncertainty_m_per_k: f64,
+    /// Whether it was found from sideways readings too, not from tilts alone.
+    #[serde(default)]
+    pub sideways: bool,
 }
 
 /// How a scale expands.
@@ -45,6 +50,42 @@ pub struct ExpansionRecord {
     pub per_k: f64,
     /// Its standard uncertainty.
     pub standard_uncertainty_per_k: f64,
+}
+
+/// What a calibration did not find of what there is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnknownRecord {
+    /// Guides that bend by the configuration: axis and direction of the bow. They are not corrected,
+    /// and no uncertainty counts them.
+    pub bends: Vec<[char; 2]>,
+    /// Error functions that are taken as zero, because they move nothing with the tools given.
+    pub without_effect: Vec<String>,
+}
+
+impl UnknownRecord {
+    /// These guides and errors.
+    pub fn of(bends: &[BendPlan], without_effect: &[ErrorName]) -> Self {
+        let bend = |it: &BendPlan| [letter(it.axis), letter(it.towards)];
+        Self {
+            bends: bends.iter().map(bend).collect(),
+            without_effect: without_effect.iter().map(ToString::to_string).collect(),
+        }
+    }
+
+    /// Behind a summary; nothing when all is known.
+    pub(super) fn summary(&self) -> String {
+        let bends = self.bends.iter().map(|[axis, _]| axis.to_string());
+        let bends: Vec<String> = bends.collect();
+        let mut text = String::new();
+        if !bends.is_empty() {
+            text += &format!(", bending of {} unknown", bends.join(", "));
+        }
+        if !self.without_effect.is_empty() {
+            text += &format!(", {} taken as zero", self.without_effect.join(", "));
+        }
+        text
+    }
 }
 
 fn letter(axis: Axis) -> char {
@@ -72,6 +113,7 @@ impl BendRecord {
             high_m: plan.high.value(),
             bow_m_per_k: found.bow.value(),
             standard_uncertainty_m_per_k: found.u.value(),
+            sideways: plan.sideways,
         }
     }
 
@@ -84,7 +126,7 @@ impl BendRecord {
                 under: self.under,
                 low: Metres(self.low_m),
                 high: Metres(self.high_m),
-                sideways: false,
+                sideways: self.sideways,
                 seen_from: None,
             },
             bow: Metres(self.bow_m_per_k),

@@ -9,6 +9,9 @@
 //! set-points at the same moment. It is mapped so, and read back, when the drive is started
 //! ([`Cia402Settings::synchronous_start`](super::Cia402Settings::synchronous_start)).
 //!
+//! Of the statusword two bits are watched meanwhile: 12, "drive follows the command value", and 11,
+//! "internal limit active". A drive that never sets bit 12 is not reproached with it.
+//!
 //! Absent: offsets of velocity and torque (0x60B1, 0x60B2), modes 9 and 10.
 
 use core::time::Duration;
@@ -16,12 +19,13 @@ use core::time::Duration;
 use units::{Coordinate, Time};
 
 use super::convert::{out_of_range, position_counts};
+use super::image::Sample;
 use super::start::{MODE, TARGET_POSITION};
 use super::{Activity, Cia402Drive};
-use crate::device::{DeviceError, Seen};
+use crate::device::{Alarm, DeviceError, Seen};
 use crate::protocol::script::Step;
 use crate::wire::canopen::Object;
-use crate::wire::cia402::{Controlword, OperationMode, PowerState};
+use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 
 const PERIOD_VALUE: Object = Object::new(0x60C2, 1);
 const PERIOD_INDEX: Object = Object::new(0x60C2, 2);
@@ -30,6 +34,18 @@ const PERIOD_INDEX: Object = Object::new(0x60C2, 2);
 const CYCLIC_POSITION: u32 = 1 << 7;
 
 const ENTERING: &str = "entering cyclic synchronous position";
+
+/// So many samples in a row must say that set-points are limited, or not followed: a torque that
+/// is limited for a moment is none.
+const WATCHED_MAX: u32 = 3;
+
+/// What the statusword has said of set-points in a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct CyclicWatch {
+    has_followed: bool,
+    unfollowed: u32,
+    limited: u32,
+}
 
 /// A change of the mode under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +67,8 @@ impl ModeChange {
 /// `period` as 0x60C2 has it: `value` times 10 to the power of `index` seconds.
 ///
 /// The coarsest power that is exact: drives that know one power only know milliseconds.
-pub(super) fn interpolation_period(period: Duration) -> Option<(u8, i8)> {
+/// `None` when no power takes it: 255 units at most.
+pub fn interpolation_period(period: Duration) -> Option<(u8, i8)> {
     let nanos = period.as_nanos();
     [
         (-3_i8, 1_000_000_u128),
@@ -62,6 +79,15 @@ pub(super) fn interpolation_period(period: Duration) -> Option<(u8, i8)> {
     .into_iter()
     .filter(|(_, unit)| nanos > 0 && nanos.is_multiple_of(*unit))
     .find_map(|(index, unit)| Some((u8::try_from(nanos / unit).ok()?, index)))
+}
+
+/// The shortest period from `at_least` on that [`interpolation_period`] takes, if there is one.
+pub fn period_from(at_least: Duration) -> Option<Duration> {
+    [1_000_u64, 10_000, 100_000, 1_000_000]
+        .into_iter()
+        .map(|unit| (unit, at_least.as_nanos().div_ceil(u128::from(unit)).max(1)))
+        .find(|(_, units)| *units <= u128::from(u8::MAX))
+        .map(|(unit, units)| Duration::from_nanos(unit * units as u64))
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
@@ -211,6 +237,28 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         // The next set-point repeats it soon enough, and a late repetition would be an old one.
         self.repeat_at = Time::NEVER;
         Ok(())
+    }
+
+    /// Told once, when it has lasted: a drive that no longer does what it is sent.
+    pub(super) fn watch_cyclic(&mut self, sample: &Sample) {
+        if !self.takes_set_points() || sample.state() != PowerState::OperationEnabled {
+            self.cyclic_watch = CyclicWatch::default();
+            return;
+        }
+        let follows = sample.status.contains(Statusword::MODE_12);
+        let limits = sample.status.contains(Statusword::INTERNAL_LIMIT);
+        let in_a_row = |before: u32, is: bool| if is { before.saturating_add(1) } else { 0 };
+        let watch = &mut self.cyclic_watch;
+        watch.has_followed |= follows;
+        watch.unfollowed = in_a_row(watch.unfollowed, watch.has_followed && !follows);
+        watch.limited = in_a_row(watch.limited, limits);
+        let node = self.node.id();
+        if watch.unfollowed == WATCHED_MAX {
+            self.alarm(Alarm::NotFollowing { node });
+        }
+        if self.cyclic_watch.limited == WATCHED_MAX {
+            self.alarm(Alarm::InternalLimit { node });
+        }
     }
 
     /// What RPDO 1 says last, while that is a set-point.

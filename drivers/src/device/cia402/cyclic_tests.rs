@@ -3,7 +3,7 @@
 use core::time::Duration;
 use units::Metres;
 
-use super::cyclic::interpolation_period;
+use super::cyclic::{interpolation_period, period_from};
 use super::tests::{Rig, SYNC_MS, move_to, settings};
 use super::*;
 use crate::device::{Axis, DriveCommand};
@@ -58,6 +58,15 @@ fn periods_are_whole_milliseconds_where_they_can_be() {
     check(1_001, None);
     check(0, None);
     assert_eq!(interpolation_period(Duration::from_nanos(1_500)), None);
+    let next = |us| period_from(Duration::from_micros(us)).map(|it| it.as_micros());
+    assert_eq!(next(1_863), Some(1_870));
+    assert_eq!(next(2_000), Some(2_000));
+    assert_eq!(next(2_551), Some(2_600));
+    assert_eq!(next(255_001), None);
+    for us in (0..3_000).step_by(7) {
+        let period = period_from(Duration::from_micros(us)).unwrap();
+        assert!(interpolation_period(period).is_some(), "{us} us");
+    }
 }
 
 #[test]
@@ -220,6 +229,38 @@ fn a_following_error_in_the_cyclic_mode_is_an_alarm() {
     rig.passes_ms(4);
     assert!(
         matches!(rig.alarms[..], [Alarm::FollowingError { .. }]),
+        "{:?}",
+        rig.alarms
+    );
+}
+
+#[test]
+fn a_drive_that_limits_or_leaves_its_set_points_is_named() {
+    let (limited, follows) = (1 << 11, 1 << 12);
+    let mut rig = following();
+    rig.passes_ms(20);
+    assert_eq!(rig.alarms, [], "a drive that never says that it follows");
+    rig.fake.also_says = follows;
+    rig.passes_ms(20);
+    rig.fake.also_says = 0;
+    rig.passes_ms(SYNC_MS);
+    rig.fake.also_says = follows | limited;
+    rig.passes_ms(SYNC_MS);
+    rig.fake.also_says = follows;
+    rig.passes_ms(20);
+    assert_eq!(rig.alarms, [], "for a moment");
+    rig.fake.also_says = follows | limited;
+    rig.passes_ms(20);
+    assert!(
+        matches!(rig.alarms[..], [Alarm::InternalLimit { .. }]),
+        "{:?}",
+        rig.alarms
+    );
+    rig.alarms.clear();
+    rig.fake.also_says = 0;
+    rig.passes_ms(20);
+    assert!(
+        matches!(rig.alarms[..], [Alarm::NotFollowing { .. }]),
         "{:?}",
         rig.alarms
     );

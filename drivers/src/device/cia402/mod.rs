@@ -41,6 +41,7 @@ use std::collections::VecDeque;
 
 use units::{Coordinate, Metres, Quantity, Time};
 
+pub use cyclic::{interpolation_period, period_from};
 pub use settings::{
     Cia402Settings, Cia402Timeouts, Edge, HomeOffset, LatchSettings, OptionCodes, PositionRange,
     Turn,
@@ -127,6 +128,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     /// Alarms that were told and whose cause lasts.
     told_state: bool,
     told_following: bool,
+    cyclic_watch: cyclic::CyclicWatch,
     told_short: bool,
     outcome: Option<Result<(), DeviceError>>,
     alarms: VecDeque<Alarm>,
@@ -168,6 +170,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             probe: Probe::default(),
             told_state: false,
             told_following: false,
+            cyclic_watch: cyclic::CyclicWatch::default(),
             told_short: false,
             outcome: None,
             alarms: VecDeque::new(),

@@ -152,5 +152,6 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             self.alarm(Alarm::FollowingError { node });
         }
         self.told_following = lagging;
+        self.watch_cyclic(sample);
     }
 }

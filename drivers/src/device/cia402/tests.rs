@@ -42,6 +42,8 @@ pub(super) struct FakeDrive {
     fault_remains: bool,
     fault_edges: u32,
     pub(super) following_error: bool,
+    /// Further bits of the statusword.
+    pub(super) also_says: u16,
 }
 
 impl FakeDrive {
@@ -98,6 +100,7 @@ impl FakeDrive {
             fault_remains: false,
             fault_edges: 0,
             following_error: false,
+            also_says: 0,
         }
     }
 
@@ -228,7 +231,7 @@ impl FakeDrive {
             status |= u16::from(reached) << 10 | u16::from(self.acknowledged) << 12;
             status |= u16::from(self.following_error) << 13;
         }
-        status
+        status | self.also_says
     }
 }
 

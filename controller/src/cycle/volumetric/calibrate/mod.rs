@@ -2,54 +2,63 @@
 //! warmth does, warm; one identification of all of them with its covariance.
 //!
 //! The references of the detectors are taken first: what the tables hold for is the machine as it
-//! was then. While lines are read it goes on warming up. What the detectors see of that is taken
-//! off each reading where it is made; expansions and bends are found with the errors, by what the
-//! thermometers showed at each line. Straightnesses are those that the detectors read along their
+//! was then. While lines are read it goes on warming up. What the detectors see of that, and what
+//! temperatures are known to do by the configuration, is taken off each reading where it is made
+//! (`known`). With warm lines expansions and bends are found with the errors, by what the thermometers
+//! showed at each line; without, expansions are those of the configuration and how guides bend stays
+//! unknown: the result says so. Straightnesses are those that the detectors read along their
 //! beams, where there are beams; a beam is straighter than what a straightedge tells.
+//!
+//! Every reading is written down when it is made. A run that was interrupted is continued at its
+//! first line that is not whole, as long as its references still hold (`resume`). What is evaluated
+//! is what was written down: the journal alone gives the same errors again.
 //!
 //! A result that cannot be applied is refused before it is stored.
 
+mod evaluate;
+mod known;
 mod own;
+mod plan;
+mod readings;
+mod resume;
 
 use core::time::Duration;
+use std::path::{Path, PathBuf};
 
+use compensator::volumetric::Axis;
 use compensator::volumetric::function::Function;
-use compensator::volumetric::identify::{
-    ExpansionPlan, Identified, Observation, Optics, Plan, Reading, RunSetup, StandardDesign,
-    StandardLine, ThermalPlan, standard_design,
-};
-use compensator::volumetric::model::{Machine as Model, Thermal, VolumetricModel};
-use compensator::volumetric::online::{BeamReference, MovingState};
-use compensator::volumetric::{Axis, Point};
-use units::{Celsius, Metres, Radians};
+use compensator::volumetric::identify::{Identified, StandardLine};
+use compensator::volumetric::online::BeamReference;
+use units::{Metres, Radians};
 
-use super::correction::lever;
-use super::line::{LineOperator, LineOptics, LineReadout, LineTask};
-use super::reference::{References, stretches};
-use super::{GEOMETRY, VolumetricCorrection, VolumetricFailure, VolumetricState};
-use crate::assemble::{
-    beam_drift, bend_plans, function_shape, model_limits, point_of_mm, thermal, volume_axis,
-    volumetric_chain, work_volume,
-};
+pub use evaluate::VolumetricEvaluated;
+pub use plan::volume_plan;
+
+use super::line::LineOperator;
+use super::reference::References;
+use super::thermometers::Thermometry;
+use super::{GEOMETRY, VolumetricFailure};
+use crate::assemble::{beam_drift, function_shape, point_of_mm};
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
-use crate::cycle::utc_now;
+use crate::cycle::{note_failure, utc_now};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    BendRecord, CalibrationRecord, Content, ExpansionRecord, GeometryContent, InstrumentRecord,
-    RecordHead, Store,
+    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
+    SCHEMA_VERSION, Store, UnknownRecord, VolumeRead, VolumeReferencesEntry,
 };
+
+use known::Known;
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
-/// Places between which the uncertainty of the tool is looked for, along each axis.
-const PLACES: u32 = 4;
 
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmUp {
-    /// It is not wanted: what warmth does is taken from the configuration.
+    /// It is not wanted: what scales and structure do in warmth is taken from the configuration, and
+    /// how guides bend stays unknown.
     None,
     /// Something else warms it for so long, while the axes are switched off.
     Idle(Duration),
@@ -70,6 +79,11 @@ pub struct VolumetricCalibrated {
     pub found: Identified,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
+    /// What stays unknown: guides that bend by the configuration, by how much nobody knows, for no
+    /// warm lines told it; errors that no line sees.
+    pub unknown: UnknownRecord,
+    /// Where every reading is.
+    pub journal: PathBuf,
 }
 
 /// What is known of the machine when its lines are read.
@@ -79,108 +93,150 @@ struct Session<'a> {
     references: References,
     beams: [Option<BeamReference>; 3],
     roll: Option<Function<Radians>>,
-    /// What detectors alone make of a place: without any table.
-    live: VolumetricModel,
+    known: Known,
+    thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
-    design: StandardDesign,
-    runs: Runs,
-}
-
-/// What was read, by runs.
-#[derive(Default)]
-struct Runs {
-    setups: Vec<RunSetup>,
-    temperatures: Vec<Vec<Celsius>>,
-    observations: Vec<Observation>,
+    /// All lines, as in the plan.
+    lines: Vec<StandardLine>,
+    /// What was read up to now.
+    read: VolumeRead,
 }
 
 impl Machine {
     /// Takes references, reads all lines that tell this machine's errors, then (unless it is not
     /// wanted) lets it become warm and reads those again that tell what warmth does; finds the
-    /// errors, stores and activates them with their references.
+    /// errors, stores and activates them with their references. With `resume` the lines that are
+    /// whole in that journal are not read again, and its references stay what everything counts
+    /// from.
     ///
     /// # Errors
     /// When an axis is not zeroed, a line cannot be set up or read, the readings do not tell all
-    /// errors, the result cannot be applied, or anything stops the machine. What was in use before
-    /// stays in use then.
+    /// errors, the result cannot be applied, or anything stops the machine; when the journal is one
+    /// of another run, or its references hold no more. What was in use before stays in use then.
     pub fn calibrate_volumetric(
         &mut self,
         store: &Store,
         warm_up: WarmUp,
+        resume: Option<&Path>,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricCalibrated, Failure> {
-        let mut session = self.calibration_session(operator)?;
-        let lines = session.design.lines.clone();
-        let warm: Vec<StandardLine> = match warm_up {
-            WarmUp::None => Vec::new(),
-            WarmUp::Idle(_) | WarmUp::Travel(_) => lines
-                .iter()
-                .filter(|it| it.is_for_warmth())
-                .copied()
-                .collect(),
-        };
-        let setups = session.plan_of_cold().runs;
-        let total = (lines.len() + warm.len()) as u64;
-        for (step, (line, setup)) in lines.iter().zip(setups).enumerate() {
-            self.observer
-                .progress(Stage::Calibrate, WHOLE, step as u64, total);
-            session.runs.setups.push(setup);
-            self.run_line(&mut session, line, (step + 1, total as usize))?;
-        }
-        if !warm.is_empty() {
-            self.end_lines(session.operator)?;
-            self.become_warm(warm_up)?;
-        }
-        for (at, line) in warm.iter().enumerate() {
-            let step = lines.len() + at;
-            self.observer
-                .progress(Stage::Calibrate, WHOLE, step as u64, total);
-            session.runs.setups.push(RunSetup {
-                offset: true,
-                alignment: None,
+        let config = self.volumetric_config()?.clone();
+        let drives = self.volume_drives(&config);
+        let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
+        let header = self.volume_header("calibrate", None)?;
+        let (mut journal, read) = resume::open(store, &header, plan, resume)?;
+        let made = self
+            .calibration_session(config, lines, read, &mut journal, operator)
+            .and_then(|mut session| {
+                self.read_lines(&mut session, warm_up, &mut journal)?;
+                self.conclude(store, session, &journal)
             });
-            self.run_line(&mut session, line, (step + 1, total as usize))?;
+        let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(made)
+    }
+
+    /// The first line of a journal of three axes.
+    pub(super) fn volume_header(
+        &self,
+        verb: &str,
+        calibration: Option<String>,
+    ) -> Result<JournalHeader, Failure> {
+        let section = "calibrate";
+        let own = self.volumetric_config()?.calibrate.as_ref();
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let instrument = &own.instrument;
+        if !self.config.instrument.contains_key(instrument) {
+            let instrument = instrument.clone();
+            return Err(VolumetricFailure::NoInstrument { instrument }.into());
+        }
+        let head = self.this_volume(GEOMETRY)?;
+        Ok(JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: verb.to_owned(),
+            machine: head.machine,
+            stage_serial: head.stage_serial,
+            config_hash: head.config_hash,
+            axis: head.axis,
+            drive: head.drive,
+            // It is brought along: who it is shows when it is switched on.
+            instrument: InstrumentRecord {
+                identity: String::new(),
+                ..self.instrument_record(instrument)
+            },
+            started: utc_now(),
+            calibration,
+            targets_m: Vec::new(),
+            runs: 1,
+        })
+    }
+
+    fn read_lines(
+        &mut self,
+        session: &mut Session<'_>,
+        warm_up: WarmUp,
+        journal: &mut Journal,
+    ) -> Result<(), Failure> {
+        let total = session.lines.len();
+        let mut is_warm = false;
+        for at in 0..total {
+            self.observer
+                .progress(Stage::Calibrate, WHOLE, at as u64, total as u64);
+            if session.read.is_whole(at) {
+                continue;
+            }
+            if session.is_warm_line(at) && !is_warm {
+                // Also in a run that is continued: it may have cooled down.
+                self.end_lines(session.operator)?;
+                self.become_warm(warm_up)?;
+                is_warm = true;
+            }
+            self.run_line(session, at, journal)?;
         }
         self.end_lines(session.operator)?;
         self.observer
-            .progress(Stage::Calibrate, WHOLE, total, total);
-        self.conclude(store, session, !warm.is_empty())
+            .progress(Stage::Calibrate, WHOLE, total as u64, total as u64);
+        Ok(())
     }
 
+    /// Takes the references, or those of the journal if they still hold.
     fn calibration_session<'a>(
         &mut self,
+        config: VolumetricConfig,
+        lines: Vec<StandardLine>,
+        mut read: VolumeRead,
+        journal: &mut Journal,
         operator: &'a mut dyn LineOperator,
     ) -> Result<Session<'a>, Failure> {
-        let config = self.volumetric_config()?.clone();
         let section = "calibrate";
         let own = config.calibrate.clone();
         let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
-        let chain = volumetric_chain(&config).map_err(VolumetricFailure::from)?;
-        let volume = work_volume(&config).map_err(VolumetricFailure::from)?;
-        let roll_axis = config.roll.as_ref().map(|it| volume_axis(it.axis));
-        let tool = point_of_mm(config.tool_offset_mm);
-        let mut tools = vec![tool];
-        tools.extend(own.second_tool_offset_mm.map(point_of_mm));
-        let rolls = Axis::ALL.map(|axis| roll_axis == Some(axis));
-        let design = standard_design(chain, &volume, &tools, rolls);
-        let live = VolumetricModel::new(
-            Model {
-                chain,
-                volume,
-                axes: Default::default(),
-                squareness: Default::default(),
-                thermal: Thermal::default(),
-                tool_max: Metres::from_mm(config.tool_max_mm),
-                displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-                roll_max: config
-                    .roll
-                    .as_ref()
-                    .map_or(Radians(0.0), |it| Radians::from_arcsec(it.roll_max_arcsec)),
-            },
-            model_limits(&config.compensation),
-        );
-        let live = live.map_err(VolumetricFailure::from)?;
-        let references = self.take_references()?;
+        let taken = self.take_references()?;
+        let entry = match read.references.take() {
+            Some(kept) => {
+                self.still_holds(&config, &own, &read, &kept, &taken)?;
+                kept
+            }
+            None => {
+                let entry = VolumeReferencesEntry {
+                    content: taken.content,
+                    temperatures_c: taken.temperatures.iter().map(|it| it.value()).collect(),
+                    at_s: self.now().seconds(),
+                };
+                journal.write(&Entry::VolumeReferences(entry.clone()))?;
+                journal.flush_to_disk()?;
+                entry
+            }
+        };
+        let references = References::from(&entry);
+        read.references = Some(entry);
+        let is_warm = read
+            .plan
+            .iter()
+            .any(|plan| plan.lines.iter().any(|it| it.warm));
+        let known = Known::new(&config, &references.temperatures, is_warm)?;
+        let thermometry = Thermometry::new(self.config(), &config.temperature);
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             if let Some(drift) = beam.and_then(beam_drift) {
@@ -194,91 +250,12 @@ impl Machine {
             references,
             beams,
             roll,
-            live,
+            known,
+            thermometry,
             operator,
-            design,
-            runs: Runs::default(),
+            lines,
+            read,
         })
-    }
-
-    /// Reads one line, by whatever reads it.
-    fn run_line(
-        &mut self,
-        session: &mut Session<'_>,
-        line: &StandardLine,
-        step: (usize, usize),
-    ) -> Result<(), Failure> {
-        let run = session.runs.setups.len() - 1;
-        if let Some(observations) = session.by_own_detectors(line, run) {
-            let temperatures = session.references.temperatures.clone();
-            session.runs.temperatures.push(temperatures);
-            session.runs.observations.extend(observations);
-            return Ok(());
-        }
-        let task = LineTask {
-            optics: match line.optics {
-                Optics::Linear => LineOptics::Linear,
-                Optics::Straightness(across) => LineOptics::Straightness { across },
-                Optics::Angle(about) => LineOptics::Angular { about },
-            },
-            start: line.from,
-            end: line.to,
-            tool: line.tool,
-            step,
-        };
-        let readout = LineReadout {
-            instrument: session.own.instrument.clone(),
-            settle: Duration::from_secs_f64(session.own.settle_ms * 1e-3),
-            samples: session.own.average_samples,
-        };
-        let set_up = self.set_up_line(&task, &readout, session.operator)?;
-        let mut shown = vec![Vec::new(); session.config.temperature.len()];
-        for at in line.points(session.points_of(line)) {
-            let read = self.read_line(&set_up, at)?;
-            let (state, temperatures) = self.state_now(session, at)?;
-            for (sum, celsius) in shown.iter_mut().zip(temperatures) {
-                sum.push(celsius.value());
-            }
-            let mut observation = read.observation(run);
-            observation.reading = session.without_live(&observation, &state)?;
-            session.runs.observations.push(observation);
-        }
-        let mean = |it: &Vec<f64>| Celsius(it.iter().sum::<f64>() / it.len() as f64);
-        let temperatures = shown.iter().map(mean).collect();
-        session.runs.temperatures.push(temperatures);
-        Ok(())
-    }
-
-    /// What the detectors see beyond their references, and what the thermometers show.
-    fn state_now(
-        &mut self,
-        session: &Session<'_>,
-        at: Point,
-    ) -> Result<(MovingState, Vec<Celsius>), Failure> {
-        let seen = self.watch_at_rest(session.own.detector_samples)?;
-        let mut state = MovingState::default();
-        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
-            let axis = volume_axis(config.axis);
-            let position = at.along(axis);
-            let roll = self.roll_of(axis, position, config, &seen)?;
-            state.roll[axis.index()] = roll - reference.at(position);
-        }
-        for axis in Axis::ALL {
-            let beam = session.config.beam.each()[axis.index()];
-            let (Some(beam), Some(reference)) = (beam, &session.beams[axis.index()]) else {
-                continue;
-            };
-            let position = at.along(axis);
-            let places = self.places_of_beam(axis, position, beam, &seen)?;
-            let end = places.1.unwrap_or_else(|| reference.end());
-            let shift = reference.beam_shift(end);
-            // How guides bend is still to be found: what the detector sees of that is part of the
-            // unknown (`BendPlan::seen_from`).
-            let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
-            let whole = reference.displacement(position, places.0, shift);
-            state.sideways[axis.index()] = core::array::from_fn(|k| whole[k] - tilts[k]);
-        }
-        Ok((state, self.temperatures_of(&session.config, &seen)?))
     }
 
     fn become_warm(&mut self, how: WarmUp) -> Result<(), Failure> {
@@ -306,151 +283,41 @@ impl Machine {
         &mut self,
         store: &Store,
         session: Session<'_>,
-        is_warm: bool,
+        journal: &Journal,
     ) -> Result<VolumetricCalibrated, Failure> {
-        let plan = session.plan(is_warm);
-        let found = plan.identify(&session.runs.observations);
-        let found = found.map_err(VolumetricFailure::from)?;
         let shape = function_shape(session.config.compensation.interpolation);
-        let axes = found.axis_errors(shape).map_err(VolumetricFailure::from)?;
-        let temperatures = session.references.temperatures.clone();
+        let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
         // What cannot be applied must not be stored as what is in use.
-        let state = VolumetricState {
-            axes: axes.clone(),
-            squareness: found.squareness,
-            bends: found.bends.clone(),
-            expansions: found.expansions.clone(),
-            beams: session.beams.clone(),
-            roll: session.roll.clone(),
-            temperatures: temperatures.clone(),
-            ..VolumetricState::default()
-        };
-        VolumetricCorrection::new(self.config(), state)?;
-        let mut content = GeometryContent::new(&axes, &found.squareness, &temperatures);
-        content.bends = found.bends.iter().map(BendRecord::of).collect();
-        content.expansions = found.expansions.iter().map(ExpansionRecord::of).collect();
-        content.drives = self.volume_drives(&session.config);
+        evaluated.check(self.config(), Some(&session.references.content))?;
+        let source = journal.path().file_name().unwrap_or_default();
+        let source = source.to_string_lossy().into_owned();
         let head = RecordHead {
             created: utc_now(),
-            source: format!("calibrate, {} lines", session.runs.setups.len()),
-            instrument: InstrumentRecord {
-                name: session.own.instrument.clone(),
-                ..InstrumentRecord::default()
-            },
+            source: source.clone(),
+            instrument: self.instrument_record(&session.own.instrument),
             ..self.this_volume(GEOMETRY)?
         };
+        let content = evaluated.content(&session.config);
+        let unknown = content.unknown.clone();
         let content = Content::VolumetricGeometry(content);
         let id = store.save(&CalibrationRecord { head, content })?;
-        let u_max = session.largest_u(&found);
-        let lines = session.runs.setups.len();
-        let references = self.keep_references(store, &id, session.references)?.id;
+        let references = self.keep_references(store, &id, session.references, &source)?;
         store.activate(GEOMETRY, &id)?;
         Ok(VolumetricCalibrated {
             id,
-            references,
-            lines,
-            found,
-            u_max,
+            references: references.id,
+            lines: evaluated.lines,
+            found: evaluated.found,
+            u_max: evaluated.u_max,
+            unknown,
+            journal: journal.path().to_owned(),
         })
     }
 }
 
 impl Session<'_> {
-    fn nodes(&self) -> [usize; 3] {
-        Axis::ALL.map(|axis| stretches(&self.config, axis, self.own.step_mm) as usize + 1)
-    }
-
-    fn plan_of_cold(&self) -> Plan {
-        let low = point_of_mm(self.config.low_mm);
-        let high = point_of_mm(self.config.high_mm);
-        // Tilts and positioning errors count from the machine's zero, where the volume has it.
-        let zero = Axis::ALL.map(|axis| {
-            let (low, high) = (low.along(axis).value(), high.along(axis).value());
-            Metres(0.0_f64.clamp(low, high))
-        });
-        self.design
-            .plan(self.nodes(), Point::new(zero[0], zero[1], zero[2]))
-    }
-
-    fn plan(&self, is_warm: bool) -> Plan {
-        let mut plan = self.plan_of_cold();
-        plan.runs = self.runs.setups.clone();
-        let known = thermal(&self.config, &self.references.temperatures);
-        if !is_warm || known.channels.is_empty() {
-            return plan;
-        }
-        let expansions = Axis::ALL.into_iter().filter_map(|axis| {
-            let of_axis = |it: &usize| known.channels[*it].expansion[axis.index()] != 0.0;
-            let thermometers: Vec<usize> = (0..known.channels.len()).filter(of_axis).collect();
-            (!thermometers.is_empty()).then_some(ExpansionPlan { axis, thermometers })
-        });
-        plan.thermal = ThermalPlan {
-            references: self.references.temperatures.clone(),
-            runs: self.runs.temperatures.clone(),
-            u: known.channels.iter().map(|it| it.u).fold(0.0, f64::max),
-            expansions: expansions.collect(),
-            bends: bend_plans(&self.config),
-            fixed: known.fixed,
-        };
-        plan
-    }
-
-    /// As many as there are nodes along the axis that goes farthest.
-    fn points_of(&self, line: &StandardLine) -> usize {
-        let nodes = self.nodes();
-        let way = line.to - line.from;
-        let moved = Axis::ALL
-            .into_iter()
-            .filter(|it| way.along(*it) != Metres(0.0));
-        moved.map(|it| nodes[it.index()]).max().unwrap_or(2)
-    }
-
-    /// The reading as it would be, had the detectors seen nothing beyond their references.
-    fn without_live(
-        &self,
-        observation: &Observation,
-        state: &MovingState,
-    ) -> Result<Reading, VolumetricFailure> {
-        let Reading::Length {
-            along,
-            deviation,
-            u,
-        } = observation.reading
-        else {
-            return Ok(observation.reading);
-        };
-        let now = self.live.conditions(observation.tool, &[], state)?;
-        let seen = self.live.deviation(observation.at, &now)?;
-        let part = Axis::ALL
-            .into_iter()
-            .map(|it| seen.along(it) * along[it.index()]);
-        let part = part.fold(Metres(0.0), |sum, it| sum + it);
-        let deviation = deviation - part;
-        Ok(Reading::Length {
-            along,
-            deviation,
-            u,
-        })
-    }
-
-    /// At the tool in use, over places all over the volume.
-    fn largest_u(&self, found: &Identified) -> Metres {
-        let (low, high) = (self.config.low_mm, self.config.high_mm);
-        let tool = point_of_mm(self.config.tool_offset_mm);
-        let shown = self.references.temperatures.clone();
-        let mut largest = Metres(0.0);
-        for n in 0..(PLACES + 1).pow(3) {
-            let steps = [
-                n % (PLACES + 1),
-                n / (PLACES + 1) % (PLACES + 1),
-                n / (PLACES + 1).pow(2),
-            ];
-            let at = core::array::from_fn(|k| {
-                low[k] + (high[k] - low[k]) * f64::from(steps[k]) / f64::from(PLACES)
-            });
-            let u = found.standard_uncertainty(point_of_mm(at), tool, &shown);
-            largest = largest.max(u.map_or(Metres(0.0), |it| it.distance()));
-        }
-        largest
+    fn is_warm_line(&self, at: usize) -> bool {
+        let plan = self.read.plan.as_ref();
+        plan.is_some_and(|it| it.lines[at].warm)
     }
 }

@@ -1,10 +1,11 @@
 //! What the machine's own detectors tell of its lines: straightnesses by the beams, a roll.
 
-use compensator::volumetric::identify::{Observation, Purpose, Reading, StandardLine};
+use compensator::volumetric::identify::{Observation, Purpose, Reading};
 use compensator::volumetric::{Axis, Point};
 use units::{Metres, Radians};
 
 use super::Session;
+use super::plan::nodes;
 use crate::assemble::point_of_mm;
 
 /// The least standard uncertainty of a straightness by a beam: the air along it.
@@ -19,12 +20,8 @@ const AT_A_NODE_M: f64 = 1e-6;
 impl Session<'_> {
     /// What the machine's own detectors read of this line when their references were taken;
     /// `None` when they do not read it.
-    pub(super) fn by_own_detectors(
-        &self,
-        line: &StandardLine,
-        run: usize,
-    ) -> Option<Vec<Observation>> {
-        match line.purpose {
+    pub(super) fn by_own_detectors(&self, run: usize) -> Option<Vec<Observation>> {
+        match self.lines[run].purpose {
             Purpose::Straightness(axis, along) => self.straightness_by_beam(axis, along, run),
             Purpose::Roll(axis) => self.roll_by_detectors(axis, run),
             Purpose::Positioning(_)
@@ -51,7 +48,7 @@ impl Session<'_> {
         let u_mean = record.slider[place].standard_uncertainties_si.as_ref();
         let stops = self.stops_at_nodes(axis, &record.slider[place].positions_m);
         let first = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
-        let chain = self.live.machine().chain;
+        let chain = self.known.chain();
         let each = stops.into_iter().map(|(index, position)| {
             let strayed = reference.slider(position)[place];
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
@@ -80,7 +77,7 @@ impl Session<'_> {
         let record = self.references.content.roll.as_ref()?;
         let stops = self.stops_at_nodes(axis, &record.positions_m);
         let u = record.standard_uncertainties_si.as_ref();
-        let sense = self.live.machine().chain.sense(axis);
+        let sense = self.known.chain().sense(axis);
         let each = stops.into_iter().map(|(index, position)| {
             let u = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             Observation {
@@ -102,7 +99,7 @@ impl Session<'_> {
         let k = axis.index();
         let low_m = self.config.low_mm[k] * 1e-3;
         let span_m = (self.config.high_mm[k] - self.config.low_mm[k]) * 1e-3;
-        let step_m = span_m / (self.nodes()[k] - 1) as f64;
+        let step_m = span_m / (nodes(&self.config, &self.own)[k] - 1) as f64;
         let is_at_node = |position: f64| {
             let steps = (position - low_m) / step_m;
             ((steps - steps.round()) * step_m).abs() < AT_A_NODE_M

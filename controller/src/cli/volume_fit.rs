@@ -1,0 +1,294 @@
+//! `truestage fit volumetric`: the errors of three axes from a run's journal, or from lines that were
+//! read elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use compensator::measurement::{VolumeLine, VolumeSeries};
+use compensator::volumetric::identify::{IdentifyError, Observation, Optics};
+use serde_json::json;
+use truestage::Failure;
+use truestage::assemble::function_shape;
+use truestage::config::{self, Loaded, VolumetricConfig};
+use truestage::cycle::volumetric::{
+    GEOMETRY, REFERENCES, VolumetricEvaluated, VolumetricFailure, volume_plan,
+};
+use truestage::store::{
+    BeamReferencesContent, CalibrationRecord, Content, LineEntry, LineReadEntry, LineReadingEntry,
+    OpticsName, ReadJournal, RecordHead, Store, VolumeRead, VolumeReferencesEntry, read_journal,
+    short,
+};
+use units::Radians;
+
+use super::data::{read, volume_head_of};
+use super::output::{Ended, Output};
+use super::volume::{found_value, warmth_text};
+use super::volumetric::shown;
+
+/// What `truestage fit volumetric` is told.
+#[derive(Debug, Args)]
+pub(super) struct VolumetricArgs {
+    /// The journal of a calibration (….jsonl), or a data file.
+    data: PathBuf,
+    /// The machine's configuration.
+    #[arg(long)]
+    config: PathBuf,
+    /// With a data file: what the thermometers showed, in the order of the configuration.
+    #[arg(
+        long,
+        value_name = "CELSIUS",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    temperatures_c: Vec<f64>,
+    /// Take these error functions as zero: `e_cz,e_az`.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    without: Vec<String>,
+    /// Store it for this machine (use it with `cal activate`).
+    #[arg(long)]
+    save: bool,
+}
+
+/// Readings, and where they come from.
+struct Given {
+    read: VolumeRead,
+    /// Of a run of this program.
+    journal: Option<ReadJournal>,
+    /// By reading: its line in the data file.
+    rows: Vec<usize>,
+}
+
+pub(super) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
+    let loaded = config::load(&args.config)?;
+    let own = loaded.config.volumetric.as_ref();
+    let own = own.ok_or(VolumetricFailure::None)?;
+    let mut given = match args.data.extension() {
+        Some(end) if end == "jsonl" => of_journal(args)?,
+        _ => of_series(args, own)?,
+    };
+    leave_out(&mut given.read, &args.without)?;
+    let shape = function_shape(own.compensation.interpolation);
+    let evaluated = VolumetricEvaluated::of(&given.read, shape);
+    let evaluated = evaluated.map_err(|it| placed(it, &args.data, &given.rows))?;
+    let found = &evaluated.found;
+    let content = evaluated.content(own);
+    let birge = found.birge_ratio;
+    let birge = birge.map_or("–".into(), |it| format!("{it:.2}"));
+    let mut text = format!(
+        "{} readings of {} lines, {} beyond the unknowns, scatter {birge} of what was stated\n  tool: \
+         standard uncertainty {:.3} µm at most{}{}",
+        evaluated.readings,
+        evaluated.lines,
+        found.degrees_of_freedom,
+        evaluated.u_max.um(),
+        shown(&content),
+        warmth_text(found) + &unknown_text(&content.unknown),
+    );
+    let mut value = found_value(found);
+    value["lines"] = json!(evaluated.lines);
+    value["readings"] = json!(evaluated.readings);
+    value["u_tool_max_um"] = json!(evaluated.u_max.um());
+    add_unknown(&mut value, &content.unknown);
+    value["functions"] = json!(content.functions);
+    let arcsec = |it: f64| Radians(it).arcsec();
+    value["squareness_arcsec"] = json!(content.squareness_rad.map(arcsec));
+    value["squareness_u_arcsec"] = json!(content.squareness_u_rad.map(arcsec));
+    if args.save {
+        let stored = save(args, &loaded, &evaluated, &given)?;
+        text += &stored_text(&args.config, &stored);
+        value["calibration"] = json!(stored.0);
+        value["references"] = json!(stored.1);
+    }
+    output.result(&text, &value)
+}
+
+fn of_journal(args: &VolumetricArgs) -> Result<Given, Failure> {
+    if !args.temperatures_c.is_empty() {
+        return Err(Failure::Usage {
+            what: "--temperatures-c is for data files".into(),
+            help: "leave it out: a journal has its own".into(),
+        });
+    }
+    let journal = read_journal(&args.data)?;
+    Ok(Given {
+        read: journal.volume.clone(),
+        journal: Some(journal),
+        rows: Vec::new(),
+    })
+}
+
+/// Lines that were read elsewhere count as read at one warmth.
+fn of_series(args: &VolumetricArgs, config: &VolumetricConfig) -> Result<Given, Failure> {
+    let file = args.data.display().to_string();
+    let series = VolumeSeries::from_csv(&read(&args.data)?, &file)?;
+    let (mut plan, _) = volume_plan(config, false, Vec::new())?;
+    plan.lines.clear();
+    let mut given = VolumeRead::default();
+    let mut rows = Vec::new();
+    for (number, line) in series.lines().iter().enumerate() {
+        plan.lines.push(entry(number, line));
+        given.whole.push(LineReadEntry {
+            line: number,
+            temperatures_c: args.temperatures_c.clone(),
+            at_s: 0.0,
+        });
+        for point in &line.points {
+            let observation = Observation {
+                at: point.at,
+                tool: line.tool,
+                run: number,
+                reading: point.reading,
+            };
+            given
+                .readings
+                .push(LineReadingEntry::of(number, &observation));
+            rows.push(point.row);
+        }
+    }
+    given.plan = Some(plan);
+    given.references = Some(VolumeReferencesEntry {
+        temperatures_c: args.temperatures_c.clone(),
+        ..VolumeReferencesEntry::default()
+    });
+    Ok(Given {
+        read: given,
+        journal: None,
+        rows,
+    })
+}
+
+fn entry(number: usize, line: &VolumeLine) -> LineEntry {
+    let (optics, sees) = match line.optics {
+        Optics::Linear => (OpticsName::Linear, None),
+        Optics::Straightness(across) => (OpticsName::Straightness, Some(across)),
+        Optics::Angle(about) => (OpticsName::Angular, Some(about)),
+    };
+    LineEntry {
+        optics,
+        sees: sees.and_then(|it| it.to_string().chars().next()),
+        purpose: format!("line {}", line.number),
+        points: line.points.len(),
+        // A straightedge was laid by hand.
+        angle: (optics == OpticsName::Straightness).then_some(number),
+        ..LineEntry::default()
+    }
+}
+
+fn leave_out(read: &mut VolumeRead, names: &[String]) -> Result<(), Failure> {
+    let Some(plan) = &mut read.plan else {
+        return Ok(());
+    };
+    for name in names {
+        let at = plan.functions.iter().position(|it| it == name);
+        let at = at.ok_or_else(|| Failure::Usage {
+            what: format!("--without {name}: that error is not looked for"),
+            help: format!("it is one of {}", plan.functions.join(", ")),
+        })?;
+        plan.functions.remove(at);
+    }
+    Ok(())
+}
+
+/// The line of the data file in place of a reading's number.
+fn placed(failure: Failure, file: &Path, rows: &[usize]) -> Failure {
+    let Failure::Volumetric(VolumetricFailure::Identify(source)) = &failure else {
+        return failure;
+    };
+    let index = match source {
+        IdentifyError::Run { index, .. }
+        | IdentifyError::NotUsable { index }
+        | IdentifyError::Outside { index, .. } => *index,
+        _ => return failure,
+    };
+    let Some(row) = rows.get(index) else {
+        return failure;
+    };
+    Failure::Usage {
+        what: format!("{}:{row}: {source}", file.display()),
+        help: "correct the row, or low_mm and high_mm of [volumetric]".into(),
+    }
+}
+
+/// Stores what was found, with the references of the run where it was one.
+fn save(
+    args: &VolumetricArgs,
+    loaded: &Loaded,
+    evaluated: &VolumetricEvaluated,
+    given: &Given,
+) -> Result<(String, Option<String>), Failure> {
+    let machine = &loaded.config;
+    let own = machine.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
+    let (seen, expected) = (evaluated.temperatures.len(), own.temperature.len());
+    if seen != expected {
+        return Err(Failure::Usage {
+            what: format!("temperatures of {seen} thermometers, the machine has {expected}"),
+            help: "say with --temperatures-c what they showed when the lines were read".into(),
+        });
+    }
+    let store = Store::of(&machine.machine);
+    let mut head = volume_head_of(loaded, GEOMETRY, &args.data)?;
+    let references = match &given.journal {
+        Some(journal) => {
+            same_machine(&args.data, journal, loaded)?;
+            head.instrument = journal.header.instrument.clone();
+            head.drive = journal.header.drive.clone();
+            given.read.references.as_ref().map(|it| &it.content)
+        }
+        None => None,
+    };
+    evaluated.check(machine, references)?;
+    let content = Content::VolumetricGeometry(evaluated.content());
+    let record = CalibrationRecord { head, content };
+    let geometry = store.save(&record)?;
+    let references = references.map(|it| {
+        let content = Content::BeamReferences(BeamReferencesContent {
+            geometry: geometry.clone(),
+            ..it.clone()
+        });
+        let head = RecordHead {
+            axis: REFERENCES.to_owned(),
+            ..record.head.clone()
+        };
+        store.save(&CalibrationRecord { head, content })
+    });
+    Ok((geometry, references.transpose()?))
+}
+
+fn same_machine(path: &Path, journal: &ReadJournal, loaded: &Loaded) -> Result<(), Failure> {
+    let (header, section) = (&journal.header, &loaded.config.machine);
+    let comparisons = [
+        ("stage", &header.stage_serial, &section.stage_serial),
+        ("configuration hash", &header.config_hash, &loaded.hash),
+    ];
+    for (what, expected, seen) in comparisons {
+        if expected != seen {
+            return Err(Failure::Usage {
+                what: format!(
+                    "{}: its {what} is `{expected}`, that of the machine `{seen}`",
+                    path.display()
+                ),
+                help: "give the configuration that the run was made with".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn stored_text(config: &Path, (geometry, references): &(String, Option<String>)) -> String {
+    let activate = |id: &str| {
+        format!(
+            "`truestage cal activate {} {}`",
+            config.display(),
+            short(id)
+        )
+    };
+    let then = match references {
+        Some(id) => format!("{} with its references", activate(id)),
+        None => "`truestage reference` while the machine is as warm as it was then".to_owned(),
+    };
+    format!(
+        "\nstored as {}; use it with {}, then {then}",
+        short(geometry),
+        activate(geometry)
+    )
+}

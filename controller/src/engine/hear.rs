@@ -1,0 +1,76 @@
+//! What the loop has heard of one SYNC: the drives' answers, and the newest sample of every
+//! channel and thermometer.
+
+use drivers::device::AxisReading;
+use units::Time;
+
+use super::account::Heard;
+use super::run::Seats;
+use super::{AXES_MAX, Channel, ThermometerSample};
+use crate::machine::Machine;
+
+impl Machine {
+    /// The newest sample of drive number `at`, if it came after the SYNC.
+    pub(super) fn answer(&self, at: usize, synced: Time) -> Option<AxisReading> {
+        let reading = self.axes[at].device.reading()?;
+        (reading.at >= synced).then_some(reading)
+    }
+
+    pub(super) fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
+        let mut actual = [None; AXES_MAX];
+        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
+            let reading = self.answer(*at, synced);
+            *actual = reading.map(|it| it.position);
+        }
+        self.hear_channels(&mut seats.channels);
+        self.hear_temperatures(&mut seats.temperatures);
+        Heard {
+            now,
+            actual,
+            channels: &seats.channels,
+            temperatures: &seats.temperatures,
+        }
+    }
+
+    /// Puts the newest sample of each analog channel into its place, in the order of the
+    /// modules' names.
+    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
+        // A module without a sample keeps its places: its channels would else be taken for
+        // those of the next one. What it said last stays, as old as it is.
+        let mut first = 0;
+        for analog in &self.analogs {
+            let own = channels.iter_mut().skip(first);
+            first += analog.device.channels();
+            let Some(sample) = analog.device.reading() else {
+                continue;
+            };
+            let values = sample.volts.iter().zip(&sample.saturated);
+            for (place, (volts, saturated)) in own.zip(values) {
+                *place = Some(Channel {
+                    at: sample.at,
+                    volts: *volts,
+                    saturated: *saturated,
+                });
+            }
+        }
+    }
+
+    /// Likewise of the thermometers.
+    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
+        let modules = self.analogs.iter();
+        let mut first = 0;
+        for module in modules.filter_map(|it| it.device.thermometers()) {
+            let own = temperatures.iter_mut().skip(first);
+            first += module.sensors();
+            let Some(sample) = module.temperatures() else {
+                continue;
+            };
+            for (place, celsius) in own.zip(&sample.celsius) {
+                *place = Some(ThermometerSample {
+                    at: sample.at,
+                    celsius: *celsius,
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! Three axes seen from the command line: what was measured of them is shown, compared, evaluated
+//! again and made into pages; and each verb on a machine of its own.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tests::volume::{Volume, good, quick};
+use tests::{Rig, VOLUMETRIC};
+use truestage::cycle::volumetric::{VerifyBy, WarmUp};
+use truestage::store::{OpticsName, read_journal};
+
+use crate::programs::{Bench, live_rigs, truestage};
+
+/// A machine that was calibrated twice and verified before and after, in virtual time.
+struct Runs {
+    volume: Volume,
+    calibrated: [(String, String); 2],
+    found: String,
+    left: String,
+}
+
+impl Runs {
+    fn folder(&self) -> &Path {
+        self.volume.bench.folder.path()
+    }
+
+    fn run(&self, words: &[&str]) -> crate::programs::Ended {
+        truestage(self.folder(), words)
+    }
+}
+
+fn runs() -> Runs {
+    let mut volume = Volume::zeroed(1, quick, |text| text);
+    let mut hand = volume.bench.emulated.clone();
+    let store = volume.bench.store.clone();
+    let machine = &mut volume.bench.machine;
+    let place = |path: &Path| path.display().to_string();
+    let mut calibrated = || {
+        let made = machine.calibrate_volumetric(&store, WarmUp::None, None, &mut hand);
+        let made = good(made);
+        (made.id, place(&made.journal))
+    };
+    let both = [calibrated(), calibrated()];
+    let mut verified = |by| good(machine.verify_volumetric(&store, by, &mut hand));
+    let found = place(&verified(VerifyBy::AsFound).journal);
+    let left = place(&verified(VerifyBy::Everything).journal);
+    good(machine.shut_down());
+    let folder = volume.bench.folder.path();
+    let text = quick(VOLUMETRIC.machine.to_owned());
+    let text = text.replace("machine-data", &folder.display().to_string());
+    fs::write(folder.join("machine.toml"), text).expect("there is room");
+    Runs {
+        calibrated: both,
+        found,
+        left,
+        volume,
+    }
+}
+
+fn text(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[track_caller]
+fn check_error(said: &Value, parts: &[&str]) {
+    let error = text(&said["error"]);
+    for part in parts {
+        assert!(error.contains(part), "`{part}` is not in {error}");
+    }
+}
+
+fn page(runs: &Runs, journal: &str) -> String {
+    let made = runs.run(&["report", journal]).with_code(0);
+    let html = fs::read_to_string(text(&made["report"])).expect("it was written");
+    assert!(
+        !html.contains("<script") && !html.contains("http"),
+        "not self-contained"
+    );
+    assert!(!html.contains("NaN") && html.ends_with("</html>\n"));
+    html
+}
+
+#[track_caller]
+fn check_says(html: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(html.contains(part), "`{part}` is not on the page");
+    }
+}
+
+#[test]
+fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
+    let runs = runs();
+    let checked = runs.run(&["check", "machine.toml"]).with_code(0);
+    assert_eq!(checked["machine"], "volumetric");
+    let list = runs.run(&["cal", "list"]).with_code(0);
+    let list = list["calibrations"].as_array().expect("a list");
+    let active = list.iter().filter(|it| it["active"] == true);
+    let mut kinds: Vec<&str> = active.map(|it| text(&it["kind"])).collect();
+    kinds.sort_unstable();
+    assert_eq!(kinds, ["beam_references", "volumetric_geometry"]);
+    let [(first, _), (second, journal)] = &runs.calibrated;
+    let shown = runs
+        .run(&["cal", "show", "machine.toml", second])
+        .with_code(0);
+    let record = &shown["record"];
+    assert_eq!(record["functions"].as_array().map(Vec::len), Some(18));
+    assert!(journal.ends_with(text(&record["source"])));
+    let words = ["cal", "diff", "machine.toml", first, second];
+    let changes = runs.run(&words).with_code(0);
+    let changes = changes["changes"].as_array().expect("a list").clone();
+    assert_eq!(changes.len(), 18);
+    let largest = changes.iter().map(|it| number(&it["change"]));
+    let largest = largest.fold(0.0, f64::max);
+    assert!(largest > 0.0 && largest < 5.0, "{largest}");
+
+    let calibrated = page(&runs, journal);
+    let errors = [
+        "e_xx",
+        "e_yz",
+        "Tilts of y",
+        "Squareness",
+        "<polygon",
+        "tilt (″)",
+    ];
+    check_says(&calibrated, &errors);
+    check_says(&calibrated, &["x (mm)", "°C", "Residuals", &second[..12]]);
+    let (found, left) = (page(&runs, &runs.found), page(&runs, &runs.left));
+    check_says(&found, &["Line as found", "deviation (µm)", "<svg"]);
+    check_says(&left, &["Line as left", "correction x, y, z (µm)", "°C"]);
+}
+
+/// The readings of a run as a file that somebody else might have made.
+fn csv_of(journal: &str) -> String {
+    let read = read_journal(Path::new(journal)).expect("it can be read");
+    let plan = read.volume.plan.expect("it has one");
+    let mut csv =
+        "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u\n".to_owned();
+    for it in &read.volume.readings {
+        let line = &plan.lines[it.line];
+        let sees = line.sees.unwrap_or_default();
+        let (reads, scale) = match line.optics {
+            OpticsName::Linear => ("linear_um".to_owned(), 1e6),
+            OpticsName::Straightness => (format!("straightness_{sees}_um"), 1e6),
+            OpticsName::Angular => (
+                format!("tilt_{sees}_arcsec"),
+                180.0 * 3600.0 / core::f64::consts::PI,
+            ),
+        };
+        let mm = |metres: [f64; 3]| metres.map(|it| (it * 1e3).to_string()).join(",");
+        let (at, tool) = (mm(it.at_m), mm(it.tool_m));
+        let (deviation, u) = (it.deviation_si * scale, it.u_si * scale);
+        let _ = writeln!(csv, "{},{reads},{at},{tool},{deviation},{u}", it.line + 1);
+    }
+    csv
+}
+
+#[test]
+fn errors_follow_again_from_a_journal_and_from_a_file_of_its_readings() {
+    let runs = runs();
+    let (id, journal) = &runs.calibrated[1];
+    let fit = |words: &[&str]| runs.run(&[&["fit", "volumetric"], words].concat());
+    let config = ["--config", "machine.toml"];
+    let from_journal = fit(&[&[journal.as_str()], &config[..], &["--save"]].concat()).with_code(0);
+    let stored = runs.volume.bench.store.load(id).expect("it was stored");
+    let stored = serde_json::to_value(stored.geometry(id).expect("it is one")).expect("plain");
+    assert_eq!(from_journal["functions"], stored["functions"]);
+    let again = text(&from_journal["calibration"]).to_owned();
+    let words = ["cal", "diff", "machine.toml", id, &again];
+    let changes = runs.run(&words).with_code(0);
+    let changes = changes["changes"].as_array().expect("a list").clone();
+    assert!(changes.iter().all(|it| number(&it["change"]) == 0.0));
+    for name in ["calibration", "references"] {
+        let words = ["cal", "activate", "machine.toml", text(&from_journal[name])];
+        runs.run(&words).with_code(0);
+    }
+
+    let file = runs.folder().join("lines.csv");
+    let csv = csv_of(journal);
+    fs::write(&file, &csv).expect("there is room");
+    let from_file = fit(&[&["lines.csv"], &config[..]].concat()).with_code(0);
+    assert_eq!(from_file["readings"], from_journal["readings"]);
+    for (a, b) in [("squareness_arcsec", 1e-4), ("squareness_u_arcsec", 1e-4)] {
+        let pairs = (0..3).map(|k| (number(&from_file[a][k]), number(&from_journal[a][k])));
+        assert!(
+            pairs.clone().all(|(x, y)| (x - y).abs() < b),
+            "{a}: {:?}",
+            pairs.collect::<Vec<_>>()
+        );
+    }
+    let unsaved = fit(&[&["lines.csv"], &config[..], &["--save"]].concat()).with_code(2);
+    check_error(&unsaved, &["6", "--temperatures-c"]);
+    let warm = ["--save", "--temperatures-c", "20,20,20,20,20,20"];
+    let saved = fit(&[&["lines.csv"], &config[..], &warm].concat()).with_code(0);
+    assert!(saved["references"].is_null() && saved["calibration"].is_string());
+
+    refuses_files(&runs, &csv);
+}
+
+fn refuses_files(runs: &Runs, csv: &str) {
+    let refused = |csv: &str, words: &[&str]| {
+        fs::write(runs.folder().join("wrong.csv"), csv).expect("there is room");
+        let fit = ["fit", "volumetric", "wrong.csv", "--config", "machine.toml"];
+        runs.run(&[&fit, words].concat())
+    };
+    let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let is_diagonal = |cells: &[String]| {
+        let away = cells[2..5].iter().filter(|it| *it != "0");
+        cells[1] == "linear_um" && away.count() > 1
+    };
+    let diagonals = csv.lines().map(cells).filter(|it| is_diagonal(it));
+    let diagonals: Vec<String> = diagonals.map(|it| it[0].clone()).collect();
+    let others = csv.lines().filter(|it| !diagonals.contains(&cells(it)[0]));
+    let no_diagonals: String = others.map(|line| format!("{line}\n")).collect();
+    let error = refused(&no_diagonals, &[]).with_code(3);
+    check_error(&error, &["do not tell", "squareness of y to x"]);
+    let error = refused(&csv.replacen("linear_um", "linear_mm", 1), &[]).with_code(2);
+    check_error(&error, &["wrong.csv:2:3", "linear_um"]);
+    let error = refused(
+        &format!("{csv}99,linear_um,0,0,0,0,0,0,0,1\n99,linear_um,900,0,0,0,0,0,0,1\n"),
+        &[],
+    );
+    check_error(&error.with_code(2), &["wrong.csv:", "900"]);
+    let error = refused(csv, &["--without", "e_dx"]).with_code(2);
+    check_error(&error, &["e_dx", "e_xx"]);
+    let linear = fs::write(runs.folder().join("linear.toml"), tests::MACHINE);
+    linear.expect("there is room");
+    let words = ["fit", "volumetric", "lines.csv", "--config", "linear.toml"];
+    runs.run(&words).with_code(2);
+}

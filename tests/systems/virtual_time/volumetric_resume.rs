@@ -1,0 +1,215 @@
+//! A calibration of three axes that is interrupted, continued, and evaluated from its journal.
+
+use core::time::Duration;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use compensator::volumetric::function::Shape;
+use tests::volume::{Volume, good, quick};
+use truestage::Failure;
+use truestage::cycle::volumetric::{
+    LineOperator, LineTask, VolumetricCalibrated, VolumetricEvaluated, WarmUp,
+};
+use truestage::emulated::{Emulated, HallDrift};
+use truestage::store::{ReadJournal, read_journal};
+
+/// Sets lines up, notes which, and goes home before the one that it is told.
+struct Hand {
+    emulated: Emulated,
+    asked: Vec<usize>,
+    leaves_before: Option<usize>,
+}
+
+impl LineOperator for Hand {
+    fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
+        if Some(task.step.0) == self.leaves_before {
+            return Err(Failure::Interrupted);
+        }
+        self.asked.push(task.step.0);
+        self.emulated.ask_line(task)
+    }
+
+    fn is_set_up(&mut self) -> Result<bool, Failure> {
+        self.emulated.is_set_up()
+    }
+
+    fn pack_up(&mut self) -> Result<(), Failure> {
+        self.emulated.pack_up()
+    }
+}
+
+/// Calibrates, and says which lines were asked for.
+fn calibrate(
+    volume: &mut Volume,
+    resume: Option<&Path>,
+    leaves_before: Option<usize>,
+) -> (Result<VolumetricCalibrated, Failure>, Vec<usize>) {
+    calibrate_by(volume, WarmUp::None, resume, leaves_before)
+}
+
+fn calibrate_by(
+    volume: &mut Volume,
+    warm_up: WarmUp,
+    resume: Option<&Path>,
+    leaves_before: Option<usize>,
+) -> (Result<VolumetricCalibrated, Failure>, Vec<usize>) {
+    let mut hand = Hand {
+        emulated: volume.bench.emulated.clone(),
+        asked: Vec::new(),
+        leaves_before,
+    };
+    let store = volume.bench.store.clone();
+    let machine = &mut volume.bench.machine;
+    let made = machine.calibrate_volumetric(&store, warm_up, resume, &mut hand);
+    (made, hand.asked)
+}
+
+fn journal_of(volume: &Volume) -> PathBuf {
+    let newest = volume.bench.store.newest_run("calibrate", "volume");
+    newest.expect("it can be read").expect("there is one")
+}
+
+fn read(path: &Path) -> ReadJournal {
+    read_journal(path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The mains goes off and on, and the machine is zeroed again.
+fn another_morning(volume: &mut Volume) {
+    let machine = &mut volume.bench.machine;
+    good(machine.shut_down());
+    let emulated = &volume.bench.emulated;
+    emulated.simulation_mut().power_cycle(HallDrift::default());
+    let back = machine.now() + Duration::from_secs(2);
+    good(machine.run_until(back));
+    good(machine.start());
+    good(machine.zero_volumetric());
+}
+
+#[test]
+fn a_calibration_that_was_interrupted_goes_on_at_its_first_line_that_is_not_whole() {
+    let mut volume = Volume::zeroed(1, quick, |text| text);
+    let (refused, asked) = calibrate(&mut volume, None, Some(11));
+    assert!(matches!(refused, Err(Failure::Interrupted)), "{refused:?}");
+    let path = journal_of(&volume);
+    let before = read(&path);
+    assert!(before.failure.is_some() && !before.complete);
+    assert_eq!(before.volume.whole.len(), 10, "{asked:?}");
+    assert!(
+        volume
+            .bench
+            .store
+            .list()
+            .expect("it can be read")
+            .is_empty()
+    );
+
+    // As killed in the middle of the line before.
+    let bytes = fs::read(&path).expect("it is there");
+    let text = String::from_utf8(bytes).expect("a journal is text");
+    let last_whole = text.rfind("{\"entry\":\"line_read\"").expect("it was read");
+    fs::write(&path, &text[..last_whole - 20]).expect("there is room");
+    another_morning(&mut volume);
+    let (made, asked_later) = calibrate(&mut volume, Some(&path), None);
+    let made = good(made);
+    assert_eq!(asked_later.first(), Some(&10), "{asked_later:?}");
+    assert!(asked_later.iter().all(|it| *it >= 10));
+
+    let after = read(&path);
+    assert!(after.complete && after.failure.is_none());
+    assert_eq!(after.volume.references, before.volume.references);
+    let of_whole = |journal: &ReadJournal| {
+        let readings = journal.volume.readings.iter().filter(|it| it.line < 9);
+        readings.cloned().collect::<Vec<_>>()
+    };
+    assert_eq!(of_whole(&after), of_whole(&before));
+    let each = |line: usize| {
+        after
+            .volume
+            .whole
+            .iter()
+            .filter(|it| it.line == line)
+            .count()
+    };
+    assert!((0..made.lines).all(|line| each(line) == 1));
+    let known = good(volume.bench.machine.volumetric_state(&volume.bench.store));
+    assert_eq!(known.expect("it is in use").1.geometry, made.id);
+
+    let error = calibrate(&mut volume, Some(&path), None).0.unwrap_err();
+    assert!(error.to_string().contains("complete"), "{error}");
+}
+
+/// Continued or not, the same machine is found: what differs is a power cycle between.
+#[test]
+fn the_journal_alone_gives_the_stored_errors_again() {
+    let mut volume = Volume::zeroed(1, quick, |text| text);
+    let made = good(calibrate(&mut volume, None, None).0);
+    let journal = read(&made.journal);
+    let shape = Shape::Spline;
+    let again = VolumetricEvaluated::of(&journal.volume, shape);
+    let again = again.unwrap_or_else(|failure| panic!("{failure}"));
+    let stored = volume.bench.store.load(&made.id).expect("it was stored");
+    let stored = stored.geometry(&made.id).expect("it is one");
+    let config = good(volume.bench.machine.volumetric_config());
+    assert_eq!(&again.content(config), stored);
+    assert_eq!((again.lines, again.u_max), (made.lines, made.u_max));
+    let source = made
+        .journal
+        .file_name()
+        .expect("it has one")
+        .to_string_lossy();
+    let from_it = volume
+        .bench
+        .store
+        .made_from(&source)
+        .expect("it can be read");
+    let mut names: Vec<&str> = from_it.iter().map(|(id, _)| id.as_str()).collect();
+    names.sort_unstable();
+    let mut expected = [made.id.as_str(), made.references.as_str()];
+    expected.sort_unstable();
+    assert_eq!(names, expected);
+
+    // Without the diagonals nothing tells the squarenesses, and that is said.
+    let mut some = journal.volume.clone();
+    let plan = some.plan.clone().expect("it has one");
+    some.whole
+        .retain(|it| !plan.lines[it.line].purpose.starts_with("squareness"));
+    let refused = VolumetricEvaluated::of(&some, shape).unwrap_err();
+    assert!(
+        refused.to_string().contains("squareness of y to x"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn what_is_not_the_same_machine_any_more_is_not_continued() {
+    let mut volume = Volume::zeroed(1, quick, |text| text);
+    let (_, asked) = calibrate(&mut volume, None, Some(2));
+    assert_eq!(asked, [1]);
+    let path = journal_of(&volume);
+    let warm_up = WarmUp::Idle(Duration::from_secs(60));
+    let refused = calibrate_by(&mut volume, warm_up, Some(&path), None).0;
+    let text = refused.unwrap_err().to_string();
+    assert!(text.contains("--warm-up-min"), "{text}");
+
+    // Guides of another machine: its detectors see other curves.
+    let mut other = Volume::zeroed(2, quick, |text| text);
+    let (refused, asked) = calibrate(&mut other, Some(&path), None);
+    let refused = refused.unwrap_err();
+    let text = refused.to_string();
+    assert!(
+        text.contains("resume_limit_um") && text.contains("--resume"),
+        "{text}"
+    );
+    assert_eq!((refused.exit_code(), asked.len()), (3, 0));
+
+    // Warmer by kelvins, with nothing to tell what that does.
+    let span = Duration::from_secs(3 * 3600);
+    good(volume.bench.machine.idle(span));
+    let (refused, asked) = calibrate(&mut volume, Some(&path), None);
+    let text = refused.unwrap_err().to_string();
+    assert!(
+        text.contains("thermometer") && text.contains("--warm-up-min"),
+        "{text}"
+    );
+    assert_eq!(asked.len(), 0);
+}
