@@ -10,7 +10,8 @@ use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 use tests::apart::{Apart, used_by_the_loop};
 use tests::stream::{Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
-use truestage::cycle::volumetric::VolumetricCorrection;
+use truestage::config::MachineConfig;
+use truestage::cycle::volumetric::{FirstPartCorrection, VolumetricCorrection, VolumetricFailure};
 use truestage::engine::{Cause, Correction, Engine, NoCorrection};
 
 #[global_allocator]
@@ -25,8 +26,32 @@ fn asked_for_memory() -> u64 {
 const FROM: u64 = 200;
 const STOP: u64 = 1_200;
 
+/// What corrects three axes.
+#[derive(Clone, Copy)]
+enum Part {
+    Any,
+    /// Their displacements are recorded.
+    First,
+}
+
+fn of_a_volume(config: &MachineConfig, part: Part) -> Box<dyn Correction> {
+    let known = nothing_known(config.volumetric.as_ref().expect("it has one"));
+    let bad = |it: VolumetricFailure| -> ! { panic!("{it}") };
+    match part {
+        Part::Any => {
+            Box::new(VolumetricCorrection::new(config, known).unwrap_or_else(|it| bad(it)))
+        }
+        Part::First => {
+            let made = FirstPartCorrection::new(config, known);
+            let (correction, recorder) = made.unwrap_or_else(|it| bad(it));
+            recorder.listen();
+            Box::new(correction)
+        }
+    }
+}
+
 #[track_caller]
-fn check(setup: &Setup, axes: &[&str]) {
+fn check(setup: &Setup, axes: &[&str], part: Part) {
     let mut inside = None;
     let mut stand = Stand::wrapped(Rig::InProcess, setup, |inner| {
         let (apart, cell) = Apart::new(inner, asked_for_memory);
@@ -45,10 +70,7 @@ fn check(setup: &Setup, axes: &[&str]) {
     };
     zeroed.unwrap_or_else(|it| panic!("{it}"));
     let correction: Box<dyn Correction> = match &config.volumetric {
-        Some(volumetric) => {
-            let known = nothing_known(volumetric);
-            Box::new(VolumetricCorrection::new(&config, known).unwrap_or_else(|it| panic!("{it}")))
-        }
+        Some(_) => of_a_volume(&config, part),
         None => Box::new(NoCorrection),
     };
     let (mut engine, mut desk) =
@@ -74,6 +96,12 @@ fn check(setup: &Setup, axes: &[&str]) {
 /// One after the other: what is counted is the whole process's.
 #[test]
 fn a_loop_along_a_path_and_to_a_stop_asks_for_no_memory() {
-    check(&Setup::four_cyclic_axes(1), &["u", "v", "w", "r"]);
-    check(&Setup::volumetric(1), &["x", "y", "z"]);
+    check(
+        &Setup::four_cyclic_axes(1),
+        &["u", "v", "w", "r"],
+        Part::Any,
+    );
+    for part in [Part::Any, Part::First] {
+        check(&Setup::volumetric(1), &["x", "y", "z"], part);
+    }
 }

@@ -448,3 +448,29 @@ fn the_other_axes_stay_corrected() {
     assert!((meanwhile + 20.0).abs() < 1.0, "{meanwhile} um meanwhile");
     check_back(&day);
 }
+
+/// A roll of 100 urad is 7 um at the tool, 70 mm below the slide's zero, and -2.5 um at the detector 25 mm
+/// above it: no displacement, and nothing at all once the detector sees no more.
+#[test]
+fn what_a_detector_sees_of_a_roll_comes_and_goes_with_it() {
+    let (mut bench, seen) = standing("fade_out");
+    let mut state = risen(&bench, &seen);
+    let roll = state.roll.expect("it has one").at(PLACE[0]);
+    state.roll = Some(constant(roll - Radians(100e-6)));
+    let correction = VolumetricCorrection::new(&bench.loaded.config, state);
+    let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
+    let fault = FaultConfig::lasting(x_blocked(), Duration::from_millis(2) * END_AT as u32);
+    let mut id = None;
+    let (_, lives) = follow(&mut bench, correction, END_AT, |simulation, period| {
+        if period == FAULT_AT {
+            id = Some(simulation.inject(fault.clone()).expect("its port is there"));
+        }
+    });
+    let delivered = bench.emulated.simulation();
+    let delivered = delivered.fault_deliveries(id.expect("it came"));
+    assert!(delivered > 0, "it never struck");
+    let y_um = |at: usize| lives[at - 1].offset[1].um();
+    let (seen, faded) = (y_um(FAULT_AT), y_um(END_AT));
+    assert!((seen + 9.5).abs() < 1.0, "{seen} um");
+    assert!((faded + 7.0).abs() < 1.0, "{faded} um");
+}

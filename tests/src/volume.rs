@@ -371,6 +371,14 @@ impl Volume {
     pub fn corrected(&mut self) -> (Mover, VolumetricState) {
         let stored = good(self.bench.machine.volumetric_state(&self.bench.store));
         let (state, _) = stored.expect("it was stored");
+        self.corrected_by(state)
+    }
+
+    /// Likewise, corrected by `state`.
+    ///
+    /// # Panics
+    /// When it cannot be applied.
+    pub fn corrected_by(&mut self, state: VolumetricState) -> (Mover, VolumetricState) {
         let correction = VolumetricCorrection::new(&self.bench.loaded.config, state.clone());
         let correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
         let mover = self.bench.machine.volumetric_mover(Box::new(correction));

@@ -193,7 +193,12 @@ pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
 /// The guides that bend, as identification looks for their bows: from tilts alone, since films and
 /// supports shift a slide sideways too.
 pub fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
+    let place = |axis: Axis| {
+        let beam = config.beam.each()[axis.index()];
+        beam.map(|it| point_of_mm(it.slider.place_mm))
+    };
     let each = config.bend.iter().map(|it| BendPlan {
+        seen_from: place(volume_axis(it.axis)),
         axis: volume_axis(it.axis),
         towards: volume_axis(it.towards),
         over: it.over,

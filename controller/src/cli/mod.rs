@@ -7,6 +7,7 @@ mod kind;
 mod operator;
 mod output;
 mod page;
+mod part;
 mod platform;
 mod progress;
 mod rotary;
@@ -158,7 +159,9 @@ struct VerifyArgs {
 /// What is done with the state memories of three axes.
 #[derive(Debug, Subcommand)]
 enum MemoryCommand {
-    /// Zero, then record the present state: it is kept from now on.
+    /// Zero, then record the present state at stops along each axis, before parts are made: all
+    /// parts from now on are made with the state of this hour. Nothing is corrected meanwhile, so
+    /// it is not the state of a part that was made before; `run --first-part` records that.
     Record(MemoryArgs),
     /// Keep nothing by it any more; nothing moves.
     Clear(MemoryArgs),
@@ -169,7 +172,7 @@ enum MemoryCommand {
 struct MemoryArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// What the machine was built with, or what the first part was made with beyond that.
+    /// What the machine was built with, or what all parts are to be made with beyond that.
     #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
     memory: MemoryChoice,
 }
@@ -196,15 +199,20 @@ struct RunArgs {
     machine: MachineArgs,
     /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
     path: Option<PathBuf>,
+    /// The first of several parts: what the detectors see meanwhile is not corrected but recorded
+    /// as the second memory, and all later parts are made with it, like this one.
+    #[arg(long)]
+    first_part: bool,
 }
 
 impl RunArgs {
     /// `truestage run path.csv` means `./machine.toml`, as with every verb.
-    fn settle(mut self) -> (MachineArgs, PathBuf) {
+    fn settle(mut self) -> (Self, PathBuf) {
         let path = self
             .path
+            .take()
             .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
-        (self.machine, path)
+        (self, path)
     }
 }
 
@@ -310,11 +318,11 @@ pub(crate) fn main() -> ExitCode {
         }
         Command::Reference(args) => volume::reference(&args, output),
         Command::Run(args) => {
-            let (machine, path) = args.settle();
-            volume::run(&machine, &path, output)
+            let (args, path) = args.settle();
+            part::run(&args, &path, output)
         }
-        Command::Memory(MemoryCommand::Record(args)) => volume::memory_record(&args, output),
-        Command::Memory(MemoryCommand::Clear(args)) => volume::memory_clear(&args, output),
+        Command::Memory(MemoryCommand::Record(args)) => part::memory_record(&args, output),
+        Command::Memory(MemoryCommand::Clear(args)) => part::memory_clear(&args, output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => rotary::plan(&command, output),
@@ -354,7 +362,10 @@ mod tests {
     #[test]
     fn a_path_without_a_configuration_is_run_on_the_machine_here() {
         let settled = |words: &[&str]| match parsed(words) {
-            Command::Run(args) => args.settle(),
+            Command::Run(args) => {
+                let (args, path) = args.settle();
+                (args.machine, path)
+            }
             _ => panic!("another verb"),
         };
         let (machine, path) = settled(&["run", "p.csv"]);
@@ -376,6 +387,19 @@ mod tests {
             panic!("another verb")
         };
         assert_eq!(args.resume, Some("a.jsonl".into()));
+    }
+
+    #[test]
+    fn a_first_part_is_made_when_asked_for_only() {
+        for (words, expected) in [
+            (&["run", "m.toml", "part.csv"][..], false),
+            (&["run", "m.toml", "part.csv", "--first-part"][..], true),
+        ] {
+            let Command::Run(args) = parsed(words) else {
+                panic!("another verb")
+            };
+            assert_eq!(args.first_part, expected);
+        }
     }
 
     #[test]

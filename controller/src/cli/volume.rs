@@ -10,9 +10,9 @@ use truestage::cycle::volumetric::{
     GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
     VolumetricVerified, WarmUp,
 };
-use truestage::engine::{CsvError, Lack, Live, Validity, read_path};
+use truestage::engine::Live;
 use truestage::ports::Use;
-use truestage::store::{MemoryName, UnknownRecord, short};
+use truestage::store::{UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
 use units::Metres;
 
@@ -21,13 +21,13 @@ use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
 use super::verbs::{journal_to_resume, parse_target};
-use super::{AxisArgs, CalibrateArgs, MachineArgs, MemoryArgs, MoveArgs, VerifyArgs};
+use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);
 
 /// Starts the machine, zeroes it, runs `procedure`, switches off.
-fn with_zeroed_volume<R>(
+pub(super) fn with_zeroed_volume<R>(
     args: &MachineArgs,
     verb: &str,
     purpose: Use,
@@ -343,125 +343,4 @@ fn live_value(live: &Live) -> Value {
                "u_um": live.uncertainty[k].um()})
     });
     axes.collect()
-}
-
-pub(super) fn run(machine: &MachineArgs, file: &Path, output: Output) -> Ended {
-    let path = read(file)?;
-    let follow = |machine: &mut Machine, store: &Store| {
-        let stored = machine.stored_mover(store)?;
-        let is_corrected = stored.is_some();
-        let mut mover = match stored {
-            Some(mover) => mover,
-            None => machine.volumetric_mover(Box::new(truestage::engine::NoCorrection))?,
-        };
-        let engine = mover.engine();
-        let points = read_path(&path, engine.axes(), engine.period());
-        let points = points.map_err(|source: CsvError| Failure::Usage {
-            what: format!("{}: {source}", file.display()),
-            help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
-        })?;
-        machine.correct_volume(&mut mover, is_corrected)?;
-        let mut corrected = CorrectedPath::default();
-        let count = points.len();
-        machine.drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
-        let timing = mover.engine().timing().to_string();
-        Ok((is_corrected.then_some(corrected), count, timing))
-    };
-    let ((corrected, count, timing), counters) =
-        with_zeroed_volume(machine, "run", Use::Motion, output, follow)?;
-    let said = match &corrected {
-        Some(corrected) => corrected.text(),
-        None => "uncorrected: the errors were never measured".into(),
-    };
-    let text = format!("{count} points followed, {said}\n{timing}");
-    let mut value = json!({"points": count, "corrected": corrected.is_some(),
-                           "counters": counters});
-    if let Some(corrected) = &corrected {
-        corrected.write_into(&mut value);
-    }
-    output.result(&text, &value)
-}
-
-/// What the correction said along a path.
-#[derive(Default)]
-struct CorrectedPath {
-    largest: [Metres; 3],
-    u: [Metres; 3],
-    periods: u64,
-    /// The worst that it had to do without, and for how many periods.
-    without: Option<Lack>,
-    degraded: u64,
-    limited: u64,
-}
-
-impl CorrectedPath {
-    fn note(&mut self, live: &Live) {
-        self.periods += 1;
-        for axis in 0..3 {
-            self.largest[axis] = self.largest[axis].max(live.offset[axis].abs());
-            self.u[axis] = self.u[axis].max(live.uncertainty[axis]);
-        }
-        if let Validity::Without(lack) = live.validity {
-            self.without = Some(lack.worse_of(self.without));
-        }
-        self.degraded += u64::from(live.validity != Validity::Valid);
-        let is_limited = live.alarms.iter().any(Option::is_some) || live.clamped.contains(&true);
-        self.limited += u64::from(is_limited);
-    }
-
-    fn text(&self) -> String {
-        let (largest, u) = (self.largest.map(|it| it.um()), self.u.map(|it| it.um()));
-        let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
-        if self.degraded > 0 {
-            let (degraded, periods) = (self.degraded, self.periods);
-            text += &format!("\nnot all was known in {degraded} of {periods} periods");
-        }
-        if let Some(lack) = &self.without {
-            text += &format!("; without {lack}");
-        }
-        if self.limited > 0 {
-            let limited = self.limited;
-            text += &format!("\nthe correction was limited in {limited} periods");
-        }
-        text
-    }
-
-    fn write_into(&self, value: &mut Value) {
-        value["largest_correction_um"] = json!(self.largest.map(|it| it.um()));
-        value["u_max_um"] = json!(self.u.map(|it| it.um()));
-        value["periods_degraded"] = json!(self.degraded);
-        value["without"] = json!(self.without.map(|it| it.to_string()));
-        value["periods_limited"] = json!(self.limited);
-    }
-}
-
-pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
-    let (kept, counters) =
-        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
-    let axes = Axis::ALL
-        .into_iter()
-        .filter(|it| kept.map.of[it.index()].is_some());
-    let axes: Vec<String> = axes.map(|it| it.to_string()).collect();
-    let text = format!(
-        "{} keeps the present state of {} from now on",
-        short(&kept.id),
-        axes.join(", ")
-    );
-    output.result(
-        &text,
-        &json!({"memory": kept.id, "axes": axes, "counters": counters}),
-    )
-}
-
-pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
-    let before = session.machine.clear_memory(&session.store, which)?;
-    let text = match &before {
-        Some(id) => format!("{} is kept no more", short(id)),
-        None => "nothing was kept".into(),
-    };
-    output.result(&text, &json!({"cleared": before}))
 }

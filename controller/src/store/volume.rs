@@ -74,6 +74,9 @@ pub struct BendEntry {
     pub low_m: f64,
     /// Where it ends.
     pub high_m: f64,
+    /// Where the detector on its slide sits, whose displacements were taken off the readings.
+    #[serde(default)]
+    pub seen_from_m: Option<[f64; 3]>,
 }
 
 /// How the errors of three axes are to be found: what a run that is continued must have in common

@@ -70,6 +70,6 @@ fn references_and_memories_of_other_errors_are_refused() {
         .bench
         .machine
         .clear_memory(&store, truestage::store::MemoryName::First);
-    assert_eq!(good(cleared), records.first_memory);
+    assert_eq!(good(cleared), (records.first_memory, None));
     assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
 }

@@ -55,6 +55,9 @@ pub struct BendPlan {
     /// Whether the arc also shows in sideways readings. Where films or supports grow too it is
     /// found from angles and levers alone, and sideways readings belong to one warmth.
     pub sideways: bool,
+    /// Where a detector sits on the slide whose displacements were taken off all readings: with
+    /// them it took off what it saw of the tilt.
+    pub seen_from: Option<Point>,
 }
 
 /// What warmth is planned to add. Empty when all runs count as made at one warmth.
@@ -192,9 +195,15 @@ impl Term<'_> {
                     0.0
                 };
                 let turned = cross(turn, lever(it.axis));
+                // A detector does not look along its axis.
+                let seen_from = it.seen_from.unwrap_or(Point::ZERO);
+                let mut taken_off = cross(turn, seen_from.array());
+                taken_off[it.axis.index()] = 0.0;
                 Effect {
                     turn,
-                    moved: core::array::from_fn(|k| turned[k] + arc.towards[k] * height),
+                    moved: core::array::from_fn(|k| {
+                        turned[k] + arc.towards[k] * height - taken_off[k]
+                    }),
                 }
             }
         }

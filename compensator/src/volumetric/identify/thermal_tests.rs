@@ -4,7 +4,7 @@ use super::tests::{Chance, OFFSET, machine, model, nodes, plan, um};
 use super::*;
 use crate::volumetric::function::Shape;
 use crate::volumetric::model::{Thermal, ThermalBend, ThermalChannel, VolumetricModel};
-use crate::volumetric::online::MovingState;
+use crate::volumetric::online::{DetectorLever, MovingState};
 
 /// Cold, and two hours later: over and under the neutral plane.
 const COLD: [f64; 2] = [20.4, 20.3];
@@ -144,6 +144,7 @@ impl Session {
                     low: Metres(0.0),
                     high: Metres(0.6),
                     sideways: false,
+                    seen_from: None,
                 }],
                 fixed: Point::ZERO,
             },
@@ -177,6 +178,66 @@ fn runs_cold_and_warm_tell_expansion_and_bending_with_the_errors_themselves() {
             (term.bow, term.under, term.is_watched),
             (bend.bow, Some(1), true)
         );
+    }
+}
+
+/// A detector 60 mm ahead of its slide's zero sees 32 urad of tilt as 1.9 um, which is taken off readings
+/// along z.
+#[test]
+fn what_a_detector_saw_of_a_tilt_is_no_part_of_the_bend() {
+    for chain in ["FXYZ", "YXFZ"] {
+        let mut chance = Chance(6);
+        let mut machine = warm_machine(chain, &mut chance).machine().clone();
+        machine.displacement_max = um(10.0);
+        let truth = model(machine);
+        let mut session = Session::new(&truth, &[COLD, WARM], &mut chance, 0.0);
+        let place = Point::from_mm(60.0, 15.0, 25.0);
+        let lever = DetectorLever::new(
+            Axis::X,
+            place,
+            &truth.machine().thermal.bends,
+            &COLD.map(Celsius),
+        );
+        for warmth in [COLD, WARM] {
+            let run = session.runs.len();
+            for x in nodes(Axis::X, 13) {
+                let at = Point::new(x, Metres::ZERO, Metres::ZERO);
+                let tool = tool();
+                let shown = warmth.map(Celsius);
+                let mut live = MovingState::default();
+                live.sideways[0] = lever.seen(x, Radians::ZERO, &shown).map(|it| -it);
+                let now = truth.conditions(tool, &shown, &live).unwrap();
+                let reading = Reading::Length {
+                    along: [0.0, 0.0, 1.0],
+                    deviation: truth.deviation(at, &now).unwrap().z,
+                    u: um(0.1),
+                };
+                session.observations.push(Observation {
+                    at,
+                    tool,
+                    run,
+                    reading,
+                });
+            }
+            session.runs.push(OFFSET);
+            session.shown.push(warmth.map(Celsius).to_vec());
+        }
+        let found = |seen_from| {
+            let mut plan = session.plan(chain);
+            plan.functions.push(FunctionPlan {
+                name: ErrorName::Along(Axis::X, Axis::Z),
+                nodes: nodes(Axis::X, 4),
+            });
+            plan.thermal.bends[0].sideways = true;
+            plan.thermal.bends[0].seen_from = seen_from;
+            let found = plan.identify(&session.observations).unwrap();
+            (found.bends[0].bow.um(), found.birge_ratio.unwrap())
+        };
+        let (bow, scatter) = found(Some(place));
+        assert!((bow - 4.0).abs() < 0.02, "{chain}: {bow} um/K");
+        assert!(scatter < 0.2, "{chain}: {scatter}");
+        let (_, scatter) = found(None);
+        assert!(scatter > 2.0, "{chain}: {scatter}");
     }
 }
 

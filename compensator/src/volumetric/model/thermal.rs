@@ -114,6 +114,15 @@ impl Thermal {
     }
 }
 
+fn unit(axis: Axis) -> V3 {
+    core::array::from_fn(|k| f64::from(u8::from(k == axis.index())))
+}
+
+/// From the direction of an axis to that of its bow.
+fn turn(axis: Axis, towards: Axis) -> V3 {
+    cross(unit(axis), unit(towards))
+}
+
 /// An arc of height 1 over its chord, and which way the slide on it turns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arc {
@@ -127,14 +136,13 @@ pub(crate) struct Arc {
 
 impl Arc {
     pub(crate) fn new(chain: Chain, axis: Axis, towards: Axis, low: f64, high: f64) -> Self {
-        let unit = |axis: Axis| core::array::from_fn(|k| f64::from(u8::from(k == axis.index())));
         // A slide with the workpiece goes the other way than the tool does as seen from it, and
         // turns the tool the other way too: of the three signs one is left.
         let sense = chain.sense(axis);
         let per = 4.0 / ((high - low) * (high - low));
         Self {
             powers: [-low * high * per, (low + high) * per, -per],
-            turn: cross(unit(axis), unit(towards)).map(|it| it * sense),
+            turn: turn(axis, towards).map(|it| it * sense),
             towards: unit(towards),
         }
     }
@@ -161,6 +169,16 @@ impl Arc {
 }
 
 impl ThermalBend {
+    /// By what the slide itself is turned at `position`, whatever it carries; `kelvin` is how far
+    /// each channel is above its reference.
+    pub fn slide_turn(&self, position: Metres, kelvin: impl Fn(usize) -> f64) -> [Radians; 3] {
+        let (low, high) = (self.low.value(), self.high.value());
+        let way = low + high - 2.0 * position.value();
+        let slope = 4.0 * way / ((high - low) * (high - low));
+        let bow = self.bow.value() * self.gradient(kelvin);
+        turn(self.axis, self.towards).map(|it| Radians(it * bow * slope))
+    }
+
     pub(crate) fn arc(&self, chain: Chain) -> Arc {
         let (low, high) = (self.low.value(), self.high.value());
         Arc::new(chain, self.axis, self.towards, low, high)

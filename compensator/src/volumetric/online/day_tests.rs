@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use units::{Metres, MetresPerSecond, Radians, Time, Volts};
+use units::{Metres, MetresPerSecond, Time, Volts};
 
 use super::*;
 use crate::volumetric::function::{Function, Shape};
@@ -122,9 +122,14 @@ impl Bench {
         let noise = 0.35 * even(&mut self.state);
         let end = sample(now, [self.beam_um(END_M) + noise, 0.0]);
         let (slider, end) = (Some(&slider), Some(&end));
-        self.monitor
-            .advance(now, Metres(x), slider, end, &self.memories)[0]
-            .um()
+        self.monitor.advance(
+            now,
+            Metres(x),
+            (slider, end),
+            [Metres(0.0); 2],
+            &self.memories,
+        )[0]
+        .um()
     }
 
     /// Standing at the start, then there and back once; calls `see` with x and what is left in
@@ -228,49 +233,4 @@ fn a_hand_in_the_beam_makes_no_step() {
     // blend of 10 µm over a second 0.1 µm.
     assert!(largest < 0.4, "{largest} um");
     assert_eq!(bench.monitor.status().0, FeedStatus::Good);
-}
-
-/// h = 10 mm, L = 100 mm, φ = 45°: 5 arcsec more than the reference of 2 arcsec.
-#[test]
-fn a_roll_is_what_two_detectors_see_beyond_its_reference() {
-    let optics = RollOptics::new(
-        Metres::from_mm(10.0),
-        Metres::from_mm(100.0),
-        Radians::from_degrees(45.0),
-        Radians::from_arcsec(60.0),
-    )
-    .unwrap();
-    let reference = Radians::from_arcsec(2.0);
-    let reference = Function::constant(Metres(0.0), Metres(1.0), reference).unwrap();
-    let settings = FeedSettings {
-        blend: Duration::ZERO,
-        confirm: 1,
-        ..settings()
-    };
-    let mut monitor = RollMonitor::new(
-        [detector(), detector()],
-        true,
-        optics,
-        reference,
-        Feed::new(settings),
-    );
-    // By the patent's equations for tan α = t: y₁ + y₂ = t·L/(1 − t), x = h·t − y·(1 − t).
-    let t = Radians::from_arcsec(7.0).value().tan();
-    let sum = t * 0.1 / (1.0 - t);
-    let reading = |share: f64| (0.01 * t - share * sum * (1.0 - t)) * 1e6;
-    let now = Time::from_seconds(1.0);
-    let (first, second) = (
-        sample(now, [0.0, reading(0.4)]),
-        sample(now, [0.0, reading(0.6)]),
-    );
-    let roll = monitor.advance(now, Metres(0.3), [Some(&first), Some(&second)]);
-    assert!((roll.arcsec() - 5.0).abs() < 1e-6, "{}", roll.arcsec());
-    let now = Time::from_seconds(1.04);
-    let (first, second) = (sample(now, [0.0, -40.0]), sample(now, [0.0, -40.0]));
-    let held = monitor.advance(now, Metres(0.3), [Some(&first), Some(&second)]);
-    assert_eq!(held, roll);
-    assert!(matches!(
-        monitor.status(),
-        FeedStatus::Tolerated(Trouble::Roll(_))
-    ));
 }

@@ -57,6 +57,14 @@ impl Memories {
         [first[0] + second[0], first[1] + second[1]]
     }
 
+    /// What is `left` of a displacement less what the first memory keeps: what the second is to
+    /// store.
+    pub fn beyond_first(&self, axis: Axis, position: Metres, left: Displacement) -> Displacement {
+        let first = self.first.as_ref();
+        let first = first.map_or([Metres::ZERO; 2], |it| it.at(axis, position));
+        difference(left, first)
+    }
+
     /// The current displacement less what is to be kept.
     pub fn error(&self, axis: Axis, position: Metres, current: Displacement) -> Displacement {
         difference(current, self.kept(axis, position))

@@ -22,7 +22,7 @@
 //! at the end of travel count the *beam's*. So D and E are deviations (actual − target), like
 //! everything in this package, and the compensation is −E.
 //!
-//! [`AxisMonitor`] and [`RollMonitor`] put the parts of one axis together.
+//! [`AxisMonitor`] puts the parts of one axis together.
 //! [`Feed`] keeps every value that comes from outside without a jump, whatever happens to the
 //! detector; [`Offset`] brings the sum onto the axes within limits of size, rate and slope.
 //!
@@ -32,6 +32,7 @@
 mod beam;
 mod feed;
 mod influence;
+mod lever;
 mod memory;
 mod monitor;
 mod offset;
@@ -44,8 +45,9 @@ pub use beam::{
 };
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
+pub use lever::DetectorLever;
 pub use memory::{Coverage, Memories, MemoryError, RecorderSettings, StateMap, StateRecorder};
-pub use monitor::{AxisMonitor, EndOfTravel, RollMonitor};
+pub use monitor::{AxisMonitor, EndOfTravel};
 pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};

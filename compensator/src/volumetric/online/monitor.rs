@@ -1,17 +1,14 @@
 //! One axis watched: its detectors, reference, memories and feeds put together.
 //!
 //! Each part can be used alone; this is the order in which they belong together: detector at the
-//! end of travel, detector of the slider, reference, memories, and the feed that lets nothing
-//! jump.
+//! end of travel, detector of the slider, reference, the slide's tilts, memories, and the feed that
+//! lets nothing jump.
 
-use units::{Metres, Radians, Time};
+use units::{Metres, Time};
 
-use super::{
-    BeamDetector, BeamReference, Displacement, Feed, FeedStatus, Memories, RollOptics, Sample,
-    Trouble,
-};
+use super::reference::difference;
+use super::{BeamDetector, BeamReference, Displacement, Feed, FeedStatus, Memories, Sample};
 use crate::volumetric::Axis;
-use crate::volumetric::function::Function;
 
 /// The sideways displacement of one slider, watched by its beam.
 #[derive(Clone, Debug)]
@@ -55,13 +52,15 @@ impl AxisMonitor {
     }
 
     /// Takes the newest samples of both detectors at `now`, with the axis at `position`, and
-    /// gives out its displacement less what `memories` keep: what is to be compensated.
+    /// gives out its displacement less what `memories` keep: what is to be compensated. `lever` is
+    /// what the detector sees of its slide's tilts ([`DetectorLever`](super::DetectorLever)), which
+    /// is no displacement.
     pub fn advance(
         &mut self,
         now: Time,
         position: Metres,
-        slider: Option<&Sample>,
-        end: Option<&Sample>,
+        (slider, end): (Option<&Sample>, Option<&Sample>),
+        lever: Displacement,
         memories: &Memories,
     ) -> Displacement {
         let shift = self.end.as_mut().map(|own| {
@@ -72,6 +71,7 @@ impl AxisMonitor {
         let shift = shift.unwrap_or([Metres::ZERO; 2]);
         let seen = self.slider.read(now, slider);
         let seen = seen.map(|it| self.reference.displacement(position, it, shift));
+        let seen = seen.map(|it| difference(it, lever));
         self.displacement = seen.ok();
         let error = seen.map(|it| memories.error(self.axis, position, it));
         self.feed.advance(now, error)
@@ -101,9 +101,16 @@ impl AxisMonitor {
     }
 
     /// The displacement by the last samples, memories and smoothing not counted; `None` when the
-    /// slider's detector had no good one. A recorder takes this less what is compensated.
+    /// slider's detector had no good one.
     pub fn displacement(&self) -> Option<Displacement> {
         self.displacement
+    }
+
+    /// The same less what was given out last, to be compensated: what the machine is left with.
+    /// That is what a recorder takes.
+    pub fn uncompensated(&self) -> Option<Displacement> {
+        let seen = self.displacement?;
+        Some(difference(seen, self.feed.values()))
     }
 
     /// What stands behind the values given out last: of the slider's detector, and of that at the
@@ -124,66 +131,6 @@ impl AxisMonitor {
 
     /// The feed, to switch it on or off.
     pub fn feed_mut(&mut self) -> &mut Feed<Metres, 2> {
-        &mut self.feed
-    }
-}
-
-/// The roll of one slider, watched by two detectors.
-#[derive(Clone, Debug)]
-pub struct RollMonitor {
-    detectors: [BeamDetector; 2],
-    /// Which direction of each detector is read.
-    direction: usize,
-    optics: RollOptics,
-    reference: Function<Radians>,
-    feed: Feed<Radians, 1>,
-}
-
-impl RollMonitor {
-    /// Watches a roll by the first (`second_direction` false) or second direction of two
-    /// detectors, against its reference along the axis.
-    pub fn new(
-        detectors: [BeamDetector; 2],
-        second_direction: bool,
-        optics: RollOptics,
-        reference: Function<Radians>,
-        feed: Feed<Radians, 1>,
-    ) -> Self {
-        Self {
-            detectors,
-            direction: usize::from(second_direction),
-            optics,
-            reference,
-            feed,
-        }
-    }
-
-    /// Takes the newest samples of both detectors at `now`, with the axis at `position`, and gives
-    /// out how far the roll is from its reference.
-    pub fn advance(
-        &mut self,
-        now: Time,
-        position: Metres,
-        samples: [Option<&Sample>; 2],
-    ) -> Radians {
-        let seen = self.roll(now, samples);
-        let beyond = seen.map(|it| [it - self.reference.at(position)]);
-        self.feed.advance(now, beyond)[0]
-    }
-
-    fn roll(&mut self, now: Time, samples: [Option<&Sample>; 2]) -> Result<Radians, Trouble> {
-        let first = self.detectors[0].read(now, samples[0])?[self.direction];
-        let second = self.detectors[1].read(now, samples[1])?[self.direction];
-        Ok(self.optics.solve(first, second)?.angle)
-    }
-
-    /// What stands behind the value given out last.
-    pub fn status(&self) -> FeedStatus {
-        self.feed.status()
-    }
-
-    /// The feed, to switch it on or off.
-    pub fn feed_mut(&mut self) -> &mut Feed<Radians, 1> {
         &mut self.feed
     }
 }

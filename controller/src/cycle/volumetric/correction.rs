@@ -1,8 +1,8 @@
 //! What the cyclic engine adds to each set-point of three axes (system S4).
 //!
-//! In every period: detectors → displacement from the reference, freed of the beam's drift → less
-//! what the memories keep → feed, so that nothing jumps → model, with roll and temperatures → exact
-//! inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
+//! In every period: detectors → displacement from the reference, freed of the beam's drift and of
+//! what a detector beside its slide's zero sees of tilts → less what the memories keep → feed, so that
+//! nothing jumps → model, with roll and temperatures → exact inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
 //! slews from one correction to the next; that the rate is enough at the axes' full speed is proven
 //! when the correction is made. Nothing is allocated in a period.
 //!
@@ -19,7 +19,8 @@ use compensator::volumetric::model::{
     AxisErrors, Conditions, Machine as Model, Squareness, ThermalBend, VolumetricModel,
 };
 use compensator::volumetric::online::{
-    AxisMonitor, BeamReference, EndOfTravel, Feed, FeedStatus, Influences, Memories, MovingState,
+    AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
+    MovingState,
 };
 use compensator::volumetric::{Axis, NoCorrection, Point};
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
@@ -65,7 +66,7 @@ struct WatchedBeam {
     slider: [usize; 4],
     end: Option<[usize; 4]>,
     /// Where the detector sits on the slide: there it sees the slide's tilts too.
-    place: Point,
+    lever: DetectorLever,
 }
 
 /// The roll of one slide.
@@ -88,9 +89,6 @@ pub struct VolumetricCorrection {
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
-    bends: Vec<ThermalBend>,
-    /// The temperatures at which no guide bends beyond its tables.
-    references: Vec<Celsius>,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
     /// Of a displacement by detectors that are believed.
@@ -118,7 +116,13 @@ impl VolumetricCorrection {
             if let Some(beam) = beam {
                 let reference = state.beams[axis.index()].clone();
                 let reference = reference.ok_or(VolumetricFailure::NoReference { axis })?;
-                beams[axis.index()] = Some(watched_beam(config, own, axis, beam, reference)?);
+                let lever = lever(
+                    axis,
+                    beam,
+                    &model.machine().thermal.bends,
+                    &state.temperatures,
+                );
+                beams[axis.index()] = Some(watched_beam(config, own, beam, reference, lever)?);
             }
         }
         let roll = match &own.roll {
@@ -132,15 +136,12 @@ impl VolumetricCorrection {
                 Some(Thermometers::new(config, each, feed(own)?, thermal))
             }
         };
-        let bends = model.machine().thermal.bends.clone();
         Ok(Self {
             model,
             tool: point_of_mm(own.tool_offset_mm),
             beams,
             roll,
             thermometers,
-            bends,
-            references: state.temperatures.clone(),
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
@@ -180,23 +181,7 @@ impl VolumetricCorrection {
     /// What the detectors say at `actual`, as it enters the model.
     fn moving_state(&mut self, observed: &Observed<'_>, actual: Point) -> MovingState {
         let mut state = MovingState::default();
-        for axis in Axis::ALL {
-            let Some(beam) = &mut self.beams[axis.index()] else {
-                continue;
-            };
-            let slider = sample(observed.channels, &beam.slider);
-            let end = beam.end.and_then(|it| sample(observed.channels, &it));
-            let seen = beam.monitor.advance(
-                observed.now,
-                actual.along(axis),
-                slider.as_ref(),
-                end.as_ref(),
-                &self.memories,
-            );
-            let factors = &self.influences.of[axis.index()];
-            state.sideways[axis.index()] =
-                core::array::from_fn(|k| seen[k] * factors[k].at(actual));
-        }
+        // Tilts come first: a detector beside its slide's zero sees them too.
         if let Some(roll) = &mut self.roll {
             let position = actual.along(roll.axis);
             let seen = roll.reader.read(observed);
@@ -204,40 +189,24 @@ impl VolumetricCorrection {
             state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
         }
         for axis in Axis::ALL {
-            self.take_off_tilts(&mut state, axis, actual);
+            let Some(beam) = &mut self.beams[axis.index()] else {
+                continue;
+            };
+            let (position, roll) = (actual.along(axis), state.roll[axis.index()]);
+            let slider = sample(observed.channels, &beam.slider);
+            let end = beam.end.and_then(|it| sample(observed.channels, &it));
+            let seen = beam.monitor.advance(
+                observed.now,
+                position,
+                (slider.as_ref(), end.as_ref()),
+                beam.lever.seen(position, roll, &self.temperatures),
+                &self.memories,
+            );
+            let factors = &self.influences.of[axis.index()];
+            state.sideways[axis.index()] =
+                core::array::from_fn(|k| seen[k] * factors[k].at(actual));
         }
         state
-    }
-
-    /// A detector that sits beside its slide's zero also sees the slide tilt: by its roll, and
-    /// where the guide bends. That is no displacement of the slide.
-    fn take_off_tilts(&self, state: &mut MovingState, axis: Axis, actual: Point) {
-        let Some(beam) = &self.beams[axis.index()] else {
-            return;
-        };
-        let mut turn = [0.0; 3];
-        turn[axis.index()] = state.roll[axis.index()].value();
-        for bend in self.bends.iter().filter(|it| it.axis == axis) {
-            let above = |at: usize| (self.temperatures[at] - self.references[at]).value();
-            let gradient = above(bend.over) - bend.under.map_or(0.0, above);
-            let (low, high) = (bend.low.value(), bend.high.value());
-            let way = low + high - 2.0 * actual.along(axis).value();
-            let slope = bend.bow.value() * gradient * 4.0 * way / ((high - low) * (high - low));
-            // From the axis towards the bow, about the third direction by the right hand.
-            let (from, to) = (axis.index(), bend.towards.index());
-            let sense = if (from + 1) % 3 == to { 1.0 } else { -1.0 };
-            turn[3 - from - to] += sense * slope;
-        }
-        let [x, y, z] = Axis::ALL.map(|it| beam.place.along(it).value());
-        let seen = [
-            turn[1] * z - turn[2] * y,
-            turn[2] * x - turn[0] * z,
-            turn[0] * y - turn[1] * x,
-        ];
-        let sideways = &mut state.sideways[axis.index()];
-        for (value, direction) in sideways.iter_mut().zip(axis.others()) {
-            *value -= Metres(seen[direction.index()]);
-        }
     }
 
     /// Of a displacement that nobody sees nothing is known but that it is no larger than the
@@ -315,11 +284,11 @@ impl Correction for VolumetricCorrection {
             return nothing(Validity::Stop("the engine does not move three axes"));
         };
         let (target, actual) = (Point::new(x, y, z), Point::new(x_now, y_now, z_now));
-        let state = self.moving_state(observed, actual);
         if let Some(thermometers) = &mut self.thermometers {
             let shown = thermometers.advance(observed);
             self.temperatures.copy_from_slice(shown);
         }
+        let state = self.moving_state(observed, actual);
         let validity = match Lack::worst(self.statuses()) {
             None => Validity::Valid,
             Some(lack) if matches!(lack.status, FeedStatus::Stop(_)) => {
@@ -412,8 +381,19 @@ fn model(
     )?)
 }
 
+/// Where the detector on the slide of `axis` sits, and what tilts that slide beyond `references`.
+pub(super) fn lever(
+    axis: Axis,
+    beam: &BeamConfig,
+    bends: &[ThermalBend],
+    references: &[Celsius],
+) -> DetectorLever {
+    let place = point_of_mm(beam.slider.place_mm);
+    DetectorLever::new(axis, place, bends, references)
+}
+
 /// The bends found, within what the configuration permits.
-fn bends(
+pub(super) fn bends(
     config: &VolumetricConfig,
     state: &VolumetricState,
 ) -> Result<Vec<ThermalBend>, VolumetricFailure> {
@@ -450,10 +430,11 @@ fn check_speed(
 fn watched_beam(
     config: &MachineConfig,
     volumetric: &VolumetricConfig,
-    axis: Axis,
     beam: &BeamConfig,
     reference: BeamReference,
+    lever: DetectorLever,
 ) -> Result<WatchedBeam, VolumetricFailure> {
+    let axis = lever.axis();
     let common = feed(volumetric)?;
     let places = |it: &BeamDetectorConfig| {
         it.channels
@@ -478,7 +459,7 @@ fn watched_beam(
         monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
         slider: places(&beam.slider),
         end: beam.end.as_ref().map(places),
-        place: point_of_mm(beam.slider.place_mm),
+        lever,
     })
 }
 

@@ -5,7 +5,7 @@ use core::time::Duration;
 use compensator::volumetric::function::FunctionError;
 use compensator::volumetric::identify::IdentifyError;
 use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
-use compensator::volumetric::online::{RollError, Trouble};
+use compensator::volumetric::online::{MemoryError, RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Radians};
 
@@ -26,15 +26,18 @@ pub enum VolumetricFailure {
     },
     /// A beam is watched, but nobody knows what its detectors read when the axis is right.
     #[error(
-        "axis {axis}: its detectors have no references; calibrate the machine, or remove \
-        [volumetric.beam.{axis}]"
+        "axis {axis}: its detectors have no references; take them (`truestage reference`) while the \
+         machine is as warm as it was when its errors were measured"
     )]
     NoReference {
         /// Whose beam.
         axis: Axis,
     },
     /// The roll is watched, but has no reference.
-    #[error("the roll detectors have no reference; calibrate, or remove [volumetric.roll]")]
+    #[error(
+        "the roll detectors have no reference; take it (`truestage reference`) while the machine is \
+         as warm as it was when its errors were measured"
+    )]
     NoRollReference,
     /// Thermometers without the temperatures at the calibration.
     #[error("{seen} reference temperatures for {expected} thermometers; calibrate again")]
@@ -51,7 +54,9 @@ pub enum VolumetricFailure {
     NoGeometry,
     /// References that were taken with other errors in use.
     #[error(
-        "the references {references} of the detectors count from the calibration {measured_with}, but          {geometry} is in use; activate what belongs together (`truestage cal activate`), or take          the references again (`truestage reference`)"
+        "the references {references} of the detectors count from the calibration {measured_with}, but \
+         {geometry} is in use; activate what belongs together (`truestage cal activate`), or take \
+         the references again (`truestage reference`)"
     )]
     OtherGeometry {
         /// The references.
@@ -63,9 +68,13 @@ pub enum VolumetricFailure {
     },
     /// A memory that counts from other references.
     #[error(
-        "the state memory {memory} counts from the references {measured_with}, but `{references}` are          in use; record it again (`truestage memory record`), or clear it (`truestage memory clear`)"
+        "the {which} state memory {memory} counts from the references {measured_with}, in use: \
+         {references}; record it again (`truestage memory record --memory {which}`), or clear it \
+         (`truestage memory clear --memory {which}`)"
     )]
     OtherReferences {
+        /// First or second.
+        which: &'static str,
         /// The memory.
         memory: String,
         /// Which references it belongs to.
@@ -73,9 +82,28 @@ pub enum VolumetricFailure {
         /// Which are in use.
         references: String,
     },
+    /// A second memory that counts beyond another first one.
+    #[error(
+        "the second state memory {memory} counts beyond the first memory {measured_with}, in use: \
+         {first}; make the first part again (`truestage run PATH --first-part`), record it again \
+         (`truestage memory record --memory second`), or clear it (`truestage memory clear --memory \
+         second`)"
+    )]
+    OtherFirstMemory {
+        /// The second memory.
+        memory: String,
+        /// Which first memory it belongs to.
+        measured_with: String,
+        /// Which is in use.
+        first: String,
+    },
+    /// What was recorded while a first part was made is no state to keep.
+    #[error("{0}; nothing was stored")]
+    Memory(#[from] MemoryError),
     /// A detector that says nothing where its reference is to be taken.
     #[error(
-        "axis {axis} at {:.3} mm: the detector {what} says nothing to be relied upon: {source}; no          references were stored", at.mm()
+        "axis {axis} at {:.3} mm: the detector {what} says nothing to be relied upon: {source}; \
+         nothing was stored", at.mm()
     )]
     Blind {
         /// Along which axis.
@@ -344,6 +372,8 @@ impl VolumetricFailure {
             | Self::NoGeometry
             | Self::OtherGeometry { .. }
             | Self::OtherReferences { .. }
+            | Self::OtherFirstMemory { .. }
+            | Self::Memory(_)
             | Self::Blind { .. }
             | Self::NoTemperature { .. }
             | Self::OtherWarmth { .. }

@@ -1,15 +1,20 @@
 //! State memories: displacements that are to be kept although they deviate (system S4).
 //!
-//! What is recorded is what the detectors see now beyond their references, at stops along each
-//! axis: the first memory keeps what a machine was built with, the second what the first part is
-//! made with beyond that, so that all later parts are made alike.
+//! The first memory keeps what a machine was built with, the second what the first part is made
+//! with beyond that, so that all later parts are made alike. Both can be recorded at stops along
+//! each axis, before any part: what the detectors see then beyond their references is kept from
+//! the next part on. The second is otherwise recorded while a first part is made (`first_part`).
 
 use compensator::volumetric::Axis;
-use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::online::{BeamReference, StateMap};
-use units::Metres;
+use compensator::volumetric::function::{Function, FunctionError, Shape};
+use compensator::volumetric::online::{Coverage, Displacement, StateMap};
+use units::{Metres, Radians};
 
-use super::{REFERENCES, VolumetricFailure, memory_pointer};
+use super::correction::{bends, lever};
+use super::reference::References;
+use super::{REFERENCES, VolumetricFailure, VolumetricRecords, VolumetricState, memory_pointer};
+use crate::assemble::volume_axis;
+use crate::config::{BeamConfig, VolumetricConfig};
 use crate::cycle::utc_now;
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -22,13 +27,19 @@ pub struct Remembered {
     pub id: String,
     /// What is kept from now on.
     pub map: StateMap,
+    /// Which part of each axis was met; beyond, its ends hold.
+    pub covers: Coverage,
+    /// A second memory in use that counts beyond another first one: nothing is corrected until it
+    /// is recorded again or cleared.
+    pub foreign: Option<String>,
 }
 
 impl Machine {
-    /// Records the present state along each watched axis as `memory`, stores and activates it.
+    /// Records the present state along each watched axis as `memory`, stores and activates it: what
+    /// is made from now on is made with it.
     ///
-    /// The second memory keeps what is there beyond the first. It is taken while nothing is
-    /// corrected by the detectors.
+    /// The second memory keeps what is there beyond the first. Nothing is corrected meanwhile, so
+    /// this is not the state of a part that was made corrected before.
     ///
     /// # Errors
     /// When there are no references, a detector is in trouble, or anything stops the machine.
@@ -37,52 +48,97 @@ impl Machine {
         store: &Store,
         memory: MemoryName,
     ) -> Result<Remembered, Failure> {
-        let stored = self.volumetric_state(store)?;
-        let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
-        let axis = Axis::ALL
-            .into_iter()
-            .find(|it| state.beams[it.index()].is_some());
-        let (Some(references), Some(_)) = (records.references, axis) else {
-            let axis = Axis::X;
-            return Err(VolumetricFailure::NoReference { axis }.into());
+        // What is recorded again need not belong to what is in use now.
+        let needed: &[MemoryName] = match memory {
+            MemoryName::First => &[],
+            MemoryName::Second => &[MemoryName::First],
         };
-        let now = self.take_references()?.content;
+        let (state, records) = self.state_to_remember(store, needed)?;
+        let now = self.take_references()?;
         let config = self.volumetric_config()?.clone();
-        let mut map = StateMap::default();
-        for axis in Axis::ALL {
-            let beam = config.beam.each()[axis.index()];
-            let reference = state.beams[axis.index()].as_ref();
-            let (Some(beam), Some(reference)) = (beam, reference) else {
+        let (mut map, mut covers) = (StateMap::default(), Coverage::default());
+        for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
+            let Some(beam) = beam else {
                 continue;
             };
-            let section = "beam";
-            let drift = crate::assemble::beam_drift(beam);
-            let drift = drift.ok_or(VolumetricFailure::NotConfigured { section })?;
-            let Some(seen) = now.beam("the present state", axis, drift)? else {
+            let Some((nodes, states)) = present(&config, &state, &now, axis, beam)? else {
                 continue;
             };
-            let first = state.memories.first.as_ref();
-            let kept = |position| match (memory, first) {
-                (MemoryName::Second, Some(first)) => first.at(axis, position),
-                (MemoryName::Second, None) | (MemoryName::First, _) => [Metres(0.0); 2],
-            };
-            let nodes = now.beams.iter().find(|it| it.axis == letter(axis));
-            let nodes = nodes.map_or(&[][..], |it| &it.slider[0].positions_m);
-            map.of[axis.index()] = Some(beyond(nodes, &seen, reference, kept)?);
+            let beyond = nodes.iter().zip(states);
+            let beyond: Vec<_> = beyond
+                .map(|(at, it)| state.memories.beyond_first(axis, *at, it))
+                .collect();
+            let functions = functions(&nodes, &beyond).map_err(VolumetricFailure::from)?;
+            map.of[axis.index()] = Some(functions);
+            covers[axis.index()] = nodes.first().copied().zip(nodes.last().copied());
         }
-        let content = StateMemoryContent::new(memory, &references, &map);
+        self.keep_memory(store, memory, &records, (map, covers), "memory record")
+    }
+
+    /// What is in use, of the memories those `needed`: for whoever records one.
+    ///
+    /// # Errors
+    /// When there are no references to count from.
+    pub(super) fn state_to_remember(
+        &self,
+        store: &Store,
+        needed: &[MemoryName],
+    ) -> Result<(VolumetricState, VolumetricRecords), Failure> {
+        let stored = self.state_with(store, needed)?;
+        let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
+        let config = self.volumetric_config()?;
+        let section = "beam";
+        let mut watched = Axis::ALL
+            .into_iter()
+            .zip(config.beam.each())
+            .filter(|it| it.1.is_some())
+            .map(|it| it.0)
+            .peekable();
+        if watched.peek().is_none() {
+            return Err(VolumetricFailure::NotConfigured { section }.into());
+        }
+        match watched.find(|it| state.beams[it.index()].is_none()) {
+            Some(axis) => Err(VolumetricFailure::NoReference { axis }.into()),
+            None => Ok((state, records)),
+        }
+    }
+
+    /// Stores and activates what was recorded with `records` in use.
+    pub(super) fn keep_memory(
+        &self,
+        store: &Store,
+        memory: MemoryName,
+        records: &VolumetricRecords,
+        (map, covers): (StateMap, Coverage),
+        source: &str,
+    ) -> Result<Remembered, Failure> {
+        let references = records.references.as_deref().unwrap_or_default();
+        let content = StateMemoryContent {
+            first: match memory {
+                MemoryName::First => None,
+                MemoryName::Second => records.first_memory.clone(),
+            },
+            ..StateMemoryContent::new(memory, references, &map)
+        };
         let head = RecordHead {
             created: utc_now(),
-            source: "memory record".into(),
+            source: source.to_owned(),
             ..self.this_volume(memory_pointer(memory))?
         };
         let content = Content::StateMemory(content);
         let id = store.save(&CalibrationRecord { head, content })?;
         store.activate(memory_pointer(memory), &id)?;
-        Ok(Remembered { id, map })
+        let foreign = foreign_second(store)?;
+        Ok(Remembered {
+            id,
+            map,
+            covers,
+            foreign,
+        })
     }
 
-    /// Keeps nothing by `memory` any more; the record stays. Returns its name.
+    /// Keeps nothing by `memory` any more; the record stays. Returns its name, and a second memory
+    /// in use that counts beyond it.
     ///
     /// # Errors
     /// When the store cannot be written.
@@ -90,8 +146,9 @@ impl Machine {
         &self,
         store: &Store,
         memory: MemoryName,
-    ) -> Result<Option<String>, Failure> {
-        Ok(store.put_out_of_use(memory_pointer(memory))?)
+    ) -> Result<(Option<String>, Option<String>), Failure> {
+        let before = store.put_out_of_use(memory_pointer(memory))?;
+        Ok((before, foreign_second(store)?))
     }
 
     /// Whether references are in use.
@@ -103,32 +160,66 @@ impl Machine {
     }
 }
 
-const fn letter(axis: Axis) -> char {
-    match axis {
-        Axis::X => 'x',
-        Axis::Y => 'y',
-        Axis::Z => 'z',
-    }
+/// The second memory in use, when it counts beyond another first memory than is in use.
+fn foreign_second(store: &Store) -> Result<Option<String>, Failure> {
+    let current = |memory| store.active(memory_pointer(memory)).map(|it| it.current);
+    let Some(second) = current(MemoryName::Second)? else {
+        return Ok(None);
+    };
+    let record = store.load(&second)?;
+    let is_own = record.state_memory(&second)?.first == current(MemoryName::First)?;
+    Ok((!is_own).then_some(second))
 }
 
-/// What `seen` is beyond `reference` and what is kept already.
-fn beyond(
-    nodes: &[f64],
-    seen: &BeamReference,
-    reference: &BeamReference,
-    kept: impl Fn(Metres) -> [Metres; 2],
-) -> Result<[Function<Metres>; 2], VolumetricFailure> {
-    let shift = reference.beam_shift(seen.end());
-    let nodes: Vec<Metres> = nodes.iter().copied().map(Metres).collect();
-    let state = |node: &Metres| {
-        let now = reference.displacement(*node, seen.slider(*node), shift);
-        let kept = kept(*node);
-        [now[0] - kept[0], now[1] - kept[1]]
+/// Places along an axis, and what was displaced there.
+type Stops = (Vec<Metres>, Vec<Displacement>);
+
+/// The stops along `axis` and the displacements there, of what was read `now`; `None` where there
+/// are none to count from.
+fn present(
+    config: &VolumetricConfig,
+    state: &VolumetricState,
+    now: &References,
+    axis: Axis,
+    beam: &BeamConfig,
+) -> Result<Option<Stops>, Failure> {
+    let section = "beam";
+    let drift = crate::assemble::beam_drift(beam);
+    let drift = drift.ok_or(VolumetricFailure::NotConfigured { section })?;
+    let seen = now.content.beam("the present state", axis, drift)?;
+    let letter = ['x', 'y', 'z'][axis.index()];
+    let record = now.content.beams.iter().find(|it| it.axis == letter);
+    let reference = state.beams[axis.index()].as_ref();
+    let (Some(seen), Some(record), Some(reference)) = (seen, record, reference) else {
+        return Ok(None);
     };
-    let states: Vec<[Metres; 2]> = nodes.iter().map(state).collect();
+    let roll_now = now.content.roll("the present state")?;
+    let rolls = config.roll.as_ref().map(|it| volume_axis(it.axis)) == Some(axis);
+    let rolls = roll_now.zip(state.roll.as_ref()).filter(|_| rolls);
+    let roll = |at: Metres| {
+        let beyond = rolls.as_ref().map(|(now, then)| now.at(at) - then.at(at));
+        beyond.unwrap_or(Radians(0.0))
+    };
+    let lever = lever(axis, beam, &bends(config, state)?, &state.temperatures);
+    let shift = reference.beam_shift(seen.end());
+    let displacement = |at: &Metres| {
+        let whole = reference.displacement(*at, seen.slider(*at), shift);
+        let tilts = lever.seen(*at, roll(*at), &now.temperatures);
+        [whole[0] - tilts[0], whole[1] - tilts[1]]
+    };
+    let nodes = record.slider[0].positions_m.iter().copied().map(Metres);
+    let nodes: Vec<Metres> = nodes.collect();
+    let displacements = nodes.iter().map(displacement).collect();
+    Ok(Some((nodes, displacements)))
+}
+
+fn functions(
+    nodes: &[Metres],
+    states: &[Displacement],
+) -> Result<[Function<Metres>; 2], FunctionError> {
     let function = |k: usize| {
         let values: Vec<Metres> = states.iter().map(|it| it[k]).collect();
-        Function::new(&nodes, &values, Shape::Spline)
+        Function::new(nodes, &values, Shape::Spline)
     };
     Ok([function(0)?, function(1)?])
 }

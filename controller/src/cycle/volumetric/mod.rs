@@ -5,7 +5,8 @@
 //! | `zero` | every axis on its index pulse, one after the other |
 //! | `calibrate` | lines by interferometer and detectors, cold and warm, and what made them |
 //! | `reference` | what the detectors read when the machine is as its tables say |
-//! | `memory` | displacements that are to be kept, recorded |
+//! | `memory` | displacements that are to be kept, recorded before parts are made |
+//! | `first_part` | displacements that are to be kept, recorded while the first part is made |
 //! | `moves` | all three axes in one line, corrected |
 //! | `verify` | a line that no calibration uses, read with the correction on |
 //! | `state` | what is stored, put together: errors, references, memories |
@@ -17,6 +18,7 @@
 mod calibrate;
 mod correction;
 mod failure;
+mod first_part;
 mod inputs;
 mod line;
 mod memory;
@@ -30,6 +32,7 @@ mod zero;
 pub use calibrate::{VolumetricCalibrated, VolumetricEvaluated, WarmUp, volume_plan};
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
+pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};
 pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};
 pub use memory::Remembered;
 pub use moves::Mover;

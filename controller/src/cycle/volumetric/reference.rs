@@ -337,10 +337,20 @@ impl Machine {
     }
 }
 
-/// From one end of the work volume to the other.
+/// Between how many stretches along `axis` its errors have nodes.
+pub(super) fn stretches(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> u32 {
+    let span = config.high_mm[axis.index()] - config.low_mm[axis.index()];
+    (span / step_mm).ceil().max(2.0) as u32
+}
+
+/// From one end of the work volume to the other. Where errors have nodes the detectors are read
+/// too: between nodes errors are straight lines, and what a detector reads there is none.
 fn stops_along(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> Vec<Metres> {
     let (low, high) = (config.low_mm[axis.index()], config.high_mm[axis.index()]);
-    let steps = ((high - low) / step_mm).ceil().max(1.0) as u32;
+    let wanted = ((high - low) / step_mm).ceil().max(1.0) as u32;
+    let nodes = config.calibrate.as_ref();
+    let nodes = nodes.map_or(1, |it| stretches(config, axis, it.step_mm));
+    let steps = wanted.next_multiple_of(nodes);
     let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(steps);
     (0..=steps).map(|it| Metres::from_mm(at(it))).collect()
 }
@@ -500,10 +510,36 @@ mod tests {
     fn stops_are_at_both_ends_and_no_farther_apart_than_said() {
         let text = include_str!("../../../../configs/machines/volumetric.toml");
         let config = crate::config::parse(text, "m").unwrap().config;
+        let mut config = config.volumetric.unwrap();
+        config.calibrate = None;
+        let stops = |config: &VolumetricConfig, step_mm: f64| -> Vec<f64> {
+            let stops = stops_along(config, Axis::Z, step_mm);
+            stops.iter().map(|it| it.mm()).collect()
+        };
+        let expected = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
+        assert_eq!(stops(&config, 70.0), expected);
+    }
+
+    /// 30 mm from stop to stop at most, nodes 50 mm apart: 25 mm.
+    #[test]
+    fn nodes_of_the_errors_are_stops() {
+        let text = include_str!("../../../../configs/machines/volumetric.toml");
+        let config = crate::config::parse(text, "m").unwrap().config;
         let config = config.volumetric.unwrap();
-        let stops = stops_along(&config, Axis::Z, 70.0);
-        let mm: Vec<f64> = stops.iter().map(|it| it.mm()).collect();
-        assert_eq!(mm, [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
+        for axis in Axis::ALL {
+            let nodes = stretches(&config, axis, config.calibrate.as_ref().unwrap().step_mm);
+            for step_mm in [25.0, 30.0, 50.0, 70.0] {
+                let stops = stops_along(&config, axis, step_mm);
+                let apart = (stops[1] - stops[0]).mm();
+                assert!(apart <= step_mm, "{apart} mm");
+                for node in 0..=nodes {
+                    let (low, high) = (config.low_mm[axis.index()], config.high_mm[axis.index()]);
+                    let at = low + (high - low) * f64::from(node) / f64::from(nodes);
+                    let is_stop = stops.iter().any(|it| (it.mm() - at).abs() < 1e-9);
+                    assert!(is_stop, "no stop at {at} mm of {axis}, {step_mm} mm apart");
+                }
+            }
+        }
     }
 
     /// The second and third thermometers are over and under y's guide by the configuration.

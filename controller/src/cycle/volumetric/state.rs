@@ -5,7 +5,7 @@
 //! names the one it counts from; what does not belong together is refused.
 
 use compensator::volumetric::Axis;
-use compensator::volumetric::online::{BeamReference, Memories, StateMap};
+use compensator::volumetric::online::{BeamReference, Memories};
 
 use super::{VolumetricFailure, VolumetricState};
 use crate::assemble::beam_drift;
@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::store::{
     BeamReferencesContent, CalibrationRecord, GeometryContent, IdentityRecord, MemoryName,
-    RecordHead, Store, StoreError, short,
+    RecordHead, StateMemoryContent, Store, StoreError, short,
 };
 
 /// What the errors of three axes are called where an axis is named.
@@ -77,6 +77,15 @@ impl Machine {
         &self,
         store: &Store,
     ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
+        self.state_with(store, &[MemoryName::First, MemoryName::Second])
+    }
+
+    /// Likewise, with no other memories than `wanted`, the first before the second.
+    pub(super) fn state_with(
+        &self,
+        store: &Store,
+        wanted: &[MemoryName],
+    ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
         let config = self.volumetric_config()?;
         let here = self.this_volume(GEOMETRY)?;
         let reader = Reader { store, here };
@@ -114,7 +123,7 @@ impl Machine {
             state.roll = references.roll(&id)?;
             records.references = Some(id);
         }
-        state.memories = memories(&reader, &mut records)?;
+        state.memories = memories(&reader, &mut records, wanted)?;
         Ok(Some((state, records)))
     }
 
@@ -188,31 +197,50 @@ fn beams(
     Ok(beams)
 }
 
-fn memories(reader: &Reader<'_>, records: &mut VolumetricRecords) -> Result<Memories, Failure> {
-    let mut one = |memory: MemoryName| -> Result<Option<StateMap>, Failure> {
-        let Some((id, record)) = reader.active(memory_pointer(memory))? else {
-            return Ok(None);
+fn memories(
+    reader: &Reader<'_>,
+    records: &mut VolumetricRecords,
+    wanted: &[MemoryName],
+) -> Result<Memories, Failure> {
+    let mut memories = Memories::default();
+    for memory in wanted {
+        let Some((id, record)) = reader.active(memory_pointer(*memory))? else {
+            continue;
         };
         let content = record.state_memory(&id)?;
-        let references = records.references.as_deref().unwrap_or_default();
-        if content.references != references {
-            return Err(VolumetricFailure::OtherReferences {
-                memory: short(&id),
-                measured_with: short(&content.references),
-                references: short(references),
-            }
-            .into());
+        check_memory(&id, content, records)?;
+        let map = Some(content.map(&id)?);
+        match memory {
+            MemoryName::First => (memories.first, records.first_memory) = (map, Some(id)),
+            MemoryName::Second => (memories.second, records.second_memory) = (map, Some(id)),
         }
-        let map = content.map(&id)?;
-        let place = match memory {
-            MemoryName::First => &mut records.first_memory,
-            MemoryName::Second => &mut records.second_memory,
-        };
-        *place = Some(id);
-        Ok(Some(map))
-    };
-    Ok(Memories {
-        first: one(MemoryName::First)?,
-        second: one(MemoryName::Second)?,
-    })
+    }
+    Ok(memories)
+}
+
+/// What does not count from what is in use keeps something else than it should.
+fn check_memory(
+    id: &str,
+    content: &StateMemoryContent,
+    records: &VolumetricRecords,
+) -> Result<(), VolumetricFailure> {
+    let name = |id: Option<&str>| id.map_or_else(|| "none".to_owned(), short);
+    let references = records.references.as_deref();
+    if Some(&*content.references) != references {
+        return Err(VolumetricFailure::OtherReferences {
+            which: content.memory.name(),
+            memory: short(id),
+            measured_with: short(&content.references),
+            references: name(references),
+        });
+    }
+    let first = records.first_memory.as_deref();
+    if content.memory == MemoryName::Second && content.first.as_deref() != first {
+        return Err(VolumetricFailure::OtherFirstMemory {
+            memory: short(id),
+            measured_with: name(content.first.as_deref()),
+            first: name(first),
+        });
+    }
+    Ok(())
 }

@@ -314,6 +314,16 @@ pub enum MemoryName {
     Second,
 }
 
+impl MemoryName {
+    /// As it is called on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Second => "second",
+        }
+    }
+}
+
 /// Displacements of one axis that are to be kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -332,6 +342,10 @@ pub struct StateMemoryContent {
     pub memory: MemoryName,
     /// The name of the references from which the displacements count.
     pub references: String,
+    /// Of a second memory: the name of the first beyond which it counts; `None` where there was
+    /// none in use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first: Option<String>,
     /// By axis.
     pub axes: Vec<MemoryRecord>,
 }
@@ -340,7 +354,8 @@ impl StateMemoryContent {
     /// The name of this kind.
     pub const KIND: &'static str = "state_memory";
 
-    /// What `map` keeps, counted from the references of the name `references`.
+    /// What `map` keeps, counted from the references of the name `references`, and from no first
+    /// memory.
     pub fn new(memory: MemoryName, references: &str, map: &StateMap) -> Self {
         let axes = AXES.iter().zip(&map.of).filter_map(|(axis, functions)| {
             let [first, second] = functions.as_ref()?;
@@ -355,6 +370,7 @@ impl StateMemoryContent {
         Self {
             memory,
             references: references.to_owned(),
+            first: None,
             axes: axes.collect(),
         }
     }
@@ -382,11 +398,9 @@ impl StateMemoryContent {
     /// One line about it, for lists.
     pub(super) fn summary(&self) -> String {
         let axes: String = self.axes.iter().map(|it| it.axis).collect();
-        let which = match self.memory {
-            MemoryName::First => "first",
-            MemoryName::Second => "second",
-        };
-        format!("{which} memory of {axes}")
+        let beyond = self.first.as_deref().map(short);
+        let beyond = beyond.map_or_else(String::new, |it| format!(", beyond the first {it}"));
+        format!("{} memory of {axes}{beyond}", self.memory.name())
     }
 }
 
@@ -526,5 +540,22 @@ mod tests {
         assert_eq!(second, Metres::ZERO);
         assert_eq!(content.memory, MemoryName::Second);
         assert!(record.geometry(&id).is_err());
+    }
+
+    #[test]
+    fn a_second_memory_names_its_first_and_one_that_does_not_is_read() {
+        let without = StateMemoryContent::new(MemoryName::Second, "r", &StateMap::default());
+        let text = serde_json::to_string(&without).unwrap();
+        assert!(!text.contains("\"first\":"), "{text}");
+        let read: StateMemoryContent = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, without);
+        let with = StateMemoryContent {
+            first: Some("abc".into()),
+            ..without
+        };
+        assert!(with.summary().contains("abc"), "{}", with.summary());
+        let (id, record) = stored(Content::StateMemory(with));
+        let first = &record.state_memory(&id).unwrap().first;
+        assert_eq!(first.as_deref(), Some("abc"));
     }
 }

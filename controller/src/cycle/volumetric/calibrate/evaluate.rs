@@ -71,7 +71,8 @@ impl VolumetricEvaluated {
     /// As it is stored, with what stays unknown of a machine of `config`.
     pub fn content(&self, config: &VolumetricConfig) -> GeometryContent {
         let found = &self.found;
-        let is_known = |it: &BendPlan| found.bends.iter().any(|found| found.plan == *it);
+        let of = |it: &BendPlan| (it.axis, it.towards);
+        let is_known = |it: &BendPlan| found.bends.iter().any(|known| of(&known.plan) == of(it));
         let mut unknown = bend_plans(config);
         unknown.retain(|it| !is_known(it));
         let of = (&self.axes, &found.squareness, &self.temperatures);
@@ -207,6 +208,7 @@ fn thermal_of(
             high: Metres(it.high_m),
             // Films and supports shift a slide sideways too.
             sideways: false,
+            seen_from: it.seen_from_m.map(point),
         })
     });
     Some(ThermalPlan {

@@ -11,6 +11,7 @@ use crate::assemble::{
 };
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
 use crate::cycle::volumetric::VolumetricFailure;
+use crate::cycle::volumetric::reference::stretches;
 use crate::store::{
     AXES, BendEntry, ExpansionEntry, IdentityRecord, LineEntry, OpticsName, VolumePlanEntry, metres,
 };
@@ -90,10 +91,7 @@ pub(super) const fn axis_of(name: ErrorName) -> Axis {
 
 /// How many nodes there are along each axis.
 pub(super) fn nodes(config: &VolumetricConfig, own: &VolumetricCalibrateConfig) -> [usize; 3] {
-    core::array::from_fn(|k| {
-        let span = config.high_mm[k] - config.low_mm[k];
-        (span / own.step_mm).ceil().max(2.0) as usize + 1
-    })
+    Axis::ALL.map(|axis| stretches(config, axis, own.step_mm) as usize + 1)
 }
 
 /// Tilts and positioning errors count from the machine's zero, where the volume has it.
@@ -156,6 +154,7 @@ fn of_warmth(config: &VolumetricConfig) -> VolumePlanEntry {
         under: it.under,
         low_m: it.low.value(),
         high_m: it.high.value(),
+        seen_from_m: it.seen_from.map(metres),
     });
     let u = config.temperature.iter();
     let u = u.map(|it| it.standard_uncertainty_k);

@@ -9,6 +9,7 @@ use units::{Celsius, Metres};
 
 use super::Session;
 use crate::assemble::volume_axis;
+use crate::cycle::volumetric::correction::lever;
 use crate::cycle::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -106,6 +107,12 @@ impl Machine {
     ) -> Result<(MovingState, Vec<Celsius>), Failure> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
         let mut state = MovingState::default();
+        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
+            let axis = volume_axis(config.axis);
+            let position = at.along(axis);
+            let roll = self.roll_of(axis, position, config, &seen)?;
+            state.roll[axis.index()] = roll - reference.at(position);
+        }
         for axis in Axis::ALL {
             let beam = session.config.beam.each()[axis.index()];
             let (Some(beam), Some(reference)) = (beam, &session.beams[axis.index()]) else {
@@ -115,13 +122,11 @@ impl Machine {
             let places = self.places_of_beam(axis, position, beam, &seen)?;
             let end = places.1.unwrap_or_else(|| reference.end());
             let shift = reference.beam_shift(end);
-            state.sideways[axis.index()] = reference.displacement(position, places.0, shift);
-        }
-        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
-            let axis = volume_axis(config.axis);
-            let position = at.along(axis);
-            let roll = self.roll_of(axis, position, config, &seen)?;
-            state.roll[axis.index()] = roll - reference.at(position);
+            // How guides bend is still to be found: what the detector sees of that is part of the
+            // unknown (`BendPlan::seen_from`).
+            let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
+            let whole = reference.displacement(position, places.0, shift);
+            state.sideways[axis.index()] = core::array::from_fn(|k| whole[k] - tilts[k]);
         }
         for still in &seen {
             session.thermometry.add(still.now, &still.temperatures)?;

@@ -1,16 +1,43 @@
-//! All that a correction is computed from: how it stands, and how one correction goes on with what
-//! another has seen.
+//! All that a correction is computed from: how it stands, how one correction goes on with what
+//! another has seen, and what is seen without being corrected.
 
 use core::any::Any;
+use core::time::Duration;
 
-use compensator::volumetric::Axis;
-use compensator::volumetric::online::FeedStatus;
+use compensator::volumetric::online::{FeedStatus, StateRecorder};
+use compensator::volumetric::{Axis, Point};
+use units::Time;
 
 use super::super::thermometers::Thermometers;
 use super::VolumetricCorrection;
 use crate::engine::Source;
 
 impl VolumetricCorrection {
+    /// Watches displacements without compensating them from now on: the machine is made to be as it
+    /// is this hour. Tables, roll and temperatures go on. To be said before it is in use.
+    #[must_use]
+    pub fn leaving_displacements(mut self) -> Self {
+        for beam in self.beams.iter_mut().flatten() {
+            let now = Time::ZERO;
+            beam.monitor.feed_mut().disable(now, Duration::ZERO);
+        }
+        self
+    }
+
+    /// Tells `recorder` what displacements the machine was left with in the last period at
+    /// `actual`, beyond what the first memory keeps. Allocates nothing.
+    pub(in crate::cycle::volumetric) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
+        for axis in Axis::ALL {
+            let beam = self.beams[axis.index()].as_ref();
+            let Some(left) = beam.and_then(|it| it.monitor.uncompensated()) else {
+                continue;
+            };
+            let position = actual.along(axis);
+            let beyond = self.memories.beyond_first(axis, position, left);
+            recorder.record(axis, position, beyond);
+        }
+    }
+
     /// What stands behind each value that is used.
     pub(super) fn statuses(&self) -> impl Iterator<Item = (Source, FeedStatus)> {
         let beams = Axis::ALL.into_iter().zip(&self.beams);
