@@ -44,10 +44,6 @@ fn small(text: &str) -> String {
             "to_mm = [60.0, 40.0, 15.0]",
         ),
         ("points = 11", "points = 3"),
-        (
-            "search_speed_mm_per_s = 20.0",
-            "search_speed_mm_per_s = 60.0",
-        ),
         // So slow that a computer with other work to do is in time.
         ("sync_period_ms = 2.0", "sync_period_ms = 20.0"),
         ("every_syncs = 10", "every_syncs = 1"),
