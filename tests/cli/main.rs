@@ -10,4 +10,3 @@ mod screw;
 mod table;
 mod verbs;
 mod volumetric;
-mod volumetric_live;

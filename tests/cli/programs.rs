@@ -27,7 +27,7 @@ pub(crate) fn live_rigs() -> impl Iterator<Item = Rig> {
 }
 
 /// A program of this workspace, beside the tests that cargo built.
-pub(crate) fn program(name: &str) -> PathBuf {
+fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a process knows its program");
     let folder = test.ancestors().nth(2).expect("target/PROFILE/deps/TEST");
     let path = folder.join(name);
@@ -43,7 +43,7 @@ pub(crate) fn program(name: &str) -> PathBuf {
 pub(crate) struct Process(Child);
 
 impl Process {
-    pub(crate) fn start(command: &mut Command) -> Self {
+    fn start(command: &mut Command) -> Self {
         let command = command.stdin(Stdio::null()).stdout(Stdio::piped());
         let child = command.stderr(Stdio::piped()).spawn();
         Self(child.unwrap_or_else(|error| panic!("{command:?}: {error}")))
@@ -69,15 +69,6 @@ impl Process {
             // A signal only makes the next look come sooner.
             let _ = poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS));
         }
-    }
-
-    /// Waits for its end, and shows each line that it tells people meanwhile to `hear`.
-    pub(crate) fn end_heard(mut self, mut hear: impl FnMut(&Self, &str)) -> Ended {
-        let said = self.0.stderr.take().expect("it is piped");
-        for line in BufReader::new(said).lines() {
-            hear(&self, &line.expect("a program prints text"));
-        }
-        self.end()
     }
 
     /// Waits for its end.

@@ -208,7 +208,9 @@ fn what_is_not_the_same_machine_any_more_is_not_continued() {
     assert_eq!((refused.exit_code(), asked.len()), (3, 0));
 
     // Warmer by kelvins, with nothing to tell what that does.
-    let span = Duration::from_secs(3 * 3600);
+    let packed = volume.bench.emulated.clone().pack_up();
+    packed.unwrap_or_else(|failure| panic!("{failure}"));
+    let span = Duration::from_secs(2 * 3600);
     good(volume.bench.machine.idle(span));
     let (refused, asked) = calibrate(&mut volume, Some(&path), None);
     let text = refused.unwrap_err().to_string();
