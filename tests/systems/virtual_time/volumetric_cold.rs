@@ -32,12 +32,11 @@ fn warmth_while_lines_are_read_does_not_get_into_the_errors() {
     let mut hand = volume.bench.emulated.clone();
     let cold = volume.truth(|truth| truth.scale_temperature(0));
     let machine = &mut volume.bench.machine;
-    let made = good(machine.calibrate_volumetric(&store, WarmUp::None, &mut hand));
+    let made = good(machine.calibrate_volumetric(&store, WarmUp::None, None, &mut hand));
     let warmer = volume.truth(|truth| truth.scale_temperature(0)) - cold;
     assert!(warmer.value() > 0.7, "{warmer}");
-    let bends = made.unknown_bends.iter().map(|it| (it.axis, it.towards));
-    assert_eq!(bends.count(), 3, "nobody knows how guides bend");
-    assert!(made.found.bends.is_empty() && made.without_effect.is_empty());
+    assert_eq!(made.unknown.bends.len(), 3, "nobody knows how guides bend");
+    assert!(made.found.bends.is_empty() && made.unknown.without_effect.is_empty());
     let id = store.active(GEOMETRY).expect("it can be read").current;
     let record = store.load(id.as_ref().expect("it is in use"));
     let record = record.expect("it can be read");
