@@ -6,12 +6,12 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use tests::VOLUMETRIC;
 use tests::volume::{Volume, good, quick};
-use tests::{Rig, VOLUMETRIC};
 use truestage::cycle::volumetric::{VerifyBy, WarmUp};
 use truestage::store::{OpticsName, read_journal};
 
-use crate::programs::{Bench, live_rigs, truestage};
+use crate::programs::truestage;
 
 /// A machine that was calibrated twice and verified before and after, in virtual time.
 struct Runs {

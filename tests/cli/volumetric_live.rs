@@ -16,7 +16,11 @@ use truestage::cycle::volumetric::{LineOptics, LineTask, volume_plan};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::{ReadJournal, read_journal};
 
-use crate::programs::{Ended, Process, live_rigs, one_machine, program, speed};
+use crate::programs::{Ended, Process, live_rigs, one_machine, program};
+
+/// How much faster than the wall's clock the machine lives: its drives ask for a set-point every
+/// 10 ms of the wall, and no more of a computer.
+const SPEED: f64 = 2.0;
 
 /// A corner of the volume, few nodes and short averages: every verb works, and none takes long.
 fn small(text: &str) -> String {
@@ -40,6 +44,13 @@ fn small(text: &str) -> String {
             "to_mm = [60.0, 40.0, 15.0]",
         ),
         ("points = 11", "points = 3"),
+        (
+            "search_speed_mm_per_s = 20.0",
+            "search_speed_mm_per_s = 60.0",
+        ),
+        // So slow that a computer with other work to do is in time.
+        ("sync_period_ms = 2.0", "sync_period_ms = 20.0"),
+        ("every_syncs = 10", "every_syncs = 1"),
     ];
     changes.iter().fold(text.to_owned(), |text, (from, to)| {
         assert!(text.contains(from), "`{from}` is not in the text");
@@ -50,7 +61,6 @@ fn small(text: &str) -> String {
 /// The machine, and where its files are.
 struct Live {
     emulated: EmulatedOnPtys,
-    speed: String,
     folder: tempfile::TempDir,
     _turn: MutexGuard<'static, ()>,
 }
@@ -58,15 +68,12 @@ struct Live {
 impl Live {
     fn new() -> Self {
         let turn = one_machine();
-        let speed = speed(Rig::Pty);
-        let factor = speed.parse().expect("a number");
-        let emulated = EmulatedOnPtys::start(VOLUMETRIC.emulated, 51, factor);
+        let emulated = EmulatedOnPtys::start(VOLUMETRIC.emulated, 51, SPEED);
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let text = small(VOLUMETRIC.machine);
         fs::write(folder.path().join("machine.toml"), text).expect("there is room");
         Self {
             emulated: emulated.unwrap_or_else(|error| panic!("{error}")),
-            speed,
             folder,
             _turn: turn,
         }
@@ -75,7 +82,9 @@ impl Live {
     fn start(&self, words: &[&str]) -> Process {
         let mut command = Command::new(program("truestage"));
         command.current_dir(self.folder.path()).arg("--json");
-        command.args(words).args(["--clock-speed", &self.speed]);
+        command
+            .args(words)
+            .args(["--clock-speed", &SPEED.to_string()]);
         for line in self.emulated.description() {
             let mut words = line.split_whitespace();
             let mut next = || words.next().expect("NAME KIND PATH");
@@ -249,23 +258,23 @@ fn follows(live: &Live) {
         fs::write(live.folder.path().join("path.csv"), csv).expect("there is room");
         live.run(&["run", "machine.toml", "path.csv"])
     };
-    // Half a cosine from 0 to 2 mm in half a second: no jerk beyond that of the axes.
-    let rows = (0..=250).map(|n: u32| {
-        let share = f64::from(n) / 250.0;
-        let at = 1.0 - (core::f64::consts::PI * share).cos();
-        format!("{:.3},{at:.6},{at:.6},{at:.6}\n", f64::from(n) * 0.002)
+    // From 0 to 2 mm in two seconds, without a jerk: 10 s³ - 15 s⁴ + 6 s⁵.
+    let rows = (0..=100).map(|n: u32| {
+        let share = f64::from(n) / 100.0;
+        let at = 2.0 * share.powi(3) * (10.0 - 15.0 * share + 6.0 * share.powi(2));
+        format!("{:.3},{at:.6},{at:.6},{at:.6}\n", f64::from(n) * 0.02)
     });
     let rows: String = rows.collect();
     let followed = run(&rows).with_code(0);
     assert_eq!(
         (&followed["points"], &followed["corrected"]),
-        (&251.into(), &true.into())
+        (&101.into(), &true.into())
     );
     check_error(
-        &run("0.0,0,0,0\n0.002,zero,0,0\n").with_code(2),
+        &run("0.0,0,0,0\n0.020,zero,0,0\n").with_code(2),
         &["path.csv"],
     );
-    let far = run("0.0,0,0,0\n0.002,900,0,0\n");
+    let far = run("0.0,0,0,0\n0.020,900,0,0\n");
     assert!(matches!(far.code, Some(2 | 3)), "{far:?}");
     check_error(&far.json, &["x"]);
     let far = live.run(&["move", "machine.toml", "x=900mm"]).with_code(3);

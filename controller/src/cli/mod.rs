@@ -198,11 +198,21 @@ struct RunArgs {
     #[command(flatten)]
     machine: MachineArgs,
     /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
-    path: PathBuf,
+    path: Option<PathBuf>,
     /// The first of several parts: what the detectors see meanwhile is not corrected but recorded
     /// as the second memory, and all later parts are made with it, like this one.
     #[arg(long)]
     first_part: bool,
+}
+
+impl RunArgs {
+    /// `truestage run path.csv` means `./machine.toml`, as with every verb.
+    fn settle(mut self) -> (MachineArgs, PathBuf) {
+        let path = self
+            .path
+            .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
+        (self.machine, path)
+    }
 }
 
 /// Which way round a rotary axis goes.
@@ -306,7 +316,11 @@ pub(crate) fn main() -> ExitCode {
             })
         }
         Command::Reference(args) => volume::reference(&args, output),
-        Command::Run(args) => part::run(&args, output),
+        Command::Run(args) => {
+            let is_first = args.first_part;
+            let (machine, path) = args.settle();
+            part::run(&machine, &path, is_first, output)
+        }
         Command::Memory(MemoryCommand::Record(args)) => part::memory_record(&args, output),
         Command::Memory(MemoryCommand::Clear(args)) => part::memory_clear(&args, output),
         Command::Cal(command) => cal::run(&command, output),
@@ -337,6 +351,27 @@ mod tests {
         Cli::try_parse_from(words)
             .unwrap_or_else(|error| panic!("{error}"))
             .command
+    }
+
+    #[test]
+    fn every_verb_can_be_parsed() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_path_without_a_configuration_is_run_on_the_machine_here() {
+        let settled = |words: &[&str]| match parsed(words) {
+            Command::Run(args) => args.settle(),
+            _ => panic!("another verb"),
+        };
+        let (machine, path) = settled(&["run", "p.csv"]);
+        assert_eq!(
+            (machine.config, path),
+            ("machine.toml".into(), "p.csv".into())
+        );
+        let (machine, path) = settled(&["run", "m.toml", "p.csv"]);
+        assert_eq!((machine.config, path), ("m.toml".into(), "p.csv".into()));
     }
 
     #[test]

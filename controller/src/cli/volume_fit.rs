@@ -22,7 +22,7 @@ use units::Radians;
 
 use super::data::{read, volume_head_of};
 use super::output::{Ended, Output};
-use super::volume::{found_value, warmth_text};
+use super::volume::{add_unknown, found_value, unknown_text, warmth_text};
 use super::volumetric::shown;
 
 /// What `truestage fit volumetric` is told.
@@ -237,7 +237,7 @@ fn save(
         None => None,
     };
     evaluated.check(machine, references)?;
-    let content = Content::VolumetricGeometry(evaluated.content());
+    let content = Content::VolumetricGeometry(evaluated.content(own));
     let record = CalibrationRecord { head, content };
     let geometry = store.save(&record)?;
     let references = references.map(|it| {

@@ -101,16 +101,8 @@ impl Machine {
         let cause = self.holding_back(|machine| {
             machine.with_own_sync(|it| it.run_periods(engine, &mut seats, host))
         })?;
-        // A drive that changes its mode while it moves may do anything.
-        self.await_rest(engine, &seats)?;
-        for at in &seats.drive[..seats.count] {
-            self.control(
-                *at,
-                DriveCommand::LeaveCyclic,
-                "leaving the cyclic mode",
-                CHANGE_LIMIT,
-            )?;
-        }
+        let leave = DriveCommand::LeaveCyclic;
+        self.change_at_rest(engine, &seats, leave, "leaving the cyclic mode")?;
         for axis in &engine.axes {
             self.remember(axis).approach.forget();
         }
@@ -189,6 +181,22 @@ impl Machine {
         Ok(())
     }
 
+    /// A drive that changes its mode while it moves may do anything. One change takes some periods,
+    /// and another axis may creep meanwhile: before each of them all must stand.
+    fn change_at_rest(
+        &mut self,
+        engine: &Engine,
+        seats: &Seats,
+        change: DriveCommand,
+        step: &'static str,
+    ) -> Result<(), Failure> {
+        for at in &seats.drive[..seats.count] {
+            self.await_rest(engine, seats)?;
+            self.control(*at, change, step, CHANGE_LIMIT)?;
+        }
+        Ok(())
+    }
+
     fn moves(&self, at: usize) -> bool {
         let device = &self.axes[at].device;
         device.power_state() == Some(PowerState::OperationEnabled)
@@ -221,9 +229,7 @@ impl Machine {
         let period = engine.period;
         let enter = DriveCommand::EnterCyclic { period };
         let mut held = [Metres::ZERO; AXES_MAX];
-        for at in &seats.drive[..seats.count] {
-            self.control(*at, enter, "entering the cyclic mode", CHANGE_LIMIT)?;
-        }
+        self.change_at_rest(engine, seats, enter, "entering the cyclic mode")?;
         for at in &seats.drive[..seats.count] {
             self.control(*at, DriveCommand::Enable, "enable", CHANGE_LIMIT)?;
         }

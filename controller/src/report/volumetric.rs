@@ -74,6 +74,10 @@ fn facts_of_run(
     let mut facts = super::facts_of(journal);
     // Readings of lines are no points, and three axes no axis.
     facts.retain(|(name, _)| name != "points" && name != "axis" && name != "drive");
+    // Who the instrument is shows when it is switched on, after the journal was begun.
+    for (_, value) in facts.iter_mut().filter(|(name, _)| name == "instrument") {
+        *value = value.replacen(" ()", "", 1);
+    }
     let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
     let read = &journal.volume;
     if let Some(plan) = &read.plan {
@@ -222,10 +226,18 @@ fn place(metres: [f64; 3]) -> String {
 /// What the thermometers showed, over the time of the machine.
 fn temperatures(readings: &[LineReadingEntry]) -> String {
     let count = readings.iter().map(|it| it.temperatures_c.len()).max();
+    let span_s = match readings {
+        [first, .., last] => last.at_s - first.at_s,
+        _ => 0.0,
+    };
+    let (seconds, label) = match span_s < 3600.0 {
+        true => (60.0, "time of the machine (min)"),
+        false => (3600.0, "time of the machine (h)"),
+    };
     let each = (0..count.unwrap_or(0).min(THERMOMETERS.len())).map(|at| {
         let shown = readings.iter().filter_map(|it| {
             let celsius = it.temperatures_c.get(at).copied().flatten()?;
-            Some((it.at_s / 3600.0, celsius))
+            Some((it.at_s / seconds, celsius))
         });
         let colour = COLOURS[at % COLOURS.len()];
         line(THERMOMETERS[at], colour, shown.collect())
@@ -234,11 +246,7 @@ fn temperatures(readings: &[LineReadingEntry]) -> String {
     if series.is_empty() {
         return String::new();
     }
-    let chart = super::chart::chart_about(
-        "Temperatures",
-        ("time of the machine (h)", "thermometer (°C)"),
-        &series,
-    );
+    let chart = super::chart::chart_about("Temperatures", (label, "thermometer (°C)"), &series);
     format!("<h2>Temperatures</h2><figure>{chart}</figure>")
 }
 

@@ -191,9 +191,14 @@ fn what_is_not_the_same_machine_any_more_is_not_continued() {
     let text = refused.unwrap_err().to_string();
     assert!(text.contains("--warm-up-min"), "{text}");
 
-    // Guides of another machine: its detectors see other curves.
+    // Guides of another machine: its detectors see other curves, whatever its warmth.
+    calibrate_by(&mut volume, warm_up, None, Some(2))
+        .0
+        .unwrap_err();
+    let with_warm_lines = journal_of(&volume);
+    assert_ne!(with_warm_lines, path);
     let mut other = Volume::zeroed(2, quick, |text| text);
-    let (refused, asked) = calibrate(&mut other, Some(&path), None);
+    let (refused, asked) = calibrate_by(&mut other, warm_up, Some(&with_warm_lines), None);
     let refused = refused.unwrap_err();
     let text = refused.to_string();
     assert!(

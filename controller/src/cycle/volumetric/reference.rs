@@ -395,6 +395,13 @@ fn mean_roll(
     Ok(mean)
 }
 
+/// How far a thermometer may be from what it showed, in kelvin, for the machine to count as warm as it
+/// was.
+pub(super) fn warmth_tolerance_k(config: &VolumetricConfig) -> f64 {
+    let own = config.reference.and_then(|it| it.warmth_tolerance_k);
+    own.unwrap_or(WARMTH_TOLERANCE_K)
+}
+
 /// Whether the machine is as warm as when its errors were measured, thermometer by thermometer and
 /// across each guide that bends.
 fn check_warmth(
@@ -407,8 +414,7 @@ fn check_warmth(
     if seen != expected {
         return Err(VolumetricFailure::Temperatures { seen, expected });
     }
-    let own = config.reference.and_then(|it| it.warmth_tolerance_k);
-    let limit_k = own.unwrap_or(WARMTH_TOLERANCE_K);
+    let limit_k = warmth_tolerance_k(config);
     let geometry = short(geometry);
     for (index, (then, now)) in then.iter().zip(now).enumerate() {
         if (*now - *then).abs().value() > limit_k {

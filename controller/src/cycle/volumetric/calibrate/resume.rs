@@ -14,6 +14,7 @@ use units::{Metres, Radians};
 
 use crate::assemble::{beam_drift, volume_axis};
 use crate::config::{BeamConfig, VolumetricCalibrateConfig, VolumetricConfig};
+use crate::cycle::volumetric::reference::warmth_tolerance_k;
 use crate::cycle::volumetric::{References, VolumetricFailure};
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -21,11 +22,6 @@ use crate::store::{
     AXES, Entry, Journal, JournalHeader, Store, StoreError, VolumePlanEntry, VolumeRead,
     VolumeReferencesEntry,
 };
-
-/// How far from where it was interrupted the machine may be in temperature when nothing is to tell
-/// what warmth does, in standard uncertainties of a thermometer. Lines must differ by as much to
-/// tell it (`compensator::volumetric::identify`): closer ones count as read at one warmth.
-const ALIKE: f64 = 10.0;
 
 /// A new journal, or one that is continued after its last whole line.
 pub(super) fn open(
@@ -164,12 +160,8 @@ fn same_warmth(
     }
     let last = read.whole.last().map(|it| &it.temperatures_c);
     let before = last.unwrap_or(&kept.temperatures_c);
-    let pairs = before
-        .iter()
-        .zip(&taken.temperatures)
-        .zip(&config.temperature);
-    for (at, ((before, seen), thermometer)) in pairs.enumerate() {
-        let limit = ALIKE * thermometer.standard_uncertainty_k;
+    let limit = warmth_tolerance_k(config);
+    for (at, (before, seen)) in before.iter().zip(&taken.temperatures).enumerate() {
         let difference = (seen.value() - before).abs();
         // A comparison with NaN is false, so that it is refused too.
         let is_alike = difference <= limit;
