@@ -207,12 +207,11 @@ struct RunArgs {
 
 impl RunArgs {
     /// `truestage run path.csv` means `./machine.toml`, as with every verb.
-    fn settle(mut self) -> (Self, PathBuf) {
+    fn settle(mut self) -> (MachineArgs, PathBuf) {
         let path = self
             .path
-            .take()
             .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
-        (self, path)
+        (self.machine, path)
     }
 }
 
@@ -318,8 +317,9 @@ pub(crate) fn main() -> ExitCode {
         }
         Command::Reference(args) => volume::reference(&args, output),
         Command::Run(args) => {
-            let (args, path) = args.settle();
-            part::run(&args, &path, output)
+            let is_first = args.first_part;
+            let (machine, path) = args.settle();
+            part::run(&machine, &path, is_first, output)
         }
         Command::Memory(MemoryCommand::Record(args)) => part::memory_record(&args, output),
         Command::Memory(MemoryCommand::Clear(args)) => part::memory_clear(&args, output),
@@ -362,10 +362,7 @@ mod tests {
     #[test]
     fn a_path_without_a_configuration_is_run_on_the_machine_here() {
         let settled = |words: &[&str]| match parsed(words) {
-            Command::Run(args) => {
-                let (args, path) = args.settle();
-                (args.machine, path)
-            }
+            Command::Run(args) => args.settle(),
             _ => panic!("another verb"),
         };
         let (machine, path) = settled(&["run", "p.csv"]);

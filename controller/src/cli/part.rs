@@ -6,7 +6,7 @@ use std::path::Path;
 use compensator::volumetric::Axis;
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::Remembered;
-use truestage::engine::{CsvError, Lack, Live, NoCorrection, Validity, read_path};
+use truestage::engine::{CsvError, Engine, Lack, Live, NoCorrection, Validity, read_path};
 use truestage::ports::Use;
 use truestage::store::{MemoryName, short};
 use truestage::{Failure, Machine, Store};
@@ -16,7 +16,7 @@ use super::data::read;
 use super::output::{Ended, Output};
 use super::session::Session;
 use super::volume::with_zeroed_volume;
-use super::{MemoryArgs, RunArgs};
+use super::{MachineArgs, MemoryArgs};
 
 /// How a path was followed.
 struct Followed {
@@ -27,13 +27,19 @@ struct Followed {
     kept: Option<Remembered>,
 }
 
-pub(super) fn run(args: &RunArgs, file: &Path, output: Output) -> Ended {
+pub(super) fn run(machine: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
     let path = read(file)?;
     let follow = |machine: &mut Machine, store: &Store| {
-        followed(machine, store, args.first_part, (file, &path))
+        let points = |engine: &Engine| {
+            let points = read_path(&path, engine.axes(), engine.period());
+            points.map_err(|source: CsvError| Failure::Usage {
+                what: format!("{}: {source}", file.display()),
+                help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
+            })
+        };
+        followed(machine, store, is_first, points)
     };
-    let (followed, counters) =
-        with_zeroed_volume(&args.machine, "run", Use::Motion, output, follow)?;
+    let (followed, counters) = with_zeroed_volume(machine, "run", Use::Motion, output, follow)?;
     let said = match &followed.corrected {
         Some(corrected) => corrected.text(),
         None => "uncorrected: the errors were never measured".into(),
@@ -60,7 +66,7 @@ fn followed(
     machine: &mut Machine,
     store: &Store,
     is_first: bool,
-    (file, path): (&Path, &str),
+    points: impl FnOnce(&Engine) -> Result<Vec<Vec<Metres>>, Failure>,
 ) -> Result<Followed, Failure> {
     let (mover, part) = match is_first {
         true => {
@@ -74,12 +80,7 @@ fn followed(
         Some(mover) => mover,
         None => machine.volumetric_mover(Box::new(NoCorrection))?,
     };
-    let engine = mover.engine();
-    let points = read_path(path, engine.axes(), engine.period());
-    let points = points.map_err(|source: CsvError| Failure::Usage {
-        what: format!("{}: {source}", file.display()),
-        help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
-    })?;
+    let points = points(mover.engine())?;
     machine.correct_volume(&mut mover, is_corrected)?;
     if let Some(part) = &part {
         part.recorder.listen();

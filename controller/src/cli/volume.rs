@@ -1,7 +1,6 @@
 //! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
 
 use core::time::Duration;
-use std::path::Path;
 
 use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
@@ -16,7 +15,6 @@ use truestage::store::{UnknownRecord, short};
 use truestage::{Failure, Machine, Store, json as to_json};
 use units::Metres;
 
-use super::data::read;
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::session::Session;
