@@ -24,7 +24,8 @@ const SECOND: u64 = 500;
 const FAULT_AT: u64 = SECOND;
 const STAND: Duration = Duration::from_secs(6);
 /// Where a false gradient does most and an expansion little: high up over the end of the x guide.
-const PLACE: [f64; 3] = [50.0, 200.0, 250.0];
+/// Near y's zero too: farther out its expansion would hide what the roll does to the tables alone.
+const PLACE: [f64; 3] = [50.0, 20.0, 250.0];
 /// The thermometer over the x guide's neutral plane, and a roll detector, at the plant's terminals.
 const OVER: usize = 26;
 const ROLL: usize = 24;
@@ -275,7 +276,6 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
         let last = stood.moments.last().expect("there are some");
         let moved = size(core::array::from_fn(|k| last.off[k] - before[k]));
         assert!(moved < Metres::from_um(0.5), "{}: {moved}", stood.text);
-        assert!(last.live.uncertainty[0].value().is_nan(), "nobody knows");
     }
 }
 

@@ -65,19 +65,8 @@ impl VolumetricModel {
             let known = u_temperatures.get(at).copied();
             known.unwrap_or(thermal.channels[at].u)
         };
-        for (at, channel) in thermal.channels.iter().enumerate() {
-            let mut one = ThermalSums::default();
-            one.add(channel, 1.0, false);
-            let lean = lean_effect(Squareness::lean(one.squareness), command);
-            let scale: V3 = core::array::from_fn(|k| one.expansion[k] * way[k]);
-            let mut effect = add(add(lean, scale), one.growth);
-            for bend in &thermal.bends {
-                let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
-                let within = bend.share_within(gradient, u_of_channel);
-                let bows = bend.bow.value() * bend.share(at) * within;
-                let arc = self.arc_effect(bend, command, now);
-                effect = core::array::from_fn(|k| effect[k] + arc[k] * bows);
-            }
+        for at in 0..thermal.channels.len() {
+            let effect = self.effect_of_channel(at, command, now, &u_of_channel);
             combine(effect, u_of_channel(at));
         }
         for axis in Axis::ALL {
@@ -91,6 +80,31 @@ impl VolumetricModel {
             combine(effect, bend.u.value() * gradient);
         }
         Ok(Point::of(squares.map(f64::sqrt)))
+    }
+
+    /// What a kelvin of one thermometer moves the tool by, as far as uncertainties can make it.
+    fn effect_of_channel(
+        &self,
+        at: usize,
+        command: Point,
+        now: &Conditions,
+        u_of_channel: impl Fn(usize) -> f64,
+    ) -> V3 {
+        let thermal = &self.machine.thermal;
+        let way = (command - thermal.fixed).array();
+        let mut one = ThermalSums::default();
+        one.add(&thermal.channels[at], 1.0, false);
+        let lean = lean_effect(Squareness::lean(one.squareness), command);
+        let scale: V3 = core::array::from_fn(|k| one.expansion[k] * way[k]);
+        let mut effect = add(add(lean, scale), one.growth);
+        for bend in &thermal.bends {
+            let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
+            let within = bend.share_within(gradient, &u_of_channel);
+            let bows = bend.bow.value() * bend.share(at) * within;
+            let arc = self.arc_effect(bend, command, now);
+            effect = core::array::from_fn(|k| effect[k] + arc[k] * bows);
+        }
+        effect
     }
 
     /// What a guide's arc of height 1 moves the tool by.
