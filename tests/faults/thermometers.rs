@@ -11,7 +11,7 @@ use tests::volume::{Off, Volume, good, point_mm, size};
 use truestage::Failure;
 use truestage::cycle::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
 use truestage::engine::{Cause, Live};
-use units::{Metres, Time};
+use units::{Metres, Quantity, Time};
 
 /// When the machine becomes warm, and when it is.
 const WARMS_S: f64 = 360.0;
