@@ -149,6 +149,7 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     assert!((here(&bench) - outside).abs() < Metres::from_um(10.0));
     // What it advises.
     let machine = &mut bench.machine;
+    machine.reset_fault("x").unwrap();
     machine.zero("x", &bench.store).unwrap();
     machine.move_to("x", Metres::from_mm(50.0)).unwrap();
     assert_eq!(follow(machine).unwrap(), Cause::PathDone);
