@@ -7,7 +7,6 @@ use drivers::wire::canopen::emcy::EmergencyCode;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
 use truestage::engine::EngineFailure;
-use units::Metres;
 
 use crate::scene::{HEARTBEAT, PERIOD, Phase, STOPPING, Scene, Wanted, check, check_harmless};
 

@@ -50,10 +50,9 @@ fn warm(reaction: &str) -> Volume {
     let emulated = |text: String| {
         let cold_first = "{ from_h = 0.0, share = 0.0 },\n{ from_h = 0.1, share = 1.0 },";
         let text = replaced(&text, "{ from_h = 0.0, share = 0.8 },", cold_first);
-        let text = replaced(&text, "scale_warming_k = 1.5", "scale_warming_k = 2.5");
         let quick = "scale_time_constant_min = 1.0";
         let text = replaced(&text, "scale_time_constant_min = 60.0", quick);
-        let text = replaced(&text, "\ngradient_k = 1.0", "\ngradient_k = 0.1");
+        let text = replaced(&text, "\ngradient_k = 1.2", "\ngradient_k = 0.1");
         let roll = "deliberate_roll_arcsec = 5.0";
         let text = replaced(&text, "deliberate_roll_arcsec = 0.0", roll);
         replaced(&text, "deliberate_from_h = 0.0", "deliberate_from_h = 0.1")

@@ -254,7 +254,7 @@ mod tests {
             };
             warm.run(300, |_| [Some(Celsius(22.0)); 6]);
             assert_eq!(warm.shown, [Celsius(22.0); 6]);
-            assert_eq!(warm.thermometers.u_kelvin(), [0.03; 6]);
+            assert_eq!(warm.thermometers.u_kelvin(), [0.01; 6]);
             warm
         }
 
@@ -298,7 +298,7 @@ mod tests {
             // From 20 to 35 °C, evenly.
             let unknown = 15.0 / 3.0_f64.sqrt();
             assert!(u[..2].iter().all(|it| (it - unknown).abs() < 1e-9), "{u:?}");
-            assert_eq!(u[2..], [0.03; 4]);
+            assert_eq!(u[2..], [0.01; 4]);
             let troubled = warm.thermometers.statuses();
             let troubled = troubled.filter(|it| matches!(it, FeedStatus::Faded(_)));
             assert_eq!(troubled.count(), 2);
@@ -312,7 +312,7 @@ mod tests {
             );
             warm.run(150, |_| [good; 6]);
             assert_eq!(warm.shown, [Celsius(22.0); 6]);
-            assert_eq!(warm.thermometers.u_kelvin(), [0.03; 6]);
+            assert_eq!(warm.thermometers.u_kelvin(), [0.01; 6]);
         }
     }
 

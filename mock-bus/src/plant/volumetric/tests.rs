@@ -174,8 +174,8 @@ fn twenty_machines_err_by_30_um_and_drift_by_10_um_in_8_hours() {
         println!("seed {seed}: {cold:.1} µm, after 8 h {warm:.1} µm, drift {drift:.1} µm");
         assert!(cold >= 30.0 && warm >= 30.0, "seed {seed}: {cold} {warm}");
         assert!(drift >= 10.0, "seed {seed}: {drift}");
-        // Nothing that no correction could be for.
-        assert!(cold < 150.0 && warm < 200.0, "seed {seed}: {cold} {warm}");
+        // Nothing that no correction could be for: the shipped one is limited to 250 µm.
+        assert!(cold < 225.0 && warm < 225.0, "seed {seed}: {cold} {warm}");
     }
 }
 

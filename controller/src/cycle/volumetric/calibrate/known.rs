@@ -158,20 +158,20 @@ mod tests {
         }
     }
 
-    /// 0.5 K make 10 ppm/K · 0.5 m = 2.5 µm along x; its two thermometers are 0.03 K sure each.
+    /// 0.5 K make 10 ppm/K · 0.5 m = 2.5 µm along x; its two thermometers are 0.01 K sure each.
     #[test]
     fn warmth_between_lines_is_taken_off_by_what_is_known_of_it() {
         let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
         let half = [0.5; 6];
-        let scale_u = |mm: f64| 0.03 * 5e-6 * mm * 1e3;
+        let scale_u = |mm: f64| 0.01 * 5e-6 * mm * 1e3;
         // The squareness leans y by 0.5 arcsec towards x: 400 mm of it are 0.97 µm, negative.
         let lean = Radians::from_arcsec(0.5).value() * 400e3;
-        let lean_u = Radians::from_arcsec(0.03).value() * 400e3;
+        let lean_u = Radians::from_arcsec(0.01).value() * 400e3;
         let x_u = (scale_u(500.0) - lean_u).hypot(scale_u(500.0)).hypot(0.02);
         check(false, x, half, [2.5 - lean, x_u]);
         let y_u = scale_u(400.0).hypot(scale_u(400.0)).hypot(0.02);
         check(false, y, half, [2.0, y_u]);
-        let growth_u = 0.03 * 2.0;
+        let growth_u = 0.01 * 2.0;
         let z_u = scale_u(300.0)
             .hypot(scale_u(300.0))
             .hypot(growth_u)
@@ -185,7 +185,7 @@ mod tests {
     fn what_warm_lines_tell_is_left_in_the_readings() {
         let (y, z) = ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
         check(true, y, [0.5; 6], [0.0, 0.02]);
-        check(true, z, [0.5; 6], [1.0, 0.06_f64.hypot(0.02)]);
+        check(true, z, [0.5; 6], [1.0, 0.02_f64.hypot(0.02)]);
     }
 
     #[test]

@@ -1,0 +1,96 @@
+//! What a shell script learns of a failure.
+
+use super::Failure;
+use crate::emulated::EmulatedError;
+use crate::store::StoreError;
+
+impl Failure {
+    /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus,
+    /// 5 the result is out of tolerance.
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Platform(failure) => failure.exit_code(),
+            Self::Table(failure) => failure.exit_code(),
+            Self::Engine(failure) => failure.exit_code(),
+            Self::Volumetric(failure) => failure.exit_code(),
+            Self::Config(_)
+            | Self::NotConfigured { .. }
+            | Self::NoSuchAxis { .. }
+            | Self::NoSuchCamera { .. }
+            | Self::Figures(_)
+            | Self::Data(_)
+            | Self::Series(_)
+            | Self::Screw { .. }
+            | Self::Rotary { .. }
+            | Self::Misplaced { .. }
+            | Self::Plan(_)
+            | Self::SearchSettings { .. }
+            | Self::File { .. }
+            | Self::Usage { .. }
+            | Self::Store(
+                StoreError::Io { .. }
+                | StoreError::Unknown { .. }
+                | StoreError::Ambiguous { .. }
+                | StoreError::NoEarlier { .. }
+                | StoreError::AlreadyComplete { .. },
+            )
+            | Self::Emulator(EmulatedError::Config(_) | EmulatedError::NoPort { .. }) => 2,
+            Self::SoftLimit { .. }
+            | Self::NotZeroed { .. }
+            | Self::NotStarted { .. }
+            | Self::Store(_)
+            | Self::Compensation { .. }
+            | Self::ScrewCompensation { .. }
+            | Self::RotaryCompensation { .. }
+            | Self::OutOfCalibration { .. }
+            | Self::Jump { .. }
+            | Self::ScaleMismatch { .. } => 3,
+            Self::Open(_)
+            | Self::Send { .. }
+            | Self::Link { .. }
+            | Self::BusOff { .. }
+            | Self::SecondMaster { .. }
+            | Self::Babbling { .. }
+            | Self::FringeJump { .. }
+            | Self::Alarm { .. }
+            | Self::Device { .. }
+            | Self::Overdue { .. }
+            | Self::Search { .. }
+            | Self::NoLines { .. }
+            | Self::Correction { .. }
+            | Self::Interrupted
+            | Self::ScanMismatch { .. }
+            | Self::Emulator(_) => 4,
+            Self::ZeroUncertain { .. }
+            | Self::Refine { .. }
+            | Self::Closure { .. }
+            | Self::Fit { .. }
+            | Self::MadeWorse { .. }
+            | Self::OutOfTolerance { .. } => 5,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use units::Metres;
+
+    use super::*;
+
+    #[track_caller]
+    fn check(failure: Failure, exit_code: u8) {
+        assert_eq!(failure.exit_code(), exit_code, "{failure}");
+    }
+
+    #[test]
+    fn the_exit_code_says_whose_turn_it_is() {
+        let id = || "abc".to_owned();
+        check(StoreError::Unknown { id: id() }.into(), 2);
+        check(StoreError::Leased { owner: id() }.into(), 3);
+        check(Failure::NotZeroed { axis: id() }, 3);
+        check(Failure::ScanMismatch { wrong: 1 }, 4);
+        let (seen, limit) = (Metres(2e-6), Metres(1e-6));
+        let axis = id();
+        check(Failure::OutOfTolerance { axis, seen, limit }, 5);
+    }
+}
