@@ -273,9 +273,7 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
         let stopped = stood.moments.len() as u64;
         let soon = FAULT_AT + SECOND / 5..=FAULT_AT + SECOND / 3;
         assert!(soon.contains(&stopped), "{stopped}");
-        let last = stood.moments.last().expect("there are some");
-        let moved = size(core::array::from_fn(|k| last.off[k] - before[k]));
-        assert!(moved < Metres::from_um(0.5), "{}: {moved}", stood.text);
+        stood.check(before.map(|it| it.abs() + Metres::from_um(0.5)));
     }
 }
 
