@@ -5,12 +5,12 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::Point;
+use compensator::volumetric::{Axis, Point};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::volume::{Off, Volume, good, point_mm, size};
 use truestage::Failure;
 use truestage::cycle::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
-use truestage::engine::{Cause, Live};
+use truestage::engine::{Cause, Live, Source};
 use units::{Metres, Quantity, Time};
 
 /// When the machine becomes warm, and when it is.
@@ -90,8 +90,9 @@ impl Stood {
         self.moments[period as usize - 1].off
     }
 
-    /// Whether the tool is never farther off than `most` along any direction, nor than twice the
-    /// standard uncertainty that is stated, and no set-point jumps.
+    /// Whether the tool is never farther off than `most` along any direction, nor than three times
+    /// the standard uncertainty that is stated (the sensors of one machine are one draw, the same in
+    /// all that is looked at), and no set-point jumps.
     #[track_caller]
     fn check(&self, most: Off) {
         for (period, Moment { live, off }) in self.moments.iter().enumerate() {
@@ -103,7 +104,7 @@ impl Stood {
                     off.um()
                 );
                 assert!(off <= most, "{text}, {} um at most", most.um());
-                assert!(off <= u * 2.0, "{text}, u {} um", u.um());
+                assert!(off <= u * 3.0, "{text}, u {} um", u.um());
             }
         }
         for (period, pair) in self.moments.windows(2).enumerate() {
@@ -258,23 +259,22 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
     let mut volume = warm("stop");
     let [broken, ..] = of_one_thermometer();
     let [saturated, _] = of_the_roll();
-    for fault in [broken, saturated] {
+    let sources = [Source::Thermometer(0), Source::Roll(Axis::X)];
+    for (fault, source) in [broken, saturated].into_iter().zip(sources) {
         let stood = stand(&mut volume, fault, 2 * SECOND);
         let before = stood.off(FAULT_AT);
         let Err(Failure::Volumetric(VolumetricFailure::NotThere { cause })) = &stood.result else {
             panic!("{}: {:?}", stood.text, stood.result)
         };
-        let Cause::Correction { reason } = cause else {
+        let Cause::CorrectionLost { lack } = cause else {
             panic!("{}: {cause}", stood.text)
         };
-        assert!(reason.contains("thermometer"), "{reason}");
+        assert_eq!(lack.source, source, "{lack}");
         // 200 ms of patience, and some periods.
         let stopped = stood.moments.len() as u64;
         let soon = FAULT_AT + SECOND / 5..=FAULT_AT + SECOND / 3;
         assert!(soon.contains(&stopped), "{stopped}");
-        let last = stood.moments.last().expect("there are some");
-        let moved = size(core::array::from_fn(|k| last.off[k] - before[k]));
-        assert!(moved < Metres::from_um(0.5), "{}: {moved}", stood.text);
+        stood.check(before.map(|it| it.abs() + Metres::from_um(0.5)));
     }
 }
 

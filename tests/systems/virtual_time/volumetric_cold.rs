@@ -8,10 +8,10 @@ use units::Metres;
 fn warming(text: String) -> String {
     let mut text = text;
     for (from, to) in [
-        ("scale_warming_k = 2.5", "scale_warming_k = 3.0"),
+        ("scale_warming_k = 2.5", "scale_warming_k = 4.0"),
         (
             "scale_time_constant_min = 60.0",
-            "scale_time_constant_min = 15.0",
+            "scale_time_constant_min = 6.0",
         ),
         ("\ngradient_k = 1.2", "\ngradient_k = 0.05"),
         ("gradient_of_air = 0.3", "gradient_of_air = 0.02"),
