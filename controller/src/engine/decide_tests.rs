@@ -321,9 +321,9 @@ fn another_path_follows_the_first_and_one_that_was_stopped() {
     go(&mut bench);
     for _ in 0..2 {
         assert_eq!(bench.until_rest(), Cause::PathDone);
-        let rounding = (bench.last(0) - Metres::from_mm(15.0)).abs();
-        assert!(rounding < Metres::from_um(1e-3), "{rounding}");
-        assert_eq!(bench.last(1), Metres::from_mm(20.0));
+        // A stop from the last point, which is one of no time.
+        let off = (bench.last(0) - Metres::from_mm(15.0)).abs();
+        assert!(off < Metres(1e-10), "{off}");
         again(&mut bench);
     }
     // One that is stopped: what its writer still writes of it is not driven, and said.
