@@ -261,7 +261,8 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
     let [saturated, _] = of_the_roll();
     let sources = [Source::Thermometer(0), Source::Roll(Axis::X)];
     for (fault, source) in [broken, saturated].into_iter().zip(sources) {
-        let stood = stand(&mut volume, fault, 2 * SECOND);
+        // Over when the next one begins.
+        let stood = stand(&mut volume, fault, SECOND / 3);
         let before = stood.off(FAULT_AT);
         let Err(Failure::Volumetric(VolumetricFailure::NotThere { cause })) = &stood.result else {
             panic!("{}: {:?}", stood.text, stood.result)
