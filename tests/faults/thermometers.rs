@@ -138,10 +138,12 @@ fn stand(volume: &mut Volume, fault: Fault, lasting: u64) -> Stood {
     let (mut moments, mut id) = (Vec::new(), None);
     let mut watch = |live: &Live| {
         let nominal: Off = core::array::from_fn(|k| live.nominal[k]);
+        // As if the drives were there already: how they lag is not the correction's.
+        let command = core::array::from_fn(|k| live.nominal[k] + live.offset[k]);
         let off = {
             let simulation = emulated.simulation();
             let truth = simulation.truth().volumetric().expect("three axes");
-            let (is, should) = (truth.tool_point(), truth.nominal_for(nominal));
+            let (is, should) = (truth.tool_point_for(command), truth.nominal_for(nominal));
             core::array::from_fn(|k| is[k] - should[k])
         };
         moments.push(Moment { live: *live, off });

@@ -114,6 +114,8 @@ pub struct Feed<Q, const N: usize> {
     last: Time,
     /// What is wanted while nothing good comes.
     held: [Q; N],
+    /// The same before it was smoothed.
+    newest: [Q; N],
     output: [Q; N],
     /// Output − wanted when what is wanted changed its origin, and how it shrinks from there.
     offset: [Q; N],
@@ -131,6 +133,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
             jump: false,
             last: Time::ZERO,
             held: [Q::ZERO; N],
+            newest: [Q::ZERO; N],
             output: [Q::ZERO; N],
             offset: [Q::ZERO; N],
             since: Time::ZERO,
@@ -188,6 +191,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     /// The same values count from elsewhere: all of them are larger by `by`.
     pub fn shift(&mut self, by: [Q; N]) {
         self.held = core::array::from_fn(|i| self.held[i] + by[i]);
+        self.newest = core::array::from_fn(|i| self.newest[i] + by[i]);
         self.output = core::array::from_fn(|i| self.output[i] + by[i]);
     }
 
@@ -201,11 +205,11 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.output
     }
 
-    /// How far the values given out last are from what was wanted then, by the largest: not zero
-    /// while one blends into the other or fades out.
+    /// How far the values given out last are from what was wanted then, by the largest: more than
+    /// what smoothing takes away while one blends into the other, lags behind or fades out.
     pub fn left(&self) -> Q {
-        let each = self.output.iter().zip(&self.held);
-        let each = each.map(|(output, held)| (*output - *held).abs());
+        let each = self.output.iter().zip(&self.newest);
+        let each = each.map(|(output, newest)| (*output - *newest).abs());
         each.fold(Q::ZERO, Q::max)
     }
 
@@ -292,11 +296,13 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
             1.0
         };
         self.held = core::array::from_fn(|i| self.held[i] + (value[i] - self.held[i]) * share);
+        self.newest = value;
     }
 
     /// From now on `wanted` is wanted, reached over `over` from what was given out last.
     fn turn_to(&mut self, now: Time, wanted: [Q; N], over: Duration) {
         self.held = wanted;
+        self.newest = wanted;
         self.offset = core::array::from_fn(|i| self.output[i] - wanted[i]);
         self.since = now;
         self.over = over;
