@@ -66,7 +66,7 @@ impl VolumetricModel {
             known.unwrap_or(thermal.channels[at].u)
         };
         for at in 0..thermal.channels.len() {
-            let effect = self.effect_of_channel(at, command, now, &u_of_channel);
+            let effect = self.effect_of_channel(at, command, now, u_of_channel);
             combine(effect, u_of_channel(at));
         }
         for axis in Axis::ALL {
