@@ -137,15 +137,10 @@ pub enum Failure {
         axis: String,
     },
     /// The machine was stopped, or was never started: nobody would heed its alarms.
-    #[error(
-        "{device}: not moved ({step}): the machine was stopped, and its alarms are not heeded \
-         until it is started again (`Machine::start`)"
-    )]
+    #[error("{device}: not moved, the machine was stopped; start it again (`Machine::start`)")]
     NotStarted {
         /// The drive.
         device: String,
-        /// What was asked of it.
-        step: &'static str,
     },
     /// The verb needs something the configuration does not have.
     #[error("axis {axis}: the configuration has no section `{section}` for it")]

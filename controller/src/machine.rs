@@ -319,7 +319,7 @@ impl Machine {
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.axis_index(axis)?;
-        self.require_supervised(at, step)?;
+        self.require_supervised(at)?;
         let now = self.now();
         self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
@@ -327,12 +327,12 @@ impl Machine {
 
     /// Nothing begins to move while alarms do not count: after a stop, the machine is started
     /// again first.
-    pub(crate) fn require_supervised(&self, at: usize, step: &'static str) -> Result<(), Failure> {
+    pub(crate) fn require_supervised(&self, at: usize) -> Result<(), Failure> {
         if self.supervision == Supervision::On {
             return Ok(());
         }
         let device = self.device_name(at);
-        Err(Failure::NotStarted { device, step })
+        Err(Failure::NotStarted { device })
     }
 
     /// Gives `command` to drive number `at`, whatever it moves, and waits until it is done.
@@ -344,7 +344,7 @@ impl Machine {
         limit: Duration,
     ) -> Result<(), Failure> {
         if let DriveCommand::Enable | DriveCommand::EnterCyclic { .. } = command {
-            self.require_supervised(at, step)?;
+            self.require_supervised(at)?;
         }
         let now = self.now();
         self.drive_mut(at).control(now, command);

@@ -93,7 +93,7 @@ fn after_a_quick_stop_nothing_moves_until_the_machine_is_started_again() {
     let refused = |outcome: Result<(), Failure>| {
         let failure = outcome.unwrap_err();
         assert!(matches!(failure, Failure::NotStarted { .. }), "{failure}");
-        assert!(failure.to_string().contains("started again"), "{failure}");
+        assert!(failure.to_string().contains("start it again"), "{failure}");
         assert_eq!(failure.exit_code(), 3);
     };
     refused(follow(machine).map(drop));

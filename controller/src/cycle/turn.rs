@@ -141,7 +141,7 @@ impl Machine {
         limit: Duration,
     ) -> Result<(), Failure> {
         let at = self.rotary_index(axis)?;
-        self.require_supervised(self.axes.len() + at, step)?;
+        self.require_supervised(self.axes.len() + at)?;
         let now = self.now();
         self.rotaries[at].device.command(now, command);
         self.await_outcome(self.axes.len() + at, step, limit)

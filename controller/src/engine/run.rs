@@ -89,7 +89,7 @@ impl Machine {
             self.require_zeroed(&axis)?;
         }
         let mut seats = self.seats(engine)?;
-        self.require_supervised(seats.drive[0], "following set-points")?;
+        self.require_supervised(seats.drive[0])?;
         self.await_rest(engine, &seats)?;
         self.require_inside(engine, &seats)?;
         // Locking memory takes its time, and so does letting it go: never between two SYNCs.
