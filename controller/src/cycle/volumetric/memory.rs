@@ -18,7 +18,9 @@ use crate::config::{BeamConfig, VolumetricConfig};
 use crate::cycle::utc_now;
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::store::{CalibrationRecord, Content, MemoryName, RecordHead, StateMemoryContent, Store};
+use crate::store::{
+    AXES, CalibrationRecord, Content, MemoryName, RecordHead, StateMemoryContent, Store,
+};
 
 /// A state that was recorded, stored and activated.
 #[derive(Clone, Debug)]
@@ -187,7 +189,7 @@ fn present(
     let drift = crate::assemble::beam_drift(beam);
     let drift = drift.ok_or(VolumetricFailure::NotConfigured { section })?;
     let seen = now.content.beam("the present state", axis, drift)?;
-    let letter = ['x', 'y', 'z'][axis.index()];
+    let letter = AXES[axis.index()];
     let record = now.content.beams.iter().find(|it| it.axis == letter);
     let reference = state.beams[axis.index()].as_ref();
     let (Some(seen), Some(record), Some(reference)) = (seen, record, reference) else {
