@@ -15,21 +15,14 @@
 
 use std::time::Duration;
 
-use drivers::wire::Payload;
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::nmt::NmtState;
 use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId, Object};
 use serde::{Deserialize, Serialize};
-use units::Time;
 
-use super::Node;
+use super::analog_module::{AnalogModule, Profile, Wires};
 use super::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
-use super::canopen_server::{
-    CanopenServer, Deliveries, Description, Identity, Manners, PdoDefault, ServerEvent,
-};
+use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
-use crate::plant::Plant;
 
 /// CiA 401 with analog inputs.
 const DEVICE_TYPE: u32 = 0x0004_0191;
@@ -89,159 +82,77 @@ impl Default for Cia401AnalogConfig {
     }
 }
 
-/// What the terminals are wired to.
-trait Terminals {
-    /// Volts at an input of the plant.
-    fn volts(&mut self, channel: usize) -> f64;
-}
-
-impl Terminals for Plant {
-    fn volts(&mut self, channel: usize) -> f64 {
-        self.analog_volts(channel)
-    }
-}
-
 /// An emulated analog module on the bus.
-#[derive(Debug)]
-pub struct Cia401AnalogNode {
-    config: Cia401AnalogConfig,
-    server: CanopenServer,
-    sample_due: Time,
-    /// What the last event reported, per channel.
-    reported: Vec<Option<i64>>,
-}
+pub type Cia401AnalogNode = AnalogModule<Cia401AnalogConfig>;
 
-impl Cia401AnalogNode {
-    /// A module that was powered at [`Time::ZERO`] and boots.
-    ///
-    /// # Panics
-    /// When `config.node_id` is not 1 to 127, which reading a configuration file refuses.
-    pub fn new(config: Cia401AnalogConfig) -> Self {
-        let node = NodeId::new(config.node_id).expect("node_id is 1 to 127");
-        let server = CanopenServer::new(
-            node,
-            Duration::from_millis(config.boot_delay_ms),
-            &description(&config, node),
-            dictionary(&config),
-            config.manners.clone(),
-        );
-        let reported = vec![None; config.plant_channels.len()];
-        Self {
-            config,
-            server,
-            sample_due: Time::NEVER,
-            reported,
-        }
+impl Profile for Cia401AnalogConfig {
+    fn node_id(&self) -> u8 {
+        self.node_id
     }
 
-    /// What it still spoils; writing it spoils what comes next.
-    pub fn manners_mut(&mut self) -> &mut Manners {
-        self.server.manners_mut()
+    fn boot_delay(&self) -> Duration {
+        Duration::from_millis(self.boot_delay_ms)
     }
 
-    /// Which faults were delivered, and how often.
-    pub const fn deliveries(&self) -> &Deliveries {
-        self.server.deliveries()
+    fn manners(&self) -> &Manners {
+        &self.manners
     }
 
-    fn handle_frame(&mut self, now: Time, frame: &CanFrame, terminals: &mut impl Terminals) {
-        if !self.server.is_powered() || !self.server.concerns(frame) {
-            return;
-        }
-        let own_request = self.server.node().cob_id(Function::SdoRequest);
-        if frame.standard_id() == Some(own_request) {
-            self.sample(terminals);
-        }
-        self.server.handle(now, frame);
-        self.settle(now, terminals);
-    }
-
-    fn pass_time(&mut self, now: Time, terminals: &mut impl Terminals) {
-        if !self.server.is_powered() {
-            return;
-        }
-        if self.sample_due <= now {
-            self.sample_due = now + self.sampling_period();
-            self.sample(terminals);
-            self.report_events(now);
-        }
-        self.server.advance(now);
-        self.settle(now, terminals);
-    }
-
-    fn settle(&mut self, now: Time, terminals: &mut impl Terminals) {
-        while let Some(event) = self.server.poll_event() {
-            match event {
-                ServerEvent::Synchronised => {
-                    if self.server.has_synchronous_tpdo() {
-                        self.sample(terminals);
-                    }
-                    self.server.send_synchronous(now);
-                }
-                ServerEvent::Written(_)
-                | ServerEvent::Nmt(_)
-                | ServerEvent::ResetNode
-                | ServerEvent::ResetCommunication => self.schedule(now),
-                ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
-            }
-        }
+    fn inputs(&self) -> usize {
+        self.plant_channels.len()
     }
 
     fn sampling_period(&self) -> Duration {
-        Duration::from_millis(self.config.sampling_period_ms.max(1))
+        Duration::from_millis(self.sampling_period_ms.max(1))
     }
 
-    /// The converter runs by itself only while events are enabled and may be sent.
-    fn schedule(&mut self, now: Time) {
-        let enabled = self.server.get(0x6423, 0) != 0;
-        let operational = self.server.nmt_state() == Some(NmtState::Operational);
-        if !(enabled && operational) {
-            self.sample_due = Time::NEVER;
-            self.reported.fill(None);
-        } else if self.sample_due == Time::NEVER {
-            self.sample_due = now;
-        }
+    fn description(&self, node: NodeId) -> Description {
+        description(self, node)
     }
 
-    fn sample(&mut self, terminals: &mut impl Terminals) {
-        for (place, wired) in self.config.plant_channels.iter().enumerate() {
-            let full_scale = full_scale(&self.config, place);
-            let volts = terminals.volts(*wired);
-            let raw = convert(volts, full_scale, self.config.resolution_bits);
+    fn dictionary(&self) -> Dictionary {
+        dictionary(self)
+    }
+
+    fn sample(&self, server: &mut CanopenServer, wires: &mut dyn Wires) {
+        for (place, wired) in self.plant_channels.iter().enumerate() {
+            let volts = wires.volts(*wired);
+            let raw = convert(volts, full_scale(self, place), self.resolution_bits);
             let sub = place as u8 + 1;
-            let offset = self.server.get(0x6431, sub);
-            let scaled = (raw + offset) * self.server.get(0x6432, sub);
+            let offset = server.get(0x6431, sub);
+            let scaled = (raw + offset) * server.get(0x6432, sub);
             let reading = scaled.clamp(i64::from(i16::MIN), i64::from(i16::MAX));
-            self.server.set(0x6401, sub, reading);
+            server.set(0x6401, sub, reading);
         }
     }
 
-    /// Which channels have an event, and the TPDOs that carry them.
-    fn report_events(&mut self, now: Time) {
-        for place in 0..self.reported.len() {
-            let sub = place as u8 + 1;
-            let reading = self.server.get(0x6401, sub);
-            let cause = self.interrupt_cause(sub, reading, self.reported[place]);
-            if cause != 0 {
-                self.reported[place] = Some(reading);
-                self.server.trigger(now, Object::new(0x6401, sub));
-            }
-        }
+    fn samples_at_sync(&self, server: &CanopenServer) -> bool {
+        server.has_synchronous_tpdo()
     }
 
-    /// The bits of 0x6421 that hold: 0 above the upper limit, 1 below the lower one, 2 changed
-    /// by more than delta. A limit repeats only after a change by more than delta.
-    fn interrupt_cause(&self, sub: u8, reading: i64, reported: Option<i64>) -> i64 {
-        let delta = self.server.get(0x6426, sub);
-        let changed = reported.is_none_or(|last| (reading - last).abs() > delta);
-        let above = reading >= self.server.get(0x6424, sub);
-        let below = reading < self.server.get(0x6425, sub);
-        let causes = i64::from(above) | i64::from(below) << 1 | 1 << 2;
-        if changed {
-            causes & self.server.get(0x6421, sub)
-        } else {
-            0
-        }
+    fn reports_events(&self, server: &CanopenServer) -> bool {
+        server.get(0x6423, 0) != 0
+    }
+
+    fn event(&self, server: &CanopenServer, sub: u8, last: Option<i64>) -> Option<(i64, Object)> {
+        let reading = server.get(0x6401, sub);
+        let cause = interrupt_cause(server, sub, reading, last);
+        (cause != 0).then(|| (reading, Object::new(0x6401, sub)))
+    }
+}
+
+/// The bits of 0x6421 that hold: 0 above the upper limit, 1 below the lower one, 2 changed
+/// by more than delta. A limit repeats only after a change by more than delta.
+fn interrupt_cause(server: &CanopenServer, sub: u8, reading: i64, reported: Option<i64>) -> i64 {
+    let delta = server.get(0x6426, sub);
+    let changed = reported.is_none_or(|last| (reading - last).abs() > delta);
+    let above = reading >= server.get(0x6424, sub);
+    let below = reading < server.get(0x6425, sub);
+    let causes = i64::from(above) | i64::from(below) << 1 | 1 << 2;
+    if changed {
+        causes & server.get(0x6421, sub)
+    } else {
+        0
     }
 }
 
@@ -310,43 +221,17 @@ fn description(config: &Cia401AnalogConfig, node: NodeId) -> Description {
     }
 }
 
-impl Node for Cia401AnalogNode {
-    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
-        if let Payload::Frame(frame) = payload {
-            self.handle_frame(now, frame, plant);
-        }
-    }
-
-    fn advance(&mut self, now: Time, plant: &mut Plant) {
-        self.pass_time(now, plant);
-    }
-
-    fn next_event(&self) -> Time {
-        self.sample_due.min(self.server.next_event())
-    }
-
-    fn poll_transmit(&mut self) -> Option<Payload> {
-        self.server.poll_transmit().map(Payload::Frame)
-    }
-
-    fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
-        self.sample_due = Time::NEVER;
-        self.server.power_off();
-    }
-
-    fn power_on(&mut self, now: Time, _plant: &mut Plant) {
-        self.reported.fill(None);
-        self.server.power_on(now);
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use drivers::wire::can::CanFrame;
+    use units::Time;
+
+    use super::super::Node;
     use super::*;
 
     struct Bench(Vec<f64>);
 
-    impl Terminals for Bench {
+    impl Wires for Bench {
         fn volts(&mut self, channel: usize) -> f64 {
             self.0[channel]
         }
@@ -360,7 +245,7 @@ mod tests {
     }
 
     fn frames(module: &mut Cia401AnalogNode) -> Vec<String> {
-        std::iter::from_fn(|| module.server.poll_transmit())
+        std::iter::from_fn(|| module.next_frame())
             .map(|frame| frame.to_string())
             .collect()
     }

@@ -19,22 +19,15 @@
 
 use std::time::Duration;
 
-use drivers::wire::Payload;
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::nmt::NmtState;
 use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId, Object};
 use drivers::wire::cia404::{self, InputStatus, PhysicalUnit, SensorType, Unit};
 use serde::{Deserialize, Serialize};
-use units::Time;
 
-use super::Node;
+use super::analog_module::{AnalogModule, Profile, Wires};
 use super::canopen_server::dictionary::{Bounds, Dictionary, Entry, Kind, Mapping};
-use super::canopen_server::{
-    CanopenServer, Deliveries, Description, Identity, Manners, PdoDefault, ServerEvent,
-};
+use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
-use crate::plant::Plant;
 
 /// Inputs of one module.
 pub const INPUTS_MAX: usize = 8;
@@ -110,184 +103,103 @@ impl Default for Cia404AnalogConfig {
     }
 }
 
-/// What the inputs are wired to.
-trait Wires {
-    /// Volts at a terminal of the plant.
-    fn volts(&mut self, terminal: usize) -> f64;
-    /// Degrees Celsius there; `None` where there is no sensor.
-    fn celsius(&mut self, terminal: usize) -> Option<f64>;
-}
-
-impl Wires for Plant {
-    fn volts(&mut self, terminal: usize) -> f64 {
-        self.analog_volts(terminal)
-    }
-
-    fn celsius(&mut self, terminal: usize) -> Option<f64> {
-        self.analog_temperature(terminal).map(|it| it.value())
-    }
-}
-
 /// An emulated measuring module on the bus.
-#[derive(Debug)]
-pub struct Cia404AnalogNode {
-    config: Cia404AnalogConfig,
-    server: CanopenServer,
-    sample_due: Time,
-    /// What the last event reported, per input.
-    reported: Vec<Option<i64>>,
-}
+pub type Cia404AnalogNode = AnalogModule<Cia404AnalogConfig>;
 
-impl Cia404AnalogNode {
-    /// A module that was powered at [`Time::ZERO`] and boots.
-    ///
-    /// # Panics
-    /// When `config.node_id` is not 1 to 127, which reading a configuration file refuses.
-    pub fn new(config: Cia404AnalogConfig) -> Self {
-        let node = NodeId::new(config.node_id).expect("node_id is 1 to 127");
-        let server = CanopenServer::new(
-            node,
-            Duration::from_millis(config.boot_delay_ms),
-            &description(&config, node),
-            dictionary(&config),
-            config.manners.clone(),
-        );
-        let reported = vec![None; config.plant_channels.len()];
-        Self {
-            config,
-            server,
-            sample_due: Time::NEVER,
-            reported,
-        }
+impl Profile for Cia404AnalogConfig {
+    fn node_id(&self) -> u8 {
+        self.node_id
     }
 
-    /// What it still spoils; writing it spoils what comes next.
-    pub fn manners_mut(&mut self) -> &mut Manners {
-        self.server.manners_mut()
+    fn boot_delay(&self) -> Duration {
+        Duration::from_millis(self.boot_delay_ms)
     }
 
-    /// Which faults were delivered, and how often.
-    pub const fn deliveries(&self) -> &Deliveries {
-        self.server.deliveries()
+    fn manners(&self) -> &Manners {
+        &self.manners
     }
 
-    fn handle_frame(&mut self, now: Time, frame: &CanFrame, wires: &mut impl Wires) {
-        if !self.server.is_powered() || !self.server.concerns(frame) {
-            return;
-        }
-        let own_request = self.server.node().cob_id(Function::SdoRequest);
-        if frame.standard_id() == Some(own_request) {
-            self.sample(wires);
-        }
-        self.server.handle(now, frame);
-        self.settle(now, wires);
-    }
-
-    fn pass_time(&mut self, now: Time, wires: &mut impl Wires) {
-        if !self.server.is_powered() {
-            return;
-        }
-        if self.sample_due <= now {
-            self.sample_due = now + self.sampling_period();
-            self.sample(wires);
-            self.report_events(now);
-        }
-        self.server.advance(now);
-        self.settle(now, wires);
-    }
-
-    fn settle(&mut self, now: Time, wires: &mut impl Wires) {
-        while let Some(event) = self.server.poll_event() {
-            match event {
-                ServerEvent::Synchronised => {
-                    if self.server.is_tpdo_turn() {
-                        self.sample(wires);
-                    }
-                    self.server.send_synchronous(now);
-                }
-                ServerEvent::Written(_)
-                | ServerEvent::Nmt(_)
-                | ServerEvent::ResetNode
-                | ServerEvent::ResetCommunication => self.schedule(now),
-                ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
-            }
-        }
+    fn inputs(&self) -> usize {
+        self.plant_channels.len()
     }
 
     fn sampling_period(&self) -> Duration {
-        Duration::from_millis(self.config.sampling_period_ms.max(1))
+        Duration::from_millis(self.sampling_period_ms.max(1))
     }
 
-    /// The converter runs by itself only while events may be sent.
-    fn schedule(&mut self, now: Time) {
-        let operational = self.server.nmt_state() == Some(NmtState::Operational);
-        if !(operational && self.server.reports_changes()) {
-            self.sample_due = Time::NEVER;
-            self.reported.fill(None);
-        } else if self.sample_due == Time::NEVER {
-            self.sample_due = now;
-        }
+    fn description(&self, node: NodeId) -> Description {
+        description(self, node)
     }
 
-    fn sample(&mut self, wires: &mut impl Wires) {
-        for place in 0..self.config.plant_channels.len() {
-            let sub = place as u8 + 1;
-            let terminal = self.config.plant_channels[place];
-            let on = self.server.get(cia404::OPERATION_MODE, sub) == i64::from(cia404::MODE_NORMAL);
-            let sensor = self.server.get(cia404::SENSOR_TYPE, sub) as u16;
+    fn dictionary(&self) -> Dictionary {
+        dictionary(self)
+    }
+
+    fn sample(&self, server: &mut CanopenServer, wires: &mut dyn Wires) {
+        for (sub, terminal) in (1..).zip(&self.plant_channels) {
+            let on = server.get(cia404::OPERATION_MODE, sub) == i64::from(cia404::MODE_NORMAL);
+            let sensor = server.get(cia404::SENSOR_TYPE, sub) as u16;
             let measured = match SensorType::from_raw(sensor) {
-                SensorType::Voltage if on => Some(self.convert(sub, wires.volts(terminal))),
+                SensorType::Voltage if on => {
+                    Some(self.convert(server, sub, wires.volts(*terminal)))
+                }
                 SensorType::Pt100 if on => {
-                    let celsius = wires.celsius(terminal);
+                    let celsius = wires.celsius(*terminal);
                     celsius.map(|it| ((it / STEP_C).round() * STEP_C, InputStatus::default()))
                 }
                 _ => None,
             };
             let (value, status) = match measured {
-                Some((value, status)) => self.process_value(sub, value, status),
+                Some((value, status)) => process_value(server, sub, value, status),
                 None => (i64::from(i16::MIN), InputStatus::NOT_VALID),
             };
-            self.server.set(cia404::PROCESS_VALUE, sub, value);
-            self.server.set(cia404::STATUS, sub, i64::from(status.0));
+            server.set(cia404::PROCESS_VALUE, sub, value);
+            server.set(cia404::STATUS, sub, i64::from(status.0));
         }
     }
 
-    /// Volts as the converter counts them, and whether it is at an end of its range.
-    fn convert(&mut self, sub: u8, volts: f64) -> (f64, InputStatus) {
-        let half = f64::from(1_u32 << (self.config.resolution_bits.clamp(2, 16) - 1));
-        let wanted = (volts / self.config.full_scale_v * half).round();
-        let counts = wanted.clamp(-half, half - 1.0);
-        self.server.set(cia404::FIELD_VALUE, sub, counts as i64);
-        (
-            counts * self.config.full_scale_v / half,
-            overload(wanted, counts),
-        )
+    fn samples_at_sync(&self, server: &CanopenServer) -> bool {
+        server.is_tpdo_turn()
     }
 
-    /// Scaled, in the unit and digits that are set, as far as 16 bits go.
-    fn process_value(&self, sub: u8, measured: f64, seen: InputStatus) -> (i64, InputStatus) {
-        let real = |index| f64::from(f32::from_bits(self.server.get(index, sub) as u32));
-        let scaled = measured * real(cia404::SCALING_FACTOR) + real(cia404::SCALING_OFFSET);
-        let unit = PhysicalUnit::from_raw(self.server.get(cia404::PHYSICAL_UNIT, sub) as u32);
-        let digits = self.server.get(cia404::DECIMAL_DIGITS, sub) as u8;
-        let wanted = (scaled / unit.per_count(digits)).round();
-        let value = wanted.clamp(f64::from(i16::MIN), f64::from(i16::MAX));
-        (value as i64, seen.and(overload(wanted, value)))
+    fn reports_events(&self, server: &CanopenServer) -> bool {
+        server.reports_changes()
     }
 
     /// An event is a change by more than 0x7133.
-    fn report_events(&mut self, now: Time) {
-        for place in 0..self.reported.len() {
-            let sub = place as u8 + 1;
-            let value = self.server.get(cia404::PROCESS_VALUE, sub);
-            let delta = self.server.get(cia404::INTERRUPT_DELTA, sub);
-            if self.reported[place].is_none_or(|last| (value - last).abs() > delta) {
-                self.reported[place] = Some(value);
-                let object = Object::new(cia404::PROCESS_VALUE, sub);
-                self.server.trigger(now, object);
-            }
-        }
+    fn event(&self, server: &CanopenServer, sub: u8, last: Option<i64>) -> Option<(i64, Object)> {
+        let value = server.get(cia404::PROCESS_VALUE, sub);
+        let delta = server.get(cia404::INTERRUPT_DELTA, sub);
+        let changed = last.is_none_or(|last| (value - last).abs() > delta);
+        changed.then(|| (value, Object::new(cia404::PROCESS_VALUE, sub)))
     }
+}
+
+impl Cia404AnalogConfig {
+    /// Volts as the converter counts them, and whether it is at an end of its range.
+    fn convert(&self, server: &mut CanopenServer, sub: u8, volts: f64) -> (f64, InputStatus) {
+        let half = f64::from(1_u32 << (self.resolution_bits.clamp(2, 16) - 1));
+        let wanted = (volts / self.full_scale_v * half).round();
+        let counts = wanted.clamp(-half, half - 1.0);
+        server.set(cia404::FIELD_VALUE, sub, counts as i64);
+        (counts * self.full_scale_v / half, overload(wanted, counts))
+    }
+}
+
+/// Scaled, in the unit and digits that are set, as far as 16 bits go.
+fn process_value(
+    server: &CanopenServer,
+    sub: u8,
+    measured: f64,
+    seen: InputStatus,
+) -> (i64, InputStatus) {
+    let real = |index| f64::from(f32::from_bits(server.get(index, sub) as u32));
+    let scaled = measured * real(cia404::SCALING_FACTOR) + real(cia404::SCALING_OFFSET);
+    let unit = PhysicalUnit::from_raw(server.get(cia404::PHYSICAL_UNIT, sub) as u32);
+    let digits = server.get(cia404::DECIMAL_DIGITS, sub) as u8;
+    let wanted = (scaled / unit.per_count(digits)).round();
+    let value = wanted.clamp(f64::from(i16::MIN), f64::from(i16::MAX));
+    (value as i64, seen.and(overload(wanted, value)))
 }
 
 fn overload(wanted: f64, given: f64) -> InputStatus {
@@ -372,38 +284,12 @@ fn description(config: &Cia404AnalogConfig, node: NodeId) -> Description {
     }
 }
 
-impl Node for Cia404AnalogNode {
-    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
-        if let Payload::Frame(frame) = payload {
-            self.handle_frame(now, frame, plant);
-        }
-    }
-
-    fn advance(&mut self, now: Time, plant: &mut Plant) {
-        self.pass_time(now, plant);
-    }
-
-    fn next_event(&self) -> Time {
-        self.sample_due.min(self.server.next_event())
-    }
-
-    fn poll_transmit(&mut self) -> Option<Payload> {
-        self.server.poll_transmit().map(Payload::Frame)
-    }
-
-    fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
-        self.sample_due = Time::NEVER;
-        self.server.power_off();
-    }
-
-    fn power_on(&mut self, now: Time, _plant: &mut Plant) {
-        self.reported.fill(None);
-        self.server.power_on(now);
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use drivers::wire::can::CanFrame;
+    use units::Time;
+
+    use super::super::Node;
     use super::*;
     use drivers::wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse};
 
@@ -462,7 +348,7 @@ mod tests {
         }
 
         fn sent(&mut self) -> Vec<String> {
-            std::iter::from_fn(|| self.module.server.poll_transmit())
+            std::iter::from_fn(|| self.module.next_frame())
                 .map(|frame| frame.to_string())
                 .collect()
         }
@@ -476,7 +362,7 @@ mod tests {
         fn request(&mut self, request: SdoRequest) -> SdoResponse {
             let frame = CanFrame::standard(0x60A, &request.emit());
             self.module.handle_frame(self.now, &frame, &mut self.bench);
-            let answer = self.module.server.poll_transmit().unwrap();
+            let answer = self.module.next_frame().unwrap();
             SdoResponse::parse(answer.data()).unwrap()
         }
 

@@ -2,6 +2,7 @@
 //!
 //! A node is sans-io: payloads, time and the plant come in, payloads go out.
 
+pub mod analog_module;
 pub mod canopen_server;
 pub mod cia401_analog;
 pub mod cia402_drive;

@@ -1,0 +1,218 @@
+//! A CANopen module that samples analog inputs, whatever its profile: what they have in common
+//! is when.
+//!
+//! Inputs are sampled when they are asked for: at the SYNC of a synchronous TPDO, by SDO, and, while
+//! the profile reports events, at the sampling period.
+
+use std::time::Duration;
+
+use drivers::wire::Payload;
+use drivers::wire::can::CanFrame;
+use drivers::wire::canopen::nmt::NmtState;
+use drivers::wire::canopen::{Function, NodeId, Object};
+use units::Time;
+
+use super::Node;
+use super::canopen_server::dictionary::Dictionary;
+use super::canopen_server::{CanopenServer, Deliveries, Description, Manners, ServerEvent};
+use crate::plant::Plant;
+
+/// What the inputs are wired to.
+pub trait Wires {
+    /// Volts at a terminal of the plant.
+    fn volts(&mut self, terminal: usize) -> f64;
+
+    /// Degrees Celsius there; `None` where there is no sensor.
+    fn celsius(&mut self, _terminal: usize) -> Option<f64> {
+        None
+    }
+}
+
+impl Wires for Plant {
+    fn volts(&mut self, terminal: usize) -> f64 {
+        self.analog_volts(terminal)
+    }
+
+    fn celsius(&mut self, terminal: usize) -> Option<f64> {
+        self.analog_temperature(terminal).map(|it| it.value())
+    }
+}
+
+/// What a profile makes of a module.
+pub trait Profile {
+    /// Its number, 1 to 127.
+    fn node_id(&self) -> u8;
+
+    /// How long it takes to boot.
+    fn boot_delay(&self) -> Duration;
+
+    /// What it spoils.
+    fn manners(&self) -> &Manners;
+
+    /// How many inputs it has.
+    fn inputs(&self) -> usize;
+
+    /// How often it samples by itself.
+    fn sampling_period(&self) -> Duration;
+
+    /// What a master reads of it first.
+    fn description(&self, node: NodeId) -> Description;
+
+    /// What it has beyond that.
+    fn dictionary(&self) -> Dictionary;
+
+    /// Samples every input.
+    fn sample(&self, server: &mut CanopenServer, wires: &mut dyn Wires);
+
+    /// Whether a sample is wanted at this SYNC.
+    fn samples_at_sync(&self, server: &CanopenServer) -> bool;
+
+    /// Whether events are enabled.
+    fn reports_events(&self, server: &CanopenServer) -> bool;
+
+    /// What input `sub` (from 1) has to report, when `last` was reported last: its value and the
+    /// object that carries it.
+    fn event(&self, server: &CanopenServer, sub: u8, last: Option<i64>) -> Option<(i64, Object)>;
+}
+
+/// An emulated analog module on the bus.
+#[derive(Debug)]
+pub struct AnalogModule<P> {
+    profile: P,
+    server: CanopenServer,
+    sample_due: Time,
+    /// What the last event reported, per input.
+    reported: Vec<Option<i64>>,
+}
+
+impl<P: Profile> AnalogModule<P> {
+    /// A module that was powered at [`Time::ZERO`] and boots.
+    ///
+    /// # Panics
+    /// When its number is not 1 to 127, which reading a configuration file refuses.
+    pub fn new(profile: P) -> Self {
+        let node = NodeId::new(profile.node_id()).expect("node_id is 1 to 127");
+        let server = CanopenServer::new(
+            node,
+            profile.boot_delay(),
+            &profile.description(node),
+            profile.dictionary(),
+            profile.manners().clone(),
+        );
+        Self {
+            reported: vec![None; profile.inputs()],
+            profile,
+            server,
+            sample_due: Time::NEVER,
+        }
+    }
+
+    /// What it still spoils; writing it spoils what comes next.
+    pub fn manners_mut(&mut self) -> &mut Manners {
+        self.server.manners_mut()
+    }
+
+    /// Which faults were delivered, and how often.
+    pub const fn deliveries(&self) -> &Deliveries {
+        self.server.deliveries()
+    }
+
+    pub(super) fn handle_frame(&mut self, now: Time, frame: &CanFrame, wires: &mut dyn Wires) {
+        if !self.server.is_powered() || !self.server.concerns(frame) {
+            return;
+        }
+        let own_request = self.server.node().cob_id(Function::SdoRequest);
+        if frame.standard_id() == Some(own_request) {
+            self.profile.sample(&mut self.server, wires);
+        }
+        self.server.handle(now, frame);
+        self.settle(now, wires);
+    }
+
+    pub(super) fn pass_time(&mut self, now: Time, wires: &mut dyn Wires) {
+        if !self.server.is_powered() {
+            return;
+        }
+        if self.sample_due <= now {
+            self.sample_due = now + self.profile.sampling_period();
+            self.profile.sample(&mut self.server, wires);
+            self.report_events(now);
+        }
+        self.server.advance(now);
+        self.settle(now, wires);
+    }
+
+    fn settle(&mut self, now: Time, wires: &mut dyn Wires) {
+        while let Some(event) = self.server.poll_event() {
+            match event {
+                ServerEvent::Synchronised => {
+                    if self.profile.samples_at_sync(&self.server) {
+                        self.profile.sample(&mut self.server, wires);
+                    }
+                    self.server.send_synchronous(now);
+                }
+                ServerEvent::Written(_)
+                | ServerEvent::Nmt(_)
+                | ServerEvent::ResetNode
+                | ServerEvent::ResetCommunication => self.schedule(now),
+                ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
+            }
+        }
+    }
+
+    /// The converter runs by itself only while events are enabled and may be sent.
+    fn schedule(&mut self, now: Time) {
+        let operational = self.server.nmt_state() == Some(NmtState::Operational);
+        if !(operational && self.profile.reports_events(&self.server)) {
+            self.sample_due = Time::NEVER;
+            self.reported.fill(None);
+        } else if self.sample_due == Time::NEVER {
+            self.sample_due = now;
+        }
+    }
+
+    /// Which inputs have an event, and the TPDOs that carry them.
+    fn report_events(&mut self, now: Time) {
+        for (sub, reported) in (1..).zip(&mut self.reported) {
+            if let Some((value, object)) = self.profile.event(&self.server, sub, *reported) {
+                *reported = Some(value);
+                self.server.trigger(now, object);
+            }
+        }
+    }
+
+    #[cfg(test)]
+    pub(super) fn next_frame(&mut self) -> Option<CanFrame> {
+        self.server.poll_transmit()
+    }
+}
+
+impl<P: Profile + 'static> Node for AnalogModule<P> {
+    fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
+        if let Payload::Frame(frame) = payload {
+            self.handle_frame(now, frame, plant);
+        }
+    }
+
+    fn advance(&mut self, now: Time, plant: &mut Plant) {
+        self.pass_time(now, plant);
+    }
+
+    fn next_event(&self) -> Time {
+        self.sample_due.min(self.server.next_event())
+    }
+
+    fn poll_transmit(&mut self) -> Option<Payload> {
+        self.server.poll_transmit().map(Payload::Frame)
+    }
+
+    fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
+        self.sample_due = Time::NEVER;
+        self.server.power_off();
+    }
+
+    fn power_on(&mut self, now: Time, _plant: &mut Plant) {
+        self.reported.fill(None);
+        self.server.power_on(now);
+    }
+}
