@@ -173,23 +173,14 @@ fn check_dcon(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConf
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{ConfigError, parse};
+    use crate::config::validate::told;
 
     const VOLUMETRIC: &str = include_str!("../../../../configs/machines/volumetric.toml");
 
     /// The finding at `key` after `from`, once, has become `to`.
     #[track_caller]
     fn check(from: &str, to: &str, key: &str, says: &str) {
-        assert!(VOLUMETRIC.contains(from), "{from}");
-        match parse(&VOLUMETRIC.replacen(from, to, 1), "machine.toml") {
-            Err(ConfigError::Invalid { findings }) => {
-                let told = findings
-                    .iter()
-                    .any(|it| it.key == key && it.cause.contains(says));
-                assert!(told, "{findings:?}");
-            }
-            other => panic!("{to}: {other:?}"),
-        }
+        told::check(VOLUMETRIC, from, to, key, says);
     }
 
     #[test]

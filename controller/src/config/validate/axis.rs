@@ -289,25 +289,11 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{ConfigError, parse};
+    use crate::config::parse;
+    use crate::config::validate::told::check;
 
     const DRIVES: &str = include_str!("../../../../configs/machines/uvw.toml");
     const AMPLIFIERS: &str = include_str!("../../../../configs/machines/uvw-copley.toml");
-
-    /// The finding at `key` after `from`, once, has become `to`.
-    #[track_caller]
-    fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
-        assert!(text.contains(from), "{from}");
-        match parse(&text.replacen(from, to, 1), "machine.toml") {
-            Err(ConfigError::Invalid { findings }) => {
-                let told = findings
-                    .iter()
-                    .any(|it| it.key == key && it.cause.contains(says));
-                assert!(told, "{findings:?}");
-            }
-            other => panic!("{to}: {other:?}"),
-        }
-    }
 
     #[test]
     fn the_same_platform_is_sound_on_either_bus() {

@@ -271,3 +271,24 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
         }
     }
 }
+
+/// What tests of the single parts share.
+#[cfg(test)]
+mod told {
+    use crate::config::{ConfigError, parse};
+
+    /// With the first `from` in `text` become `to`, the finding at `key` says so.
+    #[track_caller]
+    pub(super) fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
+        assert!(text.contains(from), "{from}");
+        match parse(&text.replacen(from, to, 1), "machine.toml") {
+            Err(ConfigError::Invalid { findings }) => {
+                let told = findings
+                    .iter()
+                    .any(|it| it.key == key && it.cause.contains(says));
+                assert!(told, "{findings:?}");
+            }
+            other => panic!("{to}: {other:?}"),
+        }
+    }
+}

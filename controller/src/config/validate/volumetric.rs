@@ -375,24 +375,15 @@ fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{ConfigError, parse};
+    use crate::config::parse;
+    use crate::config::validate::told;
 
     const VOLUMETRIC: &str = include_str!("../../../../configs/machines/volumetric.toml");
 
     /// The finding at `volumetric` and `key` after `from`, once, has become `to`.
     #[track_caller]
     fn check(from: &str, to: &str, key: &str, says: &str) {
-        assert!(VOLUMETRIC.contains(from), "{from}");
-        match parse(&VOLUMETRIC.replacen(from, to, 1), "machine.toml") {
-            Err(ConfigError::Invalid { findings }) => {
-                let key = format!("volumetric{key}");
-                let told = findings
-                    .iter()
-                    .any(|it| it.key == key && it.cause.contains(says));
-                assert!(told, "{findings:?}");
-            }
-            other => panic!("{to}: {other:?}"),
-        }
+        told::check(VOLUMETRIC, from, to, &format!("volumetric{key}"), says);
     }
 
     #[test]
