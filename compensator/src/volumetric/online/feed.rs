@@ -114,8 +114,8 @@ pub struct Feed<Q, const N: usize> {
     last: Time,
     /// What is wanted while nothing good comes.
     held: [Q; N],
-    /// The same before it was smoothed.
-    newest: [Q; N],
+    /// How far smoothing lags behind, itself smoothed: noise alone is no lag.
+    lag: [Q; N],
     output: [Q; N],
     /// Output − wanted when what is wanted changed its origin, and how it shrinks from there.
     offset: [Q; N],
@@ -133,7 +133,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
             jump: false,
             last: Time::ZERO,
             held: [Q::ZERO; N],
-            newest: [Q::ZERO; N],
+            lag: [Q::ZERO; N],
             output: [Q::ZERO; N],
             offset: [Q::ZERO; N],
             since: Time::ZERO,
@@ -191,7 +191,6 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     /// The same values count from elsewhere: all of them are larger by `by`.
     pub fn shift(&mut self, by: [Q; N]) {
         self.held = core::array::from_fn(|i| self.held[i] + by[i]);
-        self.newest = core::array::from_fn(|i| self.newest[i] + by[i]);
         self.output = core::array::from_fn(|i| self.output[i] + by[i]);
     }
 
@@ -205,11 +204,11 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.output
     }
 
-    /// How far the values given out last are from what was wanted then, by the largest: more than
-    /// what smoothing takes away while one blends into the other, lags behind or fades out.
+    /// How far the values given out last are from what was wanted then, by the largest: next to
+    /// nothing but while one blends into the other, smoothing lags behind or one fades out.
     pub fn left(&self) -> Q {
-        let each = self.output.iter().zip(&self.newest);
-        let each = each.map(|(output, newest)| (*output - *newest).abs());
+        let each = self.output.iter().zip(&self.held).zip(&self.lag);
+        let each = each.map(|((output, held), lag)| (*output - *held).abs() + lag.abs());
         each.fold(Q::ZERO, Q::max)
     }
 
@@ -296,13 +295,14 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
             1.0
         };
         self.held = core::array::from_fn(|i| self.held[i] + (value[i] - self.held[i]) * share);
-        self.newest = value;
+        self.lag =
+            core::array::from_fn(|i| self.lag[i] + (value[i] - self.held[i] - self.lag[i]) * share);
     }
 
     /// From now on `wanted` is wanted, reached over `over` from what was given out last.
     fn turn_to(&mut self, now: Time, wanted: [Q; N], over: Duration) {
         self.held = wanted;
-        self.newest = wanted;
+        self.lag = [Q::ZERO; N];
         self.offset = core::array::from_fn(|i| self.output[i] - wanted[i]);
         self.since = now;
         self.over = over;

@@ -415,6 +415,35 @@ fn switching_off_fades_and_switching_on_blends() {
     check_um(feed.advance(ms(35), Ok([um(8.0)]))[0], 4.0);
 }
 
+/// A step of 6 um under a low pass of 100 ms: after one time constant 2.2 um are not there yet, and
+/// that is said; noise of a tenth of a micrometre is next to nothing.
+#[test]
+fn what_smoothing_lags_behind_counts_and_noise_does_not() {
+    let mut feed = Feed::<Metres, 1>::new(FeedSettings {
+        blend: Duration::ZERO,
+        smoothing: millis(100),
+        ..settings(Reaction::Hold)
+    });
+    let noisy = |at: u64, value: f64| Ok([um(value + if at % 2 == 0 { 0.1 } else { -0.1 })]);
+    for at in 0..1000 {
+        feed.advance(ms(at), noisy(at, 0.0));
+    }
+    assert!(feed.left() < um(0.02), "{}", feed.left());
+    for at in 1000..1100 {
+        feed.advance(ms(at), noisy(at, 6.0));
+    }
+    let behind = um(6.0) - feed.values()[0];
+    assert!(
+        behind > um(2.0) && feed.left() > behind * 0.9,
+        "{behind} {}",
+        feed.left()
+    );
+    for at in 1100..2500 {
+        feed.advance(ms(at), noisy(at, 6.0));
+    }
+    assert!(feed.left() < um(0.02), "{}", feed.left());
+}
+
 /// Time constant 3 ms, samples each millisecond: a step of 8 µm is followed by a quarter of
 /// what is left each time.
 #[test]
