@@ -1,7 +1,6 @@
 //! What a shell script learns of a failure.
 
-use super::Failure;
-use crate::emulated::EmulatedError;
+use super::{EmulatedError, Failure};
 use crate::store::StoreError;
 
 impl Failure {
