@@ -424,7 +424,8 @@ fn what_smoothing_lags_behind_counts_and_noise_does_not() {
         smoothing: millis(100),
         ..settings(Reaction::Hold)
     });
-    let noisy = |at: u64, value: f64| Ok([um(value + if at % 2 == 0 { 0.1 } else { -0.1 })]);
+    let noisy =
+        |at: u64, value: f64| Ok([um(value + if at.is_multiple_of(2) { 0.1 } else { -0.1 })]);
     for at in 0..1000 {
         feed.advance(ms(at), noisy(at, 0.0));
     }
