@@ -25,6 +25,18 @@ use compensator::volumetric::{Axis, Point};
 
 pub use mock_bus::plant::{DriftLimits, HallDrift};
 
+/// The text of a machine file with the shipped heartbeats made rare: hours without SYNC cost little in
+/// virtual time then.
+pub fn with_rare_heartbeats(text: &str) -> String {
+    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
+        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .replace(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
+        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+}
+
 /// Why an emulated machine cannot be brought up.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatedError {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tests::{Bench, UVW};
 use truestage::cycle::platform::Pose;
 
-use crate::programs::truestage;
+use crate::programs::{check_says, page, truestage};
 
 /// A platform that was calibrated twice, verified before and after, and its runs.
 struct Runs {
@@ -55,25 +55,6 @@ fn in_use(folder: &Path) -> Vec<(String, String)> {
         .filter(|it| it["active"] == true)
         .map(|it| (text(&it["axis"]), text(&it["id"])))
         .collect()
-}
-
-fn page(folder: &Path, journal: &str) -> String {
-    let made = truestage(folder, &["report", journal]).with_code(0);
-    let path = made["report"].as_str().expect("a path");
-    let html = fs::read_to_string(path).expect("it was written");
-    assert!(
-        !html.contains("<script") && !html.contains("http"),
-        "not self-contained"
-    );
-    assert!(!html.contains("NaN") && html.ends_with("</html>\n"));
-    html
-}
-
-#[track_caller]
-fn check_says(html: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(html.contains(part), "`{part}` is not on the page");
-    }
 }
 
 #[test]

@@ -312,3 +312,39 @@ fn endpoint(line: &str) -> String {
         None => format!("{name}={rest}"),
     }
 }
+
+/// A value of `--json` that is a text.
+#[track_caller]
+pub(crate) fn text(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+}
+
+/// A value of `--json` that is a number.
+#[track_caller]
+pub(crate) fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The page that `truestage report` makes of a journal.
+#[track_caller]
+pub(crate) fn page(folder: &Path, journal: &str) -> String {
+    let made = truestage(folder, &["report", journal]).with_code(0);
+    let html = std::fs::read_to_string(text(&made["report"])).expect("it was written");
+    assert!(
+        !html.contains("<script") && !html.contains("http"),
+        "not self-contained"
+    );
+    assert!(!html.contains("NaN") && html.ends_with("</html>\n"));
+    html
+}
+
+#[track_caller]
+pub(crate) fn check_says(html: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(html.contains(part), "`{part}` is not on the page");
+    }
+}

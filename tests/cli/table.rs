@@ -3,11 +3,10 @@
 use std::fs;
 
 use nix::sys::signal::Signal;
-use serde_json::Value;
 use tests::{ROTARY, Rig};
 use truestage::store::{ReadJournal, SweepEntry, read_journal};
 
-use crate::programs::{Bench, live_rigs};
+use crate::programs::{Bench, live_rigs, number, text};
 
 /// Three placements, and the emulator's hand that turns the plate whenever it was read: the last
 /// time to where it is verified.
@@ -22,18 +21,6 @@ fn bench(rig: Rig) -> Bench {
         text.replace("optimise = ", "# ")
     });
     bench
-}
-
-fn text(value: &Value) -> &str {
-    value
-        .as_str()
-        .unwrap_or_else(|| panic!("{value} is no text"))
-}
-
-fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 /// The one journal of a calibration, as far as it is written.

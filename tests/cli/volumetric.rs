@@ -11,7 +11,7 @@ use tests::volume::{Volume, good, quick};
 use truestage::cycle::volumetric::{VerifyBy, WarmUp};
 use truestage::store::{OpticsName, read_journal};
 
-use crate::programs::truestage;
+use crate::programs::{check_says, number, page, text, truestage};
 
 /// A machine that was calibrated twice and verified before and after, in virtual time.
 struct Runs {
@@ -59,41 +59,11 @@ fn runs() -> Runs {
     }
 }
 
-fn text(value: &Value) -> &str {
-    value
-        .as_str()
-        .unwrap_or_else(|| panic!("{value} is no text"))
-}
-
-fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
-}
-
 #[track_caller]
 fn check_error(said: &Value, parts: &[&str]) {
     let error = text(&said["error"]);
     for part in parts {
         assert!(error.contains(part), "`{part}` is not in {error}");
-    }
-}
-
-fn page(runs: &Runs, journal: &str) -> String {
-    let made = runs.run(&["report", journal]).with_code(0);
-    let html = fs::read_to_string(text(&made["report"])).expect("it was written");
-    assert!(
-        !html.contains("<script") && !html.contains("http"),
-        "not self-contained"
-    );
-    assert!(!html.contains("NaN") && html.ends_with("</html>\n"));
-    html
-}
-
-#[track_caller]
-fn check_says(html: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(html.contains(part), "`{part}` is not on the page");
     }
 }
 
@@ -123,7 +93,7 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
     let largest = largest.fold(0.0, f64::max);
     assert!(largest > 0.0 && largest < 5.0, "{largest}");
 
-    let calibrated = page(&runs, journal);
+    let calibrated = page(runs.folder(), journal);
     let errors = [
         "e_xx",
         "e_yz",
@@ -134,7 +104,10 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
     ];
     check_says(&calibrated, &errors);
     check_says(&calibrated, &["x (mm)", "°C", "Residuals", &second[..12]]);
-    let (found, left) = (page(&runs, &runs.found), page(&runs, &runs.left));
+    let (found, left) = (
+        page(runs.folder(), &runs.found),
+        page(runs.folder(), &runs.left),
+    );
     check_says(&found, &["Line as found", "deviation (µm)", "<svg"]);
     check_says(&left, &["Line as left", "correction x, y, z (µm)", "°C"]);
 }

@@ -13,6 +13,7 @@ use truestage::Failure;
 use truestage::cycle::volumetric::{
     GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
 };
+use truestage::emulated::with_rare_heartbeats;
 use truestage::engine::{Live, Observed};
 use truestage::store::{
     BendRecord, CalibrationRecord, Content, GeometryContent, MemoryName, RecordHead,
@@ -33,13 +34,7 @@ pub const STAND: Duration = Duration::from_millis(300);
 
 /// Heartbeats so rare that hours without SYNC cost little.
 pub fn calm(text: String) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+    with_rare_heartbeats(&text)
 }
 
 /// Few nodes and short averages, for tests of what is done rather than of how well it is measured.

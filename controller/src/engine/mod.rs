@@ -29,6 +29,7 @@ mod lack;
 mod motion;
 mod pace;
 mod path;
+mod planner;
 mod run;
 mod tables;
 

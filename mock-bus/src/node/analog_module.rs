@@ -38,22 +38,25 @@ impl Wires for Plant {
     }
 }
 
+/// What a module is like apart from its profile.
+#[derive(Clone, Copy, Debug)]
+pub struct Module<'a> {
+    /// Its number, 1 to 127.
+    pub node_id: u8,
+    /// How long it takes to boot.
+    pub boot_delay_ms: u64,
+    /// How often it samples by itself.
+    pub sampling_period_ms: u64,
+    /// How many inputs it has.
+    pub inputs: usize,
+    /// What it spoils.
+    pub manners: &'a Manners,
+}
+
 /// What a profile makes of a module.
 pub trait Profile {
-    /// Its number, 1 to 127.
-    fn node_id(&self) -> u8;
-
-    /// How long it takes to boot.
-    fn boot_delay(&self) -> Duration;
-
-    /// What it spoils.
-    fn manners(&self) -> &Manners;
-
-    /// How many inputs it has.
-    fn inputs(&self) -> usize;
-
-    /// How often it samples by itself.
-    fn sampling_period(&self) -> Duration;
+    /// What it is like apart from its profile.
+    fn module(&self) -> Module<'_>;
 
     /// What a master reads of it first.
     fn description(&self, node: NodeId) -> Description;
@@ -91,16 +94,17 @@ impl<P: Profile> AnalogModule<P> {
     /// # Panics
     /// When its number is not 1 to 127, which reading a configuration file refuses.
     pub fn new(profile: P) -> Self {
-        let node = NodeId::new(profile.node_id()).expect("node_id is 1 to 127");
+        let module = profile.module();
+        let node = NodeId::new(module.node_id).expect("node_id is 1 to 127");
         let server = CanopenServer::new(
             node,
-            profile.boot_delay(),
+            Duration::from_millis(module.boot_delay_ms),
             &profile.description(node),
             profile.dictionary(),
-            profile.manners().clone(),
+            module.manners.clone(),
         );
         Self {
-            reported: vec![None; profile.inputs()],
+            reported: vec![None; module.inputs],
             profile,
             server,
             sample_due: Time::NEVER,
@@ -134,7 +138,8 @@ impl<P: Profile> AnalogModule<P> {
             return;
         }
         if self.sample_due <= now {
-            self.sample_due = now + self.profile.sampling_period();
+            let period_ms = self.profile.module().sampling_period_ms.max(1);
+            self.sample_due = now + Duration::from_millis(period_ms);
             self.profile.sample(&mut self.server, wires);
             self.report_events(now);
         }

@@ -13,13 +13,11 @@
 //! | 0x6401 | reading = (raw + 0x6431) · 0x6432, an i16 that saturates; raw is left-justified |
 //! | 0x6424, 0x6425, 0x6426 | upper limit, lower limit, delta of the event, in 0x6401's unit |
 
-use std::time::Duration;
-
 use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId, Object};
 use serde::{Deserialize, Serialize};
 
-use super::analog_module::{AnalogModule, Profile, Wires};
+use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
 use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
@@ -86,24 +84,14 @@ impl Default for Cia401AnalogConfig {
 pub type Cia401AnalogNode = AnalogModule<Cia401AnalogConfig>;
 
 impl Profile for Cia401AnalogConfig {
-    fn node_id(&self) -> u8 {
-        self.node_id
-    }
-
-    fn boot_delay(&self) -> Duration {
-        Duration::from_millis(self.boot_delay_ms)
-    }
-
-    fn manners(&self) -> &Manners {
-        &self.manners
-    }
-
-    fn inputs(&self) -> usize {
-        self.plant_channels.len()
-    }
-
-    fn sampling_period(&self) -> Duration {
-        Duration::from_millis(self.sampling_period_ms.max(1))
+    fn module(&self) -> Module<'_> {
+        Module {
+            node_id: self.node_id,
+            boot_delay_ms: self.boot_delay_ms,
+            sampling_period_ms: self.sampling_period_ms,
+            inputs: self.plant_channels.len(),
+            manners: &self.manners,
+        }
     }
 
     fn description(&self, node: NodeId) -> Description {

@@ -17,14 +17,12 @@
 //! | 0x7130 | process value = (measured · 0x6126 + 0x6127) in 0x6131's unit with 0x6132's digits |
 //! | 0x6150 | what is wrong with it; a value that is not valid reads −32768 |
 
-use std::time::Duration;
-
 use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId, Object};
 use drivers::wire::cia404::{self, InputStatus, PhysicalUnit, SensorType, Unit};
 use serde::{Deserialize, Serialize};
 
-use super::analog_module::{AnalogModule, Profile, Wires};
+use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Bounds, Dictionary, Entry, Kind, Mapping};
 use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
@@ -107,24 +105,14 @@ impl Default for Cia404AnalogConfig {
 pub type Cia404AnalogNode = AnalogModule<Cia404AnalogConfig>;
 
 impl Profile for Cia404AnalogConfig {
-    fn node_id(&self) -> u8 {
-        self.node_id
-    }
-
-    fn boot_delay(&self) -> Duration {
-        Duration::from_millis(self.boot_delay_ms)
-    }
-
-    fn manners(&self) -> &Manners {
-        &self.manners
-    }
-
-    fn inputs(&self) -> usize {
-        self.plant_channels.len()
-    }
-
-    fn sampling_period(&self) -> Duration {
-        Duration::from_millis(self.sampling_period_ms.max(1))
+    fn module(&self) -> Module<'_> {
+        Module {
+            node_id: self.node_id,
+            boot_delay_ms: self.boot_delay_ms,
+            sampling_period_ms: self.sampling_period_ms,
+            inputs: self.plant_channels.len(),
+            manners: &self.manners,
+        }
     }
 
     fn description(&self, node: NodeId) -> Description {
@@ -286,6 +274,8 @@ fn description(config: &Cia404AnalogConfig, node: NodeId) -> Description {
 
 #[cfg(test)]
 mod tests {
+    use core::time::Duration;
+
     use drivers::wire::can::CanFrame;
     use units::Time;
 

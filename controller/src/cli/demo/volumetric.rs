@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::json;
 use truestage::cycle::volumetric::{VerifyBy, VolumetricCalibrated, WarmUp};
-use truestage::emulated::Emulated;
+use truestage::emulated::{Emulated, with_rare_heartbeats};
 use truestage::report::volumetric::{HourOfDay, render_day};
 use truestage::store::{Lease, ReadJournal, read_journal};
 use truestage::{Failure, Machine, Store, config};
@@ -36,7 +36,7 @@ struct Hour {
 pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let started = Instant::now();
     let [path, text, description] = args.machine.files();
-    let mut loaded = config::parse(&calm(text), path)?;
+    let mut loaded = config::parse(&with_rare_heartbeats(text), path)?;
     if let Some(folder) = &args.data_dir {
         loaded.config.machine.data_dir.clone_from(folder);
     }
@@ -98,17 +98,6 @@ fn write_report(
         .collect();
     let html = render_day(&day, &calibrated, &made_from(&made.journal)?);
     write_page(store, &calibrated, &html)
-}
-
-/// Hours without SYNC cost the less, the rarer heartbeats are.
-fn calm(text: &str) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
 }
 
 fn day(

@@ -112,19 +112,20 @@ impl Machine {
     ) -> Result<(), Failure> {
         same_warmth(config, read, kept, taken)?;
         let limit = Metres::from_um(own.resume_limit_um);
-        for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
-            let Some(beam) = beam else { continue };
-            let seen = change_of_beam(axis, beam, kept, taken)?;
+        let within = |axis, what, seen: Metres| {
             if seen > limit {
-                let what = "beam";
                 return Err(VolumetricFailure::Moved {
                     axis,
                     what,
                     seen,
                     limit,
-                }
-                .into());
+                });
             }
+            Ok(())
+        };
+        for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
+            let Some(beam) = beam else { continue };
+            within(axis, "beam", change_of_beam(axis, beam, kept, taken)?)?;
         }
         let Some(roll) = &config.roll else {
             return Ok(());
@@ -132,17 +133,7 @@ impl Machine {
         // As it would show at the end of the longest tool.
         let reach = Metres::from_mm(config.tool_max_mm);
         let seen = reach * change_of_roll(kept, taken)?.value();
-        if seen > limit {
-            let (axis, what) = (volume_axis(roll.axis), "roll");
-            return Err(VolumetricFailure::Moved {
-                axis,
-                what,
-                seen,
-                limit,
-            }
-            .into());
-        }
-        Ok(())
+        Ok(within(volume_axis(roll.axis), "roll", seen)?)
     }
 }
 
