@@ -10,3 +10,4 @@ mod screw;
 mod table;
 mod verbs;
 mod volumetric;
+mod volumetric_live;

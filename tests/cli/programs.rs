@@ -27,7 +27,7 @@ pub(crate) fn live_rigs() -> impl Iterator<Item = Rig> {
 }
 
 /// A program of this workspace, beside the tests that cargo built.
-fn program(name: &str) -> PathBuf {
+pub(crate) fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a process knows its program");
     let folder = test.ancestors().nth(2).expect("target/PROFILE/deps/TEST");
     let path = folder.join(name);
@@ -44,7 +44,12 @@ pub(crate) struct Process(Child);
 
 impl Process {
     fn start(command: &mut Command) -> Self {
-        let command = command.stdin(Stdio::null()).stdout(Stdio::piped());
+        Self::start_at(command, Stdio::null())
+    }
+
+    /// Likewise, at a terminal of its own, say.
+    pub(crate) fn start_at(command: &mut Command, input: Stdio) -> Self {
+        let command = command.stdin(input).stdout(Stdio::piped());
         let child = command.stderr(Stdio::piped()).spawn();
         Self(child.unwrap_or_else(|error| panic!("{command:?}: {error}")))
     }
@@ -75,6 +80,23 @@ impl Process {
     pub(crate) fn end(mut self) -> Ended {
         let child = std::mem::replace(&mut self.0, nothing());
         Ended::new(&child.wait_with_output().expect("a child can be waited for"))
+    }
+
+    /// Waits for its end, and shows each line that it tells people meanwhile to `hear`.
+    pub(crate) fn end_heard(mut self, mut hear: impl FnMut(&Self, &str)) -> Ended {
+        let said = self.0.stderr.take().expect("it is piped");
+        let mut told = String::new();
+        for line in BufReader::new(said).lines() {
+            let line = line.expect("a program prints text");
+            hear(&self, &line);
+            told += &line;
+            told.push('\n');
+        }
+        let ended = self.end();
+        Ended {
+            said: told + &ended.said,
+            ..ended
+        }
     }
 }
 

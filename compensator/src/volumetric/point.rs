@@ -177,8 +177,11 @@ impl Volume {
     }
 
     /// Refuses what is outside, naming the axis.
+    ///
+    /// # Errors
+    /// [`NoCorrection::Outside`](super::NoCorrection::Outside).
     #[inline]
-    pub(crate) fn check(&self, point: Point) -> Result<(), super::NoCorrection> {
+    pub fn check(&self, point: Point) -> Result<(), super::NoCorrection> {
         if self.contains(point) {
             Ok(())
         } else {

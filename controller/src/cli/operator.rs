@@ -52,12 +52,13 @@ impl Terminal {
         let Some(answers) = &self.answers else {
             return Ok(());
         };
+        // What was typed before is no answer to this: a hand may be in the machine.
+        tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
         self.output.note(
             "  what it moves is switched off, which is no safe stop: make the machine safe first; \
              Enter when it is done, Ctrl-C to stop (what was read is kept)",
         );
-        // What was typed before is no answer to this: a hand may be in the machine.
-        tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))
+        Ok(())
     }
 
     fn has_entered(&mut self) -> Result<bool, Failure> {

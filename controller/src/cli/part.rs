@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use compensator::volumetric::Axis;
+use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
-use truestage::cycle::volumetric::Remembered;
-use truestage::engine::{CsvError, Engine, Lack, Live, NoCorrection, Validity, read_path};
+use truestage::cycle::volumetric::{FirstPart, GEOMETRY, Mover, Remembered};
+use truestage::engine::{Lack, Live, Validity, read_path};
 use truestage::ports::Use;
 use truestage::store::{MemoryName, short};
 use truestage::{Failure, Machine, Store};
@@ -15,7 +15,7 @@ use units::Metres;
 use super::data::read;
 use super::output::{Ended, Output};
 use super::session::Session;
-use super::volume::with_zeroed_volume;
+use super::volume::{with_zeroed_volume, zeroed_volume};
 use super::{MachineArgs, MemoryArgs};
 
 /// How a path was followed.
@@ -27,19 +27,31 @@ struct Followed {
     kept: Option<Remembered>,
 }
 
-pub(super) fn run(machine: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
+/// What drives a path, and what is recorded meanwhile.
+struct Ready {
+    /// `None`: nothing is known to correct.
+    mover: Option<Mover>,
+    part: Option<FirstPart>,
+}
+
+pub(super) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
     let path = read(file)?;
-    let follow = |machine: &mut Machine, store: &Store| {
-        let points = |engine: &Engine| {
-            let points = read_path(&path, engine.axes(), engine.period());
-            points.map_err(|source: CsvError| Failure::Usage {
-                what: format!("{}: {source}", file.display()),
-                help: "the columns are time_s,x_mm,y_mm,z_mm".into(),
-            })
-        };
-        followed(machine, store, is_first, points)
+    let session = Session::open(args, "run", Use::Motion, output)?;
+    let is_measured = session.store.active(GEOMETRY)?.current.is_some();
+    // Long paths take seconds to judge: before the drives wait for our heartbeat.
+    let points = judged(&session.machine, (file, &path), is_measured)?;
+    let ready = |machine: &Machine, store: &Store| {
+        if is_first {
+            let (mover, part) = machine.first_part(store)?;
+            let (mover, part) = (Some(mover), Some(part));
+            return Ok(Ready { mover, part });
+        }
+        let mover = machine.stored_mover(store)?;
+        Ok(Ready { mover, part: None })
     };
-    let (followed, counters) = with_zeroed_volume(machine, "run", Use::Motion, output, follow)?;
+    let follow =
+        |machine: &mut Machine, store: &Store, ready| followed(machine, store, ready, points);
+    let (followed, counters) = zeroed_volume(session, ready, follow)?;
     let said = match &followed.corrected {
         Some(corrected) => corrected.text(),
         None => "uncorrected: the errors were never measured".into(),
@@ -62,25 +74,45 @@ pub(super) fn run(machine: &MachineArgs, file: &Path, is_first: bool, output: Ou
     output.result(&text, &value)
 }
 
+/// Reads and judges all of the path: what cannot be made to its end is not begun.
+fn judged(
+    machine: &Machine,
+    (file, text): (&Path, &str),
+    is_corrected: bool,
+) -> Result<Vec<Vec<Metres>>, Failure> {
+    let wrong = |what: String| Failure::Usage {
+        what: format!("{}: {what}", file.display()),
+        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm, README.md says more"
+            .into(),
+    };
+    let mover = machine.uncorrected_mover()?;
+    let engine = mover.engine();
+    let points = read_path(text, engine.axes(), engine.period());
+    let points = points.map_err(|source| wrong(source.to_string()))?;
+    let checked = mover.check_path(&points);
+    checked.map_err(|source| wrong(source.to_string()))?;
+    if is_corrected {
+        for (point, period) in points.iter().zip(0..) {
+            let place = Point::new(point[0], point[1], point[2]);
+            let at = f64::from(period) * engine.period().as_secs_f64();
+            let checked = machine.check_volume(place);
+            checked.map_err(|source| wrong(format!("at {at:.4} s: {source}")))?;
+        }
+    }
+    Ok(points)
+}
+
 fn followed(
     machine: &mut Machine,
     store: &Store,
-    is_first: bool,
-    points: impl FnOnce(&Engine) -> Result<Vec<Vec<Metres>>, Failure>,
+    Ready { mover, part }: Ready,
+    points: Vec<Vec<Metres>>,
 ) -> Result<Followed, Failure> {
-    let (mover, part) = match is_first {
-        true => {
-            let (mover, part) = machine.first_part(store)?;
-            (Some(mover), Some(part))
-        }
-        false => (machine.stored_mover(store)?, None),
-    };
     let is_corrected = mover.is_some();
     let mut mover = match mover {
         Some(mover) => mover,
-        None => machine.volumetric_mover(Box::new(NoCorrection))?,
+        None => machine.uncorrected_mover()?,
     };
-    let points = points(mover.engine())?;
     machine.correct_volume(&mut mover, is_corrected)?;
     if let Some(part) = &part {
         part.recorder.listen();
@@ -156,9 +188,10 @@ impl CorrectedPath {
 
 pub(super) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
-    let record = |machine: &mut Machine, store: &Store| machine.record_memory(store, which);
+    let ready = |machine: &Machine, store: &Store| machine.check_memory(store, which);
+    let record = |machine: &mut Machine, store: &Store, ()| machine.record_memory(store, which);
     let (kept, counters) =
-        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, record)?;
+        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, ready, record)?;
     let text = format!(
         "{} keeps the present state: all parts from now on are made with it\n{}",
         short(&kept.id),

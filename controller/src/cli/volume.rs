@@ -1,13 +1,14 @@
 //! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
 
 use core::time::Duration;
+use std::path::PathBuf;
 
 use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::cycle::volumetric::{
-    GEOMETRY, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
-    VolumetricVerified, WarmUp,
+    GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    VolumetricVerified, WarmUp, measured_geometry,
 };
 use truestage::engine::Live;
 use truestage::ports::Use;
@@ -24,28 +25,45 @@ use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);
 
-/// Starts the machine, zeroes it, runs `procedure`, switches off.
-pub(super) fn with_zeroed_volume<R>(
+/// Starts the machine, zeroes it, runs `procedure`, switches off. What `prepare` refuses is refused
+/// when the devices have said who they are and before anything moves; what it made ready goes to
+/// `procedure`.
+pub(super) fn with_zeroed_volume<P, R>(
     args: &MachineArgs,
     verb: &str,
     purpose: Use,
     output: Output,
-    procedure: impl FnOnce(&mut Machine, &Store) -> Result<R, Failure>,
+    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
-    let mut session = Session::open(args, verb, purpose, output)?;
+    zeroed_volume(
+        Session::open(args, verb, purpose, output)?,
+        prepare,
+        procedure,
+    )
+}
+
+/// The same on a machine that is connected.
+pub(super) fn zeroed_volume<P, R>(
+    mut session: Session,
+    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
+) -> Result<(R, Value), Failure> {
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
+        let prepared = prepare(machine, &store)?;
         machine.zero_volumetric()?;
-        let result = procedure(machine, &store)?;
+        let result = procedure(machine, &store, prepared)?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.counters())))
     })
 }
 
 pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
-    let run = |_: &mut Machine, _: &Store| Ok(());
-    let ((), counters) = with_zeroed_volume(&args.machine, "zero", Use::Motion, output, run)?;
+    let (machine, ready) = (&args.machine, |_: &Machine, _: &Store| Ok(()));
+    let run = |_: &mut Machine, _: &Store, ()| Ok(());
+    let ((), counters) = with_zeroed_volume(machine, "zero", Use::Motion, output, ready, run)?;
     let text = "x, y and z: zero found on their index pulses";
     output.result(
         text,
@@ -54,8 +72,9 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(super) fn reference(args: &MachineArgs, output: Output) -> Ended {
-    let run = |machine: &mut Machine, store: &Store| machine.reference_volumetric(store);
-    let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, run)?;
+    let ready = |_: &Machine, store: &Store| measured_geometry(store);
+    let run = |machine: &mut Machine, store: &Store, _| machine.reference_volumetric(store);
+    let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;
     let mut value = referenced_value(&taken);
     value["counters"] = counters;
     output.result(&referenced_text(&taken), &value)
@@ -105,12 +124,14 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         }
     };
     let mut operator = Terminal::new(args.yes, output)?;
-    let run = |machine: &mut Machine, store: &Store| {
-        let resume = journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)?;
+    let ready = |_: &Machine, store: &Store| {
+        journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
+    };
+    let run = |machine: &mut Machine, store: &Store, resume: Option<PathBuf>| {
         machine.calibrate_volumetric(store, warm_up, resume.as_deref(), &mut operator)
     };
-    let machine = &args.axis.machine;
-    let (made, counters) = with_zeroed_volume(machine, "calibrate", Use::Measurement, output, run)?;
+    let (machine, purpose) = (&args.axis.machine, Use::Measurement);
+    let (made, counters) = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run)?;
     let mut value = calibrated_value(&made);
     value["counters"] = counters;
     output.result(&calibrated_text(&made), &value)
@@ -215,16 +236,16 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         });
     }
     let mut operator = Terminal::new(args.yes, output)?;
-    let run = |machine: &mut Machine, store: &Store| {
-        let by = match args.uncompensated {
-            true => VerifyBy::AsFound,
-            false => VerifyBy::Everything,
-        };
+    let by = match args.uncompensated {
+        true => VerifyBy::AsFound,
+        false => VerifyBy::Everything,
+    };
+    let ready = |machine: &Machine, store: &Store| machine.check_verify(store, by);
+    let run = |machine: &mut Machine, store: &Store, ()| {
         machine.verify_volumetric(store, by, &mut operator)
     };
-    let machine = &args.axis.machine;
-    let (verified, counters) =
-        with_zeroed_volume(machine, "verify", Use::Measurement, output, run)?;
+    let (machine, purpose) = (&args.axis.machine, Use::Measurement);
+    let (verified, counters) = with_zeroed_volume(machine, "verify", purpose, output, ready, run)?;
     let mut value = verified_value(&verified);
     value["counters"] = counters;
     let text = verified_text(&verified);
@@ -297,19 +318,26 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
             help: "write AXIS=PLACE with a unit: x=12.5mm y=20mm z=5mm".into(),
         });
     }
-    let run = |machine: &mut Machine, store: &Store| {
+    let ready = |machine: &Machine, store: &Store| {
         let index_mm = machine.volumetric_config()?.zero.index_mm;
         let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
         let target = Point::new(at(0), at(1), at(2));
-        match machine.stored_mover(store)? {
-            None => machine.go_straight(target).map(|()| None),
-            Some(mut mover) => {
-                machine.correct_volume(&mut mover, true)?;
-                machine.drive_to(&mut mover, target, STAND).map(Some)
-            }
+        let mover = machine.stored_mover(store)?;
+        machine.uncorrected_mover()?.check_target(target)?;
+        if mover.is_some() {
+            machine.check_volume(target)?;
         }
+        Ok((mover, target))
     };
-    let (live, counters) = with_zeroed_volume(&args.machine, "move", Use::Motion, output, run)?;
+    let run = |machine: &mut Machine, _: &Store, (mover, target): (Option<Mover>, Point)| {
+        let Some(mut mover) = mover else {
+            return machine.go_straight(target).map(|()| None);
+        };
+        machine.correct_volume(&mut mover, true)?;
+        machine.drive_to(&mut mover, target, STAND).map(Some)
+    };
+    let machine = &args.machine;
+    let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
     let Some(live) = live else {
         let text = "moved without correction: the errors were never measured";
         return output.result(text, &json!({"corrected": false, "counters": counters}));

@@ -11,8 +11,9 @@ use units::{Metres, Time};
 
 use super::account::{Cause, Command, Counts, Heard, Live, State, Trouble};
 use super::correction::{Applied, Correction, Observed};
+use super::judge::Differences;
 use super::motion::{Moment, Motion};
-use super::path::{Differences, Item};
+use super::path::Item;
 use super::{AXES_MAX, AxisLimits, PerAxis};
 
 /// So many samples of an axis in a row may be missing before it is not safe to go on.

@@ -25,6 +25,7 @@ mod decide_tests;
 mod failure;
 mod hear;
 mod histogram;
+mod judge;
 mod lack;
 mod motion;
 mod pace;
@@ -46,10 +47,11 @@ pub use correction::{
 pub use csv::{CsvError, CsvFault, read_path};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
+pub use judge::{PathError, PathFault};
 pub use lack::{Lack, Source};
 pub use motion::{Moment, Motion, MotionError};
 pub use pace::Timing;
-pub use path::{PathError, PathFault, PathWriter, PushError};
+pub use path::{PathWriter, PushError};
 pub use tables::TableCorrection;
 
 use crate::failure::Failure;
@@ -247,14 +249,43 @@ impl Desk {
     /// # Errors
     /// When the target is outside the soft limits, or nobody takes the order.
     pub fn move_to(&mut self, target: &[Metres]) -> Result<(), EngineFailure> {
+        let all = self.check_target(target)?;
+        self.order(Command::MoveTo(all))
+    }
+
+    /// Whether the axes could be moved to `target`.
+    ///
+    /// # Errors
+    /// When it is outside the soft limits, or not of these axes.
+    pub fn check_target(&mut self, target: &[Metres]) -> Result<PerAxis<Metres>, EngineFailure> {
         let expected = self.path.axes().len();
         if target.len() != expected {
             return Err(EngineFailure::Axes { seen: target.len() });
         }
         let mut all = [Metres::ZERO; AXES_MAX];
         all[..expected].copy_from_slice(target);
-        self.checker.plan_to(&Moment::at_rest(all), &all)?;
-        self.order(Command::MoveTo(all))
+        let planned = self.checker.plan_to(&Moment::at_rest(all), &all);
+        planned.map_err(|error| self.named(error))?;
+        Ok(all)
+    }
+
+    /// A plan knows its axes by number.
+    fn named(&self, error: MotionError) -> EngineFailure {
+        let names = self.path.axes();
+        match error {
+            MotionError::SoftLimit {
+                axis,
+                target,
+                min,
+                max,
+            } => EngineFailure::SoftLimit {
+                axis: names.get(axis).cloned().unwrap_or_default(),
+                target,
+                min,
+                max,
+            },
+            other => EngineFailure::Motion(other),
+        }
     }
 
     /// The newest period of the loop, `None` before the first. Who looked less often than every

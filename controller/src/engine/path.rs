@@ -12,13 +12,10 @@
 use core::time::Duration;
 
 use rtrb::{Producer, PushError as Full};
-use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
+use units::Metres;
 
-use super::motion::{Moment, Motion};
-use super::{AxisLimits, PerAxis};
-
-/// Differences may exceed a limit by this share: positions are rounded.
-const ROUNDING: f64 = 1.01;
+use super::judge::{Judge, PathError};
+use super::{AXES_MAX, AxisLimits, PerAxis};
 
 /// What waits in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,68 +24,6 @@ pub(super) enum Item {
     Begin,
     Point(PerAxis<Metres>),
     End,
-}
-
-/// Why a point cannot be driven.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("path point {point} (at {at_s:.4} s), axis {axis}: {fault}")]
-pub struct PathError {
-    /// Which point, counted from 1.
-    pub point: u64,
-    /// When it would be reached, in seconds from the path's beginning.
-    pub at_s: f64,
-    /// The axis.
-    pub axis: String,
-    /// What is wrong.
-    pub fault: PathFault,
-}
-
-/// What is wrong with a point.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "the Display text says what each field is")]
-pub enum PathFault {
-    /// NaN or infinite.
-    #[error("the position is not a number")]
-    NotANumber,
-    /// Outside the soft limits.
-    #[error("{:.6} mm is outside the soft limits {:.3} to {:.3} mm", at.mm(), min.mm(), max.mm())]
-    SoftLimit {
-        at: Metres,
-        min: Metres,
-        max: Metres,
-    },
-    /// Inside, but too fast to stop inside.
-    #[error(
-        "a stop from here would end at {:.6} mm, outside the soft limits {:.3} to {:.3} mm; \
-         slow down before the limit",
-        at.mm(), min.mm(), max.mm()
-    )]
-    NoStop {
-        at: Metres,
-        min: Metres,
-        max: Metres,
-    },
-    /// Too fast.
-    #[error("{:.3} mm/s, the limit is {:.3} mm/s", seen.value() * 1e3, limit.value() * 1e3)]
-    Speed {
-        seen: MetresPerSecond,
-        limit: MetresPerSecond,
-    },
-    /// Speeds up or slows down too much.
-    #[error("{:.3} mm/s², the limit is {:.3} mm/s²", seen.value() * 1e3, limit.value() * 1e3)]
-    Acceleration {
-        seen: MetresPerSecondSquared,
-        limit: MetresPerSecondSquared,
-    },
-    /// Jerks too much.
-    #[error(
-        "{:.1} mm/s³, the limit is {:.1} mm/s³; smooth the path, or begin and end it slowly",
-        seen.value() * 1e3, limit.value() * 1e3
-    )]
-    Jerk {
-        seen: MetresPerSecondCubed,
-        limit: MetresPerSecondCubed,
-    },
 }
 
 /// Why a point was not taken.
@@ -116,66 +51,10 @@ pub enum PushError {
     Stopped,
 }
 
-/// The last points, and what their differences say: speed, acceleration and jerk are the first,
-/// second and third backward difference over the period.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Differences {
-    pub(super) moment: Moment,
-    jerk: PerAxis<MetresPerSecondCubed>,
-}
-
-impl Differences {
-    /// At rest at `position`.
-    pub(super) fn at_rest(position: PerAxis<Metres>) -> Self {
-        Self::of(Moment::at_rest(position))
-    }
-
-    /// A motion that is known otherwise.
-    pub(super) fn of(moment: Moment) -> Self {
-        Self {
-            moment,
-            jerk: [MetresPerSecondCubed::ZERO; super::AXES_MAX],
-        }
-    }
-
-    /// The same after one more point.
-    pub(super) fn next(&self, point: &PerAxis<Metres>, axes: usize, period_s: f64) -> Self {
-        let mut next = Self::at_rest(*point);
-        let before = &self.moment;
-        for (axis, at) in point.iter().enumerate().take(axes) {
-            let speed = (*at - before.position[axis]).value() / period_s;
-            let acceleration = (speed - before.speed[axis].value()) / period_s;
-            let jerk = (acceleration - before.acceleration[axis].value()) / period_s;
-            next.moment.speed[axis] = MetresPerSecond(speed);
-            next.moment.acceleration[axis] = MetresPerSecondSquared(acceleration);
-            next.jerk[axis] = MetresPerSecondCubed(jerk);
-        }
-        next
-    }
-
-    /// The motion at the last point itself, by Newton's backward differences: a first difference
-    /// alone is true half a period earlier, a second one a whole period.
-    pub(super) fn at_the_point(&self, axes: usize, period_s: f64) -> Moment {
-        let mut moment = self.moment;
-        for axis in 0..axes {
-            let second = moment.acceleration[axis].value() * period_s;
-            let third = self.jerk[axis].value() * period_s * period_s;
-            moment.speed[axis] += MetresPerSecond(second / 2.0 + third / 3.0);
-            moment.acceleration[axis] += MetresPerSecondSquared(third / period_s);
-        }
-        moment
-    }
-}
-
 /// Writes a path; lives wherever its points come from, the loop is another thread's.
 pub struct PathWriter {
-    names: Vec<String>,
-    period: Duration,
-    limits: PerAxis<AxisLimits>,
+    judge: Judge,
     queue: Producer<Item>,
-    last: Option<Differences>,
-    stop: Motion,
-    points: u64,
     finished: bool,
 }
 
@@ -187,25 +66,45 @@ impl PathWriter {
         queue: Producer<Item>,
     ) -> Self {
         Self {
-            stop: Motion::new(names.len(), limits),
-            names,
-            period,
-            limits,
+            judge: Judge::new(names, period, limits),
             queue,
-            last: None,
-            points: 0,
             finished: false,
         }
     }
 
     /// The axes, in the order of a point's positions.
     pub fn axes(&self) -> &[String] {
-        &self.names
+        self.judge.axes()
     }
 
     /// From one point to the next.
     pub const fn period(&self) -> Duration {
-        self.period
+        self.judge.period()
+    }
+
+    /// Whether all `points` could be driven as one path, so that none is begun that cannot be
+    /// ended. Writes nothing. It takes some microseconds for each point: time to do it before
+    /// drives wait for set-points.
+    ///
+    /// # Errors
+    /// The first point that cannot.
+    pub fn check(&self, points: &[Vec<Metres>]) -> Result<(), PushError> {
+        let mut judge = self.judge.anew();
+        points.iter().try_for_each(|point| {
+            let next = judge.judge(&self.of_all_axes(point)?)?;
+            judge.accept(next);
+            Ok(())
+        })
+    }
+
+    fn of_all_axes(&self, point: &[Metres]) -> Result<PerAxis<Metres>, PushError> {
+        let (expected, seen) = (self.axes().len(), point.len());
+        if seen != expected {
+            return Err(PushError::WrongAxes { expected, seen });
+        }
+        let mut all = [Metres::ZERO; AXES_MAX];
+        all[..expected].copy_from_slice(point);
+        Ok(all)
     }
 
     /// How many points the queue takes now.
@@ -220,11 +119,10 @@ impl PathWriter {
     /// # Errors
     /// When there is no room.
     pub fn begin(&mut self) -> Result<(), PushError> {
-        if self.last.is_some() || self.finished {
+        if self.judge.has_begun() || self.finished {
             self.enqueue(Item::Begin)?;
         }
-        self.last = None;
-        self.points = 0;
+        self.judge.begin();
         self.finished = false;
         Ok(())
     }
@@ -234,20 +132,13 @@ impl PathWriter {
     /// # Errors
     /// When there is no room, or the point cannot be driven; the path is as before then.
     pub fn push(&mut self, point: &[Metres]) -> Result<(), PushError> {
-        let expected = self.names.len();
-        if point.len() != expected {
-            let seen = point.len();
-            return Err(PushError::WrongAxes { expected, seen });
-        }
+        let all = self.of_all_axes(point)?;
         if self.finished {
             return Err(PushError::Finished);
         }
-        let mut all = [Metres::ZERO; super::AXES_MAX];
-        all[..expected].copy_from_slice(point);
-        let next = self.judge(&all)?;
+        let next = self.judge.judge(&all)?;
         self.enqueue(Item::Point(all))?;
-        self.last = Some(next);
-        self.points += 1;
+        self.judge.accept(next);
         Ok(())
     }
 
@@ -289,77 +180,5 @@ impl PathWriter {
         self.queue
             .push(item)
             .map_err(|Full::Full(_)| PushError::Full)
-    }
-
-    fn judge(&mut self, point: &PerAxis<Metres>) -> Result<Differences, PathError> {
-        let axes = self.names.len();
-        let period_s = self.period.as_secs_f64();
-        for (axis, at) in point.iter().enumerate().take(axes) {
-            if !at.is_finite() {
-                return Err(self.fault(axis, PathFault::NotANumber));
-            }
-        }
-        let Some(last) = self.last else {
-            let first = Differences::at_rest(*point);
-            return self.judge_place(&first.moment).map(|()| first);
-        };
-        let next = last.next(point, axes, period_s);
-        for axis in 0..axes {
-            if let Some(fault) = self.judge_motion(axis, &next) {
-                return Err(self.fault(axis, fault));
-            }
-        }
-        self.judge_place(&next.at_the_point(axes, period_s))?;
-        Ok(next)
-    }
-
-    fn judge_motion(&self, axis: usize, seen: &Differences) -> Option<PathFault> {
-        let limits = &self.limits[axis];
-        let (speed, jerk) = (seen.moment.speed[axis], seen.jerk[axis]);
-        let acceleration = seen.moment.acceleration[axis];
-        if speed.abs() > limits.speed * ROUNDING {
-            let (seen, limit) = (speed, limits.speed);
-            return Some(PathFault::Speed { seen, limit });
-        }
-        if acceleration.abs() > limits.acceleration * ROUNDING {
-            let (seen, limit) = (acceleration, limits.acceleration);
-            return Some(PathFault::Acceleration { seen, limit });
-        }
-        if jerk.abs() > limits.jerk * ROUNDING {
-            let (seen, limit) = (jerk, limits.jerk);
-            return Some(PathFault::Jerk { seen, limit });
-        }
-        None
-    }
-
-    /// Whether the axes are, and can stop, within their limits.
-    fn judge_place(&mut self, moment: &Moment) -> Result<(), PathError> {
-        let axes = self.names.len();
-        // A stop that cannot be planned ends nowhere.
-        let stopped = match self.stop.plan_stop(moment) {
-            Ok(duration) => self.stop.at(duration).position,
-            Err(_) => [Metres(f64::NAN); super::AXES_MAX],
-        };
-        for (axis, stopped) in stopped.into_iter().enumerate().take(axes) {
-            let AxisLimits { min, max, .. } = self.limits[axis];
-            let at = moment.position[axis];
-            if !(min <= at && at <= max) {
-                return Err(self.fault(axis, PathFault::SoftLimit { at, min, max }));
-            }
-            if !(min <= stopped && stopped <= max) {
-                let at = stopped;
-                return Err(self.fault(axis, PathFault::NoStop { at, min, max }));
-            }
-        }
-        Ok(())
-    }
-
-    fn fault(&self, axis: usize, fault: PathFault) -> PathError {
-        PathError {
-            point: self.points + 1,
-            at_s: self.period.as_secs_f64() * self.points as f64,
-            axis: self.names[axis].clone(),
-            fault,
-        }
     }
 }

@@ -270,7 +270,10 @@ impl Machine {
         loop {
             match self.one_period(engine, seats, &mut pace) {
                 Ok(None) => host(),
-                Ok(Some(cause)) => return Ok(cause),
+                Ok(Some(cause)) => {
+                    self.last_sync(seats, &pace)?;
+                    return Ok(cause);
+                }
                 Err(failure) => {
                     let now = self.now();
                     let failure = self.bus_watch.explain(now, failure);
@@ -280,6 +283,15 @@ impl Machine {
                 }
             }
         }
+    }
+
+    /// The transport's first SYNC comes a period after it is asked for. Asked for in the middle of
+    /// one, the drives would wait for up to two periods, and fault when this computer stands still
+    /// just then: so the loop sends one more when it is due.
+    fn last_sync(&mut self, seats: &Seats, pace: &Pace) -> Result<(), Failure> {
+        self.transport.sleep_until(pace.deadline);
+        self.send_syncs(seats)
+            .map_err(|source| self.not_sent(source, "SYNC"))
     }
 
     fn one_period(

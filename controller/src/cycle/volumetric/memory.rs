@@ -50,12 +50,7 @@ impl Machine {
         store: &Store,
         memory: MemoryName,
     ) -> Result<Remembered, Failure> {
-        // What is recorded again need not belong to what is in use now.
-        let needed: &[MemoryName] = match memory {
-            MemoryName::First => &[],
-            MemoryName::Second => &[MemoryName::First],
-        };
-        let (state, records) = self.state_to_remember(store, needed)?;
+        let (state, records) = self.state_beneath(store, memory)?;
         let now = self.take_references()?;
         let config = self.volumetric_config()?.clone();
         let (mut map, mut covers) = (StateMap::default(), Coverage::default());
@@ -75,6 +70,27 @@ impl Machine {
             covers[axis.index()] = nodes.first().copied().zip(nodes.last().copied());
         }
         self.keep_memory(store, memory, &records, (map, covers), "memory record")
+    }
+
+    /// Whether [`Machine::record_memory`] has what it needs, before anything moves.
+    ///
+    /// # Errors
+    /// When there are no references.
+    pub fn check_memory(&self, store: &Store, memory: MemoryName) -> Result<(), Failure> {
+        self.state_beneath(store, memory).map(|_| ())
+    }
+
+    /// What `memory` counts from: what is recorded again need not belong to what is in use now.
+    fn state_beneath(
+        &self,
+        store: &Store,
+        memory: MemoryName,
+    ) -> Result<(VolumetricState, VolumetricRecords), Failure> {
+        let needed: &[MemoryName] = match memory {
+            MemoryName::First => &[],
+            MemoryName::Second => &[MemoryName::First],
+        };
+        self.state_to_remember(store, needed)
     }
 
     /// What is in use, of the memories those `needed`: for whoever records one.

@@ -9,7 +9,9 @@ use units::Metres;
 use super::VolumetricFailure;
 use crate::assemble::work_volume;
 use crate::config::VolumetricConfig;
-use crate::engine::{Cause, Correction, Desk, Engine, Live, PushError, State, Validity};
+use crate::engine::{
+    Cause, Correction, Desk, Engine, Live, NoCorrection, PushError, State, Validity,
+};
 use crate::failure::Failure;
 use crate::machine::Machine;
 
@@ -27,6 +29,27 @@ impl Mover {
     pub const fn engine(&self) -> &Engine {
         &self.engine
     }
+
+    /// Whether the tool can be moved to `target`, before anything moves.
+    ///
+    /// # Errors
+    /// When an axis cannot.
+    pub fn check_target(&mut self, target: Point) -> Result<(), Failure> {
+        self.desk.check_target(&per_axis(target))?;
+        Ok(())
+    }
+
+    /// Whether [`Machine::drive_along`] can drive `points` to their end, before anything moves.
+    ///
+    /// # Errors
+    /// The first that cannot be driven.
+    pub fn check_path(&self, points: &[Vec<Metres>]) -> Result<(), PushError> {
+        self.desk.path.check(points)
+    }
+}
+
+fn per_axis(point: Point) -> [Metres; 3] {
+    Axis::ALL.map(|axis| point.along(axis))
 }
 
 impl Machine {
@@ -39,6 +62,14 @@ impl Machine {
         let axes = config.axes.each_ref().map(String::as_str);
         let (engine, desk) = Engine::new(self, &axes, correction)?;
         Ok(Mover { engine, desk })
+    }
+
+    /// Likewise, for set-points that nothing is added to.
+    ///
+    /// # Errors
+    /// As [`Machine::volumetric_mover`].
+    pub fn uncorrected_mover(&self) -> Result<Mover, Failure> {
+        self.volumetric_mover(Box::new(NoCorrection))
     }
 
     /// Switches the correction on or off at standstill, and waits until it is all there: each
@@ -81,19 +112,32 @@ impl Machine {
         }
     }
 
+    /// Whether `point` can be corrected: in the calibrated volume, or so little beyond its end that
+    /// it is at its end.
+    ///
+    /// # Errors
+    /// When it is outside.
+    pub fn check_volume(&self, point: Point) -> Result<(), VolumetricFailure> {
+        let config = self.config().volumetric.as_ref();
+        let config = config.ok_or(VolumetricFailure::None)?;
+        let volume = work_volume(config)?;
+        let near = Metres::from_um(config.compensation.size_limit_um);
+        if (volume.nearest(point) - point).distance() > near {
+            volume.check(point)?;
+        }
+        Ok(())
+    }
+
     fn enter_volume(&mut self) -> Result<(), Failure> {
         let config = self.volumetric_config()?.clone();
-        let volume = work_volume(&config).map_err(VolumetricFailure::from)?;
         let mut here = [Metres::ZERO; 3];
         for (position, axis) in here.iter_mut().zip(&config.axes) {
             *position = self.reading(axis)?.map_or(*position, |it| it.position);
         }
         let here = Point::new(here[0], here[1], here[2]);
-        let inside = volume.nearest(here);
-        // Nearer than that it is at the end of the volume.
-        let near = Metres::from_um(config.compensation.size_limit_um);
-        if (inside - here).distance() > near {
-            self.go_straight(inside)?;
+        if self.check_volume(here).is_err() {
+            let volume = work_volume(&config).map_err(VolumetricFailure::from)?;
+            self.go_straight(volume.nearest(here))?;
         }
         Ok(())
     }
@@ -179,7 +223,7 @@ impl Machine {
     ) -> Result<Live, Failure> {
         let Mover { engine, desk } = mover;
         if let Some(target) = target {
-            desk.move_to(&Axis::ALL.map(|axis| target.along(axis)))?;
+            desk.move_to(&per_axis(target))?;
         }
         let mut since = None;
         let mut last = None;

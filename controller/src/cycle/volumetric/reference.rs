@@ -122,6 +122,15 @@ struct Stops {
     roll: Vec<Mean>,
 }
 
+/// The name of the errors in use.
+///
+/// # Errors
+/// When they were never measured.
+pub fn measured_geometry(store: &Store) -> Result<String, Failure> {
+    let geometry = store.active(GEOMETRY)?.current;
+    Ok(geometry.ok_or(VolumetricFailure::NoGeometry)?)
+}
+
 impl Machine {
     /// Takes the references of all detectors against the errors in use, stores and activates
     /// them: from now on a displacement is what has changed since now. The machine must be as
@@ -132,8 +141,7 @@ impl Machine {
     /// than they were measured at by more than is permitted, a detector is in trouble, or anything
     /// stops the machine. What was in use before stays in use then.
     pub fn reference_volumetric(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
-        let geometry = store.active(GEOMETRY)?.current;
-        let geometry = geometry.ok_or(VolumetricFailure::NoGeometry)?;
+        let geometry = measured_geometry(store)?;
         let then = store.load(&geometry)?.geometry(&geometry)?.temperatures();
         let config = self.volumetric_config()?.clone();
         if !config.temperature.is_empty() {

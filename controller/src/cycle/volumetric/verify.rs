@@ -110,6 +110,18 @@ impl Machine {
         Ok((Some(mover), Some(records.geometry)))
     }
 
+    /// Whether [`Machine::verify_volumetric`] has what it needs, before anything moves.
+    ///
+    /// # Errors
+    /// When it is not configured, or nothing that can be applied is stored.
+    pub fn check_verify(&self, store: &Store, by: VerifyBy) -> Result<(), Failure> {
+        let section = "verify";
+        if self.volumetric_config()?.verify.is_none() {
+            return Err(VolumetricFailure::NotConfigured { section }.into());
+        }
+        self.mover_by(store, by).map(|_| ())
+    }
+
     /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
     ///
     /// # Errors

@@ -25,7 +25,6 @@ pub use task::{LineOperator, LineOptics, LineTask};
 
 use super::VolumetricFailure;
 use crate::assemble;
-use crate::engine::NoCorrection;
 use crate::failure::Failure;
 use crate::machine::Machine;
 
@@ -215,7 +214,7 @@ impl Machine {
     /// When an axis is not zeroed, `target` is outside the soft limits, or something stops the
     /// machine on the way.
     pub fn go_straight(&mut self, target: Point) -> Result<(), Failure> {
-        let mut mover = self.volumetric_mover(Box::new(NoCorrection))?;
+        let mut mover = self.uncorrected_mover()?;
         self.drive_to(&mut mover, target, REST).map(|_| ())
     }
 
