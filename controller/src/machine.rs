@@ -122,9 +122,18 @@ pub struct Machine {
     /// Warnings for which there is no time now: whoever takes them may make their writer wait.
     pub(crate) held_back: Option<Vec<String>>,
     pub(crate) stop: StopRequest,
+    /// Whether its cyclic loops ask for SCHED_FIFO and locked memory.
+    pub(crate) real_time: bool,
 }
 
 impl Machine {
+    /// Lets all that is moved cyclically ask for SCHED_FIFO and locked memory
+    /// ([`Engine::in_real_time`](crate::engine::Engine::in_real_time)). Not for simulated time, which
+    /// passes as fast as the computer goes.
+    pub const fn in_real_time(&mut self) {
+        self.real_time = true;
+    }
+
     /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
     /// Nothing is sent yet.
     pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
@@ -157,6 +166,7 @@ impl Machine {
             observer: Box::new(Silent),
             held_back: None,
             stop: StopRequest::default(),
+            real_time: false,
         }
     }
 

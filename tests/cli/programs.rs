@@ -370,3 +370,12 @@ pub(crate) fn check_says(html: &str, parts: &[&str]) {
         assert!(html.contains(part), "`{part}` is not on the page");
     }
 }
+
+/// That an error says all of these.
+#[track_caller]
+pub(crate) fn check_error(said: &Value, parts: &[&str]) {
+    let error = text(&said["error"]);
+    for part in parts {
+        assert!(error.contains(part), "`{part}` is not in {error}");
+    }
+}

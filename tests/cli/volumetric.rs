@@ -5,13 +5,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use serde_json::Value;
 use tests::VOLUMETRIC;
 use tests::volume::{Volume, good, quick};
 use truestage::cycle::volumetric::{VerifyBy, WarmUp};
 use truestage::store::{OpticsName, read_journal};
 
-use crate::programs::{check_says, number, page, text, truestage};
+use crate::programs::{check_error, check_says, number, page, text, truestage};
 
 /// A machine that was calibrated twice and verified before and after, in virtual time.
 struct Runs {
@@ -56,14 +55,6 @@ fn runs() -> Runs {
         found,
         left,
         volume,
-    }
-}
-
-#[track_caller]
-fn check_error(said: &Value, parts: &[&str]) {
-    let error = text(&said["error"]);
-    for part in parts {
-        assert!(error.contains(part), "`{part}` is not in {error}");
     }
 }
 

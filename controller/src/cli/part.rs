@@ -23,6 +23,8 @@ struct Followed {
     count: usize,
     corrected: Option<CorrectedPath>,
     timing: String,
+    /// How the loop's thread was scheduled.
+    thread: String,
     /// What later parts are made with, when this was the first.
     kept: Option<Remembered>,
 }
@@ -59,7 +61,7 @@ pub(super) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     let (count, timing) = (followed.count, &followed.timing);
     let mut text = format!("{count} points followed, {said}\n{timing}");
     let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
-                           "counters": counters});
+                           "thread": followed.thread, "counters": counters});
     if let Some(corrected) = &followed.corrected {
         corrected.write_into(&mut value);
     }
@@ -120,7 +122,8 @@ fn followed(
     let mut corrected = CorrectedPath::default();
     let count = points.len();
     machine.drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
-    let timing = mover.engine().timing().to_string();
+    let timing = mover.engine().timing();
+    let (timing, thread) = (timing.to_string(), timing.scheduling.clone());
     let kept = match part {
         Some(part) => Some(machine.keep_part(store, mover, part)?),
         None => None,
@@ -129,6 +132,7 @@ fn followed(
         count,
         corrected: is_corrected.then_some(corrected),
         timing,
+        thread,
         kept,
     })
 }

@@ -37,6 +37,7 @@ impl Session {
         let transport = ports::open(&loaded.config, &overrides, purpose, args.clock_speed)?;
         let transport = recorded(transport, args, &loaded)?;
         let mut machine = Machine::new(&loaded, transport);
+        machine.in_real_time();
         machine.observe(Box::new(Bars::new(output.is_json())));
         stop_on_signals(&machine.stop_request())?;
         Ok(Self {

@@ -54,6 +54,7 @@ pub(super) struct Core {
     actual: PerAxis<Metres>,
     history: [PerAxis<Metres>; ANSWER_PERIODS + 1],
     missing: PerAxis<u32>,
+    missing_max: u32,
     deviating: PerAxis<u32>,
     counts: Counts,
 }
@@ -84,9 +85,16 @@ impl Core {
             actual: nowhere,
             history: [nowhere; ANSWER_PERIODS + 1],
             missing: [0; AXES_MAX],
+            missing_max: MISSING_MAX,
             deviating: [0; AXES_MAX],
             counts: Counts::default(),
         }
+    }
+
+    /// Bears so many times as many missing samples: those of a machine in simulated time, whose
+    /// host pauses.
+    pub(super) const fn be_patient(&mut self, patience: u32) {
+        self.missing_max = MISSING_MAX.saturating_mul(patience);
     }
 
     /// Begins at rest, with the set-points that the drives hold: what was added to them when the
@@ -224,7 +232,7 @@ impl Core {
                 None => {
                     self.missing[axis] += 1;
                     self.counts.missing += 1;
-                    if self.missing[axis] >= MISSING_MAX {
+                    if self.missing[axis] >= self.missing_max {
                         let periods = self.missing[axis];
                         return Err(Trouble::Missing { axis, periods });
                     }

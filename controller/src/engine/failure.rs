@@ -89,21 +89,6 @@ pub enum EngineFailure {
         /// How fast the correction changes at the axis's full speed.
         rate: MetresPerSecond,
     },
-    /// A target outside the soft limits.
-    #[error(
-        "axis {axis}: target {:.6} mm is outside the soft limits {:.3} to {:.3} mm; nothing was moved",
-        target.mm(), min.mm(), max.mm()
-    )]
-    SoftLimit {
-        /// The axis.
-        axis: String,
-        /// Where it should have gone.
-        target: Metres,
-        /// The lower limit.
-        min: Metres,
-        /// The upper limit.
-        max: Metres,
-    },
     /// A target cannot be reached.
     #[error(transparent)]
     Motion(MotionError),
@@ -183,7 +168,7 @@ impl EngineFailure {
             | Self::Twice { .. }
             | Self::Periods { .. }
             | Self::CorrectionLimit { .. } => 2,
-            Self::Outside { .. } | Self::SoftLimit { .. } | Self::Motion(_) => 3,
+            Self::Outside { .. } | Self::Motion(_) => 3,
             Self::NotAtRest { .. }
             | Self::NotCyclic { .. }
             | Self::Missing { .. }

@@ -139,13 +139,9 @@ impl Engine {
             return Err(EngineFailure::Twice { axis }.into());
         }
         machine.require_one_sync(period)?;
-        Ok(Self::assemble(
-            names,
-            period,
-            limits,
-            &of_correction,
-            correction,
-        ))
+        let (mut engine, desk) = Self::assemble(names, period, limits, &of_correction, correction);
+        engine.core.be_patient(machine.patience);
+        Ok((engine, desk))
     }
 
     fn assemble(
@@ -248,19 +244,19 @@ impl Desk {
     ///
     /// # Errors
     /// When the target is outside the soft limits, or nobody takes the order.
-    pub fn move_to(&mut self, target: &[Metres]) -> Result<(), EngineFailure> {
+    pub fn move_to(&mut self, target: &[Metres]) -> Result<(), Failure> {
         let all = self.check_target(target)?;
-        self.order(Command::MoveTo(all))
+        Ok(self.order(Command::MoveTo(all))?)
     }
 
     /// Whether the axes could be moved to `target`.
     ///
     /// # Errors
     /// When it is outside the soft limits, or not of these axes.
-    pub fn check_target(&mut self, target: &[Metres]) -> Result<PerAxis<Metres>, EngineFailure> {
+    pub fn check_target(&mut self, target: &[Metres]) -> Result<PerAxis<Metres>, Failure> {
         let expected = self.path.axes().len();
         if target.len() != expected {
-            return Err(EngineFailure::Axes { seen: target.len() });
+            return Err(EngineFailure::Axes { seen: target.len() }.into());
         }
         let mut all = [Metres::ZERO; AXES_MAX];
         all[..expected].copy_from_slice(target);
@@ -270,7 +266,7 @@ impl Desk {
     }
 
     /// A plan knows its axes by number.
-    fn named(&self, error: MotionError) -> EngineFailure {
+    fn named(&self, error: MotionError) -> Failure {
         let names = self.path.axes();
         match error {
             MotionError::SoftLimit {
@@ -278,13 +274,13 @@ impl Desk {
                 target,
                 min,
                 max,
-            } => EngineFailure::SoftLimit {
+            } => Failure::SoftLimit {
                 axis: names.get(axis).cloned().unwrap_or_default(),
                 target,
                 min,
                 max,
             },
-            other => EngineFailure::Motion(other),
+            other => EngineFailure::Motion(other).into(),
         }
     }
 

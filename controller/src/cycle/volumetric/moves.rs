@@ -60,7 +60,10 @@ impl Machine {
     pub fn volumetric_mover(&self, correction: Box<dyn Correction>) -> Result<Mover, Failure> {
         let config = self.volumetric_config()?;
         let axes = config.axes.each_ref().map(String::as_str);
-        let (engine, desk) = Engine::new(self, &axes, correction)?;
+        let (mut engine, desk) = Engine::new(self, &axes, correction)?;
+        if self.real_time {
+            engine.in_real_time();
+        }
         Ok(Mover { engine, desk })
     }
 

@@ -31,6 +31,8 @@ pub struct Cia402DriveConfig {
     pub encoder_resolution_nm: f64,
     /// How often the demand is updated while something moves.
     pub servo_period_us: u64,
+    /// A drive that follows set-points faults after so many periods without SYNC.
+    pub sync_lost_after_periods: f64,
     /// How often the drive looks after itself while nothing moves.
     pub supervision_period_ms: u64,
     /// How long each transition of the power state machine takes.
@@ -184,6 +186,7 @@ impl Default for Cia402DriveConfig {
             heartbeat_ms: 0,
             encoder_resolution_nm: 10.0,
             servo_period_us: 1000,
+            sync_lost_after_periods: 2.5,
             supervision_period_ms: 10,
             power_transition_ms: 1,
             mode_lag_ms: 3,

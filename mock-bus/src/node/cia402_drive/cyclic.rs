@@ -3,8 +3,8 @@
 //! At SYNC the drive takes 0x607A + 0x60B0 and goes there in a straight line over one
 //! interpolation period (0x60C2), which its servo is told in the steps of its own clock. The speed
 //! is limited to 0x607F, positions to 0x607D; what the limited demand is short of counts as
-//! following error. A drive that has waited for SYNC for two periods and half a period of grace
-//! faults. With 0x60C2 at 0, as at power-on, nothing is
+//! following error. A drive that has waited for SYNC for too long (two periods and half a period of
+//! grace, when nothing else is configured) faults. With 0x60C2 at 0, as at power-on, nothing is
 //! interpolated, limited or watched: every set-point is a step.
 //!
 //! Absent: velocity and torque offsets (0x60B1, 0x60B2), 0x60C5, extrapolation when a set-point
@@ -25,8 +25,6 @@ use crate::node::profile::Profile;
 
 /// "Sync controller" (CiA 402-2, error codes).
 const SYNC_LOST: EmergencyCode = EmergencyCode(0x8700);
-/// A SYNC is missed for good after so many periods: one that is lost is ridden out.
-const SYNC_PATIENCE: f64 = 2.5;
 
 /// What the drive remembers from one SYNC to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +62,7 @@ impl Drive {
         self.profile = Profile::interpolating(now, from, reached, period);
         self.activity = Activity::Cyclic;
         self.cyclic = Cyclic {
-            sync_due: patience(now, period),
+            sync_due: self.sync_due(now, period),
             shortfall: target - reached,
         };
         // The position loop has a clock of its own: told at both moments, which may lie a
@@ -95,6 +93,14 @@ impl Drive {
         Duration::from_secs_f64(units * 10.0_f64.powi(exponent))
     }
 
+    fn sync_due(&self, now: Time, period: Duration) -> Time {
+        let seconds = period.as_secs_f64() * self.config.sync_lost_after_periods;
+        match Duration::try_from_secs_f64(seconds) {
+            Ok(span) if !span.is_zero() => now + span,
+            _ => Time::NEVER,
+        }
+    }
+
     /// SYNC fails the drive only while it follows set-points.
     pub(super) fn watch_sync(&mut self, now: Time, m: &mut impl Mechanism) {
         if self.activity != Activity::Cyclic {
@@ -114,13 +120,5 @@ impl Drive {
             let deceleration = self.get(if option == 2 { 0x6085 } else { 0x6084 });
             self.ramp(now, deceleration, After::Stay);
         }
-    }
-}
-
-fn patience(now: Time, period: Duration) -> Time {
-    if period.is_zero() {
-        Time::NEVER
-    } else {
-        now + period.mul_f64(SYNC_PATIENCE)
     }
 }
