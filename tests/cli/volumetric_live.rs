@@ -25,12 +25,12 @@ use crate::programs::{
 /// How much faster than the wall's clock the machine lives.
 const SPEED: f64 = 2.0;
 
-/// Drives that wait for a SYNC, with the period below, for 0.3 s of the wall: longer than a shared
+/// Drives that wait for a SYNC, with the period below, for 0.6 s of the wall: longer than a shared
 /// computer stands still now and then.
 fn patient(emulated: &str) -> String {
     let servo = "has_index = true\n";
     assert!(emulated.contains(servo));
-    emulated.replace(servo, &format!("{servo}sync_lost_after_periods = 10.0\n"))
+    emulated.replace(servo, &format!("{servo}sync_lost_after_periods = 20.0\n"))
 }
 
 /// A corner of the volume, few nodes and short averages: every verb works, and none takes long.
