@@ -43,7 +43,7 @@ pub(crate) fn program(name: &str) -> PathBuf {
 pub(crate) struct Process(Child);
 
 impl Process {
-    fn start(command: &mut Command) -> Self {
+    pub(crate) fn start(command: &mut Command) -> Self {
         Self::start_at(command, Stdio::null())
     }
 

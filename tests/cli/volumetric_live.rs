@@ -1,11 +1,10 @@
 //! The verbs of three axes on a machine that lives outside: each in a process of its own at a
 //! terminal, where somebody sets up the lines that it asks for.
 
-use std::cell::RefCell;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::sync::MutexGuard;
 
 use compensator::volumetric::{Axis, Point};
@@ -116,7 +115,7 @@ impl Live {
     }
 
     fn run(&self, words: &[&str]) -> Ended {
-        Process::start_at(&mut self.command(words), Stdio::null()).end()
+        Process::start(&mut self.command(words)).end()
     }
 
     /// A verb that asks for lines: each is set up and Enter pressed, unless it is the one at which
@@ -125,12 +124,12 @@ impl Live {
         let terminal = openpty(None, None).expect("a terminal can be had");
         let mut keyboard = File::from(terminal.master);
         let process = Process::start_at(&mut self.command(words), terminal.slave.into());
-        let asked = RefCell::new(Vec::new());
+        let mut asked = Vec::new();
         let mut task = None;
         let ended = process.end_heard(|process, said| {
             if let Some(line) = said.strip_prefix("> line ") {
                 let read = read_task(line);
-                asked.borrow_mut().push(read.step.0);
+                asked.push(read.step.0);
                 task = Some(read);
             } else if said.contains("Enter when it is done") {
                 let task = task.take().expect("it says for what");
@@ -142,7 +141,7 @@ impl Live {
                 keyboard.write_all(b"\n").expect("it has a keyboard");
             }
         });
-        (ended, asked.into_inner())
+        (ended, asked)
     }
 
     fn path(&self, value: &Value) -> PathBuf {

@@ -176,12 +176,26 @@ impl Volume {
         Point::new(inside(Axis::X), inside(Axis::Y), inside(Axis::Z))
     }
 
-    /// Refuses what is outside, naming the axis.
+    /// The point inside that is nearest to `point`, which may be so far outside.
     ///
     /// # Errors
-    /// [`NoCorrection::Outside`](super::NoCorrection::Outside).
+    /// [`NoCorrection::Outside`](super::NoCorrection::Outside) when it is farther.
     #[inline]
-    pub fn check(&self, point: Point) -> Result<(), super::NoCorrection> {
+    pub fn nearest_within(
+        &self,
+        point: Point,
+        reach: Metres,
+    ) -> Result<Point, super::NoCorrection> {
+        let inside = self.nearest(point);
+        if (point - inside).distance() > reach {
+            return Err(self.outside(point));
+        }
+        Ok(inside)
+    }
+
+    /// Refuses what is outside, naming the axis.
+    #[inline]
+    pub(crate) fn check(&self, point: Point) -> Result<(), super::NoCorrection> {
         if self.contains(point) {
             Ok(())
         } else {

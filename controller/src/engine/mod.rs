@@ -141,6 +141,7 @@ impl Engine {
         machine.require_one_sync(period)?;
         let (mut engine, desk) = Self::assemble(names, period, limits, &of_correction, correction);
         engine.core.be_patient(machine.patience);
+        engine.real_time = machine.real_time;
         Ok((engine, desk))
     }
 

@@ -55,7 +55,7 @@ impl Rates {
     }
 
     /// Where the jerk is small, the greatest speed comes before the greatest acceleration.
-    fn reached_acceleration(self) -> f64 {
+    fn reached_acceleration(&self) -> f64 {
         self.acceleration.min((self.speed * self.jerk).sqrt())
     }
 }
@@ -151,20 +151,37 @@ impl Leg {
 /// Plans ways of some axes. Asks for no memory, except for the text of a refusal.
 pub(super) struct Planner {
     axes: usize,
-    limits: PerAxis<AxisLimits>,
+    rates: PerAxis<Rates>,
     ruckig: Ruckig<AXES_MAX, ThrowErrorHandler>,
+    /// In which the ways of all axes are reckoned.
+    scale: Scale,
+    /// For these, with what does not change from way to way.
     input: InputParameter<AXES_MAX>,
+    /// For lines, which the first axis stands for.
+    line_input: InputParameter<AXES_MAX>,
 }
 
 impl Planner {
     /// Of the first `axes` of `limits`, at most [`AXES_MAX`].
     pub(super) fn new(axes: usize, limits: PerAxis<AxisLimits>) -> Self {
+        let rates = limits.each_ref().map(Rates::of);
+        let reached = rates[..axes].iter().map(Rates::reached_acceleration);
+        let scale = Scale::of(reached.fold(0.0, f64::max));
+        let mut input = InputParameter::new(None);
+        let mut line_input = InputParameter::new(None);
+        for (axis, rates) in rates.iter().enumerate() {
+            input.enabled[axis] = axis < axes;
+            limit(&mut input, axis, rates, scale);
+            line_input.enabled[axis] = axis == 0;
+        }
         Self {
             axes,
-            limits,
+            rates,
             // Only motions that are looked up by time are made: the step counts for nothing.
             ruckig: Ruckig::new(None, 1.0),
-            input: InputParameter::new(None),
+            scale,
+            input,
+            line_input,
         }
     }
 
@@ -180,7 +197,7 @@ impl Planner {
         let length = (0..self.axes).map(|axis| goes(axis).abs());
         let length = length.fold(0.0, f64::max);
         let mut shares = [0.0; AXES_MAX];
-        let mut rates = Rates::of(&self.limits[0]);
+        let mut rates = self.rates[0];
         if length > 0.0 {
             for (axis, share) in shares.iter_mut().enumerate().take(self.axes) {
                 *share = goes(axis) / length;
@@ -191,7 +208,7 @@ impl Planner {
                 jerk: f64::INFINITY,
             };
             rates = (0..self.axes)
-                .map(|axis| Rates::of(&self.limits[axis]).shared_by(shares[axis].abs()))
+                .map(|axis| self.rates[axis].shared_by(shares[axis].abs()))
                 .fold(unlimited, Rates::least);
         }
         leg.scale = Scale::of(rates.reached_acceleration());
@@ -199,16 +216,9 @@ impl Planner {
             from: *from,
             shares,
         });
-        for axis in 0..AXES_MAX {
-            self.input.enabled[axis] = axis == 0;
-        }
-        self.limit(0, rates, leg.scale);
-        self.input.current_position[0] = 0.0;
-        self.input.current_velocity[0] = 0.0;
-        self.input.current_acceleration[0] = 0.0;
-        self.input.target_position[0] = length * leg.scale.factor(0);
-        self.input.control_interface = ControlInterface::Position;
-        self.calculate(leg)
+        limit(&mut self.line_input, 0, &rates, leg.scale);
+        self.line_input.target_position[0] = length * leg.scale.factor(0);
+        calculate(&mut self.ruckig, &self.line_input, leg)
     }
 
     /// From whatever the axes do to rest at `to`, all at the same time. What the planner found is
@@ -225,7 +235,7 @@ impl Planner {
         }
         self.input.control_interface = ControlInterface::Position;
         self.input.synchronization = Synchronization::Phase;
-        self.calculate(leg)?;
+        calculate(&mut self.ruckig, &self.input, leg)?;
         match (0..self.axes).find(|axis| !self.keeps_limits(*axis, leg)) {
             Some(axis) => Err(format!("the way found leaves the limits of axis {axis}")),
             None => Ok(()),
@@ -240,20 +250,14 @@ impl Planner {
         // acceleration, rsruckig 3.0.1 lets them jerk beyond the limit; and the shortest way is
         // wanted in any case.
         self.input.synchronization = Synchronization::None;
-        self.calculate(leg)
+        calculate(&mut self.ruckig, &self.input, leg)
     }
 
     fn begin_at(&mut self, from: &Moment, leg: &mut Leg) {
-        let reached = |limits: &AxisLimits| Rates::of(limits).reached_acceleration();
-        let reached = self.limits[..self.axes].iter().map(reached);
-        leg.scale = Scale::of(reached.fold(0.0, f64::max));
+        leg.scale = self.scale;
         leg.line = None;
-        for axis in 0..AXES_MAX {
-            self.input.enabled[axis] = axis < self.axes;
-        }
         for axis in 0..self.axes {
-            let rates = Rates::of(&self.limits[axis]);
-            self.limit(axis, rates, leg.scale);
+            let rates = self.rates[axis];
             self.input.current_position[axis] = from.position[axis].value() * leg.scale.factor(0);
             // What was reckoned from differences may exceed a limit by its rounding.
             let within = |value: f64, limit: f64, seconds: i32| {
@@ -263,12 +267,6 @@ impl Planner {
             self.input.current_acceleration[axis] =
                 within(from.acceleration[axis].value(), rates.acceleration, 2);
         }
-    }
-
-    fn limit(&mut self, axis: usize, rates: Rates, scale: Scale) {
-        self.input.max_velocity[axis] = rates.speed * scale.factor(1);
-        self.input.max_acceleration[axis] = rates.acceleration * scale.factor(2);
-        self.input.max_jerk[axis] = rates.jerk * scale.factor(3);
     }
 
     /// Whether every phase of constant jerk does.
@@ -297,12 +295,22 @@ impl Planner {
                     .all(|speed| within(speed, self.input.max_velocity[axis]))
         })
     }
+}
 
-    fn calculate(&mut self, leg: &mut Leg) -> Result<(), Refusal> {
-        match self.ruckig.calculate(&self.input, &mut leg.trajectory) {
-            Ok(RuckigResult::Working | RuckigResult::Finished) => Ok(()),
-            Ok(other) => Err(format!("{other:?}")),
-            Err(error) => Err(error.to_string()),
-        }
+fn limit(input: &mut InputParameter<AXES_MAX>, axis: usize, rates: &Rates, scale: Scale) {
+    input.max_velocity[axis] = rates.speed * scale.factor(1);
+    input.max_acceleration[axis] = rates.acceleration * scale.factor(2);
+    input.max_jerk[axis] = rates.jerk * scale.factor(3);
+}
+
+fn calculate(
+    ruckig: &mut Ruckig<AXES_MAX, ThrowErrorHandler>,
+    input: &InputParameter<AXES_MAX>,
+    leg: &mut Leg,
+) -> Result<(), Refusal> {
+    match ruckig.calculate(input, &mut leg.trajectory) {
+        Ok(RuckigResult::Working | RuckigResult::Finished) => Ok(()),
+        Ok(other) => Err(format!("{other:?}")),
+        Err(error) => Err(error.to_string()),
     }
 }

@@ -268,12 +268,14 @@ impl Machine {
             held_up: None,
         };
         loop {
-            match self.one_period(engine, seats, &mut pace) {
+            let period = self.one_period(engine, seats, &mut pace);
+            let period = period.and_then(|ended| match ended {
+                Some(_) => self.last_sync(seats, &pace).map(|()| ended),
+                None => Ok(None),
+            });
+            match period {
                 Ok(None) => host(),
-                Ok(Some(cause)) => {
-                    self.last_sync(seats, &pace)?;
-                    return Ok(cause);
-                }
+                Ok(Some(cause)) => return Ok(cause),
                 Err(failure) => {
                     let now = self.now();
                     let failure = self.bus_watch.explain(now, failure);

@@ -262,10 +262,10 @@ impl Correction for VolumetricCorrection {
             return self.without();
         };
         // An axis at the end of the volume is some counts beyond it: the end's correction holds there.
-        let inside = self.model.machine().volume.nearest(target);
-        if (target - inside).distance() > self.model.limits().size {
+        let reach = self.model.limits().size;
+        let Ok(inside) = self.model.machine().volume.nearest_within(target, reach) else {
             return nothing(Validity::Stop("the path leaves the calibrated volume"));
-        }
+        };
         match self.model.command(inside, &now) {
             Ok(command) => Corrected {
                 offset: per_axis(command - inside),

@@ -134,7 +134,7 @@ impl Machine {
     /// # Errors
     /// When there are no references to count from, or what is stored cannot be applied.
     pub fn first_part(&self, store: &Store) -> Result<(Mover, FirstPart), Failure> {
-        let (state, records) = self.state_to_remember(store, &[MemoryName::First])?;
+        let (state, records) = self.state_beneath(store, MemoryName::Second)?;
         let (correction, recorder) = FirstPartCorrection::new(self.config(), state)?;
         let mover = self.volumetric_mover(Box::new(correction))?;
         Ok((mover, FirstPart { recorder, records }))

@@ -80,8 +80,12 @@ impl Machine {
         self.state_beneath(store, memory).map(|_| ())
     }
 
-    /// What `memory` counts from: what is recorded again need not belong to what is in use now.
-    fn state_beneath(
+    /// What is in use beneath `memory`, for whoever records it: what is recorded again need not
+    /// belong to what is in use now.
+    ///
+    /// # Errors
+    /// When there are no references to count from.
+    pub(super) fn state_beneath(
         &self,
         store: &Store,
         memory: MemoryName,
@@ -90,18 +94,6 @@ impl Machine {
             MemoryName::First => &[],
             MemoryName::Second => &[MemoryName::First],
         };
-        self.state_to_remember(store, needed)
-    }
-
-    /// What is in use, of the memories those `needed`: for whoever records one.
-    ///
-    /// # Errors
-    /// When there are no references to count from.
-    pub(super) fn state_to_remember(
-        &self,
-        store: &Store,
-        needed: &[MemoryName],
-    ) -> Result<(VolumetricState, VolumetricRecords), Failure> {
         let stored = self.state_with(store, needed)?;
         let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
         let config = self.volumetric_config()?;

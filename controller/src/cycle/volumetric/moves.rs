@@ -60,10 +60,7 @@ impl Machine {
     pub fn volumetric_mover(&self, correction: Box<dyn Correction>) -> Result<Mover, Failure> {
         let config = self.volumetric_config()?;
         let axes = config.axes.each_ref().map(String::as_str);
-        let (mut engine, desk) = Engine::new(self, &axes, correction)?;
-        if self.real_time {
-            engine.in_real_time();
-        }
+        let (engine, desk) = Engine::new(self, &axes, correction)?;
         Ok(Mover { engine, desk })
     }
 
@@ -124,10 +121,8 @@ impl Machine {
         let config = self.config().volumetric.as_ref();
         let config = config.ok_or(VolumetricFailure::None)?;
         let volume = work_volume(config)?;
-        let near = Metres::from_um(config.compensation.size_limit_um);
-        if (volume.nearest(point) - point).distance() > near {
-            volume.check(point)?;
-        }
+        let reach = Metres::from_um(config.compensation.size_limit_um);
+        volume.nearest_within(point, reach)?;
         Ok(())
     }
 

@@ -115,11 +115,14 @@ impl Machine {
     /// # Errors
     /// When it is not configured, or nothing that can be applied is stored.
     pub fn check_verify(&self, store: &Store, by: VerifyBy) -> Result<(), Failure> {
-        let section = "verify";
-        if self.volumetric_config()?.verify.is_none() {
-            return Err(VolumetricFailure::NotConfigured { section }.into());
-        }
+        self.verify_config()?;
         self.mover_by(store, by).map(|_| ())
+    }
+
+    fn verify_config(&self) -> Result<VolumetricVerifyConfig, Failure> {
+        let section = "verify";
+        let own = self.volumetric_config()?.verify.clone();
+        Ok(own.ok_or(VolumetricFailure::NotConfigured { section })?)
     }
 
     /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
@@ -133,9 +136,7 @@ impl Machine {
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricVerified, Failure> {
         let config = self.volumetric_config()?.clone();
-        let section = "verify";
-        let own = config.verify.clone();
-        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let own = self.verify_config()?;
         let (mover, geometry) = self.mover_by(store, by)?;
         let header = self.volume_header("verify", geometry)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
