@@ -1,5 +1,5 @@
 //! The detectors that watch three axes while they are corrected: a beam that is blocked, too
-//! bright, knocked aside or seen no more (classes 32, 50). The correction is held, fades out or
+//! bright, knocked aside or seen no more, a channel that is stuck (classes 28, 32, 50). The correction is held, fades out or
 //! stops the machine, as configured; the set-points never jump.
 
 use core::time::Duration;
@@ -298,6 +298,29 @@ fn a_detector_in_trouble_stops_the_machine_where_that_is_wanted() {
         let last = day.lives.last().expect("there were some");
         assert!((last.offset[2].um() + 20.0).abs() < 1.0);
     }
+}
+
+/// A channel shows what it showed last, which is true at first: its noise is missing.
+#[test]
+fn a_channel_that_is_stuck_is_noticed_and_named() {
+    let stuck = || Fault::InputStuck { channel: 1 };
+    let day = play("stop", stuck(), 5 * SECOND);
+    let Cause::CorrectionLost { lack } = day.cause else {
+        panic!("{}", day.cause)
+    };
+    assert_eq!(lack.source, Source::Slide(Axis::X), "{lack}");
+    assert!(
+        lack.to_string().contains("input 2 of it is stuck"),
+        "{lack}"
+    );
+    // 100 samples, each tenth SYNC; 200 ms of patience and some periods.
+    let stopped = day.lives.len();
+    let soon = FAULT_AT + 1090..=FAULT_AT + 1170;
+    assert!(soon.contains(&stopped), "{}", stopped - FAULT_AT);
+    let day = play("hold", stuck(), 4 * SECOND);
+    let u = day.u_um(FAULT_AT + day.lasting - 1);
+    assert!(u > 10.0, "{u} um while nobody sees anything");
+    check_back(&day);
 }
 
 /// The shutter of x is closed before the correction is switched on: what does the machine say?

@@ -1,5 +1,5 @@
 //! Thermometers and roll detectors of three axes that are corrected: one of a pair with a broken
-//! wire, out of range, seen no more, or that jumps (classes 32, 50). What belongs together is held,
+//! wire, out of range, seen no more, stuck, or that jumps (classes 28, 32, 50). What belongs together is held,
 //! fades out or stops together: a thermometer that fades alone would show a gradient across its
 //! guide that is none. Judged by where the tool is.
 
@@ -45,6 +45,7 @@ fn warm(reaction: &str) -> Volume {
         let text = replaced(&text, "fade_out_s = 60.0", fade);
         let name = format!("reaction = \"{reaction}\"");
         let text = replaced(&text, "reaction = \"fade_out\"", &name);
+        let text = replaced(&text, "stuck_samples = 1000", "stuck_samples = 200");
         replaced(&text, "blend_s = 2.0", "blend_s = 0.5")
     };
     let emulated = |text: String| {
@@ -265,20 +266,45 @@ fn what_belongs_together_stops_the_machine_where_that_is_wanted() {
     for (fault, source) in [broken, saturated].into_iter().zip(sources) {
         // Over when the next one begins.
         let stood = stand(&mut volume, fault, SECOND / 3);
-        let before = stood.off(FAULT_AT);
-        let Err(Failure::Volumetric(VolumetricFailure::NotThere { cause })) = &stood.result else {
-            panic!("{}: {:?}", stood.text, stood.result)
-        };
-        let Cause::CorrectionLost { lack } = cause else {
-            panic!("{}: {cause}", stood.text)
-        };
-        assert_eq!(lack.source, source, "{lack}");
-        // 200 ms of patience, and some periods.
-        let stopped = stood.moments.len() as u64;
-        let soon = FAULT_AT + SECOND / 5..=FAULT_AT + SECOND / 3;
-        assert!(soon.contains(&stopped), "{stopped}");
-        stood.check(before.map(|it| it.abs() + Metres::from_um(0.5)));
+        check_stopped(&stood, 0, source);
     }
+}
+
+/// A converter that shows what it showed last, which is true at first: its noise is missing.
+#[test]
+fn an_input_that_is_stuck_stops_the_machine_where_that_is_wanted() {
+    let mut volume = warm("stop");
+    // Each tenth SYNC, 200 and 100 samples.
+    for (channel, noticed, source) in [
+        (OVER, 2000, Source::Thermometer(0)),
+        (ROLL, 1000, Source::Roll(Axis::X)),
+    ] {
+        let stuck = Fault::InputStuck { channel };
+        let stood = stand(&mut volume, stuck, noticed + SECOND / 3);
+        let lack = check_stopped(&stood, noticed, source);
+        assert!(lack.contains("input 1 of it is stuck"), "{lack}");
+    }
+}
+
+/// In a controlled way, and by the right cause, which is told.
+#[track_caller]
+fn check_stopped(stood: &Stood, noticed: u64, source: Source) -> String {
+    let Err(Failure::Volumetric(VolumetricFailure::NotThere { cause })) = &stood.result else {
+        panic!("{}: {:?}", stood.text, stood.result)
+    };
+    let Cause::CorrectionLost { lack } = cause else {
+        panic!("{}: {cause}", stood.text)
+    };
+    assert_eq!(lack.source, source, "{lack}");
+    // 200 ms of patience, and some periods; a few samples were equal before as it happens.
+    let stopped = stood.moments.len() as u64;
+    let noticed = FAULT_AT + noticed;
+    let by_chance = noticed.min(10 * 8);
+    let soon = noticed + SECOND / 5 - by_chance..=noticed + SECOND / 3;
+    assert!(soon.contains(&stopped), "{stopped}");
+    let before = stood.off(FAULT_AT);
+    stood.check(before.map(|it| it.abs() + Metres::from_um(0.5)));
+    lack.to_string()
 }
 
 /// References taken now would count 2 K of bending and of films as nothing.

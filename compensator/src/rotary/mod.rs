@@ -22,7 +22,7 @@
 //! | w_j, w̄ | e^(i2πk s_j/N), its mean over the placements |
 //! | Σ\|w_j − w̄\|² | what [`Design`] knows about harmonic k |
 //!
-//! Two placements one line apart are the patent's method: G[n + 1] − G[n] = V_1[n] − V_0[n] less
+//! Two placements one line apart are the patent's method: G\[n + 1\] − G\[n\] = V_1\[n\] − V_0\[n\] less
 //! its mean, added up round the closed circle. Its noise grows with the period of the error; the
 //! least squares over P ≥ 2 placements at offsets chosen by [`plan`] is the same method where it
 //! is equal to it, and sees slow errors as well as fast ones.

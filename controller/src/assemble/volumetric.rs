@@ -101,6 +101,7 @@ pub fn beam_detector(config: &BeamDetectorConfig) -> Result<BeamDetector, BeamDe
         age_max: millis(config.age_max_ms),
         speed_max: MetresPerSecond(config.speed_max_um_per_s * 1e-6),
         noise_max: Metres::from_um(config.noise_max_um),
+        stuck_samples: config.stuck_samples,
         curves: curves(config)?,
     })?)
 }
@@ -166,6 +167,7 @@ pub fn temperature_settings(config: &TemperatureConfig) -> TemperatureSettings {
         rate_max: config.rate_max_k_per_min / 60.0,
         noise_max: config.noise_max_k,
         age_max: millis(config.age_max_ms),
+        stuck_samples: config.stuck_samples,
     }
 }
 

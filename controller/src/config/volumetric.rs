@@ -1,6 +1,8 @@
 //! `[volumetric]`: three linear axes whose errors are corrected throughout the work volume while
 //! the machine works (system S4). Each key's suffix is its unit.
 
+use core::num::NonZeroU32;
+
 use serde::Deserialize;
 
 /// Which axes make the volume, what watches them, and what is done with it.
@@ -131,6 +133,7 @@ pub struct BeamDetectorConfig {
     pub age_max_ms: f64,
     pub speed_max_um_per_s: f64,
     pub noise_max_um: f64,
+    pub stuck_samples: Option<NonZeroU32>,
 }
 
 const fn equal() -> [f64; 4] {
@@ -164,6 +167,7 @@ pub struct RollConfig {
     pub age_max_ms: f64,
     pub speed_max_arcsec_per_s: f64,
     pub noise_max_arcsec: f64,
+    pub stuck_samples: Option<NonZeroU32>,
 }
 
 /// A thermometer, and what its temperature does to the machine.
@@ -178,6 +182,7 @@ pub struct TemperatureConfig {
     pub rate_max_k_per_min: f64,
     pub noise_max_k: f64,
     pub age_max_ms: f64,
+    pub stuck_samples: Option<NonZeroU32>,
     pub standard_uncertainty_k: f64,
     #[serde(default)]
     pub expansion_ppm_per_k: [f64; 3],

@@ -8,11 +8,12 @@
 //!
 //! Absent: more than one beam on a detector, the shape of the spot.
 
+use core::num::NonZeroU32;
 use core::time::Duration;
 
-use units::{Metres, MetresPerSecond, Time, Volts};
+use units::{Metres, MetresPerSecond, Quantity, Time, Volts};
 
-use super::RollError;
+use super::{RollError, StuckWatch};
 use crate::volumetric::function::{FunctionError, Pieces, Shape};
 
 /// How the four channels belong to the two directions.
@@ -73,6 +74,9 @@ pub struct BeamDetectorSettings {
     pub speed_max: MetresPerSecond,
     /// How far apart two samples of the same place can be, by noise.
     pub noise_max: Metres,
+    /// So many samples of a channel that are equal to the last bit make it stuck; `None` where its
+    /// noise is below the converter's step.
+    pub stuck_samples: Option<NonZeroU32>,
     /// From ratio to place, for both directions; the sign of the curve is the sign of the place.
     pub curves: [RatioCurve; 2],
 }
@@ -115,6 +119,23 @@ pub enum Trouble {
         seen: Volts,
         /// The most expected.
         limit: Volts,
+    },
+    /// The converter of a channel cannot show more.
+    #[error("a channel stands at the end of its converter's range, {seen}")]
+    AtEnd {
+        /// What it shows.
+        seen: Volts,
+    },
+    /// The same again and again, where noise must be.
+    #[error("input {} of it is stuck: exactly {seen:e} (SI units) {samples} times in a row",
+        input + 1)]
+    Stuck {
+        /// Which of the detector's inputs, from 0.
+        input: usize,
+        /// What it shows, in SI units.
+        seen: f64,
+        /// How often in a row that is no coincidence.
+        samples: NonZeroU32,
     },
     /// Nothing new for too long.
     #[error("the last sample is {:.3} s old, at most {:.3} s expected",
@@ -174,6 +195,7 @@ pub struct Sample {
 pub struct BeamDetector {
     settings: BeamDetectorSettings,
     last: Option<(Time, [Metres; 2])>,
+    stuck: StuckWatch<4>,
 }
 
 impl BeamDetector {
@@ -195,6 +217,7 @@ impl BeamDetector {
             return Err(SettingsError::NotPositive);
         }
         Ok(Self {
+            stuck: StuckWatch::new(settings.stuck_samples),
             settings,
             last: None,
         })
@@ -215,7 +238,11 @@ impl BeamDetector {
         let Some(sample) = newest.filter(|_| seen <= limit) else {
             return Err(Trouble::Stale { seen, limit });
         };
+        let volts = sample.channels.map(Quantity::value);
+        let stuck = self.stuck.check(sample.at, volts);
+        // Rails and darkness stand still as well, and say more.
         let place = self.place(&sample.channels)?;
+        stuck?;
         self.check_jump(sample.at, place)?;
         self.last = Some((sample.at, place));
         Ok(place)

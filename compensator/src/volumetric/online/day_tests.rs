@@ -39,6 +39,7 @@ fn detector() -> BeamDetector {
         age_max: Duration::from_millis(50),
         speed_max: MetresPerSecond(1e-3),
         noise_max: um(5.0),
+        stuck_samples: None,
         curves: [curve(), curve()],
     })
     .unwrap()

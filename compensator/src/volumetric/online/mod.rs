@@ -38,6 +38,7 @@ mod monitor;
 mod offset;
 mod reference;
 mod roll;
+mod stuck;
 mod temperature;
 
 pub use beam::{
@@ -51,6 +52,7 @@ pub use monitor::{AxisMonitor, EndOfTravel};
 pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
+pub use stuck::StuckWatch;
 pub use temperature::{TemperatureChannel, TemperatureSettings};
 
 use units::Metres;

@@ -2,11 +2,12 @@
 //!
 //! Source: none. What temperatures do to the machine is in [`crate::volumetric::model`].
 
+use core::num::NonZeroU32;
 use core::time::Duration;
 
 use units::{Celsius, Time};
 
-use super::Trouble;
+use super::{StuckWatch, Trouble};
 
 /// What a temperature can be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +22,9 @@ pub struct TemperatureSettings {
     pub noise_max: f64,
     /// A sample older than this says nothing about now.
     pub age_max: Duration,
+    /// So many samples in a row that are equal to the last bit make it stuck; `None` where noise
+    /// does not reach the converter's next step.
+    pub stuck_samples: Option<NonZeroU32>,
 }
 
 /// One temperature sensor.
@@ -28,6 +32,7 @@ pub struct TemperatureSettings {
 pub struct TemperatureChannel {
     settings: TemperatureSettings,
     last: Option<(Time, Celsius)>,
+    stuck: StuckWatch<1>,
 }
 
 impl TemperatureChannel {
@@ -36,6 +41,7 @@ impl TemperatureChannel {
         Self {
             settings,
             last: None,
+            stuck: StuckWatch::new(settings.stuck_samples),
         }
     }
 
@@ -50,6 +56,7 @@ impl TemperatureChannel {
         let Some((at, value)) = newest.filter(|_| seen <= limit) else {
             return Err(Trouble::Stale { seen, limit });
         };
+        let stuck = self.stuck.check(at, [value.value()]);
         if !(value >= own.low && value <= own.high) {
             return Err(Trouble::Implausible {
                 seen: value.value(),
@@ -57,6 +64,7 @@ impl TemperatureChannel {
                 high: own.high.value(),
             });
         }
+        stuck?;
         if let Some((before, last)) = self.last {
             let limit = own.noise_max + own.rate_max * at.since(before).as_secs_f64();
             let seen = (value - last).value().abs();

@@ -1,3 +1,4 @@
+use core::num::NonZeroU32;
 use core::time::Duration;
 
 use proptest::prelude::*;
@@ -38,6 +39,7 @@ fn detector(layout: Layout) -> BeamDetector {
         age_max: millis(10),
         speed_max: MetresPerSecond(1e-3),
         noise_max: um(5.0),
+        stuck_samples: None,
         curves: [curve(), curve()],
     })
     .unwrap()
@@ -122,6 +124,40 @@ fn a_place_that_nothing_can_reach_in_the_time_is_a_jump_until_the_time_has_passe
     check_um(later[0], 50.0);
 }
 
+/// The others tremble on; the same sample read again is no further one.
+#[test]
+fn a_channel_that_gives_exactly_the_same_again_and_again_is_stuck_until_it_changes() {
+    let mut settings = detector(Layout::Lateral).settings();
+    settings.stuck_samples = NonZeroU32::new(4);
+    let mut detector = BeamDetector::new(settings).unwrap();
+    let trembling = |at: u64| 2.0 + if at.is_multiple_of(2) { 1e-4 } else { -1e-4 };
+    let mut sample = |at: u64, third: f64| {
+        let other = trembling(at);
+        let channels = [other, -other + 4.0, third, other];
+        for _ in 0..10 {
+            read(&mut detector, at, channels).ok();
+        }
+        read(&mut detector, at, channels)
+    };
+    for at in 0..3 {
+        sample(at, 2.0).unwrap();
+    }
+    for at in 3..6 {
+        let seen = sample(at, 2.0);
+        let Err(trouble @ Trouble::Stuck { input: 2, .. }) = seen else {
+            panic!("{seen:?}")
+        };
+        let text = "input 3 of it is stuck: exactly 2e0 (SI units) 4 times in a row";
+        assert_eq!(trouble.to_string(), text);
+    }
+    sample(6, 2.0001).unwrap();
+    // Darkness stands still as well, and says more.
+    for at in 7..20 {
+        let seen = read(&mut detector, at, [0.0; 4]);
+        assert!(matches!(seen, Err(Trouble::Blocked { .. })), "{seen:?}");
+    }
+}
+
 #[test]
 fn a_detector_without_an_intensity_window_is_refused() {
     let mut settings = detector(Layout::Lateral).settings();
@@ -141,6 +177,7 @@ fn a_temperature_that_cannot_be_is_not_believed() {
         rate_max: 0.1,
         noise_max: 0.05,
         age_max: Duration::from_secs(2),
+        stuck_samples: NonZeroU32::new(3),
     });
     let at = |seconds: u64, value: f64| Some((ms(1000 * seconds), Celsius(value)));
     assert_eq!(channel.read(ms(0), at(0, 20.0)), Ok(Celsius(20.0)));
@@ -154,6 +191,12 @@ fn a_temperature_that_cannot_be_is_not_believed() {
     );
     let nan = channel.read(ms(3000), at(3, f64::NAN));
     assert!(matches!(nan, Err(Trouble::Implausible { .. })), "{nan:?}");
+    for second in 4..6 {
+        let again = channel.read(ms(1000 * second), at(second, 20.1));
+        assert_eq!(again, Ok(Celsius(20.1)));
+    }
+    let stuck = channel.read(ms(6000), at(6, 20.1));
+    assert!(matches!(stuck, Err(Trouble::Stuck { .. })), "{stuck:?}");
     let old = channel.read(ms(9000), at(3, 20.1));
     assert!(matches!(old, Err(Trouble::Stale { .. })), "{old:?}");
 }

@@ -1,5 +1,6 @@
 //! Whether the detectors of three axes make sense: wiring, curves, limits.
 
+use core::num::NonZeroU32;
 use std::collections::BTreeSet;
 
 use super::judge::{Finding, Judge};
@@ -103,12 +104,20 @@ fn check_detector<'a>(
         }
         check_age(judge, config, analog, detector.age_max_ms);
     }
+    check_stuck(judge, detector.stuck_samples);
     for mv in detector.dark_mv {
         judge.within("dark_mv", mv, -1e5, 1e5);
     }
     if let Err(error) = assemble::beam_detector(detector) {
         let help = "configs/README.md describes every key of a beam detector";
         judge.say("", error.to_string(), help);
+    }
+}
+
+/// Two or three equal samples are a coincidence that comes every minute.
+fn check_stuck(judge: &mut Judge<'_>, samples: Option<NonZeroU32>) {
+    if let Some(samples) = samples {
+        judge.within("stuck_samples", samples.get().into(), 10.0, 1e6);
     }
 }
 
@@ -222,6 +231,7 @@ fn check_roll<'a>(
     let speed = roll.speed_max_arcsec_per_s;
     judge.within("speed_max_arcsec_per_s", speed, 1e-6, 1e6);
     judge.within("noise_max_arcsec", roll.noise_max_arcsec, 1e-6, 1e6);
+    check_stuck(judge, roll.stuck_samples);
     if let Some(arcsec) = roll.standard_uncertainty_arcsec {
         judge.within("standard_uncertainty_arcsec", arcsec, 0.0, 1e3);
     }
@@ -248,6 +258,7 @@ fn check_temperature<'a>(
     let rate = temperature.rate_max_k_per_min;
     judge.within("rate_max_k_per_min", rate, 1e-6, 1e4);
     judge.within("noise_max_k", temperature.noise_max_k, 1e-6, 1e3);
+    check_stuck(judge, temperature.stuck_samples);
     let uncertainty = temperature.standard_uncertainty_k;
     judge.within("standard_uncertainty_k", uncertainty, 0.0, 1e3);
     for (key, limit, values) in [

@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::{RollOptics, Sample, Trouble};
-use units::{Metres, Radians, Time, Volts};
+use compensator::volumetric::online::{RollOptics, Sample, StuckWatch, Trouble};
+use units::{Metres, Quantity, Radians, Time, Volts};
 
 use crate::assemble::roll_optics;
 use crate::config::{AnalogConfig, FeedConfig, MachineConfig, RollConfig};
@@ -74,6 +74,7 @@ pub(super) struct RollReader {
     speed_max: f64,
     noise_max: Radians,
     last: Option<(Time, Radians)>,
+    stuck: StuckWatch<2>,
 }
 
 impl RollReader {
@@ -90,28 +91,32 @@ impl RollReader {
             speed_max: Radians::from_arcsec(roll.speed_max_arcsec_per_s).value(),
             noise_max: Radians::from_arcsec(roll.noise_max_arcsec),
             last: None,
+            stuck: StuckWatch::new(roll.stuck_samples),
         })
     }
 
     /// The roll by the newest samples.
     pub(super) fn read(&mut self, observed: &Observed<'_>) -> Result<Radians, Trouble> {
-        let mut readings = [Metres::ZERO; 2];
+        let mut volts = [Volts::ZERO; 2];
         let mut at = Time::NEVER;
-        for (k, reading) in readings.iter_mut().enumerate() {
-            let channel = observed.channels.get(self.places[k]).copied().flatten();
+        for (volts, place) in volts.iter_mut().zip(&self.places) {
+            let channel = observed.channels.get(*place).copied().flatten();
             let seen = channel.map_or(Duration::MAX, |it| observed.now.since(it.at));
             let limit = self.age_max;
             let Some(channel) = channel.filter(|_| seen <= limit) else {
                 return Err(Trouble::Stale { seen, limit });
             };
             if channel.saturated {
-                let (seen, limit) = (channel.volts, channel.volts);
-                return Err(Trouble::Saturated { seen, limit });
+                return Err(Trouble::AtEnd {
+                    seen: channel.volts,
+                });
             }
-            *reading = Metres(channel.volts.value() * self.per_volt[k]);
+            *volts = channel.volts;
             at = at.min(channel.at);
         }
-        let roll = self.optics.solve(readings[0], readings[1])?.angle;
+        self.stuck.check(at, volts.map(Quantity::value))?;
+        let reading = |k: usize| Metres(volts[k].value() * self.per_volt[k]);
+        let roll = self.optics.solve(reading(0), reading(1))?.angle;
         if let Some((before, last)) = self.last {
             let passed = at.since(before).as_secs_f64();
             let limit = self.noise_max.value() + self.speed_max * passed;

@@ -5,7 +5,7 @@
 //! supervision of one axis.
 //!
 //! Up to some four amplifiers share a line. Each has a driver of its own, which takes its turn
-//! ([`LineUse`](super::LineUse)) for one exchange at a time: command and reply, and what has to be
+//! ([`LineUse`]) for one exchange at a time: command and reply, and what has to be
 //! done when the reply is missing (`link`). Urgency decides whose turn it is: stops, then starts,
 //! then steps of commands, then looks at how things are.
 //!

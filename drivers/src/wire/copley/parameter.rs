@@ -34,9 +34,9 @@ impl Parameter {
     pub const BAUD: Self = Self(0x90);
     /// Firmware version, major and minor in a byte each (Parameter Dictionary).
     pub const FIRMWARE: Self = Self(0x94);
-    /// [`EventStatus`] (p. 46).
+    /// [`EventStatus`](super::EventStatus) (p. 46).
     pub const EVENT_STATUS: Self = Self(0xA0);
-    /// [`Faults`] that have latched; a 1 written clears its fault (p. 48).
+    /// [`Faults`](super::Faults) that have latched; a 1 written clears its fault (p. 48).
     pub const FAULTS: Self = Self(0xA4);
     /// Milliseconds since power-on or reset (Parameter Dictionary).
     pub const UPTIME: Self = Self(0xB7);
@@ -62,7 +62,7 @@ impl Parameter {
     pub const HOME_OFFSET: Self = Self(0xC6);
     /// Profile type: 0 is absolute and trapezoidal (p. 28).
     pub const PROFILE_TYPE: Self = Self(0xC8);
-    /// [`TrajectoryStatus`] (p. 48).
+    /// [`TrajectoryStatus`](super::TrajectoryStatus) (p. 48).
     pub const TRAJECTORY_STATUS: Self = Self(0xC9);
     /// Position command of the next move, counts (p. 28).
     pub const POSITION_COMMAND: Self = Self(0xCA);
