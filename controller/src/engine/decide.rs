@@ -30,6 +30,7 @@ pub(super) struct Lines {
     pub(super) commands: Consumer<Command>,
     pub(super) retired: Producer<Box<dyn Correction>>,
     pub(super) live: Producer<Live>,
+    pub(super) newest: triple_buffer::Input<Option<Live>>,
 }
 
 /// The decisions of the loop.
@@ -397,7 +398,7 @@ impl Core {
         (set_point, clamped)
     }
 
-    /// A full line means that nobody looks: what is older is as good.
+    /// A full line means that nobody looks; who looks again finds at least the newest.
     fn tell(
         &mut self,
         at: Time,
@@ -406,7 +407,7 @@ impl Core {
         clamped: PerAxis<bool>,
     ) {
         let (said, corrected) = self.applied.last();
-        let _ = self.lines.live.push(Live {
+        let live = Live {
             at,
             cycle: self.counts.cycles,
             state: self.state,
@@ -418,6 +419,8 @@ impl Core {
             corrected,
             alarms: self.applied.alarms(),
             clamped,
-        });
+        };
+        let _ = self.lines.live.push(live);
+        self.lines.newest.write(Some(live));
     }
 }

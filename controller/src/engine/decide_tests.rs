@@ -150,6 +150,27 @@ fn circle(periods: u32) -> impl Iterator<Item = [Metres; 2]> {
     })
 }
 
+/// A watcher who comes by once in a while finds what is, the end included; one who follows misses
+/// only what came after his line was full.
+#[test]
+fn who_looks_seldom_sees_the_newest_period() {
+    let mut bench = Bench::new();
+    bench.periods(2 * QUEUE_LIVE);
+    assert_eq!(bench.desk.live().map(|it| it.at), Some(bench.now));
+    assert!(bench.desk.next_live().is_none());
+    bench.periods(1);
+    let next = bench.desk.next_live();
+    assert_eq!(next.map(|it| it.at), Some(bench.now));
+    bench.desk.move_to(&[Metres::from_mm(50.0); 2]).unwrap();
+    bench.periods(2 * QUEUE_LIVE);
+    bench.desk.stop().unwrap();
+    while bench.engine.core.ended().is_none() {
+        bench.period().unwrap();
+    }
+    let last = bench.desk.live().map(|it| it.state);
+    assert_eq!(last, Some(State::Stopped(Cause::Asked)));
+}
+
 #[test]
 fn a_path_is_approached_followed_to_the_point_and_ends_at_rest() {
     let mut bench = Bench::new();

@@ -105,7 +105,7 @@ pub struct Desk {
     commands: Producer<Command>,
     retired: Consumer<Box<dyn Correction>>,
     live: Consumer<Live>,
-    latest: Option<Live>,
+    newest: triple_buffer::Output<Option<Live>>,
     checker: Motion,
 }
 
@@ -156,11 +156,13 @@ impl Engine {
         let (orders, commands) = RingBuffer::new(QUEUE_COMMANDS);
         let (retired, collected) = RingBuffer::new(QUEUE_COMMANDS);
         let (live, seen) = RingBuffer::new(QUEUE_LIVE);
+        let (newest, latest) = triple_buffer::triple_buffer(&None);
         let lines = Lines {
             path,
             commands,
             retired,
             live,
+            newest,
         };
         let applied = Applied::new(correction, of_correction, period);
         let desk = Desk {
@@ -168,7 +170,7 @@ impl Engine {
             commands: orders,
             retired: collected,
             live: seen,
-            latest: None,
+            newest: latest,
             checker: Motion::new(axes.len(), limits),
         };
         let core = Core::new(axes.len(), period, limits, applied, lines);
@@ -285,21 +287,20 @@ impl Desk {
         }
     }
 
-    /// The newest period of the loop, `None` before the first. Who looked less often than every
-    /// 256 periods gets one that old, and the present one at his next look.
+    /// The newest period of the loop, `None` before the first, however long nobody looked.
     pub fn live(&mut self) -> Option<Live> {
-        while let Ok(live) = self.live.pop() {
-            self.latest = Some(live);
+        let newest = (*self.newest.read())?;
+        // Those before it count as looked at.
+        while self.live.peek().is_ok_and(|it| it.at <= newest.at) {
+            let _ = self.live.pop();
         }
-        self.latest
+        Some(newest)
     }
 
     /// The next period that was not looked at yet, in order; some are left out when nobody
-    /// looked for long.
+    /// looked for more than 256.
     pub fn next_live(&mut self) -> Option<Live> {
-        let live = self.live.pop().ok()?;
-        self.latest = Some(live);
-        self.latest
+        self.live.pop().ok()
     }
 
     fn order(&mut self, command: Command) -> Result<(), EngineFailure> {

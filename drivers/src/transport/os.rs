@@ -15,6 +15,16 @@ pub(super) fn take_descriptor(port: impl IntoRawFd) -> OwnedFd {
     unsafe { OwnedFd::from_raw_fd(port.into_raw_fd()) }
 }
 
+/// Whether the calling thread comes before all ordinary ones, whoever asked for that.
+pub(super) fn is_real_time() -> bool {
+    // SAFETY: 0 is the calling thread; nothing is passed by reference.
+    let policy = unsafe { libc::sched_getscheduler(0) };
+    matches!(
+        policy & !libc::SCHED_RESET_ON_FORK,
+        libc::SCHED_FIFO | libc::SCHED_RR
+    )
+}
+
 /// Puts the calling thread under SCHED_FIFO.
 ///
 /// # Errors

@@ -10,12 +10,14 @@ use nix::errno::Errno;
 use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
 
 use super::os;
-use super::sync_thread::{FIFO_PRIORITY, Scheduling};
+use super::sync_thread::Scheduling;
 
 /// What the system granted; given back when it is dropped.
 #[derive(Debug)]
 pub struct RealTime {
     scheduling: Scheduling,
+    /// A thread that was real time before keeps its own priority, now and afterwards.
+    was_before: bool,
     locked: Result<(), Errno>,
     /// It belongs to the thread that asked.
     here: PhantomData<*const ()>,
@@ -24,14 +26,15 @@ pub struct RealTime {
 impl RealTime {
     /// Asks for both, for the calling thread (its priority) and the process (its memory).
     pub fn ask() -> Self {
-        let scheduling = match os::schedule_fifo(FIFO_PRIORITY) {
-            Ok(()) => Scheduling::RealTime,
-            Err(errno) => Scheduling::Ordinary {
-                errno: errno as i32,
-            },
+        let was_before = os::is_real_time();
+        let scheduling = if was_before {
+            Scheduling::RealTime
+        } else {
+            Scheduling::ask()
         };
         Self {
             scheduling,
+            was_before,
             locked: mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE),
             here: PhantomData,
         }
@@ -67,7 +70,7 @@ impl fmt::Display for RealTime {
 
 impl Drop for RealTime {
     fn drop(&mut self) {
-        if self.scheduling == Scheduling::RealTime {
+        if self.scheduling == Scheduling::RealTime && !self.was_before {
             os::schedule_ordinary();
         }
         if self.locked.is_ok() {
@@ -79,6 +82,17 @@ impl Drop for RealTime {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a program asked for its own thread is not taken from it by what it calls.
+    #[test]
+    fn a_thread_that_was_real_time_before_still_is_afterwards() {
+        let outer = RealTime::ask();
+        drop(RealTime::ask());
+        let granted = outer.scheduling() == Scheduling::RealTime;
+        assert_eq!(os::is_real_time(), granted);
+        drop(outer);
+        assert!(!os::is_real_time());
+    }
 
     #[test]
     fn what_was_granted_is_said() {

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::os;
 
 /// Below the kernel's own threads (50), above everything ordinary.
-pub(super) const FIFO_PRIORITY: i32 = 40;
+const FIFO_PRIORITY: i32 = 40;
 /// Longer sleeps are cut into these, so that a thread told to stop does.
 const SLEEP_MAX: Duration = Duration::from_millis(50);
 /// How many classes [`SyncStatistics::histogram`] has.
@@ -44,6 +44,18 @@ pub enum Scheduling {
         /// The operating system's error number.
         errno: i32,
     },
+}
+
+impl Scheduling {
+    /// Asks for SCHED_FIFO for the calling thread.
+    pub(super) fn ask() -> Self {
+        match os::schedule_fifo(FIFO_PRIORITY) {
+            Ok(()) => Self::RealTime,
+            Err(errno) => Self::Ordinary {
+                errno: errno as i32,
+            },
+        }
+    }
 }
 
 /// What the SYNC thread has done so far; lateness is in wall time.
@@ -142,13 +154,7 @@ impl Shared {
     }
 
     fn run(&self) {
-        let scheduling = match os::schedule_fifo(FIFO_PRIORITY) {
-            Ok(()) => Scheduling::RealTime,
-            Err(errno) => Scheduling::Ordinary {
-                errno: errno as i32,
-            },
-        };
-        self.plan().statistics.scheduling = scheduling;
+        self.plan().statistics.scheduling = Scheduling::ask();
         let mut deadline = monotonic() + self.plan().period;
         while self.sleep_until(deadline) {
             let mut plan = self.plan();
