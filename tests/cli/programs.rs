@@ -68,7 +68,7 @@ impl Process {
         const LOOK_EVERY_MS: u16 = 5;
         while !reached() {
             let ended = self.0.try_wait().expect("a child can be asked");
-            assert!(ended.is_none(), "it ended before: {ended:?}");
+            assert!(ended.is_none(), "it ended before: {:?}", self.collect());
             let output = self.0.stdout.as_ref().expect("it is piped").as_fd();
             let mut fds = [PollFd::new(output, PollFlags::POLLIN)];
             // A signal only makes the next look come sooner.
@@ -78,6 +78,10 @@ impl Process {
 
     /// Waits for its end.
     pub(crate) fn end(mut self) -> Ended {
+        self.collect()
+    }
+
+    fn collect(&mut self) -> Ended {
         let child = std::mem::replace(&mut self.0, nothing());
         Ended::new(&child.wait_with_output().expect("a child can be waited for"))
     }

@@ -7,25 +7,29 @@ use crate::volumetric::point::V3;
 #[derive(Clone, Debug)]
 struct Line {
     finder: Finder,
-    /// Start of each interval and one over its width.
-    intervals: Vec<[f64; 2]>,
+    /// Start and end of each interval, and one over its width.
+    intervals: Vec<[f64; 3]>,
 }
 
 impl Line {
     fn new(nodes: &[f64]) -> Self {
-        let interval = |ends: &[f64]| [ends[0], 1.0 / (ends[1] - ends[0])];
+        let interval = |ends: &[f64]| [ends[0], ends[1], 1.0 / (ends[1] - ends[0])];
         Self {
             finder: Finder::new(nodes.to_vec()),
             intervals: nodes.windows(2).map(interval).collect(),
         }
     }
 
-    /// The interval of a position, and how far through it that is, 0 to 1.
+    /// The interval of a position, and what its two ends weigh there; neither weight waits for the
+    /// other.
     #[inline(always)]
-    fn find(&self, position: f64) -> (usize, f64) {
+    fn find(&self, position: f64) -> (usize, [f64; 2]) {
         let (inside, at) = self.finder.find(position);
-        let [start, per_width] = self.intervals[at];
-        (at, (inside - start) * per_width)
+        let [start, end, per_width] = self.intervals[at];
+        (
+            at,
+            [(end - inside) * per_width, (inside - start) * per_width],
+        )
     }
 }
 
@@ -39,8 +43,13 @@ pub(super) struct Trilinear {
 }
 
 #[inline(always)]
-fn between(a: [f64; 4], b: [f64; 4], share: f64) -> [f64; 4] {
-    core::array::from_fn(|k| a[k] + share * (b[k] - a[k]))
+fn times(node: [f64; 4], weight: f64) -> [f64; 4] {
+    node.map(|it| it * weight)
+}
+
+#[inline(always)]
+fn plus(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    core::array::from_fn(|k| a[k] + b[k])
 }
 
 impl Trilinear {
@@ -81,12 +90,16 @@ impl Trilinear {
         // Two slices with one check each; all eight nodes are within them.
         let low = &self.nodes[corner..corner + along_y + 2];
         let high = &self.nodes[corner + along_x..corner + along_x + along_y + 2];
-        let edge = |of: &[[f64; 4]]| {
-            let near = between(of[0], of[1], u);
-            let far = between(of[along_y], of[along_y + 1], u);
-            between(near, far, t)
+        // The weights are ready when the nodes arrive: one product and three sums behind them,
+        // where nested interpolations would wait for each other.
+        let edge = |of: &[[f64; 4]], from: usize, weight: f64| {
+            let (near, far) = (of[from], of[from + 1]);
+            plus(times(near, weight * u[0]), times(far, weight * u[1]))
         };
-        let [x, y, z, _] = between(edge(low), edge(high), s);
+        let face = |of: &[[f64; 4]], weight: f64| {
+            plus(edge(of, 0, weight * t[0]), edge(of, along_y, weight * t[1]))
+        };
+        let [x, y, z, _] = plus(face(low, s[0]), face(high, s[1]));
         [x, y, z]
     }
 }
