@@ -12,7 +12,7 @@ use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use tests::volume::point_mm;
-use tests::{INTERFACE, Rig, VOLUMETRIC};
+use tests::{INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
 use truestage::cycle::volumetric::{LineOptics, LineTask};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::read_journal;
@@ -212,8 +212,7 @@ fn read_place(said: &str) -> Point {
 #[test]
 fn three_axes_are_zeroed_calibrated_verified_and_moved_from_process_to_process() {
     // Three axes and their drives on the one core of a guest: too much for minutes without a pause.
-    let native = std::env::var("VCAN_HOST").is_ok_and(|host| host == "native");
-    for rig in live_rigs().filter(|rig| native || *rig == Rig::Pty) {
+    for rig in live_rigs().filter(|rig| vcan_is_native() || *rig == Rig::Pty) {
         let live = Live::new(rig);
         refuses_before_anything_moves(&live);
         let zero = live.run(&["zero", "machine.toml"]).with_code(0);

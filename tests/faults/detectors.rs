@@ -1,6 +1,6 @@
 //! The detectors that watch three axes while they are corrected: a beam that is blocked, too
-//! bright, knocked aside or seen no more, a channel that is stuck (classes 28, 32, 50). The correction is held, fades out or
-//! stops the machine, as configured; the set-points never jump.
+//! bright, knocked aside or seen no more, a channel that is stuck (classes 28, 32, 50). The
+//! correction is held, fades out or stops the machine, as configured; the set-points never jump.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex};

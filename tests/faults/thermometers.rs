@@ -1,7 +1,7 @@
 //! Thermometers and roll detectors of three axes that are corrected: one of a pair with a broken
-//! wire, out of range, seen no more, stuck, or that jumps (classes 28, 32, 50). What belongs together is held,
-//! fades out or stops together: a thermometer that fades alone would show a gradient across its
-//! guide that is none. Judged by where the tool is.
+//! wire, out of range, seen no more, stuck, or that jumps (classes 28, 32, 50). What belongs
+//! together is held, fades out or stops together: a thermometer that fades alone would show a
+//! gradient across its guide that is none. Judged by where the tool is.
 
 use core::time::Duration;
 
@@ -298,8 +298,8 @@ fn check_stopped(stood: &Stood, noticed: u64, source: Source) -> String {
     assert_eq!(lack.source, source, "{lack}");
     // 200 ms of patience, and some periods; a few samples were equal before as it happens.
     let stopped = stood.moments.len() as u64;
-    let noticed = FAULT_AT + noticed;
     let by_chance = noticed.min(10 * 8);
+    let noticed = FAULT_AT + noticed;
     let soon = noticed + SECOND / 5 - by_chance..=noticed + SECOND / 3;
     assert!(soon.contains(&stopped), "{stopped}");
     let before = stood.off(FAULT_AT);

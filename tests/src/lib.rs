@@ -29,7 +29,7 @@ pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use random::random;
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC,
-    machine_config, rigs, shipped_config,
+    machine_config, rigs, shipped_config, vcan_is_native,
 };
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};
