@@ -6,21 +6,23 @@
 
 use std::cell::{Ref, RefCell, RefMut};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::rc::Rc;
 
 use drivers::transport::in_process::{InProcess, World};
 use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
 use mock_bus::plant::{LineOptics as EmulatedOptics, LineSetUp};
-use mock_bus::runner::{self, RunError, Running};
+use mock_bus::runner::{self, Options, RunError, Running};
 use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
+use tempfile::TempDir;
 use units::Time;
 
 use crate::assemble;
 use crate::config::MachineConfig;
 use crate::cycle::volumetric::{LineOperator, LineOptics, LineTask};
 use crate::failure::Failure;
-use crate::ports::{Endpoint, Overrides};
+use crate::ports::{self, Endpoint, Overrides};
 use compensator::volumetric::{Axis, Point};
 
 pub use mock_bus::plant::{DriftLimits, HallDrift};
@@ -128,6 +130,14 @@ pub struct EmulatedOnPtys {
     running: Running,
     /// The SocketCAN interface, and the place of the port that is on it.
     interface: Option<(usize, String)>,
+    time: EmulatedTime,
+}
+
+/// How the time of a machine on pseudo-terminals passes.
+enum EmulatedTime {
+    Wall(f64),
+    /// The side channel's folder goes with it.
+    Lockstep(TempDir),
 }
 
 impl EmulatedOnPtys {
@@ -136,13 +146,7 @@ impl EmulatedOnPtys {
     /// # Errors
     /// When the description is wrong or pseudo-terminals cannot be had.
     pub fn start(toml: &str, seed: u64, speed: f64) -> Result<Self, EmulatedError> {
-        let config = EmulatedConfig::parse(toml)?;
-        let running = runner::spawn_on_ptys(&config, seed, speed)?;
-        Ok(Self {
-            config,
-            running,
-            interface: None,
-        })
+        Self::start_on(toml, seed, EmulatedTime::Wall(speed), None)
     }
 
     /// The same with the first CAN bus on the SocketCAN interface `name` (`vcan0`, say).
@@ -155,15 +159,70 @@ impl EmulatedOnPtys {
         speed: f64,
         name: &str,
     ) -> Result<Self, EmulatedError> {
+        Self::start_on(toml, seed, EmulatedTime::Wall(speed), Some(name))
+    }
+
+    /// The machine that `toml` describes, on a clock that it shares with its controller: frames
+    /// and bytes pass the kernel, time passes only when neither has anything left to do.
+    /// Nothing depends on how fast or how busy the computer is: one seed is one log.
+    ///
+    /// # Errors
+    /// When the description is wrong, or pseudo-terminals, or a socket in the folder for
+    /// temporary files, cannot be had.
+    pub fn in_lockstep(toml: &str, seed: u64) -> Result<Self, EmulatedError> {
+        Self::start_on(toml, seed, side_channel()?, None)
+    }
+
+    /// The same with the first CAN bus on the SocketCAN interface `name` (`vcan0`, say).
+    ///
+    /// # Errors
+    /// As [`EmulatedOnPtys::in_lockstep`], or when the interface cannot be had.
+    pub fn in_lockstep_on_socketcan(
+        toml: &str,
+        seed: u64,
+        name: &str,
+    ) -> Result<Self, EmulatedError> {
+        Self::start_on(toml, seed, side_channel()?, Some(name))
+    }
+
+    fn start_on(
+        toml: &str,
+        seed: u64,
+        time: EmulatedTime,
+        interface: Option<&str>,
+    ) -> Result<Self, EmulatedError> {
         let config = EmulatedConfig::parse(toml)?;
-        let running = runner::spawn_on_vcan(&config, seed, speed, name)?;
         let place = config.ports.iter().position(|port| port.is_can());
-        let interface = place.map(|place| (place, name.to_owned()));
+        let interface = place.zip(interface.map(str::to_owned));
+        let options = Options {
+            seed,
+            pace: match &time {
+                EmulatedTime::Wall(speed) => runner::Pace::Wall(*speed),
+                EmulatedTime::Lockstep(folder) => runner::Pace::Lockstep(socket_in(folder)),
+            },
+            interfaces: interface
+                .iter()
+                .map(|(place, name)| (config.ports[*place].name().to_owned(), name.clone()))
+                .collect(),
+            ..Options::default()
+        };
         Ok(Self {
+            running: runner::spawn(&config, &options)?,
             config,
-            running,
             interface,
+            time,
         })
+    }
+
+    /// The time that its controller lives by; `name` is what the emulator calls it.
+    ///
+    /// # Errors
+    /// When the machine's thread has ended.
+    pub fn pace(&self, name: &str) -> Result<ports::Pace, Failure> {
+        match &self.time {
+            EmulatedTime::Wall(speed) => Ok(ports::Pace::Wall(*speed)),
+            EmulatedTime::Lockstep(folder) => ports::Pace::lockstep(&socket_in(folder), name),
+        }
     }
 
     /// Where a controller configured by `config` finds its buses and lines.
@@ -248,6 +307,15 @@ impl EmulatedOnPtys {
     pub fn take_line_away(&self) -> Result<(), EmulatedError> {
         Ok(self.running.take_line_away()?)
     }
+}
+
+fn side_channel() -> Result<EmulatedTime, EmulatedError> {
+    let folder = tempfile::Builder::new().prefix("truestage").tempdir();
+    Ok(EmulatedTime::Lockstep(folder.map_err(RunError::Start)?))
+}
+
+fn socket_in(folder: &TempDir) -> PathBuf {
+    folder.path().join("clock")
 }
 
 /// What the hand does when it is asked for a line.

@@ -1,11 +1,13 @@
 //! From the configuration's buses and lines to open ports.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use drivers::transport::Port;
 use drivers::transport::clock::Clock;
-use drivers::transport::live::{Live, LiveBuilder, SerialSettings, SlcanSettings};
+use drivers::transport::live::{Live, LiveBuilder, OpenError, SerialSettings, SlcanSettings};
+use drivers::transport::lockstep::Participant;
 
 use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};
@@ -81,11 +83,61 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
     )))
 }
 
-/// The patience ([`Loaded::patience`]) that a machine needs whose clock runs `clock_speed`
-/// times as fast as the wall's: none in real time. Beyond it, a host under load pauses for
-/// tens of milliseconds, which the fastest supervision must outlast.
-///
-/// [`Loaded::patience`]: crate::config::Loaded::patience
+/// Whose time a machine lives by.
+#[derive(Clone, Debug)]
+pub enum Pace {
+    /// The wall's, so many times as fast; 1 on real machines.
+    Wall(f64),
+    /// An emulated machine's: it passes only when both ends have nothing left to do.
+    Lockstep(Arc<Participant>),
+}
+
+impl From<f64> for Pace {
+    fn from(speed: f64) -> Self {
+        Self::Wall(speed)
+    }
+}
+
+impl Pace {
+    /// Takes part in the clock whose side channel is at `path`; the emulator calls it `name`.
+    ///
+    /// # Errors
+    /// When no emulated machine is there.
+    pub fn lockstep(path: &Path, name: &str) -> Result<Self, Failure> {
+        let joined = Participant::join(path, name).map_err(OpenError::from)?;
+        Ok(Self::Lockstep(joined))
+    }
+
+    /// The patience ([`Loaded::patience`]) that a machine needs: none in real time and on a
+    /// clock that waits for both ends. On a clock that runs faster than the wall's, a host
+    /// under load pauses for tens of milliseconds, which the fastest supervision must outlast.
+    ///
+    /// [`Loaded::patience`]: crate::config::Loaded::patience
+    pub fn patience(&self) -> u32 {
+        match self {
+            Self::Wall(speed) => patience(*speed),
+            Self::Lockstep(_) => 1,
+        }
+    }
+
+    fn clock(&self) -> Result<Clock, Failure> {
+        match self {
+            Self::Lockstep(participant) => Ok(Clock::lockstep(Arc::clone(participant))),
+            Self::Wall(speed) if speed.is_finite() && *speed > 0.0 => Ok(Clock::scaled(*speed)),
+            Self::Wall(speed) => Err(Failure::Usage {
+                what: format!("a clock speed of {speed}"),
+                help: "give a positive number; 1 is real time".into(),
+            }),
+        }
+    }
+
+    /// Whether a machine of metal can live by it.
+    fn is_real(&self) -> bool {
+        matches!(self, Self::Wall(speed) if *speed == 1.0)
+    }
+}
+
+/// [`Pace::patience`] on the wall's clock.
 pub fn patience(clock_speed: f64) -> u32 {
     const PAUSES: f64 = 25.0;
     if clock_speed <= 1.0 {
@@ -104,7 +156,7 @@ pub enum Use {
     Measurement,
 }
 
-/// Opens the buses and lines that `purpose` needs. `clock_speed` is 1 on real machines.
+/// Opens the buses and lines that `purpose` needs. `pace` is 1.0 on real machines.
 ///
 /// # Errors
 /// When one cannot be opened; those before it are closed again.
@@ -112,19 +164,15 @@ pub fn open(
     config: &MachineConfig,
     overrides: &Overrides,
     purpose: Use,
-    clock_speed: f64,
+    pace: impl Into<Pace>,
 ) -> Result<Live, Failure> {
-    if !(clock_speed.is_finite() && clock_speed > 0.0) {
-        return Err(Failure::Usage {
-            what: format!("a clock speed of {clock_speed}"),
-            help: "give a positive number; 1 is real time".into(),
-        });
-    }
+    let pace = pace.into();
+    let clock = pace.clock()?;
     let endpoints = endpoints(config, overrides, purpose);
-    if clock_speed != 1.0 {
-        refuse_real(&endpoints, clock_speed)?;
+    if !pace.is_real() {
+        refuse_real(&endpoints)?;
     }
-    let mut builder = Live::builder(Clock::scaled(clock_speed));
+    let mut builder = Live::builder(clock);
     let ports = assemble::ports(config);
     for (name, endpoint) in &endpoints {
         builder = add(builder, ports[name], config, name, endpoint);
@@ -168,7 +216,7 @@ fn endpoints(
 }
 
 /// A clock that does not keep time stretches every supervision time-out: never with metal.
-fn refuse_real(endpoints: &BTreeMap<String, Endpoint>, speed: f64) -> Result<(), Failure> {
+fn refuse_real(endpoints: &BTreeMap<String, Endpoint>) -> Result<(), Failure> {
     let is_emulated = |endpoint: &Endpoint| match endpoint {
         Endpoint::SocketCan(interface) => interface.starts_with("vcan"),
         Endpoint::Slcan(path) | Endpoint::Serial(path) => path
@@ -181,8 +229,8 @@ fn refuse_real(endpoints: &BTreeMap<String, Endpoint>, speed: f64) -> Result<(),
     {
         None => Ok(()),
         Some((name, _)) => Err(Failure::Usage {
-            what: format!("a clock speed of {speed} with `{name}`, which is no emulated port"),
-            help: "leave --clock-speed out on a real machine".into(),
+            what: format!("a clock that is not the wall's with `{name}`, which is no emulated port"),
+            help: "leave --clock and --clock-speed out on a real machine".into(),
         }),
     }
 }
@@ -214,9 +262,9 @@ mod tests {
     #[test]
     fn a_fast_clock_is_refused_on_a_real_port() {
         let real = BTreeMap::from([("can0".to_owned(), Endpoint::SocketCan("can0".into()))]);
-        let error = refuse_real(&real, 10.0).unwrap_err().to_string();
+        let error = refuse_real(&real).unwrap_err().to_string();
         assert!(error.contains("can0"), "{error}");
         let emulated = BTreeMap::from([("can0".to_owned(), Endpoint::SocketCan("vcan0".into()))]);
-        assert!(refuse_real(&emulated, 10.0).is_ok());
+        assert!(refuse_real(&emulated).is_ok());
     }
 }

@@ -1,11 +1,14 @@
 //! The command `mock-bus`: an emulated machine for other programs to talk to.
 
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
 use std::os::fd::AsFd;
-use std::path::PathBuf;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
+use drivers::wire::lockstep::{Reply, Request};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
@@ -13,14 +16,22 @@ use nix::sys::signalfd::SignalFd;
 
 use mock_bus::config::MachineConfig;
 use mock_bus::fault::FaultConfig;
-use mock_bus::runner::{self, Options, Running};
+use mock_bus::runner::{self, Options, Pace, Running, hand};
 
 /// Runs an emulated machine until it is interrupted, and prints where its ports are.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(
+    version,
+    about,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
 struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
     /// The machine's configuration.
-    config: PathBuf,
+    #[arg(required = true)]
+    config: Option<PathBuf>,
     /// Put the first CAN bus on this SocketCAN interface.
     #[arg(long, value_name = "INTERFACE", conflicts_with = "slcan")]
     can: Option<String>,
@@ -36,20 +47,41 @@ struct Arguments {
     /// Simulated seconds for each second.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
+    /// `lockstep:PATH`: time passes only when neither the machine nor the programs that talk to
+    /// it have anything left to do, so that a busy computer changes nothing. They agree over a
+    /// socket at PATH: `truestage … --clock lockstep:PATH`.
+    #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "speed")]
+    clock: Option<PathBuf>,
+    /// A socket for `mock-bus ctl` where time is the wall's; a lockstep clock's own serves too.
+    #[arg(long, value_name = "PATH", conflicts_with = "clock")]
+    control: Option<PathBuf>,
     /// Add a fault, as TOML: `from_s = 2.0, fault = { kind = "beam_blocked" }`.
-    #[arg(long, value_name = "TOML", value_parser = fault)]
+    #[arg(long, value_name = "TOML", value_parser = hand::fault)]
     fault: Vec<FaultConfig>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Lends a hand at a running machine: `mock-bus ctl SOCKET turn-plate 73`.
+    Ctl {
+        /// Where it listens: the PATH of its `--clock lockstep:PATH` or `--control PATH`.
+        socket: PathBuf,
+        /// `turn-plate LINES`, `fix-plate OFFSET`, `place-plate OFFSET`, `set-up-line TOML`, `take-line-away`, `fault TOML`, `end-fault
+        /// NUMBER`, `power off`, `power on`, or `truth`.
+        #[arg(required = true, num_args = 1.., allow_hyphen_values = true)]
+        words: Vec<String>,
+    },
+}
+
+fn lockstep(text: &str) -> Result<PathBuf, String> {
+    let path = text.strip_prefix("lockstep:").filter(|it| !it.is_empty());
+    let path = path.ok_or("expected lockstep:PATH")?;
+    Ok(PathBuf::from(path))
 }
 
 fn port_and_path(text: &str) -> Result<(String, PathBuf), String> {
     let (port, path) = text.split_once('=').ok_or("expected PORT=PATH")?;
     Ok((port.to_owned(), PathBuf::from(path)))
-}
-
-fn fault(text: &str) -> Result<FaultConfig, String> {
-    let mut faults: BTreeMap<String, FaultConfig> =
-        toml::from_str(&format!("fault = {{ {text} }}")).map_err(|error| error.to_string())?;
-    faults.remove("fault").ok_or_else(|| "no fault".to_owned())
 }
 
 fn main() -> ExitCode {
@@ -63,7 +95,37 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let mut config = MachineConfig::load(&arguments.config)?;
+    match (&arguments.command, arguments.config.clone()) {
+        (Some(Command::Ctl { socket, words }), _) => lend_a_hand(socket, &words.join(" ")),
+        (None, Some(config)) => emulate(&config, arguments),
+        // The command line's parser asks for one of them.
+        (None, None) => Ok(()),
+    }
+}
+
+/// Says what shall be done and prints what came of it.
+#[expect(clippy::print_stdout, reason = "the answer is the command's result")]
+fn lend_a_hand(socket: &Path, words: &str) -> Result<(), Box<dyn std::error::Error>> {
+    // A machine need not run for its user to learn the words.
+    hand::Deed::parse(words)?;
+    let failed = |error| format!("{}: {error}; is a machine running there?", socket.display());
+    let mut stream = UnixStream::connect(socket).map_err(failed)?;
+    let words = words.to_owned();
+    writeln!(stream, "{}", Request::Do { words }).map_err(failed)?;
+    let mut line = String::new();
+    BufReader::new(stream)
+        .read_line(&mut line)
+        .map_err(failed)?;
+    match Reply::parse(line.trim_end_matches('\n'))? {
+        Reply::Done(text) => println!("{text}"),
+        Reply::Refused(why) => return Err(why.into()),
+        other => return Err(format!("unexpected answer `{other}`").into()),
+    }
+    Ok(())
+}
+
+fn emulate(config: &Path, arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let mut config = MachineConfig::load(config)?;
     config.faults.extend(arguments.fault.iter().cloned());
     let options = options(&config, arguments);
     // Before the machine's thread starts, so that it inherits the mask.
@@ -73,6 +135,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
     signals.thread_block()?;
     let machine = runner::spawn(&config, &options)?;
     print_ports(&config, &options, machine.ports());
+    std::io::stdout().flush()?;
     wait_for_the_end(&signals, &machine)?;
     Ok(machine.stop()?)
 }
@@ -99,7 +162,11 @@ fn options(config: &MachineConfig, arguments: Arguments) -> Options {
     links.extend(can.clone().zip(arguments.slcan));
     Options {
         seed: arguments.seed,
-        speed: arguments.speed,
+        pace: match arguments.clock {
+            None => Pace::Wall(arguments.speed),
+            Some(path) => Pace::Lockstep(path),
+        },
+        control: arguments.control,
         interfaces: can.zip(arguments.can).into_iter().collect(),
         links,
     }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use drivers::transport::Transport;
 use mock_bus::simulation::Simulation;
 use truestage::config::Loaded;
-use truestage::emulated::{Emulated, EmulatedOnPtys};
+use truestage::emulated::{Emulated, EmulatedError, EmulatedOnPtys};
 use truestage::ports;
 
 use crate::four_screws::{four_cyclic_axes, with_fourth_drive};
@@ -27,7 +27,7 @@ pub struct Setup {
     shipped: Shipped,
     seed: u64,
     interface: &'static str,
-    /// How much faster than the wall's clock it lives on live buses, if not by the rig.
+    /// How much faster than the wall's clock it lives on live buses, where it lives by that.
     speed: Option<f64>,
     machine: Vec<Change>,
     emulated: Vec<Change>,
@@ -151,13 +151,29 @@ enum Emulation {
     Running(EmulatedOnPtys),
 }
 
+/// On live buses: by the wall's clock where a setup asks for that, else on a shared one.
+fn on_ptys(
+    text: &str,
+    setup: &Setup,
+    interface: Option<&str>,
+) -> Result<EmulatedOnPtys, EmulatedError> {
+    let seed = setup.seed;
+    match (setup.speed, interface) {
+        (None, None) => EmulatedOnPtys::in_lockstep(text, seed),
+        (None, Some(name)) => EmulatedOnPtys::in_lockstep_on_socketcan(text, seed, name),
+        (Some(speed), None) => EmulatedOnPtys::start(text, seed, speed),
+        (Some(speed), Some(name)) => {
+            EmulatedOnPtys::start_on_socketcan(text, seed, speed, name)
+        }
+    }
+}
+
 /// An emulated machine on one rig.
 pub struct Emulator {
     /// Where it is.
     pub rig: Rig,
     /// What its controller is told.
     pub loaded: Loaded,
-    speed: f64,
     emulation: Emulation,
     /// For the controller's records; gone when dropped.
     pub folder: tempfile::TempDir,
@@ -170,25 +186,24 @@ impl Emulator {
     /// # Panics
     /// When it cannot be brought up.
     pub fn new(rig: Rig, setup: &Setup) -> Self {
-        let turn = (rig != Rig::InProcess)
+        let by_the_wall = setup.speed.filter(|_| rig != Rig::InProcess);
+        let turn = (by_the_wall.is_some() || rig == Rig::Vcan)
             .then(|| REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let change = |text| replace(text, &setup.machine);
         let mut loaded = shipped_config(&setup.shipped, folder.path(), change);
-        let speed = setup.speed.unwrap_or_else(|| rig.speed());
-        loaded.patience = ports::patience(speed);
+        loaded.patience = ports::Pace::Wall(by_the_wall.unwrap_or(1.0)).patience();
         let text = replace(setup.shipped.emulated.to_owned(), &setup.emulated);
-        let seed = setup.seed;
         let emulation = match rig {
-            Rig::InProcess => Emulated::new(&text, seed, &loaded.config).map(Emulation::InProcess),
-            Rig::Pty => EmulatedOnPtys::start(&text, seed, speed).map(Emulation::Running),
-            Rig::Vcan => EmulatedOnPtys::start_on_socketcan(&text, seed, speed, setup.interface)
-                .map(Emulation::Running),
+            Rig::InProcess => {
+                Emulated::new(&text, setup.seed, &loaded.config).map(Emulation::InProcess)
+            }
+            Rig::Pty => on_ptys(&text, setup, None).map(Emulation::Running),
+            Rig::Vcan => on_ptys(&text, setup, Some(setup.interface)).map(Emulation::Running),
         };
         Self {
             rig,
             loaded,
-            speed,
             emulation: emulation.unwrap_or_else(|error| panic!("{rig:?}: {error}")),
             folder,
             _turn: turn,
@@ -206,7 +221,8 @@ impl Emulator {
         };
         let config = &self.loaded.config;
         let overrides = emulated.overrides(config).expect("its ports were matched");
-        match ports::open(config, &overrides, ports::Use::Measurement, self.speed) {
+        let pace = emulated.pace("a test").expect("the emulator runs");
+        match ports::open(config, &overrides, ports::Use::Measurement, pace) {
             Ok(live) => Box::new(live),
             Err(failure) => panic!("{:?}: {failure}", self.rig),
         }

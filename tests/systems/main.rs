@@ -2,6 +2,7 @@
 
 mod engine;
 mod linear;
+mod one_log;
 mod platform;
 mod rotary;
 mod virtual_time;

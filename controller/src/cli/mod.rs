@@ -20,13 +20,15 @@ mod volume;
 mod volume_fit;
 mod volumetric;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use kind::{Kind, by_kind};
 use output::Output;
+use truestage::Failure;
+use truestage::ports::Pace;
 
 /// Makes precision motion stages go where they are told.
 #[derive(Debug, Parser)]
@@ -99,9 +101,38 @@ struct MachineArgs {
     /// The clock of an emulated machine that runs faster than real time (`mock-bus --speed`).
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     clock_speed: f64,
+    /// `lockstep:PATH`: the clock of an emulated machine that waits for its controller (`mock-bus
+    /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
+    #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "clock_speed")]
+    clock: Option<PathBuf>,
+    /// Let the hand of the emulated machine at this socket (`mock-bus --control PATH`) do what
+    /// people are asked for.
+    #[arg(long, value_name = "PATH")]
+    hand: Option<PathBuf>,
     /// Write everything on the buses to this file, in candump's log format.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+}
+
+impl MachineArgs {
+    /// Whose time the machine lives by.
+    fn pace(&self, verb: &str) -> Result<Pace, Failure> {
+        match &self.clock {
+            None => Ok(Pace::Wall(self.clock_speed)),
+            Some(path) => Pace::lockstep(path, &format!("truestage {verb}")),
+        }
+    }
+
+    /// Where an emulated machine's hand does what people are asked for.
+    fn hand(&self) -> Option<&Path> {
+        self.hand.as_deref().or(self.clock.as_deref())
+    }
+}
+
+fn lockstep(text: &str) -> Result<PathBuf, String> {
+    let path = text.strip_prefix("lockstep:").filter(|it| !it.is_empty());
+    let path = path.ok_or("expected lockstep:PATH")?;
+    Ok(PathBuf::from(path))
 }
 
 #[derive(Clone, Debug, Args)]

@@ -4,35 +4,49 @@
 use std::fs::File;
 use std::io::{self, IsTerminal, Read, stdin};
 use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
 
+use compensator::volumetric::Axis;
+use drivers::transport::live::OpenError;
+use drivers::transport::lockstep::lend_hand;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, tcflush};
 use truestage::Failure;
-use truestage::cycle::rotary::{Operator, PlateTask};
-use truestage::cycle::volumetric::{LineOperator, LineTask};
+use truestage::cycle::rotary::{Operator, PlateMove, PlateTask};
+use truestage::cycle::volumetric::{LineOperator, LineOptics, LineTask};
 
 use super::output::Output;
 
 /// Asks on stderr and waits for Enter on stdin; the machine lives on meanwhile.
 #[derive(Debug)]
 pub(super) struct Terminal {
-    /// Where Enter comes from. `None`: somebody else sees to it that it is done, and nothing is
-    /// waited for.
-    answers: Option<File>,
+    answers: Answers,
     output: Output,
+}
+
+/// Who says that it has been done.
+#[derive(Debug)]
+enum Answers {
+    /// A person, by Enter.
+    Keyboard(File),
+    /// The hand of the emulated machine whose socket this is: it does it at once.
+    Hand(PathBuf),
+    /// Somebody else sees to it, and nothing is waited for.
+    Nobody,
 }
 
 impl Terminal {
     /// # Errors
     /// When nobody can answer, before anything moves.
-    pub(super) fn new(yes: bool, output: Output) -> Result<Self, Failure> {
-        let answers = match yes {
-            true => None,
-            false if stdin().is_terminal() => {
+    pub(super) fn new(yes: bool, hand: Option<&Path>, output: Output) -> Result<Self, Failure> {
+        let answers = match (yes, hand) {
+            (true, _) => Answers::Nobody,
+            (false, Some(socket)) => Answers::Hand(socket.to_owned()),
+            (false, None) if stdin().is_terminal() => {
                 let own = stdin().as_fd().try_clone_to_owned();
-                Some(File::from(own.map_err(|error| gone(&error))?))
+                Answers::Keyboard(File::from(own.map_err(|error| gone(&error))?))
             }
-            false => {
+            (false, None) => {
                 return Err(Failure::Usage {
                     what:
                         "somebody must turn the plate or set lines up, and there is no terminal to \
@@ -47,10 +61,13 @@ impl Terminal {
         Ok(Self { answers, output })
     }
 
-    fn wait_for_enter(&mut self, text: &str) -> Result<(), Failure> {
+    /// Asks for what `text` says, which a hand does by `words`.
+    fn ask_for(&mut self, text: &str, words: &str) -> Result<(), Failure> {
         self.output.note(&format!("> {text}"));
-        let Some(answers) = &self.answers else {
-            return Ok(());
+        let answers = match &self.answers {
+            Answers::Nobody => return Ok(()),
+            Answers::Hand(socket) => return self.lend_hand(socket, words),
+            Answers::Keyboard(answers) => answers,
         };
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
@@ -61,8 +78,14 @@ impl Terminal {
         Ok(())
     }
 
+    fn lend_hand(&self, socket: &Path, words: &str) -> Result<(), Failure> {
+        let done = lend_hand(socket, words).map_err(OpenError::from)?;
+        self.output.note(&format!("  hand: {done}"));
+        Ok(())
+    }
+
     fn has_entered(&mut self) -> Result<bool, Failure> {
-        let Some(answers) = &mut self.answers else {
+        let Answers::Keyboard(answers) = &mut self.answers else {
             return Ok(true);
         };
         let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
@@ -82,7 +105,13 @@ impl Terminal {
 
 impl Operator for Terminal {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
-        self.wait_for_enter(&task.text())
+        let words = match task.by {
+            PlateMove::Fix => format!("fix-plate {}", task.offset),
+            PlateMove::TurnBy(_) | PlateMove::TurnFrom { .. } => {
+                format!("place-plate {}", task.offset)
+            }
+        };
+        self.ask_for(&task.text(), &words)
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
@@ -92,7 +121,7 @@ impl Operator for Terminal {
 
 impl LineOperator for Terminal {
     fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
-        self.wait_for_enter(&task.text())
+        self.ask_for(&task.text(), &line_words(task))
     }
 
     fn is_set_up(&mut self) -> Result<bool, Failure> {
@@ -102,8 +131,27 @@ impl LineOperator for Terminal {
     fn pack_up(&mut self) -> Result<(), Failure> {
         self.output
             .note("> the interferometer is not needed any more and may be packed up");
-        Ok(())
+        match &self.answers {
+            Answers::Hand(socket) => self.lend_hand(socket, "take-line-away"),
+            Answers::Keyboard(_) | Answers::Nobody => Ok(()),
+        }
     }
+}
+
+/// How an emulated machine's hand is told to set a line up.
+fn line_words(task: &LineTask) -> String {
+    let unit = |axis: Axis| Axis::ALL.map(|it| f64::from(u8::from(it == axis)));
+    let way = task.end - task.start;
+    let along = [way.x, way.y, way.z].map(|it| it.value());
+    let tool_mm = [task.tool.x, task.tool.y, task.tool.z].map(|it| it.mm());
+    let optics = match task.optics {
+        LineOptics::Linear => "\"linear\"".to_owned(),
+        LineOptics::Straightness { across } => {
+            format!("\"straightness\", side = {:?}", unit(across))
+        }
+        LineOptics::Angular { about } => format!("\"angular\", side = {:?}", unit(about)),
+    };
+    format!("set-up-line along = {along:?}, tool_mm = {tool_mm:?}, optics = {optics}")
 }
 
 fn gone(why: &io::Error) -> Failure {
@@ -118,14 +166,15 @@ mod tests {
     use super::*;
     use nix::pty::openpty;
     use std::io::Write;
-    use truestage::cycle::rotary::PlateMove;
 
     const PATIENCE_MS: u16 = 10_000;
 
     /// Enter, and what the kernel needs to bring it to the other end.
     fn enter(keyboard: &mut File, terminal: &Terminal) {
         keyboard.write_all(b"\n").unwrap();
-        let answers = terminal.answers.as_ref().unwrap();
+        let Answers::Keyboard(answers) = &terminal.answers else {
+            panic!("it has a keyboard")
+        };
         let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
         let ready = poll(&mut fds, PollTimeout::from(PATIENCE_MS));
         assert_eq!(ready, Ok(1), "Enter did not arrive");
@@ -136,7 +185,7 @@ mod tests {
         let pty = openpty(None, None).unwrap();
         let mut keyboard = File::from(pty.master);
         let mut terminal = Terminal {
-            answers: Some(File::from(pty.slave)),
+            answers: Answers::Keyboard(File::from(pty.slave)),
             output: Output::new(true),
         };
         let task = PlateTask {

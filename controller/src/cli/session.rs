@@ -6,7 +6,7 @@ use std::io::BufWriter;
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
 use truestage::config::{self, Loaded};
-use truestage::ports::{self, Overrides, Use};
+use truestage::ports::{self, Overrides, Pace, Use};
 use truestage::store::Lease;
 use truestage::{Failure, Machine, StopRequest, Store, assemble};
 
@@ -30,14 +30,18 @@ impl Session {
         output: Output,
     ) -> Result<Self, Failure> {
         let mut loaded = config::load(&args.config)?;
-        loaded.patience = ports::patience(args.clock_speed);
         let overrides = Overrides::parse(&args.ports, &loaded.config)?;
         let store = Store::of(&loaded.config.machine);
         let lease = Lease::take(&store, verb)?;
-        let transport = ports::open(&loaded.config, &overrides, purpose, args.clock_speed)?;
+        let pace = args.pace(verb)?;
+        loaded.patience = pace.patience();
+        let keeps_time = matches!(pace, Pace::Wall(_));
+        let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
         let transport = recorded(transport, args, &loaded)?;
         let mut machine = Machine::new(&loaded, transport);
-        machine.in_real_time();
+        if keeps_time {
+            machine.in_real_time();
+        }
         machine.observe(Box::new(Bars::new(output.is_json())));
         stop_on_signals(&machine.stop_request())?;
         Ok(Self {

@@ -47,7 +47,7 @@ fn with_zeroed_table<R>(
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    let mut operator = Terminal::new(args.yes, output)?;
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
         let options = CalibrateOptions {
             resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
@@ -71,7 +71,7 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         });
     }
     let compensated = !args.uncompensated;
-    let mut operator = Terminal::new(args.yes, output)?;
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
         // Uncompensated, too: it knows the plate's errors.
         machine.load_active_rotary(axis, store)?;

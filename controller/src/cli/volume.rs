@@ -123,7 +123,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             });
         }
     };
-    let mut operator = Terminal::new(args.yes, output)?;
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let ready = |_: &Machine, store: &Store| {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
     };
@@ -235,7 +235,7 @@ pub(super) fn verify(args: &VerifyArgs, output: Output) -> Ended {
             help: "it is one line: start it again".into(),
         });
     }
-    let mut operator = Terminal::new(args.yes, output)?;
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let by = match args.uncompensated {
         true => VerifyBy::AsFound,
         false => VerifyBy::Everything,

@@ -1,17 +1,25 @@
-//! The clock of live ports: `CLOCK_MONOTONIC`, real or scaled.
+//! The clock of live ports: `CLOCK_MONOTONIC`, real or scaled, or one that both ends share.
 
 use core::time::Duration;
+use std::sync::Arc;
 use std::time::Instant;
 use units::Time;
 
-/// Monotonic time since the clock was made, optionally faster or slower than the wall's.
+use super::lockstep::Participant;
+
+/// Monotonic time since the clock was made, optionally faster or slower than the wall's; or
+/// the time of an emulated machine, which passes only when both ends have nothing left to do.
 ///
 /// An emulated machine may live ten times as fast as the wall; controller and emulator then
-/// use the same factor, and every time-out and period means the same to both.
-#[derive(Clone, Copy, Debug)]
-pub struct Clock {
-    start: Instant,
-    speed: f64,
+/// use the same factor, and every time-out and period means the same to both. With a shared
+/// clock nothing depends on the wall's.
+#[derive(Clone, Debug)]
+pub struct Clock(Pace);
+
+#[derive(Clone, Debug)]
+enum Pace {
+    Wall { start: Instant, speed: f64 },
+    Lockstep(Arc<Participant>),
 }
 
 impl Clock {
@@ -29,20 +37,37 @@ impl Clock {
             speed.is_finite() && speed > 0.0,
             "a clock's speed is positive, not {speed}"
         );
-        Self {
+        Self(Pace::Wall {
             start: Instant::now(),
             speed,
+        })
+    }
+
+    /// The emulated machine's, in which `participant` takes part.
+    pub const fn lockstep(participant: Arc<Participant>) -> Self {
+        Self(Pace::Lockstep(participant))
+    }
+
+    /// Who takes part in the clock that both ends share; `None` on the wall's clock.
+    pub const fn participant(&self) -> Option<&Arc<Participant>> {
+        match &self.0 {
+            Pace::Wall { .. } => None,
+            Pace::Lockstep(participant) => Some(participant),
         }
     }
 
-    /// How many times as fast as the wall this clock runs.
+    /// How many times as fast as the wall this clock runs; 1 for a shared one, which has no
+    /// speed of its own.
     pub const fn speed(&self) -> f64 {
-        self.speed
+        match &self.0 {
+            Pace::Wall { speed, .. } => *speed,
+            Pace::Lockstep(_) => 1.0,
+        }
     }
 
     /// The present moment.
     pub fn now(&self) -> Time {
-        self.at_wall(self.start.elapsed())
+        self.at_wall(self.wall_elapsed())
     }
 
     /// How long to wait on the wall until this clock shows `moment`; zero when it has.
@@ -52,17 +77,20 @@ impl Clock {
 
     /// How long a span of this clock takes on the wall.
     pub fn wall_span(&self, span: Duration) -> Duration {
-        scale(span, 1.0 / self.speed)
+        scale(span, 1.0 / self.speed())
     }
 
     /// How long a span of the wall is on this clock.
     pub fn span_of_wall(&self, wall: Duration) -> Duration {
-        scale(wall, self.speed)
+        scale(wall, self.speed())
     }
 
-    /// Wall time since the clock's start.
+    /// Wall time since the clock's start; a shared clock is its own wall.
     pub(super) fn wall_elapsed(&self) -> Duration {
-        self.start.elapsed()
+        match &self.0 {
+            Pace::Wall { start, .. } => start.elapsed(),
+            Pace::Lockstep(participant) => participant.now().since(Time::ZERO),
+        }
     }
 
     /// What this clock shows `wall` after its start.

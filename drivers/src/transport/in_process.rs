@@ -2,10 +2,10 @@
 
 use core::time::Duration;
 use nix::errno::Errno;
-use std::collections::BTreeMap;
 use units::Time;
 
 use super::live::system;
+use super::sync_grid::SyncGrid;
 use super::{Arrival, Payload, Port, SendError, Transport};
 use crate::wire::canopen::sync::emit_sync;
 
@@ -35,18 +35,12 @@ pub trait World {
 /// How often a world may ask for the same moment before it is taken to hang.
 const ROUNDS_MAX: u32 = 1_000_000;
 
-#[derive(Clone, Copy, Debug)]
-struct Sync {
-    period: Duration,
-    next: Time,
-}
-
 /// A transport whose other end is a [`World`].
 #[derive(Debug)]
 pub struct InProcess<W> {
     world: W,
     now: Time,
-    syncs: BTreeMap<Port, Sync>,
+    syncs: SyncGrid,
 }
 
 impl<W: World> InProcess<W> {
@@ -55,7 +49,7 @@ impl<W: World> InProcess<W> {
         Self {
             world,
             now: Time::ZERO,
-            syncs: BTreeMap::new(),
+            syncs: SyncGrid::new(),
         }
     }
 
@@ -74,24 +68,13 @@ impl<W: World> InProcess<W> {
         self.world
     }
 
-    fn next_sync(&self) -> Time {
-        let next = self.syncs.values().map(|sync| sync.next).min();
-        next.unwrap_or(Time::NEVER)
-    }
-
-    /// Sends the SYNCs that are due; those that a held-up host missed are left out. The host
-    /// does not hear its own.
+    /// Sends the SYNCs that are due; the host does not hear its own.
     fn send_due_syncs(&mut self) {
-        for (port, sync) in &mut self.syncs {
-            while sync.next <= self.now {
-                let frame = Payload::Frame(emit_sync(None));
-                if self.now.since(sync.next) < sync.period {
-                    // A SYNC that the port cannot take is lost, as on a real bus.
-                    let _ = self.world.deliver(sync.next, *port, &frame);
-                }
-                sync.next += sync.period;
-            }
-        }
+        let world = &mut self.world;
+        self.syncs.send_due(self.now, |port, at| {
+            // A SYNC that the port cannot take is lost, as on a real bus.
+            let _ = world.deliver(at, port, &Payload::Frame(emit_sync(None)));
+        });
     }
 }
 
@@ -114,7 +97,7 @@ impl<W: World> Transport for InProcess<W> {
                 return Some(arrival);
             }
             // A world may be late for an event, but time does not run backwards.
-            let next = self.world.next_event().min(self.next_sync()).min(until);
+            let next = self.world.next_event().min(self.syncs.next()).min(until);
             let before = self.now;
             self.now = next.max(self.now);
             self.send_due_syncs();
@@ -130,23 +113,17 @@ impl<W: World> Transport for InProcess<W> {
     fn sleep_until(&mut self, until: Time) {
         self.now = self.now.max(self.world.now());
         while self.now < until {
-            self.now = until.min(self.next_sync()).max(self.now);
+            self.now = until.min(self.syncs.next()).max(self.now);
             self.send_due_syncs();
             self.world.advance(self.now);
         }
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
-        match period {
-            None => {
-                self.syncs.remove(&port);
-            }
-            Some(Duration::ZERO) => return Err(system(port, Errno::EINVAL)),
-            Some(period) => {
-                let next = self.now + period;
-                self.syncs.insert(port, Sync { period, next });
-            }
+        if period.is_some_and(|period| period.is_zero()) {
+            return Err(system(port, Errno::EINVAL));
         }
+        self.syncs.set(self.now, port, period);
         Ok(())
     }
 }

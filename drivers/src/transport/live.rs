@@ -6,6 +6,9 @@
 //! takes deadlines in nanoseconds and costs one system call: a tokio timer is a millisecond
 //! late at the median and reads the clock several times per turn.
 
+mod in_lockstep;
+mod opening;
+
 use core::cell::Cell;
 use core::time::Duration;
 use nix::errno::Errno;
@@ -14,16 +17,14 @@ use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
-use std::path::Path;
 use std::sync::Arc;
 use units::Time;
 
+use self::in_lockstep::InLockstep;
+pub use self::opening::{LiveBuilder, OpenError};
 use super::clock::Clock;
 pub use super::serial::{Parity, SerialSettings, StopBits};
-use super::serial::{SerialError, SerialLine};
-use super::slcan::SlcanPort;
 pub use super::slcan::{SlcanFailure, SlcanSettings};
-use super::socketcan::{self, CanPort};
 use super::sync_thread::{SyncSink, SyncStatistics, SyncThread, monotonic};
 use super::{Arrival, Input, Payload, Port, SendError, Transport};
 
@@ -54,6 +55,23 @@ pub(super) trait LivePort: Send {
     /// Sends without waiting.
     fn send(&mut self, payload: &Payload) -> Result<(), SendError>;
 
+    /// How its start went, once that has ended.
+    fn start_result(&self) -> Option<Result<(), SlcanFailure>> {
+        Some(Ok(()))
+    }
+
+    /// Goes on with its start; what comes in is kept.
+    fn progress(&mut self, _now: Time, _ready: bool) {}
+
+    /// How many frames or bytes it has sent so far.
+    fn units_sent(&self) -> u64;
+
+    /// Writes what waits for a slow line.
+    fn flush(&mut self) {}
+
+    /// Reads so many frames or bytes, which are known to be on their way; they came at `now`.
+    fn take_in(&mut self, now: Time, units: usize);
+
     /// Where a SYNC thread may send; `None` for a serial line.
     fn sync_sink(&self) -> Option<Arc<dyn SyncSink>> {
         None
@@ -63,208 +81,24 @@ pub(super) trait LivePort: Send {
     fn counters(&self) -> Vec<(&'static str, u64)>;
 }
 
-/// Why a port could not be opened.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// No network interface of that name.
-    #[error(
-        "CAN interface {interface}: does not exist; `ip link` lists what there is, \
-         `ip link add dev {interface} type vcan && ip link set {interface} up` makes a \
-         virtual one"
-    )]
-    NoInterface {
-        /// Its name.
-        interface: String,
-    },
-    /// The kernel was built without CAN.
-    #[error(
-        "CAN interface {interface}: this kernel has no CAN sockets; try `modprobe can_raw`, \
-         or use an SLCAN adapter"
-    )]
-    NoCan {
-        /// Its name.
-        interface: String,
-    },
-    /// Opening or setting up the CAN socket failed otherwise.
-    #[error("CAN interface {interface}: {source}")]
-    Can {
-        /// Its name.
-        interface: String,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
-    /// The serial port could not be opened.
-    #[error("{path}: {source}; {help}")]
-    Serial {
-        /// The device's path.
-        path: String,
-        /// What the operating system said.
-        source: std::io::Error,
-        /// What to do about it.
-        help: &'static str,
-    },
-    /// The CAN adapter has no code for the bit rate.
-    #[error(
-        "{path}: SLCAN knows no bit rate of {bitrate} bit/s; it has 10, 20, 50, 100, 125, \
-         250, 500, 800 and 1000 kbit/s"
-    )]
-    Bitrate {
-        /// The device's path.
-        path: String,
-        /// The bit rate asked for.
-        bitrate: u32,
-    },
-    /// The SLCAN adapter did not do what it was told.
-    #[error("{path}: SLCAN adapter {failure}")]
-    Slcan {
-        /// The device's path.
-        path: String,
-        /// What went wrong.
-        failure: SlcanFailure,
-    },
-    /// More ports than one thread waits for.
-    #[error("more than {limit} CAN buses and serial lines: give some to another process")]
-    TooManyPorts {
-        /// How many there may be.
-        limit: usize,
-    },
-    /// Two ports have the same number.
-    #[error("port {}: given twice", port.0)]
-    DuplicatePort {
-        /// The number.
-        port: Port,
-    },
-}
-
-impl OpenError {
-    pub(super) fn serial(path: &str, error: SerialError) -> Self {
-        Self::Serial {
-            path: path.to_owned(),
-            source: error.source,
-            help: error.help,
-        }
-    }
-}
-
-enum Plan {
-    SocketCan(String),
-    Slcan(String, SlcanSettings),
-    Serial(String, SerialSettings),
-}
-
-/// What to open; see [`Live::builder`].
-pub struct LiveBuilder {
-    clock: Clock,
-    plans: Vec<(Port, Plan)>,
-}
-
-impl LiveBuilder {
-    /// A CAN interface of the kernel, such as `can0` or `vcan0`.
-    #[must_use]
-    pub fn socketcan(mut self, port: Port, interface: &str) -> Self {
-        self.plans
-            .push((port, Plan::SocketCan(interface.to_owned())));
-        self
-    }
-
-    /// A CAN adapter that speaks SLCAN over a serial line or pty.
-    #[must_use]
-    pub fn slcan(mut self, port: Port, path: impl AsRef<Path>, settings: SlcanSettings) -> Self {
-        self.plans.push((port, Plan::Slcan(text(path), settings)));
-        self
-    }
-
-    /// A serial line.
-    #[must_use]
-    pub fn serial(mut self, port: Port, path: impl AsRef<Path>, settings: SerialSettings) -> Self {
-        self.plans.push((port, Plan::Serial(text(path), settings)));
-        self
-    }
-
-    /// Opens all of them.
-    ///
-    /// # Errors
-    /// The first port that cannot be opened, its cause and what to do.
-    pub fn build(self) -> Result<Live, OpenError> {
-        let mut ports = Vec::with_capacity(self.plans.len());
-        let mut index = BTreeMap::new();
-        for (port, plan) in self.plans {
-            if ports.len() == WAITED_MAX {
-                return Err(OpenError::TooManyPorts { limit: WAITED_MAX });
-            }
-            if index.insert(port, ports.len()).is_some() {
-                return Err(OpenError::DuplicatePort { port });
-            }
-            let live = open(self.clock, port, plan)?;
-            ports.push(Slot {
-                port,
-                live,
-                ready: false,
-                sync: None,
-            });
-        }
-        Ok(Live {
-            clock: self.clock,
-            known: Cell::new(self.clock.now()),
-            ports,
-            index,
-        })
-    }
-}
-
-fn text(path: impl AsRef<Path>) -> String {
-    path.as_ref().to_string_lossy().into_owned()
-}
-
-fn open(clock: Clock, port: Port, plan: Plan) -> Result<Box<dyn LivePort>, OpenError> {
-    Ok(match plan {
-        Plan::SocketCan(interface) => Box::new(
-            CanPort::open(clock, port, &interface)
-                .map_err(|error| socketcan::open_error(interface, error))?,
-        ),
-        Plan::Slcan(path, settings) => {
-            let mut slcan = SlcanPort::open(clock, port, &path, settings)?;
-            wait_for_handshake(clock, &mut slcan)
-                .map_err(|failure| OpenError::Slcan { path, failure })?;
-            Box::new(slcan)
-        }
-        Plan::Serial(path, settings) => Box::new(
-            SerialLine::open(clock, port, &path, settings)
-                .map_err(|error| OpenError::serial(&path, error))?,
-        ),
-    })
-}
-
-/// Lets an adapter finish its start; ends because every step of it has a deadline.
-fn wait_for_handshake(clock: Clock, slcan: &mut SlcanPort) -> Result<(), SlcanFailure> {
-    loop {
-        if let Some(result) = slcan.handshake_result() {
-            return result;
-        }
-        let ready = wait_one(clock, slcan);
-        let now = clock.now();
-        // Frames cannot come before the channel is open; link reports can wait.
-        slcan.progress(now, ready);
-    }
-}
-
-fn wait_one(clock: Clock, port: &dyn LivePort) -> bool {
-    let Some(descriptor) = port.descriptor() else {
-        return false;
-    };
-    let mut descriptors = [PollFd::new(descriptor, interest(port))];
-    let timeout = clock.until(port.next_event()).min(WAIT_MAX);
-    matches!(
-        ppoll(&mut descriptors, Some(TimeSpec::from(timeout)), None),
-        Ok(count) if count > 0
-    )
-}
-
 fn interest(port: &dyn LivePort) -> PollFlags {
     if port.wants_write() {
         PollFlags::POLLIN | PollFlags::POLLOUT
     } else {
         PollFlags::POLLIN
+    }
+}
+
+/// Waits for what is known to be on its way; `false` when it does not come.
+pub(super) fn awaited(descriptor: BorrowedFd<'_>) -> bool {
+    /// The kernel hands on what was written within microseconds, on a busy computer too.
+    const LIMIT: TimeSpec = TimeSpec::new(10, 0);
+    let mut descriptors = [PollFd::new(descriptor, PollFlags::POLLIN)];
+    loop {
+        match ppoll(&mut descriptors, Some(LIMIT), None) {
+            Err(Errno::EINTR) => {}
+            result => return result.is_ok_and(|count| count > 0),
+        }
     }
 }
 
@@ -283,20 +117,14 @@ pub struct Live {
     known: Cell<Time>,
     ports: Vec<Slot>,
     index: BTreeMap<Port, usize>,
+    /// On a clock that both ends share.
+    lockstep: Option<InLockstep>,
 }
 
 impl Live {
-    /// Begins the list of ports to open.
-    pub const fn builder(clock: Clock) -> LiveBuilder {
-        LiveBuilder {
-            clock,
-            plans: Vec::new(),
-        }
-    }
-
     /// The clock.
-    pub const fn clock(&self) -> Clock {
-        self.clock
+    pub const fn clock(&self) -> &Clock {
+        &self.clock
     }
 
     /// What the SYNC thread of `port` has done, `None` when it has none.
@@ -389,7 +217,8 @@ impl Transport for Live {
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        self.slot_mut(port)?.live.send(payload)
+        let sent = self.slot_mut(port)?.live.send(payload);
+        self.note_sent(port, payload, sent)
     }
 
     /// Reads the clock only when nothing comes in the first half of the wait: where that is a
@@ -398,6 +227,9 @@ impl Transport for Live {
     /// longer ago than half of what it now waits may get that much more than it asked for,
     /// or a millisecond.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
+        if self.keeps_step() {
+            return self.receive_in_lockstep(until);
+        }
         let mut fresh = false;
         loop {
             if let Some(arrival) = self.poll_ports() {
@@ -425,6 +257,9 @@ impl Transport for Live {
     }
 
     fn sleep_until(&mut self, until: Time) {
+        while self.keeps_step() && self.now() < until {
+            self.step(until);
+        }
         let deadline = monotonic() + self.clock.until(until);
         while monotonic() < deadline {
             // EINTR ends the sleep early; the loop then sleeps on.
@@ -438,18 +273,23 @@ impl Transport for Live {
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
-        let clock = self.clock;
+        let period = period.map(|period| self.clock.wall_span(period));
+        let now = self.now();
         let slot = self.slot_mut(port)?;
         let Some(period) = period else {
             slot.sync = None;
+            self.set_sync_in_lockstep(now, port, None);
             return Ok(());
         };
         let sink = slot.live.sync_sink();
         let sink = sink.ok_or(SendError::WrongKind { port })?;
-        let period = clock.wall_span(period);
         if period.is_zero() {
             return Err(system(port, Errno::EINVAL));
         }
+        if self.set_sync_in_lockstep(now, port, Some(period)) {
+            return Ok(());
+        }
+        let slot = self.slot_mut(port)?;
         match &slot.sync {
             Some(thread) if thread.is_running() => thread.set_period(period),
             _ => {

@@ -7,6 +7,7 @@
 pub mod clock;
 pub mod in_process;
 pub mod live;
+pub mod lockstep;
 mod os;
 pub mod real_time;
 pub mod record;
@@ -15,6 +16,7 @@ mod serial;
 mod slcan;
 mod socketcan;
 mod stamps;
+mod sync_grid;
 pub mod sync_thread;
 
 use core::time::Duration;

@@ -12,7 +12,7 @@ use tokio_serial::SerialPort as _;
 use units::Time;
 
 use super::clock::Clock;
-use super::live::{LivePort, system};
+use super::live::{LivePort, awaited, system};
 use super::os;
 use super::{Input, LinkState, Payload, Port, SendError};
 use crate::wire::LineControl;
@@ -163,6 +163,8 @@ pub(super) struct Outbox {
     descriptor: Option<Arc<OwnedFd>>,
     pending: VecDeque<u8>,
     limit: usize,
+    /// Bytes that were written or kept so far.
+    taken: u64,
 }
 
 impl Outbox {
@@ -171,7 +173,13 @@ impl Outbox {
             descriptor: None,
             pending: VecDeque::new(),
             limit,
+            taken: 0,
         }
+    }
+
+    /// How many bytes were written or kept so far.
+    pub(super) const fn taken(&self) -> u64 {
+        self.taken
     }
 
     /// From now on to this descriptor; what was pending is forgotten.
@@ -196,6 +204,7 @@ impl Outbox {
             self.write(bytes)?
         };
         self.pending.extend(&bytes[written..]);
+        self.taken += bytes.len() as u64;
         Ok(())
     }
 
@@ -232,8 +241,27 @@ pub(super) enum Read {
 
 /// Reads what is there.
 pub(super) fn read(descriptor: &OwnedFd) -> Read {
+    read_up_to(descriptor, &mut [0; READ_MAX])
+}
+
+/// Waits until `count` bytes have come, which are known to be on their way; fewer when the
+/// device vanished or they do not come.
+pub(super) fn read_exactly(descriptor: &OwnedFd, count: usize) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(count);
     let mut buffer = [0; READ_MAX];
-    match nix::unistd::read(descriptor, &mut buffer) {
+    while bytes.len() < count {
+        let wanted = (count - bytes.len()).min(READ_MAX);
+        match read_up_to(descriptor, &mut buffer[..wanted]) {
+            Read::Bytes(more) => bytes.extend(more),
+            Read::Nothing if awaited(descriptor.as_fd()) => {}
+            Read::Nothing | Read::Gone => break,
+        }
+    }
+    bytes
+}
+
+fn read_up_to(descriptor: &OwnedFd, buffer: &mut [u8]) -> Read {
+    match nix::unistd::read(descriptor, buffer) {
         // A pty whose other side was closed reads as 0 bytes or EIO.
         Ok(0) => Read::Gone,
         Ok(count) => Read::Bytes(buffer[..count].to_vec()),
@@ -300,12 +328,12 @@ impl SerialLine {
     ) -> Result<Self, SerialError> {
         let mut line = Self {
             port,
+            back_off: BackOff::new(clock.clone()),
             clock,
             path: path.to_owned(),
             settings,
             descriptor: None,
             outbox: Outbox::new(PENDING_MAX),
-            back_off: BackOff::new(clock),
             queued: VecDeque::new(),
             reopened: 0,
             refused: 0,
@@ -379,9 +407,7 @@ impl SerialLine {
             Read::Nothing => {}
             Read::Gone => self.lose(now),
         }
-        if self.outbox.flush().is_err() {
-            self.lose(now);
-        }
+        self.flush();
     }
 }
 
@@ -433,6 +459,27 @@ impl LivePort for SerialLine {
             self.lose(self.clock.now());
             gone
         })
+    }
+
+    fn units_sent(&self) -> u64 {
+        self.outbox.taken()
+    }
+
+    fn flush(&mut self) {
+        if self.outbox.flush().is_err() {
+            self.lose(self.clock.now());
+        }
+    }
+
+    fn take_in(&mut self, now: Time, units: usize) {
+        let Some(descriptor) = &self.descriptor else {
+            return;
+        };
+        let bytes = read_exactly(descriptor, units);
+        if !bytes.is_empty() {
+            let input = Input::Payload(Payload::Bytes(bytes));
+            self.queued.push_back((now, input));
+        }
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

@@ -75,8 +75,8 @@ struct Counts {
 }
 
 impl SlcanPort {
-    /// Opens the serial line and begins the start; [`SlcanPort::handshake_result`] tells how
-    /// it went.
+    /// Opens the serial line and begins the start; [`LivePort::start_result`] tells how it
+    /// went.
     pub(super) fn open(
         clock: Clock,
         port: Port,
@@ -89,12 +89,13 @@ impl SlcanPort {
         })?;
         let mut slcan = Self {
             port,
-            clock,
+            back_off: BackOff::new(clock.clone()),
+            clock: clock.clone(),
             path: path.to_owned(),
             settings,
             bitrate,
             descriptor: None,
-            lines: Arc::new(SharedLines::new(clock, settings.answers)),
+            lines: Arc::new(SharedLines::new(clock.clone(), settings.answers)),
             buffer: LineBuffer::default(),
             state: State::Gone,
             reported: LinkState::Up,
@@ -103,7 +104,6 @@ impl SlcanPort {
             next_status: Time::NEVER,
             flags: StatusFlags::empty(),
             stamps: AdapterStamps::default(),
-            back_off: BackOff::new(clock),
             queued: VecDeque::new(),
             counts: Counts::default(),
         };
@@ -112,16 +112,6 @@ impl SlcanPort {
             .connect(now)
             .map_err(|error| OpenError::serial(path, error))?;
         Ok(slcan)
-    }
-
-    /// How the start went, once it has ended.
-    pub(super) const fn handshake_result(&self) -> Option<Result<(), SlcanFailure>> {
-        match self.state {
-            State::Starting { .. } => None,
-            State::Open => Some(Ok(())),
-            State::Failed(failure) => Some(Err(failure)),
-            State::Gone => Some(Err(SlcanFailure::Gone)),
-        }
     }
 
     fn connect(&mut self, now: Time) -> Result<(), serial::SerialError> {
@@ -245,19 +235,6 @@ impl SlcanPort {
         }
     }
 
-    /// Reads what the adapter said, writes what waits, and acts on deadlines.
-    pub(super) fn progress(&mut self, now: Time, ready: bool) {
-        if ready {
-            self.read(now);
-        }
-        match self.state {
-            State::Starting { step, deadline } if deadline <= now => self.start_timeout(now, step),
-            State::Open => self.watch(now),
-            State::Gone | State::Failed(_) if self.back_off.at() <= now => self.try_again(now),
-            State::Starting { .. } | State::Gone | State::Failed(_) => {}
-        }
-    }
-
     fn try_again(&mut self, now: Time) {
         match self.connect(now) {
             Ok(()) => self.counts.reopened += 1,
@@ -270,19 +247,18 @@ impl SlcanPort {
             return;
         };
         match serial::read(descriptor) {
-            Read::Bytes(bytes) => {
-                for byte in bytes {
-                    if let Some(line) = self.buffer.push(byte) {
-                        self.line(now, Reply::parse(&line));
-                    }
-                }
-            }
+            Read::Bytes(bytes) => self.heard(now, &bytes),
             Read::Nothing => {}
             Read::Gone => return self.lose(now),
         }
-        let flushed = self.lines.lock().outbox.flush();
-        if flushed.is_err() {
-            self.lose(now);
+        self.flush();
+    }
+
+    fn heard(&mut self, now: Time, bytes: &[u8]) {
+        for byte in bytes {
+            if let Some(line) = self.buffer.push(*byte) {
+                self.line(now, Reply::parse(&line));
+            }
         }
     }
 
@@ -450,6 +426,47 @@ impl LivePort for SlcanPort {
                 Err(SendError::Unusable { port, state })
             }
         }
+    }
+
+    fn start_result(&self) -> Option<Result<(), SlcanFailure>> {
+        match self.state {
+            State::Starting { .. } => None,
+            State::Open => Some(Ok(())),
+            State::Failed(failure) => Some(Err(failure)),
+            State::Gone => Some(Err(SlcanFailure::Gone)),
+        }
+    }
+
+    /// Reads what the adapter said, writes what waits, and acts on deadlines.
+    fn progress(&mut self, now: Time, ready: bool) {
+        if ready {
+            self.read(now);
+        }
+        match self.state {
+            State::Starting { step, deadline } if deadline <= now => self.start_timeout(now, step),
+            State::Open => self.watch(now),
+            State::Gone | State::Failed(_) if self.back_off.at() <= now => self.try_again(now),
+            State::Starting { .. } | State::Gone | State::Failed(_) => {}
+        }
+    }
+
+    fn units_sent(&self) -> u64 {
+        self.lines.lock().outbox.taken()
+    }
+
+    fn flush(&mut self) {
+        let flushed = self.lines.lock().outbox.flush();
+        if flushed.is_err() {
+            self.lose(self.clock.now());
+        }
+    }
+
+    fn take_in(&mut self, now: Time, units: usize) {
+        let Some(descriptor) = &self.descriptor else {
+            return;
+        };
+        let bytes = serial::read_exactly(descriptor, units);
+        self.heard(now, &bytes);
     }
 
     fn sync_sink(&self) -> Option<Arc<dyn SyncSink>> {

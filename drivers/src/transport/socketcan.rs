@@ -13,11 +13,12 @@ use socketcan::{CanSocket, Socket as _, SocketOptions as _};
 use std::collections::VecDeque;
 use std::io::IoSliceMut;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use units::Time;
 
 use super::clock::Clock;
-use super::live::{LivePort, OpenError, system};
+use super::live::{LivePort, OpenError, awaited, system};
 use super::serial::BackOff;
 use super::stamps::KernelStamps;
 use super::sync_thread::SyncSink;
@@ -72,18 +73,28 @@ struct Counts {
 }
 
 #[derive(Default)]
-struct SharedSocket(RwLock<Option<Arc<CanSocket>>>);
+struct SharedSocket {
+    socket: RwLock<Option<Arc<CanSocket>>>,
+    /// Frames that the kernel took.
+    sent: AtomicU64,
+}
 
 impl SharedSocket {
     fn set(&self, socket: Option<Arc<CanSocket>>) {
-        *self.0.write().unwrap_or_else(PoisonError::into_inner) = socket;
+        *self.socket.write().unwrap_or_else(PoisonError::into_inner) = socket;
+    }
+
+    fn send(&self, frame: &CanFrame) -> Result<(), Errno> {
+        let socket = self.socket.read().unwrap_or_else(PoisonError::into_inner);
+        write(socket.as_ref().ok_or(Errno::ENODEV)?, frame)?;
+        self.sent.fetch_add(1, Ordering::Relaxed);
+        Ok(())
     }
 }
 
 impl SyncSink for SharedSocket {
     fn send_sync(&self) -> Result<(), Errno> {
-        let socket = self.0.read().unwrap_or_else(PoisonError::into_inner);
-        write(socket.as_ref().ok_or(Errno::ENODEV)?, &emit_sync(None))
+        self.send(&emit_sync(None))
     }
 }
 
@@ -178,14 +189,14 @@ impl CanPort {
     pub(super) fn open(clock: Clock, port: Port, interface: &str) -> std::io::Result<Self> {
         let mut can = Self {
             port,
+            back_off: BackOff::new(clock.clone()),
+            stamps: KernelStamps::new(clock.clone()),
             clock,
             interface: interface.to_owned(),
             socket: Arc::default(),
             open: None,
             state: LinkState::Up,
-            back_off: BackOff::new(clock),
             queued: VecDeque::new(),
-            stamps: KernelStamps::new(clock),
             control: nix::cmsg_space!(TimeSpec, u32),
             dropped: 0,
             counts: Counts::default(),
@@ -224,16 +235,21 @@ impl CanPort {
         }
     }
 
-    fn read(&mut self) {
+    /// Whether there was a frame.
+    fn read(&mut self) -> bool {
         let Some(socket) = &self.open else {
-            return;
+            return false;
         };
         match read(socket, &mut self.control) {
-            Ok(message) => self.take(&message),
+            Ok(message) => {
+                self.take(&message);
+                true
+            }
             Err(errno) => {
                 if let Some(state) = Self::state_after(errno) {
                     self.enter(self.clock.now(), state);
                 }
+                false
             }
         }
     }
@@ -310,11 +326,7 @@ impl LivePort for CanPort {
         let Payload::Frame(frame) = payload else {
             return Err(SendError::WrongKind { port });
         };
-        let result = match &self.open {
-            Some(socket) => write(socket, frame),
-            None => Err(Errno::ENODEV),
-        };
-        match result {
+        match self.socket.send(frame) {
             Ok(()) => {
                 self.counts.sent += 1;
                 Ok(())
@@ -326,6 +338,21 @@ impl LivePort for CanPort {
                 };
                 self.enter(self.clock.now(), state);
                 Err(SendError::Unusable { port, state })
+            }
+        }
+    }
+
+    fn units_sent(&self) -> u64 {
+        self.socket.sent.load(Ordering::Relaxed)
+    }
+
+    fn take_in(&mut self, _now: Time, units: usize) {
+        for _ in 0..units {
+            while !self.read() {
+                let Some(socket) = &self.open else { return };
+                if !awaited(socket.as_fd()) {
+                    return;
+                }
             }
         }
     }

@@ -12,6 +12,7 @@ pub mod cia404;
 pub mod copley;
 pub mod dcon;
 pub mod in_sight;
+pub mod lockstep;
 pub mod slcan;
 pub mod umd2;
 

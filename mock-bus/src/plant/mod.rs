@@ -262,6 +262,11 @@ impl Plant {
         Metres(stage.true_position_m(self.now, stage_c))
     }
 
+    /// How far the Hall sensors have drifted.
+    pub(crate) const fn hall_drift(&self) -> HallDrift {
+        self.hall.drift
+    }
+
     /// The mains is off for a while: the Hall sensors come back as `drift` says, and nobody
     /// has held the machine. The devices themselves tell when their encoders lose power.
     pub fn power_cycle(&mut self, drift: HallDrift) {

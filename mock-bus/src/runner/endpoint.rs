@@ -5,6 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::path::{Path, PathBuf};
 
 use drivers::wire::can::CanFrame;
+use drivers::wire::lockstep::Passed;
 use drivers::wire::{LineControl, Payload, Port};
 use units::Time;
 
@@ -21,6 +22,22 @@ pub(super) struct Endpoint {
     port: Port,
     link: Option<PathBuf>,
     kind: Kind,
+}
+
+/// What an adapter answers to what it was told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Answered {
+    /// Bytes.
+    pub(super) units: usize,
+    /// Somebody waits for it: it is not just that a frame was taken.
+    pub(super) is_awaited: bool,
+}
+
+impl Answered {
+    fn note(&mut self, reply: &[u8]) {
+        self.units += reply.len();
+        self.is_awaited |= !matches!(reply, b"z\r" | b"Z\r");
+    }
 }
 
 enum Kind {
@@ -46,7 +63,10 @@ impl Endpoint {
                 let adapter = SlcanAdapter::new(can.bitrate_kbit_per_s * 1000);
                 Kind::Slcan(Some(Pty::open(link)?), adapter)
             }
-            (PortConfig::Serial(_), _) => Kind::Serial(Some(Pty::open(link)?), 0),
+            (PortConfig::Serial(line), _) => {
+                let rate = line.baud_bit_per_s.unwrap_or_default();
+                Kind::Serial(Some(Pty::open(link)?), rate)
+            }
         };
         Ok(Self {
             port: Port(place as u8),
@@ -109,35 +129,128 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Hands what the machine sends to the client.
-    pub(super) fn send(&mut self, at: Time, event: Event) -> io::Result<()> {
-        match event {
-            Event::Link(Link::Gone) => self.unplug(),
-            Event::Link(Link::Up) => self.plug_in()?,
-            Event::Link(Link::Down) | Event::Payload(Payload::Control(_)) => {}
-            Event::Payload(Payload::Bytes(bytes)) => {
-                if let Kind::Serial(Some(pty), _) = &mut self.kind {
-                    pty.send(&bytes)?;
-                }
-            }
-            Event::Payload(Payload::Frame(frame)) => self.send_frame(at, frame)?,
-            Event::BusError(error) => match &mut self.kind {
-                Kind::Slcan(Some(pty), adapter) => pty.send(&adapter.bus_error(error))?,
-                Kind::Vcan(vcan) => vcan.send_error(error)?,
-                Kind::Serial(..) | Kind::Slcan(None, _) => {}
-            },
+    /// Whether a participant that has opened `endpoint` means this port.
+    pub(super) fn is_called(&self, endpoint: &str) -> bool {
+        match &self.kind {
+            Kind::Vcan(vcan) => vcan.interface() == endpoint,
+            _ => self.path() == Some(Path::new(endpoint)),
         }
-        Ok(())
     }
 
-    fn send_frame(&mut self, at: Time, frame: CanFrame) -> io::Result<()> {
+    /// What a person finds it by.
+    pub(super) fn name(&self) -> String {
+        match &self.kind {
+            Kind::Vcan(vcan) => vcan.interface().to_owned(),
+            _ => self.path().map_or_else(
+                || "a terminal that was unplugged".to_owned(),
+                |path| path.display().to_string(),
+            ),
+        }
+    }
+
+    /// Whether several programs can have it open at once.
+    pub(super) const fn is_shared(&self) -> bool {
+        matches!(self.kind, Kind::Vcan(_))
+    }
+
+    /// The rate at which a participant has opened the line, where it is not the line's own.
+    pub(super) fn opened(&mut self, now: Time, machine: &mut Simulation) {
+        if let Kind::Serial(Some(pty), rate) = &mut self.kind
+            && let Some(seen) = pty.client_rate().filter(|seen| seen != rate)
+        {
+            *rate = seen;
+            let control = Payload::Control(LineControl::Baud(seen));
+            let _ = machine.deliver(now, self.port, &control);
+        }
+    }
+
+    /// Takes in exactly what a participant says that it has sent.
+    ///
+    /// # Errors
+    /// When it does not come, or the port fails.
+    pub(super) fn take_in(
+        &mut self,
+        passed: Passed,
+        now: Time,
+        machine: &mut Simulation,
+    ) -> io::Result<Answered> {
+        let port = self.port;
+        let mut answered = Answered::default();
+        match (&mut self.kind, passed) {
+            (Kind::Serial(Some(pty), _), Passed::Units(count)) => {
+                let bytes = pty.receive_exactly(count)?;
+                // A line that is down swallows what is said into it.
+                let _ = machine.deliver(now, port, &Payload::Bytes(bytes));
+            }
+            (Kind::Serial(Some(pty), rate), Passed::Control(control)) => {
+                if let LineControl::Baud(said) = control {
+                    *rate = pty.client_rate().unwrap_or(said);
+                }
+                let _ = machine.deliver(now, port, &Payload::Control(control));
+            }
+            (Kind::Slcan(Some(pty), adapter), Passed::Units(count)) => {
+                for byte in pty.receive_exactly(count)? {
+                    if let Some(reply) = answer(adapter, byte, now, port, machine) {
+                        answered.note(&reply);
+                        pty.send(&reply)?;
+                    }
+                }
+            }
+            (Kind::Vcan(vcan), Passed::Units(count)) => {
+                for _ in 0..count {
+                    if let Some(frame) = vcan.receive_one()? {
+                        let _ = machine.deliver(now, port, &Payload::Frame(frame));
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(answered)
+    }
+
+    /// A frame on an interface that nobody who shares the clock has sent.
+    pub(super) fn strange_frame(&mut self) -> io::Result<Option<CanFrame>> {
         match &mut self.kind {
-            Kind::Slcan(Some(pty), adapter) => match adapter.received(at, frame) {
-                line if line.is_empty() => Ok(()),
-                line => pty.send(&line),
+            Kind::Vcan(vcan) => vcan.receive(),
+            Kind::Serial(..) | Kind::Slcan(..) => Ok(None),
+        }
+    }
+
+    /// Sends what a slow client has left waiting.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Serial(Some(pty), _) | Kind::Slcan(Some(pty), _) => pty.flush(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Hands what the machine sends to the client; says what has passed, if the client was there.
+    pub(super) fn send(&mut self, at: Time, event: Event) -> io::Result<Option<Passed>> {
+        match event {
+            Event::Link(Link::Gone) => {
+                self.unplug();
+                Ok(Some(Passed::Look))
+            }
+            Event::Link(Link::Up) => self.plug_in().map(|()| None),
+            Event::Link(Link::Down) | Event::Payload(Payload::Control(_)) => Ok(None),
+            Event::Payload(Payload::Bytes(bytes)) => match &mut self.kind {
+                Kind::Serial(Some(pty), _) => passed(pty, &bytes),
+                _ => Ok(None),
             },
-            Kind::Vcan(vcan) => vcan.send(&frame),
-            Kind::Serial(..) | Kind::Slcan(None, _) => Ok(()),
+            Event::Payload(Payload::Frame(frame)) => self.send_frame(at, frame),
+            Event::BusError(error) => match &mut self.kind {
+                Kind::Slcan(Some(pty), adapter) => passed(pty, &adapter.bus_error(error)),
+                Kind::Vcan(vcan) => Ok(vcan.send_error(error)?.then_some(Passed::Units(1))),
+                Kind::Serial(..) | Kind::Slcan(None, _) => Ok(None),
+            },
+        }
+    }
+
+    fn send_frame(&mut self, at: Time, frame: CanFrame) -> io::Result<Option<Passed>> {
+        match &mut self.kind {
+            Kind::Slcan(Some(pty), adapter) => passed(pty, &adapter.received(at, frame)),
+            Kind::Vcan(vcan) => Ok(vcan.send(&frame)?.then_some(Passed::Units(1))),
+            Kind::Serial(..) | Kind::Slcan(None, _) => Ok(None),
         }
     }
 
@@ -159,6 +272,12 @@ impl Endpoint {
         }
         Ok(())
     }
+}
+
+/// Sends bytes, and says whether they have passed.
+fn passed(pty: &mut Pty, bytes: &[u8]) -> io::Result<Option<Passed>> {
+    let taken = !bytes.is_empty() && pty.send(bytes)?;
+    Ok(taken.then_some(Passed::Units(bytes.len())))
 }
 
 /// What the adapter says to one byte of the host.

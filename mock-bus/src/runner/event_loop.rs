@@ -1,8 +1,8 @@
 //! Waits for clients and for the machine's next event, and carries between them.
 
-use std::io::{self, PipeReader, Read};
+use std::io::{self, Read};
 use std::os::fd::AsFd;
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::TryRecvError;
 use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
@@ -10,36 +10,23 @@ use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use units::Time;
 
-use super::Job;
 use super::endpoint::Endpoint;
-use crate::simulation::Simulation;
+use super::{Job, Site};
 
 /// Shorter waits are not worth a system call; what is due meanwhile is done together.
 const WAIT_MIN: Duration = Duration::from_micros(100);
 const WAIT_MAX: Duration = Duration::from_secs(1);
 
 pub(super) struct EventLoop {
-    machine: Simulation,
-    endpoints: Vec<Endpoint>,
-    jobs: Receiver<Job>,
-    waker: PipeReader,
+    site: Site,
     started: Instant,
     speed: f64,
 }
 
 impl EventLoop {
-    pub(super) fn new(
-        machine: Simulation,
-        endpoints: Vec<Endpoint>,
-        jobs: Receiver<Job>,
-        waker: PipeReader,
-        speed: f64,
-    ) -> Self {
+    pub(super) fn new(site: Site, speed: f64) -> Self {
         Self {
-            machine,
-            endpoints,
-            jobs,
-            waker,
+            site,
             started: Instant::now(),
             speed,
         }
@@ -49,13 +36,16 @@ impl EventLoop {
     pub(super) fn run(mut self) -> io::Result<()> {
         loop {
             let now = self.now();
-            for endpoint in &mut self.endpoints {
-                endpoint.receive(now, &mut self.machine)?;
+            for endpoint in &mut self.site.endpoints {
+                endpoint.receive(now, &mut self.site.machine)?;
             }
-            self.machine.advance(now);
+            self.site.machine.advance(now);
             self.hand_out()?;
             if self.do_jobs()? {
                 return Ok(());
+            }
+            if self.site.visitors.lend_hands(&mut self.site.machine)? {
+                self.hand_out()?;
             }
             self.wait()?;
         }
@@ -68,29 +58,29 @@ impl EventLoop {
     /// True when it is time to stop. What one job sets off has left before the next begins.
     fn do_jobs(&mut self) -> io::Result<bool> {
         loop {
-            match self.jobs.try_recv() {
-                Ok(Job::Do(work)) => work(&mut self.machine),
+            match self.site.jobs.try_recv() {
+                Ok(Job::Do(work)) => work(&mut self.site.machine),
                 Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return Ok(true),
                 Err(TryRecvError::Empty) => return Ok(false),
             }
             let now = self.now();
-            self.machine.advance(now);
+            self.site.machine.advance(now);
             self.hand_out()?;
         }
     }
 
     fn hand_out(&mut self) -> io::Result<()> {
-        while let Some(delivery) = self.machine.collect() {
+        while let Some(delivery) = self.site.machine.collect() {
             let place = usize::from(delivery.port.0);
-            self.endpoints[place].send(delivery.at, delivery.event)?;
+            self.site.endpoints[place].send(delivery.at, delivery.event)?;
         }
         Ok(())
     }
 
     fn wait(&mut self) -> io::Result<()> {
-        let span = self.span_to(self.machine.next_event());
-        let mut fds = vec![PollFd::new(self.waker.as_fd(), PollFlags::POLLIN)];
-        for (fd, unsent) in self.endpoints.iter().filter_map(Endpoint::fd) {
+        let span = self.span_to(self.site.machine.next_event());
+        let mut fds = vec![PollFd::new(self.site.waker.as_fd(), PollFlags::POLLIN)];
+        for (fd, unsent) in self.site.endpoints.iter().filter_map(Endpoint::fd) {
             let sending = if unsent {
                 PollFlags::POLLOUT
             } else {
@@ -98,13 +88,14 @@ impl EventLoop {
             };
             fds.push(PollFd::new(fd, PollFlags::POLLIN | sending));
         }
+        fds.extend(self.site.visitors.fds());
         match ppoll(&mut fds, Some(TimeSpec::from_duration(span)), None) {
             Ok(_) | Err(Errno::EINTR) => {}
             Err(errno) => return Err(errno.into()),
         }
         if fds[0].any() == Some(true) {
             let mut bytes = [0; 64];
-            let _ = self.waker.read(&mut bytes)?;
+            let _ = self.site.waker.read(&mut bytes)?;
         }
         Ok(())
     }

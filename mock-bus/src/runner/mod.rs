@@ -1,22 +1,27 @@
-//! The emulated machine in real time, on pseudo-terminals and SocketCAN interfaces.
+//! The emulated machine on pseudo-terminals and SocketCAN interfaces.
 //!
-//! One thread waits for its clients and for the machine's next event, with absolute
-//! deadlines: a late wake-up is caught up, never added. Simulated time is wall time times
-//! `speed`.
+//! One thread waits for its clients and for the machine's next event. By the wall's clock it
+//! has absolute deadlines: a late wake-up is caught up, never added, and simulated time is
+//! wall time times `speed`. On a clock that it shares with its clients ([`Pace::Lockstep`])
+//! time passes only when nobody has anything left to do.
 
 mod endpoint;
 mod event_loop;
+pub mod hand;
+mod lockstep;
+mod peer;
 mod pty;
 mod slcan_adapter;
 mod vcan;
+mod visitors;
 
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
-use std::io::{self, PipeWriter, Write};
-use std::path::PathBuf;
-use std::sync::mpsc::{self, Sender};
+use std::io::{self, PipeReader, PipeWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
 use crate::config::{ConfigError, MachineConfig};
@@ -25,14 +30,29 @@ use crate::plant::{HallDrift, LineSetUp};
 use crate::simulation::Simulation;
 use endpoint::Endpoint;
 use event_loop::EventLoop;
+use lockstep::Lockstep;
+use visitors::{Door, Visitors};
+
+/// How an emulated machine's time passes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pace {
+    /// By the wall's clock: so many simulated seconds for each second.
+    Wall(f64),
+    /// Only when neither the machine nor its clients have anything left to do; they agree over
+    /// a Unix socket at this path.
+    Lockstep(PathBuf),
+}
 
 /// How a machine is run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Chooses noise and errors.
     pub seed: u64,
-    /// Simulated seconds for each second.
-    pub speed: f64,
+    /// How its time passes.
+    pub pace: Pace,
+    /// Where hands reach it ([`hand`]) while it lives by the wall's clock; a lockstep clock's
+    /// side channel serves them too.
+    pub control: Option<PathBuf>,
     /// SocketCAN interface for a CAN port, by the port's name; the others speak SLCAN.
     pub interfaces: BTreeMap<String, String>,
     /// Symbolic link to a port's terminal, by the port's name.
@@ -43,11 +63,30 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             seed: 0,
-            speed: 1.0,
+            pace: Pace::Wall(1.0),
+            control: None,
             interfaces: BTreeMap::new(),
             links: BTreeMap::new(),
         }
     }
+}
+
+impl Options {
+    fn door(&self) -> Option<&Path> {
+        match &self.pace {
+            Pace::Wall(_) => self.control.as_deref(),
+            Pace::Lockstep(path) => Some(path),
+        }
+    }
+}
+
+/// Everything that a loop runs: the machine, its ports, and who comes by.
+struct Site {
+    machine: Simulation,
+    endpoints: Vec<Endpoint>,
+    jobs: Receiver<Job>,
+    waker: PipeReader,
+    visitors: Visitors,
 }
 
 /// Why a machine cannot be run.
@@ -69,6 +108,14 @@ pub enum RunError {
     Speed {
         /// What was asked for.
         seen: f64,
+    },
+    /// The socket beside the buses cannot be made.
+    #[error("socket {}: {source}; the folder must exist and nobody else listen there", path.display())]
+    Door {
+        /// Where.
+        path: PathBuf,
+        /// What the operating system says.
+        source: io::Error,
     },
     /// The thread or its wake-up pipe cannot be made.
     #[error("cannot start the emulator's thread: {0}")]
@@ -102,7 +149,7 @@ pub fn spawn_on_ptys(config: &MachineConfig, seed: u64, speed: f64) -> Result<Ru
         config,
         &Options {
             seed,
-            speed,
+            pace: Pace::Wall(speed),
             ..Options::default()
         },
     )
@@ -122,7 +169,7 @@ pub fn spawn_on_vcan(
     let interfaces = can.map(|port| (port.name().to_owned(), interface.to_owned()));
     let options = Options {
         seed,
-        speed,
+        pace: Pace::Wall(speed),
         interfaces: interfaces.into_iter().collect(),
         ..Options::default()
     };
@@ -134,29 +181,47 @@ pub fn spawn_on_vcan(
 /// # Errors
 /// When the configuration contradicts itself, or an interface or a terminal cannot be opened.
 pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunError> {
-    if !(options.speed.is_finite() && options.speed > 0.0) {
-        return Err(RunError::Speed {
-            seen: options.speed,
-        });
+    if let Pace::Wall(seen) = options.pace
+        && !(seen.is_finite() && seen > 0.0)
+    {
+        return Err(RunError::Speed { seen });
     }
     // The devices are built on the machine's own thread; this one only proves that they can be.
     Simulation::new(config, options.seed)?;
     let (config, options) = (config.clone(), options.clone());
     let endpoints = open_endpoints(&config, &options)?;
     let ports = paths(&endpoints, &config, &options);
+    let door = options.door().map(open_door).transpose()?;
     let (jobs, inbox) = mpsc::channel();
     let (waker, wake) = io::pipe()?;
     let thread = std::thread::Builder::new()
         .name("mock-bus".to_owned())
         .spawn(move || {
             let machine = Simulation::new(&config, options.seed).map_err(io::Error::other)?;
-            EventLoop::new(machine, endpoints, inbox, waker, options.speed).run()
+            let site = Site {
+                machine,
+                endpoints,
+                jobs: inbox,
+                waker,
+                visitors: Visitors::new(door),
+            };
+            match options.pace {
+                Pace::Wall(speed) => EventLoop::new(site, speed).run(),
+                Pace::Lockstep(_) => Lockstep::new(site).run(),
+            }
         })?;
     Ok(Running {
         ports,
         jobs,
         wake,
         thread: Some(thread),
+    })
+}
+
+fn open_door(path: &Path) -> Result<Door, RunError> {
+    Door::open(path).map_err(|source| RunError::Door {
+        path: path.to_owned(),
+        source,
     })
 }
 

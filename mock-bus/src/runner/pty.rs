@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::libc;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
 use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};
@@ -97,13 +98,33 @@ impl Pty {
         })
     }
 
-    /// Sends now what fits, and the rest at the next [`Pty::flush`].
-    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+    /// Exactly so many bytes of the client, which it has written: the kernel may still have them
+    /// on the way.
+    pub(super) fn receive_exactly(&mut self, count: usize) -> io::Result<Vec<u8>> {
         self.look_who_is_there()?;
-        if self.clients.is_any() && self.unsent.len() + bytes.len() <= UNSENT_MAX {
+        self.clients.heard();
+        let mut bytes = vec![0; count];
+        let mut filled = 0;
+        while filled < count {
+            match read(&self.master, &mut bytes[filled..]) {
+                Ok(length) => filled += length,
+                Err(Errno::EAGAIN) => await_readable(self.fd())?,
+                Err(Errno::EINTR) => {}
+                Err(errno) => return Err(errno.into()),
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// Sends now what fits, and the rest at the next [`Pty::flush`]; `false` when it is lost.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<bool> {
+        self.look_who_is_there()?;
+        let taken = self.clients.is_any() && self.unsent.len() + bytes.len() <= UNSENT_MAX;
+        if taken {
             self.unsent.extend(bytes);
         }
-        self.flush()
+        self.flush()?;
+        Ok(taken)
     }
 
     pub(super) fn flush(&mut self) -> io::Result<()> {
@@ -184,6 +205,23 @@ impl Drop for Pty {
                 let _ = std::fs::remove_file(link);
             }
         }
+    }
+}
+
+/// Waits for what a client says that it has sent.
+///
+/// # Errors
+/// When it does not come.
+pub(super) fn await_readable(descriptor: BorrowedFd<'_>) -> io::Result<()> {
+    /// The kernel hands on what was written within microseconds, on a busy computer too.
+    const LIMIT_MS: u16 = 10_000;
+    let mut fds = [PollFd::new(descriptor, PollFlags::POLLIN)];
+    match poll(&mut fds, PollTimeout::from(LIMIT_MS)) {
+        Ok(0) => Err(io::Error::other(
+            "a participant says that it has sent more than has come",
+        )),
+        Ok(_) | Err(Errno::EINTR) => Ok(()),
+        Err(errno) => Err(errno.into()),
     }
 }
 

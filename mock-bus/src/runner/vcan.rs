@@ -8,6 +8,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
 use drivers::wire::can::{BusError, CanFrame, CanId};
+use super::pty::await_readable;
 use socketcan::{CanErrorFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, StandardId};
 
 /// How often to look whether a deleted interface is back.
@@ -45,6 +46,10 @@ impl Vcan {
         })
     }
 
+    pub(super) fn interface(&self) -> &str {
+        &self.interface
+    }
+
     /// Nothing to wait for while the interface is gone.
     pub(super) fn fd(&self) -> Option<BorrowedFd<'_>> {
         match &self.socket {
@@ -65,27 +70,48 @@ impl Vcan {
         }
     }
 
-    /// A full transmit queue loses the frame, as a node that nobody acknowledges does.
-    pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
-        match to_socket(frame) {
-            Some(frame) => self.write(&frame),
-            None => Ok(()),
+    /// Exactly the next frame of a host, which has sent it: the kernel may still have it on the
+    /// way.
+    pub(super) fn receive_one(&mut self) -> io::Result<Option<CanFrame>> {
+        loop {
+            let Link::Open(socket) = &self.socket else {
+                return Ok(None);
+            };
+            match socket.read_frame() {
+                Ok(frame) => return Ok(from_socket(&frame)),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    await_readable(socket.as_fd())?;
+                }
+                Err(error) => return self.pass(error).map(|()| None),
+            }
         }
     }
 
-    pub(super) fn send_error(&mut self, error: BusError) -> io::Result<()> {
+    /// A full transmit queue loses the frame, as a node that nobody acknowledges does.
+    /// `false` then.
+    pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
+        match to_socket(frame) {
+            Some(frame) => self.write(&frame),
+            None => Ok(false),
+        }
+    }
+
+    pub(super) fn send_error(&mut self, error: BusError) -> io::Result<bool> {
         let (class, data) = error.emit();
         match CanErrorFrame::new_error(class, &data) {
             Ok(frame) => self.write(&frame.into()),
-            Err(_) => Ok(()),
+            Err(_) => Ok(false),
         }
     }
 
-    fn write(&mut self, frame: &socketcan::CanFrame) -> io::Result<()> {
+    fn write(&mut self, frame: &socketcan::CanFrame) -> io::Result<bool> {
         let Link::Open(socket) = &self.socket else {
-            return Ok(());
+            return Ok(false);
         };
-        socket.write_frame(frame).or_else(|error| self.pass(error))
+        match socket.write_frame(frame) {
+            Ok(()) => Ok(true),
+            Err(error) => self.pass(error).map(|()| false),
+        }
     }
 
     /// Lets an error be that is no failure of the emulator.

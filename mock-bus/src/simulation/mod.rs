@@ -215,6 +215,24 @@ impl Simulation {
         }
     }
 
+    /// Lets time pass to the next moment at which something reaches the controller, or to `to`;
+    /// what has reached it by then is collected afterwards.
+    pub fn advance_until_delivery(&mut self, to: Time) {
+        loop {
+            let waiting = self.outbox.front().map_or(Time::NEVER, |first| first.at);
+            let internal = self.next_internal();
+            let next = waiting.min(internal);
+            if next > to {
+                return self.move_clock(to);
+            }
+            if waiting <= internal {
+                // Everything of that moment happens before the controller hears of it.
+                return self.advance(waiting);
+            }
+            self.step(internal);
+        }
+    }
+
     /// The next thing that has reached the controller by now, in time order.
     pub fn collect(&mut self) -> Option<Delivery> {
         let first = self.outbox.front()?;
@@ -277,6 +295,18 @@ impl Simulation {
         }
         self.plant.power_cycle(drift);
         self.mains_back = self.now + self.config.power_off();
+    }
+
+    /// The mains goes off, or comes back, and stays so; sensors do not drift meanwhile.
+    pub fn switch_mains(&mut self, on: bool) {
+        if on {
+            self.mains_back = Time::NEVER;
+            self.switch_on();
+        } else {
+            let drift = self.plant.hall_drift();
+            self.power_cycle(drift);
+            self.mains_back = Time::NEVER;
+        }
     }
 
     /// Somebody takes up the table's plate, turns it by so many lines against the table and

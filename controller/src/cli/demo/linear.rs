@@ -10,7 +10,7 @@ use truestage::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
 use truestage::report::{self, Page, Section};
 use truestage::store::{ZeroEntry, read_journal};
 use truestage::{Failure, Machine, Store, json as to_json, text};
-use units::{Metres, Volts};
+use units::{Metres, Time, Volts};
 
 use super::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
 use crate::cli::output::Output;
@@ -53,7 +53,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
     let report = write_report(store, &story)?;
     let wall = started.elapsed();
     Ok(Shown {
-        text: summary(&story, &report, wall, args.speed),
+        text: summary(&story, &report, wall, machine.now()),
         value: to_value(&story, &report, wall),
         bad: out_of_tolerance(&story),
     })
@@ -141,7 +141,7 @@ fn columns(story: &Story) -> [(&'static str, &Figures); 3] {
     ]
 }
 
-fn summary(story: &Story, report: &std::path::Path, wall: Duration, speed: f64) -> String {
+fn summary(story: &Story, report: &std::path::Path, wall: Duration, lived: Time) -> String {
     let largest = |figures| text::largest_deviation(figures).um();
     let mut lines = vec![
         String::new(),
@@ -176,7 +176,7 @@ fn summary(story: &Story, report: &std::path::Path, wall: Duration, speed: f64) 
         String::new(),
         format!("calibration  {} (active)", story.calibrated.path.display()),
         format!("report       {}", report.display()),
-        took(wall, speed),
+        took(wall, lived),
     ]);
     lines.join("\n")
 }

@@ -1,7 +1,8 @@
 //! `truestage demo`: the whole cycle on an emulated machine, over real protocols.
 //!
 //! The emulated devices run in a thread of their own behind pseudo-terminals: CAN as SLCAN,
-//! everything else as serial lines. The controller side is the one of every other verb.
+//! everything else as serial lines. The controller side is the one of every other verb. Both
+//! share a clock that waits for them, so that every computer shows the same.
 
 mod linear;
 mod rotary;
@@ -18,6 +19,7 @@ use truestage::config::{self, Loaded};
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
 use truestage::store::{Lease, ReadJournal};
 use truestage::{Failure, Machine, Store, ports};
+use units::Time;
 
 use super::output::{Ended, Output};
 use super::progress::Bars;
@@ -34,9 +36,10 @@ pub(super) struct DemoArgs {
     /// The emulated stage's errors, noise and drift; the same seed is the same stage.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How much faster than real time the emulated machine lives.
-    #[arg(long, default_value_t = 10.0)]
-    speed: f64,
+    /// Let the emulated machine live by the wall's clock, so many times as fast (10, say), for
+    /// whoever wants to watch; without it time passes as fast as the computer goes.
+    #[arg(long, value_name = "FACTOR")]
+    speed: Option<f64>,
     /// How often the power is cycled.
     #[arg(long, default_value_t = 3)]
     power_cycles: u64,
@@ -135,17 +138,18 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
         return volumetric::run(args, output);
     }
     let started = Instant::now();
-    let loaded = load(args)?;
+    let mut loaded = load(args)?;
     let store = Store::of(&loaded.config.machine);
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = args.machine.files();
-    let emulated = EmulatedOnPtys::start(description, args.seed, args.speed)?;
-    let transport = ports::open(
-        &loaded.config,
-        &emulated.overrides(&loaded.config)?,
-        ports::Use::Measurement,
-        args.speed,
-    )?;
+    let emulated = match args.speed {
+        None => EmulatedOnPtys::in_lockstep(description, args.seed)?,
+        Some(speed) => EmulatedOnPtys::start(description, args.seed, speed)?,
+    };
+    let pace = emulated.pace("truestage demo")?;
+    loaded.patience = pace.patience();
+    let overrides = emulated.overrides(&loaded.config)?;
+    let transport = ports::open(&loaded.config, &overrides, ports::Use::Measurement, pace)?;
     let mut machine = Machine::new(&loaded, Box::new(transport));
     machine.observe(Box::new(Bars::new(
         output.is_json() || !std::io::stderr().is_terminal(),
@@ -161,7 +165,7 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
     let shown = match args.machine {
         Which::Linear => linear::show(&mut stand, args, output),
         Which::Uvw | Which::UvwCopley => uvw::show(&mut stand, args, output),
-        Which::Rotary => rotary::show(&mut stand, args, output),
+        Which::Rotary => rotary::show(&mut stand, output),
         Which::Volumetric => unreachable!("it was shown in virtual time"),
     }?;
     match shown.bad {
@@ -171,15 +175,16 @@ pub(super) fn run(args: &DemoArgs, output: Output) -> Ended {
 }
 
 fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
-    if !(args.speed.is_finite() && args.speed > 0.0) {
+    if let Some(speed) = args.speed
+        && !(speed.is_finite() && speed > 0.0)
+    {
         return Err(Failure::Usage {
-            what: format!("a speed of {}", args.speed),
+            what: format!("a speed of {speed}"),
             help: "give a positive number; 1 is real time".into(),
         });
     }
     let [path, text, _] = args.machine.files();
     let mut loaded = config::parse(text, path)?;
-    loaded.patience = ports::patience(args.speed);
     if let Some(folder) = &args.data_dir {
         loaded.config.machine.data_dir.clone_from(folder);
     }
@@ -189,18 +194,23 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
 fn announce(args: &DemoArgs, loaded: &Loaded, emulated: &EmulatedOnPtys, output: Output) {
     let machine = &loaded.config.machine;
     output.note(&format!(
-        "truestage demo: emulated machine `{}` (stage {}), seed {}, {}× real time",
-        machine.name, machine.stage_serial, args.seed, args.speed
+        "truestage demo: emulated machine `{}` (stage {}), seed {}{}",
+        machine.name,
+        machine.stage_serial,
+        args.seed,
+        args.speed
+            .map_or(String::new(), |speed| format!(", {speed}× real time")),
     ));
     for line in emulated.description() {
         output.note(&format!("  {line}"));
     }
 }
 
-/// The last line of every demonstration.
-fn took(wall: Duration, speed: f64) -> String {
+/// The last line of every demonstration: how long it took, and how long the machine lived.
+fn took(wall: Duration, lived: Time) -> String {
     format!(
-        "took {:.1} s; the emulated machine lived {speed}× faster",
-        wall.as_secs_f64()
+        "took {:.1} s; the emulated machine lived {:.0} s meanwhile",
+        wall.as_secs_f64(),
+        lived.seconds()
     )
 }

@@ -14,7 +14,7 @@ use truestage::store::read_journal;
 use truestage::{Failure, Store};
 use units::Radians;
 
-use super::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use super::{Shown, Stand, power_cycle, took, write_page};
 use crate::cli::output::Output;
 use crate::cli::page::made_from;
 use crate::cli::table::{
@@ -55,7 +55,7 @@ impl Operator for Hand<'_> {
     }
 }
 
-pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+pub(super) fn show(stand: &mut Stand, output: Output) -> Result<Shown, Failure> {
     let story = tell(stand, output)?;
     let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();
@@ -74,7 +74,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
             moved_text(AXIS, &story.moved, id),
             String::new(),
             format!("report       {}", report.display()),
-            took(wall, args.speed),
+            took(wall, stand.machine.now()),
         ]
         .join("\n"),
         value: json!({

@@ -52,11 +52,7 @@ pub(super) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
             ),
             String::new(),
             format!("report       {}", report.display()),
-            format!(
-                "the times between starts contain this host's delays, times {}",
-                args.speed
-            ),
-            took(wall, args.speed),
+            took(wall, stand.machine.now()),
         ]
         .join("\n"),
         value: json!({

@@ -33,7 +33,7 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    const fn new(clock: Clock, answers: bool) -> Self {
+    fn new(clock: Clock, answers: bool) -> Self {
         Self {
             clock,
             outbox: Outbox::new(PENDING_MAX),
@@ -62,7 +62,7 @@ impl Lines {
 pub(super) struct SharedLines(Mutex<Lines>);
 
 impl SharedLines {
-    pub(super) const fn new(clock: Clock, answers: bool) -> Self {
+    pub(super) fn new(clock: Clock, answers: bool) -> Self {
         Self(Mutex::new(Lines::new(clock, answers)))
     }
 

@@ -1,0 +1,309 @@
+//! The machine on a clock that all participants share: time passes only when nobody has
+//! anything left to do.
+//!
+//! A participant that would wait says until when, and what it has sent since it last waited.
+//! Once all of them wait, exactly that is taken in, in the order of the participants, and the
+//! machine lives to the first moment that one of them waits for, or at which something
+//! reaches one. Frames and bytes pass the kernel; nothing is guessed at, and how busy the
+//! computer is changes nothing. The lines are those of [`drivers::wire::lockstep`].
+//!
+//! Nobody there: time stands still until somebody comes. Somebody who ends without taking
+//! leave, hangs, or computes without end is named, and the machine ends.
+
+use std::io::{self, Read};
+use std::os::fd::AsFd;
+use std::sync::mpsc::TryRecvError;
+
+use drivers::wire::Port;
+use drivers::wire::lockstep::{Entry, Passed, Reply, Request, VERSION};
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use units::Time;
+
+use super::endpoint::Endpoint;
+use super::peer::{Doing, Heard};
+use super::{Job, Site};
+
+/// The machine lives no further at once, so that whoever asks for something meanwhile is
+/// heard, however long everybody else waits.
+const STRIDE: core::time::Duration = core::time::Duration::from_secs(1);
+/// How often to look whether somebody hangs.
+const LOOK_EVERY_MS: u16 = 500;
+
+pub(super) struct Lockstep(Site);
+
+impl Lockstep {
+    pub(super) const fn new(site: Site) -> Self {
+        Self(site)
+    }
+
+    /// Until somebody stops it, a participant fails, or a terminal or interface does.
+    pub(super) fn run(mut self) -> io::Result<()> {
+        while !self.do_jobs() {
+            if self.is_everybody_idle() {
+                self.let_time_pass()?;
+            } else {
+                self.wait()?;
+            }
+            self.hear_everybody()?;
+        }
+        Ok(())
+    }
+
+    /// True when it is time to stop.
+    fn do_jobs(&mut self) -> bool {
+        loop {
+            match self.0.jobs.try_recv() {
+                Ok(Job::Do(work)) => work(&mut self.0.machine),
+                Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return true,
+                Err(TryRecvError::Empty) => return false,
+            }
+        }
+    }
+
+    /// Time waits for whoever works; with nobody there it stands still.
+    fn is_everybody_idle(&self) -> bool {
+        let mut anybody = false;
+        self.0.visitors.peers.iter().all(|peer| {
+            anybody |= matches!(peer.doing, Doing::Idle { .. });
+            !matches!(peer.doing, Doing::Working(_))
+        }) && anybody
+    }
+
+    fn let_time_pass(&mut self) -> io::Result<()> {
+        let is_awaited = self.take_in()?;
+        self.refuse_strangers()?;
+        if !is_awaited {
+            let waits = self.0.visitors.peers.iter().filter_map(|peer| match peer.doing {
+                Doing::Idle { until, .. } => Some(until),
+                Doing::Nothing | Doing::Working(_) => None,
+            });
+            let until = waits.min().unwrap_or(Time::NEVER);
+            let stride = self.0.machine.now() + STRIDE;
+            self.0.machine.advance_until_delivery(until.min(stride));
+            self.hand_out()?;
+        }
+        self.wake();
+        Ok(())
+    }
+
+    /// What everybody has sent reaches the machine. Whether somebody waits for an answer that
+    /// an adapter gives at once.
+    fn take_in(&mut self) -> io::Result<bool> {
+        let mut is_awaited = false;
+        for who in 0..self.0.visitors.peers.len() {
+            let Doing::Idle { sent, .. } = &mut self.0.visitors.peers[who].doing else {
+                continue;
+            };
+            for entry in core::mem::take(sent) {
+                is_awaited |= self.take_in_one(who, entry)?;
+            }
+        }
+        Ok(is_awaited)
+    }
+
+    fn take_in_one(&mut self, who: usize, entry: Entry) -> io::Result<bool> {
+        let ports = &self.0.visitors.peers[who].ports;
+        let place = ports.iter().find(|(_, port)| **port == entry.port);
+        let Some((&place, _)) = place else {
+            return Ok(false);
+        };
+        let now = self.0.machine.now();
+        let answered = self.0.endpoints[place].take_in(entry.passed, now, &mut self.0.machine)?;
+        if answered.units > 0 {
+            let passed = Passed::Units(answered.units);
+            let port = entry.port;
+            self.0.visitors.peers[who].passed.push(Entry { port, passed });
+        }
+        if self.0.endpoints[place].is_shared() {
+            self.tell_others(Some(who), place, entry.passed);
+        }
+        Ok(answered.is_awaited)
+    }
+
+    /// Whoever has the port open hears it too, except who has sent it.
+    fn tell_others(&mut self, sender: Option<usize>, place: usize, passed: Passed) {
+        for (who, peer) in self.0.visitors.peers.iter_mut().enumerate() {
+            if let Some(&port) = peer.ports.get(&place)
+                && Some(who) != sender
+            {
+                peer.passed.push(Entry { port, passed });
+            }
+        }
+    }
+
+    /// Who sends without keeping the clock would have to be guessed at.
+    fn refuse_strangers(&mut self) -> io::Result<()> {
+        for endpoint in &mut self.0.endpoints {
+            if let Some(frame) = endpoint.strange_frame()? {
+                return Err(io::Error::other(format!(
+                    "{}: the frame {frame} comes from a program that does not keep the lockstep \
+                     clock; give this machine an interface of its own, or leave --clock out",
+                    endpoint.name()
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn hand_out(&mut self) -> io::Result<()> {
+        while let Some(delivery) = self.0.machine.collect() {
+            let place = usize::from(delivery.port.0);
+            let is_open = self.0.visitors.peers.iter().any(|peer| peer.ports.contains_key(&place));
+            // Nobody has opened it: it is lost, as on a real line.
+            if !is_open {
+                continue;
+            }
+            if let Some(passed) = self.0.endpoints[place].send(delivery.at, delivery.event)? {
+                self.tell_others(None, place, passed);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whoever has something to hear, or waited until now, goes on.
+    fn wake(&mut self) {
+        let now = self.0.machine.now();
+        for peer in &mut self.0.visitors.peers {
+            let Doing::Idle { until, .. } = peer.doing else {
+                continue;
+            };
+            if until <= now || !peer.passed.is_empty() {
+                let sent = core::mem::take(&mut peer.passed);
+                peer.set_working();
+                peer.say(&Reply::Go { now, sent });
+            }
+        }
+    }
+
+    fn wait(&mut self) -> io::Result<()> {
+        let mut fds = vec![
+            PollFd::new(self.0.waker.as_fd(), PollFlags::POLLIN),
+        ];
+        fds.extend(self.0.visitors.fds());
+        let unsent = self.0.endpoints.iter().filter_map(Endpoint::fd);
+        let unsent = unsent.filter(|(_, unsent)| *unsent);
+        fds.extend(unsent.map(|(fd, _)| PollFd::new(fd, PollFlags::POLLOUT)));
+        match poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS)) {
+            Ok(0) => return self.complain(),
+            Ok(_) | Err(Errno::EINTR) => {}
+            Err(errno) => return Err(errno.into()),
+        }
+        if fds[0].any() == Some(true) {
+            let mut bytes = [0; 64];
+            let _ = self.0.waker.read(&mut bytes)?;
+        }
+        self.0.endpoints.iter_mut().try_for_each(Endpoint::flush)
+    }
+
+    /// Names whoever everybody waits for in vain.
+    fn complain(&mut self) -> io::Result<()> {
+        let at = self.0.machine.now().seconds();
+        for peer in &mut self.0.visitors.peers {
+            if let Doing::Working(watch) = &mut peer.doing
+                && let Some(complaint) = watch.complaint()
+            {
+                let who = peer.who();
+                let text = format!("{who} {complaint}; the machine stands still at {at:.6} s");
+                return Err(io::Error::other(text));
+            }
+        }
+        Ok(())
+    }
+
+    fn hear_everybody(&mut self) -> io::Result<()> {
+        self.0.visitors.let_in()?;
+        let mut who = 0;
+        while who < self.0.visitors.peers.len() {
+            if self.hear(who)? {
+                who += 1;
+            } else {
+                self.0.visitors.peers.remove(who);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether it is still there.
+    fn hear(&mut self, who: usize) -> io::Result<bool> {
+        loop {
+            // One that waits for the time says nothing.
+            if matches!(self.0.visitors.peers[who].doing, Doing::Idle { .. }) {
+                return Ok(true);
+            }
+            match self.0.visitors.peers[who].hear() {
+                Heard::Nothing => return Ok(true),
+                Heard::Said(Request::Bye) => return Ok(false),
+                Heard::Said(request) => self.answer(who, request),
+                Heard::Nonsense(what) => self.0.visitors.peers[who].say(&Reply::Refused(what)),
+                Heard::Gone => return self.gone(who).map(|()| false),
+            }
+        }
+    }
+
+    /// A hand may go as it comes; who shares the clock takes leave.
+    fn gone(&self, who: usize) -> io::Result<()> {
+        let peer = &self.0.visitors.peers[who];
+        if matches!(peer.doing, Doing::Nothing) {
+            return Ok(());
+        }
+        Err(io::Error::other(format!(
+            "{} ended without taking leave, at {:.6} s",
+            peer.who(),
+            self.0.machine.now().seconds()
+        )))
+    }
+
+    fn answer(&mut self, who: usize, request: Request) {
+        let reply = match request {
+            Request::Hello { version, pid, name } => self.welcome(who, version, pid, name),
+            Request::Attach { port, endpoint } => self.attach(who, port, &endpoint),
+            Request::Detach { port } => {
+                self.0.visitors.peers[who].ports.retain(|_, known| *known != port);
+                return;
+            }
+            Request::Idle { until, sent } => {
+                self.0.visitors.peers[who].doing = Doing::Idle { until, sent };
+                return;
+            }
+            Request::Do { words } => {
+                let hands = &mut self.0.visitors.hands;
+                let done = hands.do_words(&words, &mut self.0.machine);
+                done.map_or_else(Reply::Refused, Reply::Done)
+            }
+            // Heard already.
+            Request::Bye => return,
+        };
+        self.0.visitors.peers[who].say(&reply);
+    }
+
+    fn welcome(&mut self, who: usize, version: u32, pid: u32, name: String) -> Reply {
+        if version != VERSION {
+            return Reply::Refused(format!(
+                "it speaks version {version} of the lockstep clock, this machine {VERSION}"
+            ));
+        }
+        self.0.visitors.peers[who].join(name, pid);
+        Reply::Welcome(self.0.machine.now())
+    }
+
+    fn attach(&mut self, who: usize, port: Port, endpoint: &str) -> Reply {
+        let place = self.0.endpoints.iter().position(|it| it.is_called(endpoint));
+        let Some(place) = place else {
+            let known: Vec<_> = self.0.endpoints.iter().map(Endpoint::name).collect();
+            return Reply::Refused(format!(
+                "this machine has no port {endpoint}; it has {}",
+                known.join(", ")
+            ));
+        };
+        let taken = self.0.visitors.peers.iter().find(|peer| peer.ports.contains_key(&place));
+        if let Some(other) = taken
+            && !self.0.endpoints[place].is_shared()
+        {
+            return Reply::Refused(format!("{} has {endpoint} open", other.who()));
+        }
+        self.0.endpoints[place].opened(self.0.machine.now(), &mut self.0.machine);
+        self.0.visitors.peers[who].ports.insert(place, port);
+        Reply::Attached
+    }
+}

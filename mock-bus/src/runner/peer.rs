@@ -1,0 +1,187 @@
+//! A program at the other end of the side channel of a lockstep clock.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read, Write};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use drivers::wire::Port;
+use drivers::wire::lockstep::{Entry, LINE_MAX, Reply, Request};
+use units::Time;
+
+/// How long a participant may compute, or hang, while everybody waits for it.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Whether it has something left to do.
+#[derive(Debug)]
+pub(super) enum Doing {
+    /// Only lends a hand now and then: time does not wait for it.
+    Nothing,
+    /// Time stands still for it.
+    Working(Watch),
+    /// It waits, and has sent this before.
+    Idle { until: Time, sent: Vec<Entry> },
+}
+
+/// One program.
+#[derive(Debug)]
+pub(super) struct Peer {
+    stream: UnixStream,
+    heard: Vec<u8>,
+    pub(super) name: String,
+    pid: u32,
+    pub(super) doing: Doing,
+    /// Its numbers of the machine's ports, by their places.
+    pub(super) ports: BTreeMap<usize, Port>,
+    /// What it is told with the next `go`.
+    pub(super) passed: Vec<Entry>,
+}
+
+/// What came from a peer.
+#[derive(Debug)]
+pub(super) enum Heard {
+    /// Nothing whole.
+    Nothing,
+    /// It says something.
+    Said(Request),
+    /// It says what means nothing.
+    Nonsense(String),
+    /// It has gone.
+    Gone,
+}
+
+impl Peer {
+    pub(super) fn new(stream: UnixStream) -> io::Result<Self> {
+        stream.set_nonblocking(true)?;
+        Ok(Self {
+            stream,
+            heard: Vec::new(),
+            name: "a program".to_owned(),
+            pid: 0,
+            doing: Doing::Nothing,
+            ports: BTreeMap::new(),
+            passed: Vec::new(),
+        })
+    }
+
+    pub(super) fn fd(&self) -> BorrowedFd<'_> {
+        self.stream.as_fd()
+    }
+
+    /// It takes part from now on.
+    pub(super) fn join(&mut self, name: String, pid: u32) {
+        self.name = name;
+        self.pid = pid;
+        self.set_working();
+    }
+
+    /// Time stands still for it from now on.
+    pub(super) fn set_working(&mut self) {
+        self.doing = Doing::Working(Watch::new(self.pid));
+    }
+
+    /// Who it is, for a person.
+    pub(super) fn who(&self) -> String {
+        match self.pid {
+            0 => format!("`{}`", self.name),
+            pid => format!("`{}` (process {pid})", self.name),
+        }
+    }
+
+    /// Reads what has come, and takes the next line of it.
+    pub(super) fn hear(&mut self) -> Heard {
+        if let Some(heard) = self.next_line() {
+            return heard;
+        }
+        let mut buffer = [0; 4096];
+        match self.stream.read(&mut buffer) {
+            Ok(0) => return Heard::Gone,
+            Ok(length) => self.heard.extend_from_slice(&buffer[..length]),
+            Err(error) => match error.kind() {
+                io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => return Heard::Nothing,
+                _ => return Heard::Gone,
+            },
+        }
+        self.next_line().unwrap_or(Heard::Nothing)
+    }
+
+    fn next_line(&mut self) -> Option<Heard> {
+        let Some(end) = self.heard.iter().position(|byte| *byte == b'\n') else {
+            let endless = self.heard.len() > LINE_MAX;
+            return endless.then(|| Heard::Nonsense("a line without an end".to_owned()));
+        };
+        let line: Vec<u8> = self.heard.drain(..=end).collect();
+        let line = String::from_utf8_lossy(&line[..end]);
+        Some(match Request::parse(&line) {
+            Ok(request) => Heard::Said(request),
+            Err(error) => Heard::Nonsense(error.to_string()),
+        })
+    }
+
+    /// Says something; one that does not listen any more is noticed when it is heard.
+    pub(super) fn say(&mut self, reply: &Reply) {
+        let line = format!("{reply}\n");
+        // A line is short and its reader waits for it: the socket has room.
+        let _ = self.stream.write_all(line.as_bytes());
+    }
+}
+
+/// Whether somebody for whom time stands still is still at work.
+///
+/// Patience is counted in the program's own processor time as far as it gets any, so that a
+/// busy computer is not taken for a program that hangs.
+#[derive(Debug)]
+pub(super) struct Watch {
+    pid: u32,
+    /// When it was last seen to have worked, and its processor time then.
+    seen: Option<(Instant, Duration)>,
+    begun: Instant,
+    worked: Duration,
+}
+
+impl Watch {
+    fn new(pid: u32) -> Self {
+        Self {
+            pid,
+            seen: None,
+            begun: Instant::now(),
+            worked: Duration::ZERO,
+        }
+    }
+
+    /// What is wrong with it, if anything is.
+    pub(super) fn complaint(&mut self) -> Option<String> {
+        if self.begun.elapsed() < PATIENCE {
+            return None;
+        }
+        let limit = PATIENCE.as_secs();
+        let Some(used) = processor_time(self.pid) else {
+            return Some(format!("has not answered for {limit} s"));
+        };
+        let (since, before) = *self.seen.get_or_insert_with(|| (Instant::now(), used));
+        if used > before {
+            self.worked += used - before;
+            self.seen = Some((Instant::now(), used));
+        }
+        if self.worked >= PATIENCE {
+            return Some(format!("has computed for more than {limit} s"));
+        }
+        (since.elapsed() >= PATIENCE).then(|| {
+            format!("hangs: it has neither answered nor used the processor for {limit} s")
+        })
+    }
+}
+
+/// The processor time that a process has used; `None` where that cannot be known.
+fn processor_time(pid: u32) -> Option<Duration> {
+    // Source: proc_pid_stat(5). The name of the program may hold anything, also blanks.
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let (_, fields) = stat.rsplit_once(')')?;
+    let mut times = fields.split_whitespace().skip(11);
+    let user: u64 = times.next()?.parse().ok()?;
+    let system: u64 = times.next()?.parse().ok()?;
+    // USER_HZ is 100 on Linux, whatever the kernel's own rate.
+    const TICK: Duration = Duration::from_millis(10);
+    Some(TICK * u32::try_from(user + system).ok()?)
+}
