@@ -225,6 +225,15 @@ impl EmulatedOnPtys {
         }
     }
 
+    /// Where its side channel is, for programs that are given it as `--clock lockstep:PATH`;
+    /// `None` where time is the wall's.
+    pub fn clock(&self) -> Option<PathBuf> {
+        match &self.time {
+            EmulatedTime::Wall(_) => None,
+            EmulatedTime::Lockstep(folder) => Some(socket_in(folder)),
+        }
+    }
+
     /// Where a controller configured by `config` finds its buses and lines.
     ///
     /// # Errors

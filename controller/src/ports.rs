@@ -229,7 +229,9 @@ fn refuse_real(endpoints: &BTreeMap<String, Endpoint>) -> Result<(), Failure> {
     {
         None => Ok(()),
         Some((name, _)) => Err(Failure::Usage {
-            what: format!("a clock that is not the wall's with `{name}`, which is no emulated port"),
+            what: format!(
+                "a clock that is not the wall's with `{name}`, which is no emulated port"
+            ),
             help: "leave --clock and --clock-speed out on a real machine".into(),
         }),
     }

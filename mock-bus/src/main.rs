@@ -52,6 +52,9 @@ struct Arguments {
     /// socket at PATH: `truestage … --clock lockstep:PATH`.
     #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "speed")]
     clock: Option<PathBuf>,
+    /// With --clock: a program that is killed does not end the machine; the next one goes on.
+    #[arg(long, requires = "clock")]
+    outlive: bool,
     /// A socket for `mock-bus ctl` where time is the wall's; a lockstep clock's own serves too.
     #[arg(long, value_name = "PATH", conflicts_with = "clock")]
     control: Option<PathBuf>,
@@ -167,6 +170,7 @@ fn options(config: &MachineConfig, arguments: Arguments) -> Options {
             Some(path) => Pace::Lockstep(path),
         },
         control: arguments.control,
+        outlive: arguments.outlive,
         interfaces: can.zip(arguments.can).into_iter().collect(),
         links,
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 use tests::Rig;
 
-use crate::programs::{live_rigs, one_machine, speed, truestage};
+use crate::programs::{live_rigs, truestage};
 
 /// Runs the demonstration of `machine` to its end, which is a good one: as found and as left, by
 /// their places in what it prints, and a page.
@@ -34,18 +34,8 @@ fn shown(machine: &str) -> Option<(Value, String)> {
     if !live_rigs().any(|rig| rig == Rig::Pty) {
         return None;
     }
-    let _turn = one_machine();
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let speed = speed(Rig::Pty);
-    let words = [
-        "demo",
-        "--machine",
-        machine,
-        "--speed",
-        &speed,
-        "--data-dir",
-        ".",
-    ];
+    let words = ["demo", "--machine", machine, "--data-dir", "."];
     let said = truestage(folder.path(), &words).with_code(0);
     let report = said["report"].as_str().expect("it names its page");
     let page = std::fs::read_to_string(folder.path().join(Path::new(report)));

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
+use drivers::transport::lockstep::Participant;
 use drivers::transport::{Input, Payload, Port, Transport};
 use nix::sys::signal::Signal;
 use tests::Rig;
@@ -110,7 +111,11 @@ fn drive_complains_of_a_silent_master(bench: &Bench) {
     const EMERGENCY_OF_NODE_1: u16 = 0x081;
     const HEARTBEAT_ERROR: [u8; 2] = [0x30, 0x81];
     const CAN: Port = Port(0);
-    let builder = Live::builder(Clock::scaled(bench.rig().speed()));
+    // The drive watches for half a second.
+    const SILENCE_MAX: Duration = Duration::from_secs(1);
+    let participant = Participant::join(&bench.folder().join("clock"), "a listener");
+    let participant = participant.unwrap_or_else(|error| panic!("{error}"));
+    let builder = Live::builder(Clock::lockstep(participant));
     let endpoint = bench.port("can0");
     let (_, place) = endpoint.split_once(':').expect("KIND:PLACE");
     let builder = match bench.rig() {
@@ -118,8 +123,7 @@ fn drive_complains_of_a_silent_master(bench: &Bench) {
         _ => builder.slcan(CAN, place, SlcanSettings::new(1_000_000)),
     };
     let mut bus = builder.build().unwrap_or_else(|error| panic!("{error}"));
-    // 0x1016 has 16 bits of milliseconds, so the drive waits no longer than this.
-    let until = bus.now() + Duration::from_secs(100);
+    let until = bus.now() + SILENCE_MAX;
     loop {
         let arrival = bus.receive(until).expect("the drive does not complain");
         let Input::Payload(Payload::Frame(frame)) = arrival.input else {

@@ -13,6 +13,9 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use tests::{INTERFACE, LINEAR, Rig, Shipped, rigs};
 
+/// The clock that a machine and its controllers share, beside the machine's other files.
+const LOCKSTEP: &str = "lockstep:clock";
+
 /// Machines share the processor, and on SocketCAN the interface: one after the other.
 static ONE_MACHINE: Mutex<()> = Mutex::new(());
 
@@ -178,18 +181,19 @@ impl Bench {
 
     /// The same with any machine that ships, its emulation after `change`.
     pub(crate) fn of(rig: Rig, shipped: Shipped, change: impl Fn(String) -> String) -> Self {
-        Self::at_speed(rig, shipped, &speed(rig), change)
+        let clock = ["--clock", LOCKSTEP, "--outlive"];
+        Self::with_clock(rig, shipped, &clock, change)
     }
 
     /// The linear machine in real time.
     pub(crate) fn in_real_time(rig: Rig) -> Self {
-        Self::at_speed(rig, LINEAR, "1", |text| text)
+        Self::with_clock(rig, LINEAR, &["--speed", "1"], |text| text)
     }
 
-    fn at_speed(
+    fn with_clock(
         rig: Rig,
         shipped: Shipped,
-        speed: &str,
+        clock: &[&str],
         change: impl Fn(String) -> String,
     ) -> Self {
         let emulated = change(shipped.emulated.to_owned());
@@ -198,7 +202,7 @@ impl Bench {
         fs::write(folder.path().join("emulated.toml"), &emulated).expect("a file can be written");
         let mut command = Command::new(program("mock-bus"));
         command.current_dir(folder.path());
-        command.args(["emulated.toml", "--seed", "51", "--speed", speed]);
+        command.args(["emulated.toml", "--seed", "51"]).args(clock);
         if rig == Rig::Vcan {
             command.args(["--can", INTERFACE]);
         } else {
@@ -281,7 +285,7 @@ impl Bench {
         command.arg(words[0]);
         let uses_machine = ["scan", "zero", "calibrate", "verify", "move"];
         if uses_machine.contains(&words[0]) {
-            command.args(["--clock-speed", &speed(self.rig)]);
+            command.args(["--clock", LOCKSTEP]);
             let machine = self.shipped.machine;
             let uses = |name: &str| machine.contains(&format!(".{name}]"));
             for port in self
@@ -313,10 +317,6 @@ impl Process {
     fn end_quietly(mut self) -> Option<i32> {
         self.0.wait().expect("a child can be waited for").code()
     }
-}
-
-pub(crate) fn speed(rig: Rig) -> String {
-    rig.speed().to_string()
 }
 
 /// `can0: slcan /dev/pts/4` and the like become endpoints `can0=slcan:/dev/pts/4`.

@@ -21,17 +21,6 @@ use crate::programs::{
     Ended, Process, check_error, live_rigs, number, one_machine, program, text, truestage,
 };
 
-/// How much faster than the wall's clock the machine lives.
-const SPEED: f64 = 2.0;
-
-/// Drives that wait for a SYNC, with the period below, for 0.6 s of the wall: longer than a shared
-/// computer stands still now and then.
-fn patient(emulated: &str) -> String {
-    let servo = "has_index = true\n";
-    assert!(emulated.contains(servo));
-    emulated.replace(servo, &format!("{servo}sync_lost_after_periods = 20.0\n"))
-}
-
 /// A corner of the volume, few nodes and short averages: every verb works, and none takes long.
 /// What is late by some SYNC periods is no trouble.
 fn small(machine: &str) -> String {
@@ -85,10 +74,10 @@ struct Live {
 impl Live {
     fn new(rig: Rig) -> Self {
         let turn = one_machine();
-        let toml = patient(VOLUMETRIC.emulated);
+        let toml = VOLUMETRIC.emulated;
         let emulated = match rig {
-            Rig::Vcan => EmulatedOnPtys::start_on_socketcan(&toml, 51, SPEED, INTERFACE),
-            Rig::Pty | Rig::InProcess => EmulatedOnPtys::start(&toml, 51, SPEED),
+            Rig::Vcan => EmulatedOnPtys::in_lockstep_on_socketcan(toml, 51, INTERFACE),
+            Rig::Pty | Rig::InProcess => EmulatedOnPtys::in_lockstep(toml, 51),
         };
         let emulated = emulated.unwrap_or_else(|error| panic!("{error}"));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -107,7 +96,10 @@ impl Live {
         let mut command = Command::new(program("truestage"));
         command.current_dir(self.folder.path()).arg("--json");
         command.args(words);
-        command.args(["--clock-speed", &SPEED.to_string()]);
+        let clock = self.emulated.clock().expect("it has one");
+        command.arg("--clock");
+        command.arg(format!("lockstep:{}", clock.display()));
+        command.args(["--hand", "ask"]);
         for port in &self.ports {
             command.args(["--port", port]);
         }

@@ -88,6 +88,11 @@ impl Setup {
         self
     }
 
+    /// Whether it lives by the wall's clock on live buses, where no two runs are alike.
+    pub const fn is_by_the_wall(&self) -> bool {
+        self.speed.is_some()
+    }
+
     /// The shipped rotary table with the noise and errors of `seed`.
     pub const fn rotary(seed: u64) -> Self {
         Self::of(ROTARY, seed)
@@ -162,9 +167,7 @@ fn on_ptys(
         (None, None) => EmulatedOnPtys::in_lockstep(text, seed),
         (None, Some(name)) => EmulatedOnPtys::in_lockstep_on_socketcan(text, seed, name),
         (Some(speed), None) => EmulatedOnPtys::start(text, seed, speed),
-        (Some(speed), Some(name)) => {
-            EmulatedOnPtys::start_on_socketcan(text, seed, speed, name)
-        }
+        (Some(speed), Some(name)) => EmulatedOnPtys::start_on_socketcan(text, seed, speed, name),
     }
 }
 

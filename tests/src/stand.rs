@@ -56,6 +56,12 @@ impl Stand {
         self.emulator.rig
     }
 
+    /// The emulator's side once the controller's has gone: what that said last has been heard.
+    pub fn gone(self) -> Emulator {
+        drop(self.machine);
+        self.emulator
+    }
+
     /// Looks at the simulated machine, or meddles with it.
     pub fn simulation<R: Send + 'static>(
         &self,
@@ -92,11 +98,12 @@ impl Stand {
 }
 
 /// Runs `procedure` with the started machine of `setup` on every rig of this run, and shuts
-/// the machine down.
+/// the machine down. Whatever the rig, the same frames pass at the same times.
 ///
 /// # Panics
-/// When anything returns a failure; the rig is named.
+/// When anything returns a failure, or the log is another one; the rig is named.
 pub fn on_every_rig(setup: &Setup, procedure: impl Fn(&mut Stand) -> Result<(), Failure>) {
+    let mut first = None;
     for rig in rigs() {
         let mut stand = Stand::new(rig, setup);
         let result = stand
@@ -108,6 +115,11 @@ pub fn on_every_rig(setup: &Setup, procedure: impl Fn(&mut Stand) -> Result<(), 
             stand.machine.make_safe();
             let counters = stand.machine.counters();
             panic!("{rig:?}: {failure}\n{counters:?}");
+        }
+        let emulator = stand.gone();
+        let hash = emulator.simulation(|simulation| simulation.log_hash());
+        if !setup.is_by_the_wall() {
+            assert_eq!(*first.get_or_insert(hash), hash, "{rig:?}: another log");
         }
     }
 }

@@ -1,9 +1,15 @@
 //! One seed is one log: in virtual time, on SLCAN and serial lines, and on SocketCAN.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 
 use mock_bus::simulation::Simulation;
 use tests::{Rig, Setup, Stand, rigs};
 use truestage::Failure;
+use truestage::cycle::Way;
+use truestage::cycle::platform::Pose;
+use units::{Metres, Radians};
 
 /// What a machine did on its buses.
 #[derive(Debug, PartialEq)]
@@ -12,11 +18,7 @@ struct Log {
     lines: Vec<String>,
 }
 
-fn log_of(
-    rig: Rig,
-    setup: &Setup,
-    procedure: impl Fn(&mut Stand) -> Result<(), Failure>,
-) -> Log {
+fn log_of(rig: Rig, setup: &Setup, procedure: impl Fn(&mut Stand) -> Result<(), Failure>) -> Log {
     let mut stand = Stand::new(rig, setup);
     stand.simulation(Simulation::keep_log);
     let result = stand
@@ -25,7 +27,7 @@ fn log_of(
         .and_then(|()| procedure(&mut stand))
         .and_then(|()| stand.machine.shut_down());
     result.unwrap_or_else(|failure| panic!("{rig:?}: {failure}"));
-    stand.simulation(|simulation| Log {
+    stand.gone().simulation(|simulation| Log {
         hash: simulation.log_hash(),
         lines: simulation.log_lines().to_vec(),
     })
@@ -46,10 +48,77 @@ fn check(setup: &Setup, procedure: impl Fn(&mut Stand) -> Result<(), Failure>) {
     }
 }
 
+/// Keeps both cores of a small computer busy while it lives.
+struct BusyComputer {
+    enough: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<u64>>,
+}
+
+impl BusyComputer {
+    fn new() -> Self {
+        let enough = Arc::new(AtomicBool::new(false));
+        let busy = |_| {
+            let enough = Arc::clone(&enough);
+            std::thread::spawn(move || {
+                let mut count = 0_u64;
+                while !enough.load(Ordering::Relaxed) {
+                    count = std::hint::black_box(count + 1);
+                }
+                count
+            })
+        };
+        let threads = (0..2).map(busy).collect();
+        Self { enough, threads }
+    }
+}
+
+impl Drop for BusyComputer {
+    fn drop(&mut self) {
+        self.enough.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            assert!(thread.join().is_ok_and(|count| count > 0), "it was idle");
+        }
+    }
+}
+
 #[test]
-fn a_linear_stage_has_one_log_on_every_bus() {
+fn a_linear_stage_has_one_log_on_every_bus_of_a_busy_computer() {
+    let _busy = BusyComputer::new();
     check(&Setup::new(7), |stand| {
         let store = stand.store.clone();
-        stand.machine.zero("x", &store).map(drop)
+        stand.machine.zero("x", &store)?;
+        let target = Metres::from_mm(12.5);
+        stand.machine.move_to("x", target).map(drop)
+    });
+}
+
+#[test]
+fn a_platform_has_one_log_on_every_bus_of_a_busy_computer() {
+    let _busy = BusyComputer::new();
+    for setup in [Setup::uvw(7), Setup::uvw_copley(7)] {
+        check(&setup, |stand| {
+            let store = stand.store.clone();
+            stand.machine.zero_platform(&store)?;
+            stand.machine.move_pose(Pose::default()).map(drop)
+        });
+    }
+}
+
+#[test]
+fn a_rotary_table_has_one_log_on_every_bus_of_a_busy_computer() {
+    let _busy = BusyComputer::new();
+    check(&Setup::rotary(7), |stand| {
+        stand.machine.zero_rotary("c")?;
+        let target = Radians::from_degrees(123.4);
+        let way = Way::Shortest;
+        stand.machine.move_rotary("c", target, way).map(drop)
+    });
+}
+
+#[test]
+fn three_axes_have_one_log_on_every_bus_of_a_busy_computer() {
+    let _busy = BusyComputer::new();
+    check(&Setup::volumetric(7), |stand| {
+        stand.machine.zero_volumetric()
     });
 }

@@ -105,8 +105,8 @@ struct MachineArgs {
     /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
     #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "clock_speed")]
     clock: Option<PathBuf>,
-    /// Let the hand of the emulated machine at this socket (`mock-bus --control PATH`) do what
-    /// people are asked for.
+    /// Who does what people are asked for: the hand of the emulated machine at this socket
+    /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, who sits here.
     #[arg(long, value_name = "PATH")]
     hand: Option<PathBuf>,
     /// Write everything on the buses to this file, in candump's log format.
@@ -125,7 +125,8 @@ impl MachineArgs {
 
     /// Where an emulated machine's hand does what people are asked for.
     fn hand(&self) -> Option<&Path> {
-        self.hand.as_deref().or(self.clock.as_deref())
+        let hand = self.hand.as_deref().or(self.clock.as_deref());
+        hand.filter(|hand| *hand != Path::new("ask"))
     }
 }
 

@@ -204,6 +204,12 @@ impl Participant {
         self.noted(said)
     }
 
+    /// Computes on this processor from now on.
+    pub(super) fn on(&self, cpu: Option<u32>) {
+        // Only a wish: who does not hear it is noticed elsewhere.
+        let _ = self.channel().say(&Request::On { cpu });
+    }
+
     /// Whether an answer waits is seen here.
     pub(super) fn with_descriptor<R>(&self, look: impl FnOnce(BorrowedFd<'_>) -> R) -> R {
         look(self.channel().stream.get_ref().as_fd())

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod in_process;
 pub mod live;
 pub mod lockstep;
+mod one_core;
 mod os;
 pub mod real_time;
 pub mod record;

@@ -11,6 +11,7 @@
 //! | `attach ID ENDPOINT` | `attached` | has opened this terminal or interface |
 //! | `detach ID` | nothing | has closed it |
 //! | `idle UNTIL ENTRY…` | `go NOW ENTRY…` | has sent these and waits until then, or until something comes |
+//! | `on CPU` | nothing | computes on this processor now, or on `any`: better both on one |
 //! | `do WORDS` | `done TEXT` | a hand at the machine, before anything sent later |
 //! | `bye` | nothing | takes part no longer |
 //!
@@ -82,6 +83,12 @@ pub enum Request {
         until: Time,
         /// What it has sent since it last said so.
         sent: Vec<Entry>,
+    },
+    /// Computes on this processor now; `None` for any. Whoever only waits for the other is woken
+    /// much faster on the same one.
+    On {
+        /// Its number.
+        cpu: Option<u32>,
     },
     /// A hand at the machine.
     Do {
@@ -158,6 +165,10 @@ impl Request {
                 let (until, sent) = parse_time_and_entries(rest).ok_or_else(wrong)?;
                 Self::Idle { until, sent }
             }
+            "on" if rest == "any" => Self::On { cpu: None },
+            "on" => Self::On {
+                cpu: Some(rest.parse().map_err(|_| wrong())?),
+            },
             "do" => Self::Do {
                 words: rest.to_owned(),
             },
@@ -174,6 +185,8 @@ impl fmt::Display for Request {
             Self::Attach { port, endpoint } => write!(f, "attach {} {endpoint}", port.0),
             Self::Detach { port } => write!(f, "detach {}", port.0),
             Self::Idle { until, sent } => write_time_and_entries(f, "idle", *until, sent),
+            Self::On { cpu: None } => f.write_str("on any"),
+            Self::On { cpu: Some(cpu) } => write!(f, "on {cpu}"),
             Self::Do { words } => write!(f, "do {words}"),
             Self::Bye => f.write_str("bye"),
         }
@@ -341,6 +354,8 @@ mod tests {
                 words: "turn-plate 73".to_owned(),
             },
         );
+        check_request("on 3", &Request::On { cpu: Some(3) });
+        check_request("on any", &Request::On { cpu: None });
         check_request("bye", &Request::Bye);
     }
 

@@ -153,6 +153,14 @@ impl Endpoint {
         matches!(self.kind, Kind::Vcan(_))
     }
 
+    /// A participant has opened it, or has closed it.
+    pub(super) fn attend(&mut self, is_there: bool) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Serial(Some(pty), _) | Kind::Slcan(Some(pty), _) => pty.attend(is_there),
+            _ => Ok(()),
+        }
+    }
+
     /// The rate at which a participant has opened the line, where it is not the line's own.
     pub(super) fn opened(&mut self, now: Time, machine: &mut Simulation) {
         if let Kind::Serial(Some(pty), rate) = &mut self.kind

@@ -68,7 +68,10 @@ impl LineWords {
                 .ok_or("`side` is missing: the direction across the line that is measured")
         };
         let all = self.along.iter().chain(&self.tool_mm);
-        if !all.chain(self.side.iter().flatten()).all(|it| it.is_finite()) {
+        if !all
+            .chain(self.side.iter().flatten())
+            .all(|it| it.is_finite())
+        {
             return Err("a number is not finite".to_owned());
         }
         if self.along == [0.0; 3] {
@@ -112,7 +115,6 @@ impl Deed {
             _ => Err(format!("`{words}` is not understood; there are: {WORDS}")),
         }
     }
-
 }
 
 /// The hands of one machine, and what they remember.
@@ -272,8 +274,14 @@ mod tests {
             ("power up", "power off"),
             ("fault fault = { kind = \"gremlin\" }", "gremlin"),
             ("end-fault x", "no number"),
-            ("set-up-line along = [0, 0, 0], optics = \"linear\"", "direction"),
-            ("set-up-line along = [1, 0, 0], optics = \"angular\"", "side"),
+            (
+                "set-up-line along = [0, 0, 0], optics = \"linear\"",
+                "direction",
+            ),
+            (
+                "set-up-line along = [1, 0, 0], optics = \"angular\"",
+                "side",
+            ),
         ] {
             let error = Deed::parse(words).unwrap_err();
             assert!(error.contains(says), "{words}: {error}");

@@ -8,7 +8,8 @@
 //! computer is changes nothing. The lines are those of [`drivers::wire::lockstep`].
 //!
 //! Nobody there: time stands still until somebody comes. Somebody who ends without taking
-//! leave, hangs, or computes without end is named, and the machine ends.
+//! leave (unless that was asked for), hangs, or computes without end is named, and the
+//! machine ends.
 
 use std::io::{self, Read};
 use std::os::fd::AsFd;
@@ -18,6 +19,8 @@ use drivers::wire::Port;
 use drivers::wire::lockstep::{Entry, Passed, Reply, Request, VERSION};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
+use nix::unistd::Pid;
 use units::Time;
 
 use super::endpoint::Endpoint;
@@ -30,11 +33,24 @@ const STRIDE: core::time::Duration = core::time::Duration::from_secs(1);
 /// How often to look whether somebody hangs.
 const LOOK_EVERY_MS: u16 = 500;
 
-pub(super) struct Lockstep(Site);
+/// The calling thread.
+const OWN: Pid = Pid::from_raw(0);
+
+pub(super) struct Lockstep {
+    site: Site,
+    /// The processors on which this thread may compute.
+    allowed: Option<CpuSet>,
+    outlive: bool,
+}
 
 impl Lockstep {
-    pub(super) const fn new(site: Site) -> Self {
-        Self(site)
+    /// `outlive`: a participant that ends without taking leave does not end the machine.
+    pub(super) fn new(site: Site, outlive: bool) -> Self {
+        Self {
+            site,
+            outlive,
+            allowed: sched_getaffinity(OWN).ok(),
+        }
     }
 
     /// Until somebody stops it, a participant fails, or a terminal or interface does.
@@ -42,8 +58,8 @@ impl Lockstep {
         while !self.do_jobs() {
             if self.is_everybody_idle() {
                 self.let_time_pass()?;
-            } else {
-                self.wait()?;
+            } else if self.wait()? {
+                self.site.visitors.let_in()?;
             }
             self.hear_everybody()?;
         }
@@ -53,8 +69,8 @@ impl Lockstep {
     /// True when it is time to stop.
     fn do_jobs(&mut self) -> bool {
         loop {
-            match self.0.jobs.try_recv() {
-                Ok(Job::Do(work)) => work(&mut self.0.machine),
+            match self.site.jobs.try_recv() {
+                Ok(Job::Do(work)) => work(&mut self.site.machine),
                 Ok(Job::Stop) | Err(TryRecvError::Disconnected) => return true,
                 Err(TryRecvError::Empty) => return false,
             }
@@ -64,7 +80,7 @@ impl Lockstep {
     /// Time waits for whoever works; with nobody there it stands still.
     fn is_everybody_idle(&self) -> bool {
         let mut anybody = false;
-        self.0.visitors.peers.iter().all(|peer| {
+        self.site.visitors.peers.iter().all(|peer| {
             anybody |= matches!(peer.doing, Doing::Idle { .. });
             !matches!(peer.doing, Doing::Working(_))
         }) && anybody
@@ -74,13 +90,18 @@ impl Lockstep {
         let is_awaited = self.take_in()?;
         self.refuse_strangers()?;
         if !is_awaited {
-            let waits = self.0.visitors.peers.iter().filter_map(|peer| match peer.doing {
-                Doing::Idle { until, .. } => Some(until),
-                Doing::Nothing | Doing::Working(_) => None,
-            });
+            let waits = self
+                .site
+                .visitors
+                .peers
+                .iter()
+                .filter_map(|peer| match peer.doing {
+                    Doing::Idle { until, .. } => Some(until),
+                    Doing::Nothing | Doing::Working(_) => None,
+                });
             let until = waits.min().unwrap_or(Time::NEVER);
-            let stride = self.0.machine.now() + STRIDE;
-            self.0.machine.advance_until_delivery(until.min(stride));
+            let stride = self.site.machine.now() + STRIDE;
+            self.site.machine.advance_until_delivery(until.min(stride));
             self.hand_out()?;
         }
         self.wake();
@@ -91,8 +112,8 @@ impl Lockstep {
     /// an adapter gives at once.
     fn take_in(&mut self) -> io::Result<bool> {
         let mut is_awaited = false;
-        for who in 0..self.0.visitors.peers.len() {
-            let Doing::Idle { sent, .. } = &mut self.0.visitors.peers[who].doing else {
+        for who in 0..self.site.visitors.peers.len() {
+            let Doing::Idle { sent, .. } = &mut self.site.visitors.peers[who].doing else {
                 continue;
             };
             for entry in core::mem::take(sent) {
@@ -103,19 +124,22 @@ impl Lockstep {
     }
 
     fn take_in_one(&mut self, who: usize, entry: Entry) -> io::Result<bool> {
-        let ports = &self.0.visitors.peers[who].ports;
+        let ports = &self.site.visitors.peers[who].ports;
         let place = ports.iter().find(|(_, port)| **port == entry.port);
         let Some((&place, _)) = place else {
             return Ok(false);
         };
-        let now = self.0.machine.now();
-        let answered = self.0.endpoints[place].take_in(entry.passed, now, &mut self.0.machine)?;
+        let now = self.site.machine.now();
+        let answered =
+            self.site.endpoints[place].take_in(entry.passed, now, &mut self.site.machine)?;
         if answered.units > 0 {
             let passed = Passed::Units(answered.units);
             let port = entry.port;
-            self.0.visitors.peers[who].passed.push(Entry { port, passed });
+            self.site.visitors.peers[who]
+                .passed
+                .push(Entry { port, passed });
         }
-        if self.0.endpoints[place].is_shared() {
+        if self.site.endpoints[place].is_shared() {
             self.tell_others(Some(who), place, entry.passed);
         }
         Ok(answered.is_awaited)
@@ -123,7 +147,7 @@ impl Lockstep {
 
     /// Whoever has the port open hears it too, except who has sent it.
     fn tell_others(&mut self, sender: Option<usize>, place: usize, passed: Passed) {
-        for (who, peer) in self.0.visitors.peers.iter_mut().enumerate() {
+        for (who, peer) in self.site.visitors.peers.iter_mut().enumerate() {
             if let Some(&port) = peer.ports.get(&place)
                 && Some(who) != sender
             {
@@ -134,7 +158,7 @@ impl Lockstep {
 
     /// Who sends without keeping the clock would have to be guessed at.
     fn refuse_strangers(&mut self) -> io::Result<()> {
-        for endpoint in &mut self.0.endpoints {
+        for endpoint in &mut self.site.endpoints {
             if let Some(frame) = endpoint.strange_frame()? {
                 return Err(io::Error::other(format!(
                     "{}: the frame {frame} comes from a program that does not keep the lockstep \
@@ -147,14 +171,19 @@ impl Lockstep {
     }
 
     fn hand_out(&mut self) -> io::Result<()> {
-        while let Some(delivery) = self.0.machine.collect() {
+        while let Some(delivery) = self.site.machine.collect() {
             let place = usize::from(delivery.port.0);
-            let is_open = self.0.visitors.peers.iter().any(|peer| peer.ports.contains_key(&place));
+            let is_open = self
+                .site
+                .visitors
+                .peers
+                .iter()
+                .any(|peer| peer.ports.contains_key(&place));
             // Nobody has opened it: it is lost, as on a real line.
             if !is_open {
                 continue;
             }
-            if let Some(passed) = self.0.endpoints[place].send(delivery.at, delivery.event)? {
+            if let Some(passed) = self.site.endpoints[place].send(delivery.at, delivery.event)? {
                 self.tell_others(None, place, passed);
             }
         }
@@ -163,8 +192,8 @@ impl Lockstep {
 
     /// Whoever has something to hear, or waited until now, goes on.
     fn wake(&mut self) {
-        let now = self.0.machine.now();
-        for peer in &mut self.0.visitors.peers {
+        let now = self.site.machine.now();
+        for peer in &mut self.site.visitors.peers {
             let Doing::Idle { until, .. } = peer.doing else {
                 continue;
             };
@@ -176,30 +205,36 @@ impl Lockstep {
         }
     }
 
-    fn wait(&mut self) -> io::Result<()> {
-        let mut fds = vec![
-            PollFd::new(self.0.waker.as_fd(), PollFlags::POLLIN),
-        ];
-        fds.extend(self.0.visitors.fds());
-        let unsent = self.0.endpoints.iter().filter_map(Endpoint::fd);
+    /// Until somebody says something; whether somebody new has come.
+    fn wait(&mut self) -> io::Result<bool> {
+        let mut fds = vec![PollFd::new(self.site.waker.as_fd(), PollFlags::POLLIN)];
+        fds.extend(self.site.visitors.fds());
+        let unsent = self.site.endpoints.iter().filter_map(Endpoint::fd);
         let unsent = unsent.filter(|(_, unsent)| *unsent);
         fds.extend(unsent.map(|(fd, _)| PollFd::new(fd, PollFlags::POLLOUT)));
         match poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS)) {
-            Ok(0) => return self.complain(),
+            Ok(0) => return self.complain().map(|()| false),
             Ok(_) | Err(Errno::EINTR) => {}
             Err(errno) => return Err(errno.into()),
         }
-        if fds[0].any() == Some(true) {
+        let is_woken = fds[0].any() == Some(true);
+        // The door stands first among the visitors.
+        let has_come = fds.get(1).is_some_and(|door| door.any() == Some(true));
+        if is_woken {
             let mut bytes = [0; 64];
-            let _ = self.0.waker.read(&mut bytes)?;
+            let _ = self.site.waker.read(&mut bytes)?;
         }
-        self.0.endpoints.iter_mut().try_for_each(Endpoint::flush)
+        self.site
+            .endpoints
+            .iter_mut()
+            .try_for_each(Endpoint::flush)?;
+        Ok(has_come)
     }
 
     /// Names whoever everybody waits for in vain.
     fn complain(&mut self) -> io::Result<()> {
-        let at = self.0.machine.now().seconds();
-        for peer in &mut self.0.visitors.peers {
+        let at = self.site.machine.now().seconds();
+        for peer in &mut self.site.visitors.peers {
             if let Doing::Working(watch) = &mut peer.doing
                 && let Some(complaint) = watch.complaint()
             {
@@ -212,13 +247,12 @@ impl Lockstep {
     }
 
     fn hear_everybody(&mut self) -> io::Result<()> {
-        self.0.visitors.let_in()?;
         let mut who = 0;
-        while who < self.0.visitors.peers.len() {
+        while who < self.site.visitors.peers.len() {
             if self.hear(who)? {
                 who += 1;
             } else {
-                self.0.visitors.peers.remove(who);
+                self.site.visitors.peers.remove(who);
             }
         }
         Ok(())
@@ -228,30 +262,51 @@ impl Lockstep {
     fn hear(&mut self, who: usize) -> io::Result<bool> {
         loop {
             // One that waits for the time says nothing.
-            if matches!(self.0.visitors.peers[who].doing, Doing::Idle { .. }) {
+            if matches!(self.site.visitors.peers[who].doing, Doing::Idle { .. }) {
                 return Ok(true);
             }
-            match self.0.visitors.peers[who].hear() {
+            match self.site.visitors.peers[who].hear() {
                 Heard::Nothing => return Ok(true),
-                Heard::Said(Request::Bye) => return Ok(false),
+                Heard::Said(Request::Bye) => return self.forget(who).map(|()| false),
                 Heard::Said(request) => self.answer(who, request),
-                Heard::Nonsense(what) => self.0.visitors.peers[who].say(&Reply::Refused(what)),
+                Heard::Nonsense(what) => self.site.visitors.peers[who].say(&Reply::Refused(what)),
                 Heard::Gone => return self.gone(who).map(|()| false),
             }
         }
     }
 
     /// A hand may go as it comes; who shares the clock takes leave.
-    fn gone(&self, who: usize) -> io::Result<()> {
-        let peer = &self.0.visitors.peers[who];
+    fn gone(&mut self, who: usize) -> io::Result<()> {
+        let peer = &self.site.visitors.peers[who];
         if matches!(peer.doing, Doing::Nothing) {
             return Ok(());
         }
-        Err(io::Error::other(format!(
+        let what = format!(
             "{} ended without taking leave, at {:.6} s",
             peer.who(),
-            self.0.machine.now().seconds()
-        )))
+            self.site.machine.now().seconds()
+        );
+        if !self.outlive {
+            return Err(io::Error::other(what));
+        }
+        eprintln!("mock-bus: {what}; time stands still until the next one comes");
+        self.forget(who)
+    }
+
+    /// What somebody who has ended had sent is still on its way, as on a real line.
+    fn forget(&mut self, who: usize) -> io::Result<()> {
+        let places: Vec<_> = self.site.visitors.peers[who]
+            .ports
+            .keys()
+            .copied()
+            .collect();
+        let now = self.site.machine.now();
+        for place in places {
+            self.site.endpoints[place].receive(now, &mut self.site.machine)?;
+        }
+        self.detach(who, None);
+        self.follow(None);
+        Ok(())
     }
 
     fn answer(&mut self, who: usize, request: Request) {
@@ -259,22 +314,26 @@ impl Lockstep {
             Request::Hello { version, pid, name } => self.welcome(who, version, pid, name),
             Request::Attach { port, endpoint } => self.attach(who, port, &endpoint),
             Request::Detach { port } => {
-                self.0.visitors.peers[who].ports.retain(|_, known| *known != port);
+                self.detach(who, Some(port));
                 return;
             }
             Request::Idle { until, sent } => {
-                self.0.visitors.peers[who].doing = Doing::Idle { until, sent };
+                self.site.visitors.peers[who].doing = Doing::Idle { until, sent };
+                return;
+            }
+            Request::On { cpu } => {
+                self.follow(cpu);
                 return;
             }
             Request::Do { words } => {
-                let hands = &mut self.0.visitors.hands;
-                let done = hands.do_words(&words, &mut self.0.machine);
+                let hands = &mut self.site.visitors.hands;
+                let done = hands.do_words(&words, &mut self.site.machine);
                 done.map_or_else(Reply::Refused, Reply::Done)
             }
             // Heard already.
             Request::Bye => return,
         };
-        self.0.visitors.peers[who].say(&reply);
+        self.site.visitors.peers[who].say(&reply);
     }
 
     fn welcome(&mut self, who: usize, version: u32, pid: u32, name: String) -> Reply {
@@ -283,27 +342,71 @@ impl Lockstep {
                 "it speaks version {version} of the lockstep clock, this machine {VERSION}"
             ));
         }
-        self.0.visitors.peers[who].join(name, pid);
-        Reply::Welcome(self.0.machine.now())
+        self.site.visitors.peers[who].join(name, pid);
+        Reply::Welcome(self.site.machine.now())
+    }
+
+    /// It has closed a port, or (with `None`) all of them.
+    fn detach(&mut self, who: usize, port: Option<Port>) {
+        let endpoints = &mut self.site.endpoints;
+        self.site.visitors.peers[who].ports.retain(|place, known| {
+            let stays = port.is_some_and(|port| *known != port);
+            if !stays {
+                // What cannot be tidied up now shows when the next one opens it.
+                let _ = endpoints[*place].attend(false);
+            }
+            stays
+        });
+    }
+
+    /// Computes where the only participant does: each only waits for the other.
+    fn follow(&self, cpu: Option<u32>) {
+        let joined = self.site.visitors.peers.iter();
+        let alone = joined
+            .filter(|peer| !matches!(peer.doing, Doing::Nothing))
+            .count()
+            == 1;
+        let (Some(allowed), wanted) = (self.allowed, cpu.filter(|_| alone)) else {
+            return;
+        };
+        let mut set = CpuSet::new();
+        match wanted {
+            Some(cpu) if set.set(cpu as usize).is_ok() => {}
+            _ => set = allowed,
+        }
+        // A refusal costs speed only.
+        let _ = sched_setaffinity(OWN, &set);
     }
 
     fn attach(&mut self, who: usize, port: Port, endpoint: &str) -> Reply {
-        let place = self.0.endpoints.iter().position(|it| it.is_called(endpoint));
+        let place = self
+            .site
+            .endpoints
+            .iter()
+            .position(|it| it.is_called(endpoint));
         let Some(place) = place else {
-            let known: Vec<_> = self.0.endpoints.iter().map(Endpoint::name).collect();
+            let known: Vec<_> = self.site.endpoints.iter().map(Endpoint::name).collect();
             return Reply::Refused(format!(
                 "this machine has no port {endpoint}; it has {}",
                 known.join(", ")
             ));
         };
-        let taken = self.0.visitors.peers.iter().find(|peer| peer.ports.contains_key(&place));
+        let taken = self
+            .site
+            .visitors
+            .peers
+            .iter()
+            .find(|peer| peer.ports.contains_key(&place));
         if let Some(other) = taken
-            && !self.0.endpoints[place].is_shared()
+            && !self.site.endpoints[place].is_shared()
         {
             return Reply::Refused(format!("{} has {endpoint} open", other.who()));
         }
-        self.0.endpoints[place].opened(self.0.machine.now(), &mut self.0.machine);
-        self.0.visitors.peers[who].ports.insert(place, port);
+        if let Err(error) = self.site.endpoints[place].attend(true) {
+            return Reply::Refused(error.to_string());
+        }
+        self.site.endpoints[place].opened(self.site.machine.now(), &mut self.site.machine);
+        self.site.visitors.peers[who].ports.insert(place, port);
         Reply::Attached
     }
 }

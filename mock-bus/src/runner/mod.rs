@@ -53,6 +53,9 @@ pub struct Options {
     /// Where hands reach it ([`hand`]) while it lives by the wall's clock; a lockstep clock's
     /// side channel serves them too.
     pub control: Option<PathBuf>,
+    /// On a lockstep clock: a participant that ends without taking leave is named, and the next
+    /// one goes on with the machine, which ends otherwise.
+    pub outlive: bool,
     /// SocketCAN interface for a CAN port, by the port's name; the others speak SLCAN.
     pub interfaces: BTreeMap<String, String>,
     /// Symbolic link to a port's terminal, by the port's name.
@@ -65,6 +68,7 @@ impl Default for Options {
             seed: 0,
             pace: Pace::Wall(1.0),
             control: None,
+            outlive: false,
             interfaces: BTreeMap::new(),
             links: BTreeMap::new(),
         }
@@ -207,7 +211,7 @@ pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunEr
             };
             match options.pace {
                 Pace::Wall(speed) => EventLoop::new(site, speed).run(),
-                Pace::Lockstep(_) => Lockstep::new(site).run(),
+                Pace::Lockstep(_) => Lockstep::new(site, options.outlive).run(),
             }
         })?;
     Ok(Running {

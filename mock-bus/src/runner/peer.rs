@@ -167,9 +167,8 @@ impl Watch {
         if self.worked >= PATIENCE {
             return Some(format!("has computed for more than {limit} s"));
         }
-        (since.elapsed() >= PATIENCE).then(|| {
-            format!("hangs: it has neither answered nor used the processor for {limit} s")
-        })
+        (since.elapsed() >= PATIENCE)
+            .then(|| format!("hangs: it has neither answered nor used the processor for {limit} s"))
     }
 }
 

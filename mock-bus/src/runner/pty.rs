@@ -29,6 +29,8 @@ pub(super) struct Pty {
     link: Option<PathBuf>,
     unsent: VecDeque<u8>,
     clients: Clients,
+    /// Its client says itself when it comes and goes: nobody needs to look.
+    is_attended: bool,
 }
 
 impl Pty {
@@ -53,6 +55,7 @@ impl Pty {
             link: link.map(Path::to_owned),
             unsent: VecDeque::new(),
             clients,
+            is_attended: false,
         })
     }
 
@@ -119,7 +122,8 @@ impl Pty {
     /// Sends now what fits, and the rest at the next [`Pty::flush`]; `false` when it is lost.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<bool> {
         self.look_who_is_there()?;
-        let taken = self.clients.is_any() && self.unsent.len() + bytes.len() <= UNSENT_MAX;
+        let is_heard = self.is_attended || self.clients.is_any();
+        let taken = is_heard && self.unsent.len() + bytes.len() <= UNSENT_MAX;
         if taken {
             self.unsent.extend(bytes);
         }
@@ -140,8 +144,19 @@ impl Pty {
         Ok(())
     }
 
+    /// A client that says itself when it comes and goes has come, or has gone.
+    pub(super) fn attend(&mut self, is_there: bool) -> io::Result<()> {
+        self.is_attended = false;
+        self.look_who_is_there()?;
+        self.is_attended = is_there;
+        Ok(())
+    }
+
     /// What the last program has not read when it closes is not for the next one.
     fn look_who_is_there(&mut self) -> io::Result<()> {
+        if self.is_attended {
+            return Ok(());
+        }
         if self.clients.have_all_gone() {
             self.unsent.clear();
             tcflush(&self.slave, FlushArg::TCIFLUSH)?;

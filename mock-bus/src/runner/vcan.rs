@@ -7,8 +7,8 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
-use drivers::wire::can::{BusError, CanFrame, CanId};
 use super::pty::await_readable;
+use drivers::wire::can::{BusError, CanFrame, CanId};
 use socketcan::{CanErrorFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, StandardId};
 
 /// How often to look whether a deleted interface is back.

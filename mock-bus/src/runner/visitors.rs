@@ -62,7 +62,6 @@ fn is_deserted(path: &Path) -> bool {
     refused.is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
 }
 
-
 /// Whoever has come to the socket, if there is one.
 pub(super) struct Visitors {
     door: Option<Door>,

@@ -14,6 +14,7 @@ use nix::poll::{PollFd, PollFlags, ppoll};
 use units::Time;
 
 use super::super::lockstep::{LockstepError, Participant};
+use super::super::one_core::OneCore;
 use super::super::sync_grid::SyncGrid;
 use super::super::{Arrival, SendError};
 use super::{Clock, Live, Payload, Port, WAITED_MAX};
@@ -30,16 +31,18 @@ pub(super) struct InLockstep {
     /// For each port how much of what it sent is in `sent`, or was.
     noted: Vec<u64>,
     arrivals: VecDeque<Arrival>,
+    core: OneCore,
 }
 
 impl InLockstep {
-    pub(super) const fn new(participant: Arc<Participant>) -> Self {
+    pub(super) fn new(participant: Arc<Participant>) -> Self {
         Self {
             participant,
             syncs: SyncGrid::new(),
             sent: Vec::new(),
             noted: Vec::new(),
             arrivals: VecDeque::new(),
+            core: OneCore::new(),
         }
     }
 }
@@ -146,6 +149,9 @@ impl Live {
         let next = events.fold(until.min(lockstep.syncs.next()), Time::min);
         let sent = core::mem::take(&mut lockstep.sent);
         let participant = Arc::clone(&lockstep.participant);
+        if let Some(cpu) = lockstep.core.changed() {
+            participant.on(cpu);
+        }
         let gone = participant.idle(next, sent).and_then(|()| {
             self.flush_until_answered(&participant);
             participant.go()

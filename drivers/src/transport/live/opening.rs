@@ -158,9 +158,7 @@ impl Plan {
                 CanPort::open(clock, port, interface)
                     .map_err(|error| socketcan::open_error(interface.clone(), error))?,
             ),
-            Self::Slcan(path, settings) => {
-                Box::new(SlcanPort::open(clock, port, path, *settings)?)
-            }
+            Self::Slcan(path, settings) => Box::new(SlcanPort::open(clock, port, path, *settings)?),
             Self::Serial(path, settings) => Box::new(
                 SerialLine::open(clock, port, path, *settings)
                     .map_err(|error| OpenError::serial(path, error))?,
