@@ -113,6 +113,13 @@ impl Field {
     pub(super) fn at(&self, position_m: f64) -> f64 {
         self.smooth(position_m) + self.cyclic.at(position_m)
     }
+
+    /// It is not larger at `position_m` than this, which costs less to tell.
+    pub(super) fn at_most(&self, position_m: f64) -> f64 {
+        let waves: f64 = self.waves.iter().map(|wave| wave.amplitude_m.abs()).sum();
+        let periodic_m = waves + self.at_zero_m.abs() + self.cyclic.amplitude_m.abs();
+        (self.slope * position_m).abs() + periodic_m
+    }
 }
 
 /// The part that depends on the way the stage came.
@@ -198,5 +205,9 @@ impl StopError {
 }
 
 fn approach(from: f64, to: f64, lengths: f64) -> f64 {
+    // What has arrived stays, as the exponential would have it too.
+    if from == to {
+        return to;
+    }
     to + (from - to) * (-lengths).exp()
 }

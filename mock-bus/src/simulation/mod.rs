@@ -20,6 +20,7 @@ mod tests;
 mod volumetric_tests;
 
 use core::any::Any;
+use core::cell::Cell;
 use std::collections::VecDeque;
 
 use drivers::wire::can::BusError;
@@ -127,6 +128,8 @@ pub struct Simulation {
     outbox: VecDeque<Delivery>,
     mains_back: Time,
     log: Log,
+    /// When something happens by itself next, until something changes that.
+    next: Cell<Option<Time>>,
 }
 
 impl Simulation {
@@ -156,6 +159,7 @@ impl Simulation {
             outbox: VecDeque::new(),
             mains_back: Time::NEVER,
             log: Log::default(),
+            next: Cell::new(None),
             config: config.clone(),
         };
         for fault in &config.faults {
@@ -236,6 +240,7 @@ impl Simulation {
             .get_mut(place)
             .ok_or(DeliverError::NoPort { port })?;
         state.take(self.now, port, payload)?;
+        self.next.set(None);
         self.log
             .payload(self.now, port, Direction::FromHost, payload);
         if let Payload::Bytes(bytes) = payload
@@ -253,11 +258,13 @@ impl Simulation {
     pub fn inject(&mut self, fault: FaultConfig) -> Result<FaultId, ConfigError> {
         self.config
             .check_fault(&fault, |node| self.slot(node).is_some())?;
+        self.next.set(None);
         Ok(self.plan.add(self.now, fault))
     }
 
     /// Ends a fault now.
     pub fn end_fault(&mut self, fault: FaultId) {
+        self.next.set(None);
         self.plan.end(self.now, fault);
     }
 
@@ -277,6 +284,7 @@ impl Simulation {
         }
         self.plant.power_cycle(drift);
         self.mains_back = self.now + self.config.power_off();
+        self.next.set(None);
     }
 
     /// Somebody takes up the table's plate, turns it by so many lines against the table and
@@ -305,6 +313,7 @@ impl Simulation {
         let slot = &mut self.slots[place];
         if slot.powered {
             slot.next = self.now;
+            self.next.set(None);
         }
         let node: &mut dyn Any = &mut *slot.node;
         node.downcast_mut()
@@ -365,6 +374,12 @@ impl Simulation {
     }
 
     fn next_internal(&self) -> Time {
+        let next = self.next.get().unwrap_or_else(|| self.find_next());
+        self.next.set(Some(next));
+        next
+    }
+
+    fn find_next(&self) -> Time {
         let ports = self.ports.iter().map(|port| port.next_event(self.now));
         let slots = self.slots.iter().map(|slot| slot.next);
         let own = self.plan.next_edge().min(self.mains_back);
@@ -374,6 +389,7 @@ impl Simulation {
     /// Everything that is due at `next`; an arbitration only when nothing else is.
     fn step(&mut self, next: Time) {
         self.move_clock(next);
+        self.next.set(None);
         if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
             return;
         }
@@ -441,6 +457,7 @@ impl Simulation {
     }
 
     fn power_off(&mut self, place: usize) {
+        self.next.set(None);
         let slot = &mut self.slots[place];
         if !core::mem::take(&mut slot.powered) {
             return;
@@ -453,6 +470,7 @@ impl Simulation {
     }
 
     fn power_on(&mut self, place: usize) {
+        self.next.set(None);
         let slot = &mut self.slots[place];
         if slot.powered {
             return;
