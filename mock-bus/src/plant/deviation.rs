@@ -12,6 +12,7 @@
 
 use crate::random::Stream;
 use core::f64::consts::TAU;
+use units::portable::{exp, sin};
 
 use super::config::DeviationConfig;
 
@@ -30,7 +31,7 @@ struct Wave {
 
 impl Wave {
     fn at(&self, position_m: f64) -> f64 {
-        self.amplitude_m * (self.per_m * position_m + self.phase).sin()
+        self.amplitude_m * sin(self.per_m * position_m + self.phase)
     }
 }
 
@@ -209,5 +210,5 @@ fn approach(from: f64, to: f64, lengths: f64) -> f64 {
     if from == to {
         return to;
     }
-    to + (from - to) * (-lengths).exp()
+    to + (from - to) * exp(-lengths)
 }

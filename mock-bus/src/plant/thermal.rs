@@ -2,6 +2,7 @@
 
 use crate::random::Stream;
 use core::f64::consts::TAU;
+use units::portable::sin;
 use units::{Celsius, Pascals, RelativeHumidity, Time};
 
 use super::config::ClimateConfig;
@@ -37,7 +38,7 @@ impl Climate {
 
     /// The stage alone, as [`Climate::at`] has it.
     pub(super) fn stage_temperature(&self, now: Time) -> Celsius {
-        let swing = (self.angle(now) + self.phases[3]).sin();
+        let swing = sin(self.angle(now) + self.phases[3]);
         self.stage_at(swing)
     }
 
@@ -53,7 +54,7 @@ impl Climate {
     pub(super) fn at(&self, now: Time) -> Environment {
         let c = &self.config;
         let angle = self.angle(now);
-        let [air, pressure, humidity, stage] = self.phases.map(|phase| (angle + phase).sin());
+        let [air, pressure, humidity, stage] = self.phases.map(|phase| sin(angle + phase));
         Environment {
             air_temperature: Celsius(c.air_temperature_c + c.air_temperature_swing_k * air),
             pressure: Pascals(100.0 * (c.pressure_hpa + c.pressure_swing_hpa * pressure)),

@@ -7,6 +7,7 @@
 
 mod effects;
 mod log;
+mod mains;
 mod port;
 mod traffic;
 
@@ -27,11 +28,10 @@ use drivers::wire::can::BusError;
 use drivers::wire::{Payload, Port};
 use units::Time;
 
-use crate::bus::Sender;
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
-use crate::plant::{HallDrift, LineSetUp, Plant, Truth};
+use crate::plant::{Plant, Truth};
 use log::{Direction, Log};
 use port::PortState;
 
@@ -273,37 +273,10 @@ impl Simulation {
         self.plan.delivered(fault)
     }
 
-    /// The mains goes off now and comes back after the configured time; meanwhile the Hall
-    /// sensors drift to `drift` and nobody holds the stage.
-    pub fn power_cycle(&mut self, drift: HallDrift) {
-        for place in 0..self.slots.len() {
-            let entry = self.config.nodes.get(place);
-            if !entry.is_some_and(|entry| entry.own_mains || entry.brought_along) {
-                self.power_off(place);
-            }
-        }
-        self.plant.power_cycle(drift);
-        self.mains_back = self.now + self.config.power_off();
-        self.next.set(None);
-    }
-
     /// Somebody takes up the table's plate, turns it by so many lines against the table and
     /// fixes it again, a little off as ever. Nothing happens on a machine without one.
     pub fn turn_plate(&mut self, lines: f64) {
         self.plant.turn_plate(lines);
-    }
-
-    /// Somebody sets a laser up along a line of three axes, from where their tool stands, and
-    /// switches on what was brought along for it.
-    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
-        self.plant.set_up_line(set_up);
-        self.power_what_was_brought(true);
-    }
-
-    /// Somebody packs the laser up again.
-    pub fn take_line_away(&mut self) {
-        self.plant.take_line_away();
-        self.power_what_was_brought(false);
     }
 
     /// The device called `name`, when it is a `T`: for the faults that only it knows. It is
@@ -350,29 +323,6 @@ impl Simulation {
         self.plant.advance(self.now);
     }
 
-    fn switch_on(&mut self) {
-        for place in 0..self.slots.len() {
-            if !self.is_brought_along(place) {
-                self.power_on(place);
-            }
-        }
-    }
-
-    fn is_brought_along(&self, place: usize) -> bool {
-        let entry = self.config.nodes.get(place);
-        entry.is_some_and(|entry| entry.brought_along)
-    }
-
-    fn power_what_was_brought(&mut self, on: bool) {
-        for place in 0..self.slots.len() {
-            match (self.is_brought_along(place), on) {
-                (true, true) => self.power_on(place),
-                (true, false) => self.power_off(place),
-                (false, _) => {}
-            }
-        }
-    }
-
     fn next_internal(&self) -> Time {
         let next = self.next.get().unwrap_or_else(|| self.find_next());
         self.next.set(Some(next));
@@ -411,15 +361,6 @@ impl Simulation {
         any
     }
 
-    fn step_mains(&mut self) -> bool {
-        if self.mains_back > self.now {
-            return false;
-        }
-        self.mains_back = Time::NEVER;
-        self.switch_on();
-        true
-    }
-
     fn step_ports(&mut self) -> bool {
         let mut any = false;
         for place in 0..self.ports.len() {
@@ -454,31 +395,6 @@ impl Simulation {
 
     fn slot(&self, name: &str) -> Option<usize> {
         self.slots.iter().position(|slot| slot.name == name)
-    }
-
-    fn power_off(&mut self, place: usize) {
-        self.next.set(None);
-        let slot = &mut self.slots[place];
-        if !core::mem::take(&mut slot.powered) {
-            return;
-        }
-        slot.next = Time::NEVER;
-        slot.node.power_off(self.now, &mut self.plant);
-        while slot.node.poll_transmit().is_some() {}
-        let port = slot.port;
-        self.ports[port].forget(Sender::Node(place));
-    }
-
-    fn power_on(&mut self, place: usize) {
-        self.next.set(None);
-        let slot = &mut self.slots[place];
-        if slot.powered {
-            return;
-        }
-        slot.powered = true;
-        slot.node.power_on(self.now, &mut self.plant);
-        slot.next = slot.node.next_event();
-        self.flush(place);
     }
 }
 

@@ -8,6 +8,7 @@
 
 use crate::random::Stream;
 use core::f64::consts::TAU;
+use units::portable::sin;
 
 use super::config::ScrewConfig;
 
@@ -80,7 +81,7 @@ impl LeadError {
     pub(super) fn at(&self, nominal_m: f64) -> f64 {
         let [(first_m, first), (second_m, second)] = self.cycles;
         let turn = self.per_m * nominal_m;
-        let cyclic_m = first_m * (turn + first).sin() + second_m * (2.0 * turn + second).sin();
+        let cyclic_m = first_m * sin(turn + first) + second_m * sin(2.0 * turn + second);
         self.slope * nominal_m + cyclic_m + self.walk.at(nominal_m) - self.at_zero_m
     }
 
