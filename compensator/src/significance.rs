@@ -8,6 +8,7 @@
 //! | Q(F, ν₁, ν₂) | [`f_tail`] |
 //!
 //! Absent: quantiles; a test compares the tail probability with its level.
+use units::portable::{exp, ln, ln_1p};
 
 /// Terms of the continued fraction at most; it needs about √max(a, b).
 const TERMS_MAX: usize = 10_000;
@@ -24,7 +25,7 @@ pub fn f_tail(f: f64, numerator: usize, denominator: usize) -> f64 {
     }
     if numerator == 2 {
         // The closed form of this case has no cancellation however small the result.
-        return (-0.5 * d2 * (2.0 * f / d2).ln_1p()).exp();
+        return exp(-0.5 * d2 * ln_1p(2.0 * f / d2));
     }
     incomplete_beta(d2 / (d2 + d1 * f), d2 / 2.0, d1 / 2.0)
 }
@@ -37,8 +38,8 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x >= 1.0 {
         return 1.0;
     }
-    let ln_front = a * x.ln() + b * (-x).ln_1p() + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b);
-    let front = ln_front.exp();
+    let ln_front = a * ln(x) + b * ln_1p(-x) + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b);
+    let front = exp(ln_front);
     // The fraction converges fast on this side of the mean, the mirrored one on the other.
     if x < (a + 1.0) / (a + b + 2.0) {
         front * fraction(x, a, b) / a
@@ -82,13 +83,13 @@ fn ln_gamma(z: f64) -> f64 {
     let mut z = z;
     // Γ(z) = Γ(z + 1)/z brings z to where Stirling's series has all digits.
     while z < 12.0 {
-        shift += z.ln();
+        shift += ln(z);
         z += 1.0;
     }
     let (inverse, square) = (1.0 / z, 1.0 / (z * z));
     let series =
         inverse * (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1260.0 - square / 1680.0)));
-    (z - 0.5) * z.ln() - z + 0.5 * core::f64::consts::TAU.ln() + series - shift
+    (z - 0.5) * ln(z) - z + 0.5 * ln(core::f64::consts::TAU) + series - shift
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! | c·Σ·cᵀ | [`propagate`] |
 //!
 //! Absent: Student factors; expanded uncertainties are stated with their k by who prints them.
+use units::portable::powi;
 
 /// Turns a median absolute deviation into the standard deviation of a normal distribution.
 const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
@@ -85,7 +86,7 @@ pub fn propagate(gradient: &[f64], covariance: &[f64]) -> f64 {
 /// `sigmas` standard deviations (Wilson and Hilferty 1931: 3 is about 0.13 %).
 pub fn reduced_chi_square_limit(degrees_of_freedom: usize, sigmas: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees_of_freedom.max(1) as f64);
-    (1.0 - spread + sigmas * spread.sqrt()).powi(3)
+    powi(1.0 - spread + sigmas * spread.sqrt(), 3)
 }
 
 #[cfg(test)]

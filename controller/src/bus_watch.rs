@@ -51,6 +51,8 @@ const IDENTIFIERS: usize = 0x800;
 struct Load {
     since: Time,
     busy: Box<[Duration; IDENTIFIERS]>,
+    /// The identifiers that were heard: few of all.
+    heard: Vec<u16>,
 }
 
 impl Default for Load {
@@ -58,7 +60,27 @@ impl Default for Load {
         Self {
             since: Time::ZERO,
             busy: Box::new([Duration::ZERO; IDENTIFIERS]),
+            heard: Vec::with_capacity(IDENTIFIERS),
         }
+    }
+}
+
+impl Load {
+    fn begin(&mut self, since: Time) {
+        self.since = since;
+        for cob_id in self.heard.drain(..) {
+            self.busy[usize::from(cob_id)] = Duration::ZERO;
+        }
+    }
+
+    fn add(&mut self, cob_id: u16, span: Duration) {
+        let Some(busy) = self.busy.get_mut(usize::from(cob_id)) else {
+            return;
+        };
+        if *busy == Duration::ZERO {
+            self.heard.push(cob_id);
+        }
+        *busy += span;
     }
 }
 
@@ -127,14 +149,11 @@ impl Bus {
     fn count(&mut self, at: Time, cob_id: u16, frame: &CanFrame) {
         if at.since(self.now.since) >= self.window {
             core::mem::swap(&mut self.before, &mut self.now);
-            self.now.since = at;
-            self.now.busy.fill(Duration::ZERO);
+            self.now.begin(at);
         }
         // Between the shortest form and the longest, with every stuff bit there may be.
         let bits = (47 + 8 * frame.data().len()) as u32;
-        if let Some(busy) = self.now.busy.get_mut(usize::from(cob_id)) {
-            *busy += self.bit * bits;
-        }
+        self.now.add(cob_id, self.bit * bits);
     }
 
     /// Who took the largest share lately.

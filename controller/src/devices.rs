@@ -79,7 +79,8 @@ impl Machine {
     }
 
     pub(crate) fn device_name(&self, at: usize) -> String {
-        self.device_names().swap_remove(at)
+        let (name, _) = self.devices().nth(at).expect("a device has a number");
+        name.clone()
     }
 
     /// Device number `at`, in the order of [`Machine::device_names`].

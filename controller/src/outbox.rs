@@ -15,10 +15,19 @@ const FULL_LIMIT: Duration = Duration::from_millis(15);
 /// How soon the queue is tried again.
 const AGAIN: Duration = Duration::from_millis(1);
 
+/// Who has something to send; named only when it cannot be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sender {
+    /// The controller itself, as a node of the bus.
+    Heartbeat,
+    /// A device by its number.
+    Device(usize),
+}
+
 struct Waiting {
     port: Port,
     payload: Payload,
-    device: String,
+    sender: Sender,
     since: Time,
 }
 
@@ -32,25 +41,25 @@ impl Outbox {
     /// Sends `payload` after everything that waits.
     ///
     /// # Errors
-    /// When the port cannot carry it at all; the device it was for is named.
+    /// When the port cannot carry it at all; whoever wanted to send is named.
     pub(crate) fn send(
         &mut self,
         transport: &mut dyn Transport,
         port: Port,
         payload: Payload,
-        device: &str,
-    ) -> Result<(), (String, SendError)> {
+        sender: Sender,
+    ) -> Result<(), (Sender, SendError)> {
         if self.waiting.is_empty() {
             match transport.send(port, &payload) {
                 Ok(()) => return Ok(()),
                 Err(SendError::QueueFull { .. }) => {}
-                Err(error) => return Err((device.to_owned(), error)),
+                Err(error) => return Err((sender, error)),
             }
         }
         self.waiting.push_back(Waiting {
             port,
             payload,
-            device: device.to_owned(),
+            sender,
             since: transport.now(),
         });
         Ok(())
@@ -64,7 +73,7 @@ impl Outbox {
         &mut self,
         transport: &mut dyn Transport,
         patience: u32,
-    ) -> Result<(), (String, SendError)> {
+    ) -> Result<(), (Sender, SendError)> {
         while let Some(first) = self.waiting.front() {
             match transport.send(first.port, &first.payload) {
                 Ok(()) => {}
@@ -74,9 +83,9 @@ impl Outbox {
                     return Ok(());
                 }
                 Err(error) => {
-                    let device = first.device.clone();
+                    let sender = first.sender;
                     self.waiting.clear();
-                    return Err((device, error));
+                    return Err((sender, error));
                 }
             }
             self.waiting.pop_front();
@@ -150,7 +159,7 @@ mod tests {
         };
         for byte in 0..3 {
             outbox
-                .send(&mut narrow, Port(0), payload(byte), "x")
+                .send(&mut narrow, Port(0), payload(byte), Sender::Device(1))
                 .unwrap();
         }
         (outbox, narrow)
@@ -171,8 +180,8 @@ mod tests {
     fn a_queue_that_stays_full_is_an_error_that_names_the_device() {
         let (mut outbox, mut narrow) = full_after(1);
         narrow.now = Time::ZERO + Duration::from_millis(21);
-        let (device, error) = outbox.flush(&mut narrow, 1).unwrap_err();
-        assert_eq!(device, "x");
+        let (sender, error) = outbox.flush(&mut narrow, 1).unwrap_err();
+        assert_eq!(sender, Sender::Device(1));
         assert_eq!(error, SendError::QueueFull { port: Port(0) });
     }
 
@@ -181,7 +190,9 @@ mod tests {
         let (mut outbox, mut narrow) = full_after(0);
         outbox.clear();
         narrow.room = 1;
-        outbox.send(&mut narrow, Port(0), payload(9), "x").unwrap();
+        outbox
+            .send(&mut narrow, Port(0), payload(9), Sender::Device(1))
+            .unwrap();
         assert_eq!(narrow.taken, [payload(9)]);
     }
 }

@@ -11,6 +11,7 @@ use units::Time;
 
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
+use crate::outbox::Sender;
 
 /// So many warnings are kept for later.
 const WARNINGS_HELD: usize = 32;
@@ -171,30 +172,30 @@ impl Machine {
             producer.handle_timeout(now);
             if let Some(frame) = producer.poll_transmit() {
                 let port = *port;
-                self.send(port, Payload::Frame(frame), "heartbeat")?;
+                self.send(port, Payload::Frame(frame), Sender::Heartbeat)?;
             }
         }
         for at in 0..self.device_count() {
-            while self.may_speak(at) {
-                let unit = self.device_mut(at);
-                let port = unit.port;
-                let Some(payload) = unit.device.poll_transmit() else {
-                    break;
-                };
-                let name = self.device_name(at);
-                self.send(port, payload, &name)?;
+            while let Some((port, payload)) = self.next_payload(at) {
+                self.send(port, payload, Sender::Device(at))?;
             }
         }
         Ok(())
     }
 
-    /// Whether device number `at` has its turn, where devices share a line.
-    fn may_speak(&mut self, at: usize) -> bool {
+    /// What device number `at` wants to send, when it has its turn.
+    fn next_payload(&mut self, at: usize) -> Option<(Port, Payload)> {
         let unit = self.device_mut(at);
         let (port, own) = (unit.port, unit.device.line_use());
-        if own == LineUse::Unshared {
-            return true;
+        if own == LineUse::Unshared || self.may_speak(at, port, own) {
+            let payload = self.device_mut(at).device.poll_transmit()?;
+            return Some((port, payload));
         }
+        None
+    }
+
+    /// Whether device number `at` has its turn on a line that it shares.
+    fn may_speak(&mut self, at: usize, port: Port, own: LineUse) -> bool {
         let others: Vec<_> = (0..self.device_count())
             .filter(|other| *other != at)
             .filter_map(|other| {
@@ -205,14 +206,14 @@ impl Machine {
         own.may_speak(others)
     }
 
-    fn send(&mut self, port: Port, payload: Payload, device: &str) -> Result<(), Failure> {
+    fn send(&mut self, port: Port, payload: Payload, sender: Sender) -> Result<(), Failure> {
         let sent = self
             .outbox
-            .send(&mut *self.transport, port, payload, device);
+            .send(&mut *self.transport, port, payload, sender);
         sent.or_else(|refusal| self.judge_refusal(refusal))
     }
 
-    fn judge_refusal(&self, (device, source): (String, SendError)) -> Result<(), Failure> {
+    fn judge_refusal(&self, (sender, source): (Sender, SendError)) -> Result<(), Failure> {
         match source {
             // While stopping, what can be sent is sent; the drives' watchdogs do the rest.
             _ if self.supervision == Supervision::Stopping => Ok(()),
@@ -220,7 +221,13 @@ impl Machine {
                 port: self.port_name(port),
                 state,
             }),
-            source => Err(Failure::Send { device, source }),
+            source => Err(Failure::Send {
+                device: match sender {
+                    Sender::Heartbeat => "heartbeat".to_owned(),
+                    Sender::Device(at) => self.device_name(at),
+                },
+                source,
+            }),
         }
     }
 

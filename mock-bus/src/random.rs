@@ -5,6 +5,7 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use units::portable::ln;
 
 /// One source of random numbers.
 #[derive(Clone, Debug)]
@@ -49,7 +50,7 @@ impl Stream {
             let (a, b) = (self.between(-1.0, 1.0), self.between(-1.0, 1.0));
             let square = a * a + b * b;
             if square > 0.0 && square < 1.0 {
-                let factor = (-2.0 * square.ln() / square).sqrt();
+                let factor = (-2.0 * ln(square) / square).sqrt();
                 self.spare_gaussian = Some(b * factor);
                 return a * factor;
             }

@@ -232,6 +232,73 @@ fn fused_multiply_add_is_never_used() {
     }
 }
 
+/// Functions of the operating system, whose last bits differ between processors and versions.
+const SYSTEMS_MATHEMATICS: &[&str] = &[
+    "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp",
+    "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "powi", "hypot", "cbrt",
+];
+
+/// What is only looked at: it reaches no set-point, no record and no log.
+const PICTURES: &str = "controller/src/report/";
+
+#[test]
+fn a_seed_is_the_same_log_whatever_the_processor_calls_a_sine() {
+    let is_test = |name: &str| {
+        ["test", "rig.rs", "fake"]
+            .iter()
+            .any(|it| name.contains(it))
+    };
+    let mut offences = Vec::new();
+    for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
+        for (name, text) in sources(&format!("{folder}/src")) {
+            if is_test(&name) || name.starts_with(PICTURES) {
+                continue;
+            }
+            for (line, code) in code_lines(without_tests(&text)) {
+                if let Some(function) = systems_function(code) {
+                    offences.push(format!("{name}:{line}: `{function}`"));
+                }
+            }
+        }
+    }
+    let why = "take it from `units::portable`";
+    assert!(offences.is_empty(), "{why}:\n{}", offences.join("\n"));
+}
+
+/// The first of the system's functions that a line of code calls or names.
+fn systems_function(code: &str) -> Option<&'static str> {
+    let named = |function: &&&str| {
+        let called = |with: &str| {
+            let argument = code.split(&format!(".{function}(")).nth(1);
+            argument.is_some_and(|it| with.is_empty() || it.starts_with(with))
+        };
+        let of_one = !["atan2", "log", "powf", "powi", "hypot"].contains(*function);
+        called(if of_one { ")" } else { "" }) || code.contains(&format!("f64::{function}"))
+    };
+    SYSTEMS_MATHEMATICS.iter().find(named).copied()
+}
+
+#[test]
+fn the_systems_functions_are_known_by_their_calls() {
+    for code in [
+        "let height = angle.sin();",
+        "let (sin, cos) = self.angle.value().sin_cos();",
+        "    .atan2(cosine)",
+        "values.map(f64::exp)",
+        "10.0_f64.powi(digits)",
+    ] {
+        assert!(systems_function(code).is_some(), "{code}");
+    }
+    for code in [
+        "let height = sin(angle);",
+        "self.log.delivery(&delivery);",
+        "let name = it.cos(4);",
+        "variance.sqrt().abs().floor()",
+    ] {
+        assert_eq!(systems_function(code), None, "{code}");
+    }
+}
+
 #[test]
 fn no_test_waits_for_the_clock_on_the_wall() {
     for (name, text) in sources("tests") {

@@ -2,10 +2,12 @@
 //!
 //! Every public signature of truestage speaks these types; micrometres, millimetres and
 //! arc-seconds exist only where a person writes or reads them (configuration, data files,
-//! screen). The package depends on nothing, so that everybody may import it.
+//! screen). The package depends on no other of truestage's, so that everybody
+//! may import it.
 
 mod coordinate;
 mod counts;
+pub mod portable;
 mod quantity;
 mod time;
 

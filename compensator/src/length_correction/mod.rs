@@ -26,6 +26,7 @@
 
 mod environment;
 
+use units::portable::{cos, tan};
 use units::{Celsius, Metres, Pascals, Radians, RelativeHumidity};
 
 use crate::air;
@@ -207,7 +208,7 @@ impl LengthCorrection {
             }
         }
         if let Some(cosine) = self.settings.cosine {
-            let corrected = length / cosine.angle.value().cos();
+            let corrected = length / cos(cosine.angle.value());
             terms.cosine = Some(replace(&mut length, corrected));
         }
         if let Some(material) = self.settings.material_expansion {
@@ -272,7 +273,7 @@ impl LengthCorrection {
         if let Some(cosine) = s.cosine {
             let (angle, u) = (cosine.angle.value(), cosine.u_angle.value());
             // First order, and the second order that is left when the angle itself is zero.
-            let relative = combine(&[angle.tan() * u, u * u / 2.0_f64.sqrt()]);
+            let relative = combine(&[tan(angle) * u, u * u / 2.0_f64.sqrt()]);
             lines.push((Source::Cosine, length * relative));
         }
         if let Some(material) = s.material_expansion {

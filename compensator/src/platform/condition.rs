@@ -4,6 +4,7 @@ use core::f64::consts::PI;
 use core::fmt;
 
 use nalgebra::SMatrix;
+use units::portable::{atan2, hypot, powi, sin_cos};
 use units::{Metres, Radians};
 
 use super::{Actuator, Platform, PlatformError, Point};
@@ -60,7 +61,7 @@ pub(super) fn extent(actuators: &[Actuator]) -> ([f64; 2], f64) {
     let mean = |axis: usize| points().map(|p| p[axis]).sum::<f64>() / count;
     let centre = [mean(0), mean(1)];
     let squares: f64 = points()
-        .map(|p| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2))
+        .map(|p| powi(p[0] - centre[0], 2) + powi(p[1] - centre[1], 2))
         .sum();
     (centre, (squares / count).sqrt())
 }
@@ -87,7 +88,7 @@ impl Platform {
     fn weakest(&self, angle: f64) -> (f64, Motion) {
         // Points that all coincide: any length will do, the turn about them has no gain.
         let size = if self.size > 0.0 { self.size } else { 1.0 };
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = sin_cos(angle);
         let [cx, cy] = self.centre;
         let turned_centre = [cos * cx - sin * cy, sin * cx + cos * cy];
         let mut gains = Gains::zeros();
@@ -150,7 +151,7 @@ impl Platform {
         };
         // det = lever·cos θ − radial·sin θ, each summed with its minor.
         let (lever, radial) = (sum(|r| r.lever), sum(|r| r.radial));
-        Some(lever.atan2(radial))
+        Some(atan2(lever, radial))
     }
 }
 
@@ -170,8 +171,8 @@ fn bisected(mut good: f64, mut bad: f64, good_at: impl Fn(f64) -> bool) -> f64 {
 /// A velocity (of the centre, and of turning, per metre) as a motion.
 fn motion_of([vx, vy, turn]: [f64; 3], centre: [f64; 2]) -> Motion {
     // A turn about a point a kilometre away is a shift for any platform.
-    if turn.abs() * 1e3 <= vx.hypot(vy) {
-        let mut direction = vy.atan2(vx);
+    if turn.abs() * 1e3 <= hypot(vx, vy) {
+        let mut direction = atan2(vy, vx);
         if direction < -1e-9 {
             direction += PI;
         }

@@ -8,6 +8,7 @@
 //! do, other starts are tried and the least misfit of all is taken.
 
 use nalgebra::SVector;
+use units::portable::{hypot, powi};
 use units::{Metres, Radians};
 
 use super::condition::Gains;
@@ -144,7 +145,7 @@ impl Platform {
             let Some(step) = self.step(pose, &misfit) else {
                 return Err(self.lost(iterations, pose, &misfit));
             };
-            let length = step[0].hypot(step[1]).hypot(step[2] * self.size);
+            let length = hypot(hypot(step[0], step[1]), step[2] * self.size);
             if length <= LAST_STEP * self.size {
                 pose = [0, 1, 2].map(|i| pose[i] + step[i]);
                 misfit = self.misfit(wanted, pose);
@@ -170,7 +171,7 @@ impl Platform {
     ) -> Option<[f64; 3]> {
         let whole = (TURN_MAX / step[2].abs()).min(1.0);
         (0..HALVINGS_MAX)
-            .map(|halvings| whole * 0.5_f64.powi(halvings))
+            .map(|halvings| whole * powi(0.5, halvings))
             .map(|share| [0, 1, 2].map(|i| pose[i] + share * step[i]))
             .find(|next| self.misfit(wanted, *next).norm() < misfit.norm())
     }
@@ -217,8 +218,8 @@ impl Platform {
 
     /// The largest length that took part in the arithmetic.
     fn reach(&self, [x, y, _]: [f64; 3]) -> f64 {
-        let arms = self.rows.iter().map(|r| r.radial.hypot(r.lever));
-        arms.fold(self.size + x.hypot(y), f64::max)
+        let arms = self.rows.iter().map(|r| hypot(r.radial, r.lever));
+        arms.fold(self.size + hypot(x, y), f64::max)
     }
 
     fn lost(&self, iterations: usize, pose: [f64; 3], misfit: &SVector<f64, 4>) -> ForwardError {

@@ -27,6 +27,7 @@ mod forward;
 mod presets;
 mod reach;
 
+use units::portable::{cos, hypot, sin};
 use units::{Metres, Radians};
 
 pub use condition::Motion;
@@ -154,7 +155,7 @@ struct Row {
 impl Row {
     fn new(actuator: &Actuator) -> Self {
         let [dx, dy] = actuator.direction;
-        let length = dx.hypot(dy);
+        let length = hypot(dx, dy);
         let (dx, dy) = (dx / length, dy / length);
         let (px, py) = (actuator.point.x.value(), actuator.point.y.value());
         Self {
@@ -172,8 +173,8 @@ impl Row {
 
     /// The part of the stroke that the turn makes.
     fn turned(&self, angle: f64) -> f64 {
-        let half = (angle / 2.0).sin();
-        self.lever * angle.sin() - 2.0 * self.radial * half * half
+        let half = sin(angle / 2.0);
+        self.lever * sin(angle) - 2.0 * self.radial * half * half
     }
 
     fn stroke(&self, [x, y, angle]: [f64; 3]) -> f64 {
@@ -182,7 +183,7 @@ impl Row {
 
     /// d stroke / d angle.
     fn per_radian(&self, angle: f64) -> f64 {
-        self.lever * angle.cos() - self.radial * angle.sin()
+        self.lever * cos(angle) - self.radial * sin(angle)
     }
 }
 
@@ -290,7 +291,7 @@ fn check(actuators: &[Actuator]) -> Result<(), PlatformError> {
         if !finite || it.direction.iter().any(|d| !d.is_finite()) {
             return Err(PlatformError::NotFinite { name: name() });
         }
-        let length = it.direction[0].hypot(it.direction[1]);
+        let length = hypot(it.direction[0], it.direction[1]);
         // Wide enough for a direction written with four digits, too narrow for a mistaken one.
         if (length - 1.0).abs() > 1e-3 {
             return Err(PlatformError::Direction {

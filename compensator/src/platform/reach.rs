@@ -6,6 +6,7 @@
 
 use core::f64::consts::TAU;
 
+use units::portable::{acos, asin, atan2, hypot};
 use units::{Metres, Radians};
 
 use super::{Platform, Point, Pose, Row};
@@ -235,13 +236,13 @@ impl Row {
     /// The turns at which the stroke equals one of its limits, with the platform at x, y. The
     /// turn's part is r cos(θ − φ) − a.
     fn turns_at_limits(&self, x: f64, y: f64) -> Vec<f64> {
-        let reach = self.radial.hypot(self.lever);
-        let phase = self.lever.atan2(self.radial);
+        let reach = hypot(self.radial, self.lever);
+        let phase = atan2(self.lever, self.radial);
         let limits = [self.min, self.max].into_iter();
         limits
             .map(|limit| (limit + self.radial - self.along(x, y)) / reach)
             .filter(|cosine| cosine.abs() <= 1.0)
-            .flat_map(|cosine| [phase + cosine.acos(), phase - cosine.acos()])
+            .flat_map(|cosine| [phase + acos(cosine), phase - acos(cosine)])
             .collect()
     }
 
@@ -249,15 +250,15 @@ impl Row {
     fn extremes(&self, start: [f64; 3], end: [f64; 3]) -> Vec<f64> {
         let mut fractions = vec![0.0, 1.0];
         let turn = end[2] - start[2];
-        let reach = self.radial.hypot(self.lever);
+        let reach = hypot(self.radial, self.lever);
         // d stroke/d θ = d·Δt/Δθ − r sin(θ − φ) = 0.
         let sine = self.along(end[0] - start[0], end[1] - start[1]) / (turn * reach);
         // Without a turn there is no extreme between the ends, and the sine is no number.
         if sine.is_nan() || sine.abs() > 1.0 {
             return fractions;
         }
-        let phase = self.lever.atan2(self.radial);
-        let rise = sine.asin();
+        let phase = atan2(self.lever, self.radial);
+        let rise = asin(sine);
         for flat in [phase + rise, phase + core::f64::consts::PI - rise] {
             // Every repetition of the angle that the path passes.
             let low = start[2].min(end[2]);
@@ -272,7 +273,7 @@ impl Row {
 }
 
 fn same_place(a: [f64; 2], b: [f64; 2]) -> bool {
-    (a[0] - b[0]).hypot(a[1] - b[1]) <= SLACK
+    hypot(a[0] - b[0], a[1] - b[1]) <= SLACK
 }
 
 /// The part of a convex polygon where `normal` · corner ≤ `limit`.

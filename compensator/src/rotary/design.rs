@@ -1,6 +1,7 @@
 //! What a set of plate offsets can tell: the information each harmonic gets, before any reading.
 
 use core::f64::consts::PI;
+use units::portable::{sin, sin_cos};
 
 /// Information below it is rounding of none; two placements one line apart of 100 000 have 2e-9.
 pub(super) const INFORMATION_MIN: f64 = 1e-12;
@@ -242,7 +243,7 @@ fn information(lines: usize, offsets: &[usize]) -> Vec<f64> {
 fn turn(lines: usize) -> Vec<(f64, f64)> {
     let mut turn = vec![(1.0, 0.0); lines];
     for m in 1..=lines / 2 {
-        let (sin, cos) = (2.0 * PI * m as f64 / lines as f64).sin_cos();
+        let (sin, cos) = sin_cos(2.0 * PI * m as f64 / lines as f64);
         turn[m] = (cos, sin);
         turn[lines - m] = (cos, -sin);
     }
@@ -257,7 +258,7 @@ fn by_pairs(lines: usize, offsets: &[usize], harmonic: usize) -> f64 {
         for b in &offsets[..at] {
             let apart = a.abs_diff(*b) * harmonic % lines;
             // sin(π − x) = sin(x), and the smaller argument is the more exact one.
-            let sine = (PI * apart.min(lines - apart) as f64 / lines as f64).sin();
+            let sine = sin(PI * apart.min(lines - apart) as f64 / lines as f64);
             sum += sine * sine;
         }
     }

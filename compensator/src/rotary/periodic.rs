@@ -18,6 +18,7 @@ use core::f64::consts::TAU;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use units::Radians;
+use units::portable::powi;
 
 use crate::error_table::Curve;
 use crate::interpolation::Segment;
@@ -269,7 +270,7 @@ impl PeriodicCompensation {
         let place = within / TAU * lines as f64;
         let line = (place as usize).min(lines - 1);
         let part = (place - line as f64).clamp(0.0, 1.0);
-        let square = |at: usize| uncertainties[at % lines].value().powi(2);
+        let square = |at: usize| powi(uncertainties[at % lines].value(), 2);
         let own = square(line) * (1.0 - part) + square(line + 1) * part;
         let bent = match self.interpolation {
             PeriodicInterpolation::BandLimited => 0.0,
@@ -393,9 +394,9 @@ fn band_limited(values: &[f64]) -> (Vec<Segment>, f64) {
     }
     let harmonics = || spectrum.iter().enumerate().skip(1);
     let fourth: f64 = harmonics()
-        .map(|(k, it)| 2.0 * it.norm() * (k as f64).powi(4))
+        .map(|(k, it)| 2.0 * it.norm() * powi(k as f64, 4))
         .sum();
-    let error = |refinement: usize| (TAU / (refinement * lines) as f64).powi(4) / 384.0 * fourth;
+    let error = |refinement: usize| powi(TAU / (refinement * lines) as f64, 4) / 384.0 * fourth;
     let allowed = |it: &&usize| **it == REFINEMENTS[0] || **it * lines <= PIECES_MAX;
     let possible = || REFINEMENTS.iter().filter(allowed);
     let wanted = possible().find(|it| error(**it) <= ERROR_WANTED);

@@ -8,6 +8,7 @@
 
 use core::cell::Cell;
 use core::f64::consts::TAU;
+use units::portable::sin_cos;
 
 use super::design::{Design, DesignError};
 
@@ -123,7 +124,7 @@ impl Search {
         };
         let candidates = (share * WORK_MAX as usize / descent).clamp(16.min(lines), lines);
         let turn = (0..lines)
-            .map(|m| (TAU * m as f64 / lines as f64).sin_cos())
+            .map(|m| sin_cos(TAU * m as f64 / lines as f64))
             .map(|(sin, cos)| (cos, sin))
             .collect();
         Self {

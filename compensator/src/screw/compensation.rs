@@ -9,6 +9,7 @@
 
 use core::f64::consts::TAU;
 
+use units::portable::hypot;
 use units::{Approach, Metres};
 
 use super::ScrewModel;
@@ -169,7 +170,7 @@ impl ScrewCompensation {
         let (low, high) = self.nut(&after);
         let standard_uncertainty = self.u_model(set_point, engagement).map(|u| {
             let doubt = (high - low) / 2.0 / 3.0_f64.sqrt();
-            Metres(u.value().hypot(doubt))
+            Metres(hypot(u.value(), doubt))
         });
         Correction {
             set_point,

@@ -42,6 +42,7 @@ pub mod patent;
 
 use core::f64::consts::TAU;
 
+use units::portable::{hypot, sin_cos};
 use units::{Approach, Metres};
 
 use crate::uncertainty::propagate;
@@ -69,17 +70,17 @@ pub struct Harmonic {
 impl Harmonic {
     /// The largest deviation it makes.
     pub fn amplitude(&self) -> Metres {
-        Metres(self.sine.value().hypot(self.cosine.value()))
+        Metres(hypot(self.sine.value(), self.cosine.value()))
     }
 
     fn at(&self, stroke: f64, lead: f64) -> f64 {
-        let (sin, cos) = turns(stroke, lead, self.number).sin_cos();
+        let (sin, cos) = sin_cos(turns(stroke, lead, self.number));
         self.sine.value() * sin + self.cosine.value() * cos
     }
 
     /// d deviation / d stroke.
     fn slope_at(&self, stroke: f64, lead: f64) -> f64 {
-        let (sin, cos) = turns(stroke, lead, self.number).sin_cos();
+        let (sin, cos) = sin_cos(turns(stroke, lead, self.number));
         let per_metre = TAU * f64::from(self.number) / lead;
         per_metre * (self.sine.value() * cos - self.cosine.value() * sin)
     }
@@ -210,7 +211,7 @@ fn design_row(stroke: f64, approach: Approach, lead: f64, harmonics: &[u32]) -> 
     };
     let mut row = vec![1.0, stroke, reverse];
     for &number in harmonics {
-        let (sin, cos) = turns(stroke, lead, number).sin_cos();
+        let (sin, cos) = sin_cos(turns(stroke, lead, number));
         row.extend([sin, cos]);
     }
     row

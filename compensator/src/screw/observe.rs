@@ -4,6 +4,7 @@
 use super::fit::FitError;
 use super::{BASE, design_row};
 use crate::measurement::Stroke;
+use units::portable::hypot;
 use units::{Approach, Metres};
 
 /// The share of the lost motion's column that slope and offset must not explain: below it its
@@ -103,7 +104,7 @@ fn weakest(pair: &[Vec<f64>; 2]) -> f64 {
     let [sine, cosine] = pair;
     let (ss, cc, sc) = (dot(sine, sine), dot(cosine, cosine), dot(sine, cosine));
     let (mean, half) = ((ss + cc) / 2.0, (ss - cc) / 2.0);
-    let smallest = (mean - half.hypot(sc)).max(0.0);
+    let smallest = (mean - hypot(half, sc)).max(0.0);
     (smallest / (0.5 * sine.len() as f64)).sqrt()
 }
 

@@ -12,6 +12,7 @@
 
 use std::collections::BTreeMap;
 
+use units::portable::hypot;
 use units::{Approach, Metres};
 
 use super::{FitError, ScrewModel};
@@ -91,7 +92,7 @@ pub fn estimate(strokes: &[Stroke]) -> Result<PatentEstimate, FitError> {
             mean_at_m: u_m,
             mean_at_n: u_n,
             mean_all: of(rows),
-            slope: u_m.value().hypot(u_n.value()) / (at_n - at_m).value(),
+            slope: hypot(u_m.value(), u_n.value()) / (at_n - at_m).value(),
         }
     });
     Ok(PatentEstimate {

@@ -1,6 +1,7 @@
 //! A CiA 404 module: which inputs carry what, and how finely they are read.
 
 use drivers::device::cia404::{Cia404Settings, InputSettings, Quantity};
+use units::portable::powi;
 
 use super::{CHECKED, node_settings};
 use crate::config::{AnalogConfig, CanBus};
@@ -13,7 +14,7 @@ const DIGITS_MAX: u8 = 3;
 /// The digits behind the point of a millivolt with which `full_scale_v` can still be told: as many
 /// as fit. `None` when not even whole millivolts reach that far.
 pub(crate) fn voltage_digits(full_scale_v: f64) -> Option<u8> {
-    let fits = |digits: &u8| full_scale_v * 10_f64.powi(i32::from(*digits)) <= REACH_V;
+    let fits = |digits: &u8| full_scale_v * powi(10.0, i32::from(*digits)) <= REACH_V;
     (0..=DIGITS_MAX).rev().find(fits)
 }
 

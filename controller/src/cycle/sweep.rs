@@ -10,6 +10,7 @@ use core::time::Duration;
 use std::collections::BTreeSet;
 
 use drivers::device::{LatchCommand, Latched, Repeat, SYNCS_PER_EDGE};
+use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use super::turn::Way;
@@ -209,9 +210,9 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
 fn phase_of(latched: &[Latched<Radians>], spacing: f64, near: Option<Radians>) -> f64 {
     let (sine, cosine) = latched.iter().fold((0.0, 0.0), |(sine, cosine), edge| {
         let angle = TAU * edge.position.value() / spacing;
-        (sine + angle.sin(), cosine + angle.cos())
+        (sine + sin(angle), cosine + cos(angle))
     });
-    let phase = sine.atan2(cosine) / TAU * spacing;
+    let phase = atan2(sine, cosine) / TAU * spacing;
     let near = near.map_or(0.0, Radians::value);
     phase + spacing * ((near - phase) / spacing).round()
 }

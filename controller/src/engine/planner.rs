@@ -12,6 +12,7 @@ use rsruckig::prelude::{
     ControlInterface, DataArrayOrVec, InputParameter, Ruckig, RuckigResult, Synchronization,
     ThrowErrorHandler, Trajectory,
 };
+use units::portable::{power_of_two_below, powi};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
 use super::motion::Moment;
@@ -77,13 +78,13 @@ impl Scale {
     fn of(reached_acceleration: f64) -> Self {
         let time = (Self::ACCELERATION / (Self::LENGTH * reached_acceleration)).sqrt();
         Self {
-            time: time.log2().floor().exp2(),
+            time: power_of_two_below(time),
         }
     }
 
     /// Of a quantity that has so many seconds below its fraction bar.
     fn factor(self, seconds: i32) -> f64 {
-        Self::LENGTH * self.time.powi(seconds)
+        Self::LENGTH * powi(self.time, seconds)
     }
 }
 

@@ -3,6 +3,7 @@
 use compensator::screw::patent::PatentEstimate;
 use compensator::screw::{Fitted, ScrewModel, StrokeOutlier};
 use serde_json::{Value, json};
+use units::portable::atan2;
 use units::{Metres, Radians};
 
 /// Rounded to a picometre: uncertainties are small and wanted with digits.
@@ -100,7 +101,7 @@ fn harmonics(model: &ScrewModel) -> Vec<Value> {
     let each = |(index, it): (usize, &compensator::screw::Harmonic)| {
         let u = model.u_harmonic(index);
         // As amplitude · sin(2π number s/lead + phase).
-        let phase = Radians(it.cosine.value().atan2(it.sine.value()));
+        let phase = Radians(atan2(it.cosine.value(), it.sine.value()));
         json!({
             "harmonic": it.number,
             "amplitude_um": um(it.amplitude()),

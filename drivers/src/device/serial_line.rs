@@ -33,7 +33,9 @@ impl LineAssembler {
     /// Takes one byte; returns the message that it ends.
     pub fn push(&mut self, byte: u8) -> Option<AssembledLine> {
         if byte == self.terminator {
-            let line = core::mem::take(&mut self.line);
+            // The next message is about as long: room for it is asked for once.
+            let next = Vec::with_capacity(self.line.len());
+            let line = core::mem::replace(&mut self.line, next);
             return Some(if core::mem::take(&mut self.discarding) {
                 AssembledLine::Overlong
             } else {

@@ -5,6 +5,7 @@
 //! SYS TEC IO-X7 (thermocouples, 0x7130, 0x6126, 0x6131), esd CAN-CBX-Pt100 and -THERMO (0x6110,
 //! 0x6131, 0x6150). Objects 0x6nnn hold REAL32, 0x7nnn INTEGER16 and 0x9nnn INTEGER32 of the same
 //! value.
+use units::portable::powi;
 
 /// The profile number in 0x1000.
 pub const PROFILE: u16 = 404;
@@ -143,7 +144,7 @@ impl PhysicalUnit {
     /// How much of the unit, without its prefix, one count of a value with so many decimal
     /// digits is.
     pub fn per_count(self, decimal_digits: u8) -> f64 {
-        10.0_f64.powi(i32::from(self.exponent) - i32::from(decimal_digits))
+        powi(10.0, i32::from(self.exponent) - i32::from(decimal_digits))
     }
 }
 

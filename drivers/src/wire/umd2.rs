@@ -159,13 +159,39 @@ impl Line {
     }
 }
 
-/// Digits with an optional minus sign: `str::parse` would also take a plus sign.
+/// Digits with an optional minus sign: `str::parse` would also take a plus sign, and these are
+/// thousands of numbers a second.
 fn parse_field(text: &str) -> Option<i64> {
-    let digits = text.strip_prefix('-').unwrap_or(text);
-    if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+    let (digits, sign) = match text.strip_prefix('-') {
+        Some(digits) => (digits, -1),
+        None => (text, 1),
+    };
+    if digits.is_empty() {
         return None;
     }
-    text.parse().ok()
+    digits.bytes().try_fold(0_i64, |value, byte| {
+        let digit = byte.is_ascii_digit().then(|| i64::from(byte - b'0'))?;
+        value.checked_mul(10)?.checked_add(sign * digit)
+    })
+}
+
+/// Appends an integer as decimal digits; formatting would cost more than all the rest of a sample.
+fn push_decimal(line: &mut Vec<u8>, value: i64) {
+    const LONGEST: usize = 20;
+    let mut digits = [0; LONGEST];
+    let (mut rest, mut begin) = (value.unsigned_abs(), LONGEST);
+    loop {
+        begin -= 1;
+        digits[begin] = b'0' + (rest % 10) as u8;
+        rest /= 10;
+        if rest == 0 {
+            break;
+        }
+    }
+    if value < 0 {
+        line.push(b'-');
+    }
+    line.extend_from_slice(&digits[begin..]);
 }
 
 impl Sample {
@@ -187,18 +213,30 @@ impl Sample {
 
     /// The line on the wire, LF included.
     pub fn emit(&self) -> String {
+        let mut line = Vec::new();
+        self.emit_into(&mut line);
+        String::from_utf8(line).expect("digits, signs and blanks are ASCII")
+    }
+
+    /// Appends the line on the wire, LF included.
+    pub fn emit_into(&self, line: &mut Vec<u8>) {
         let (code, data) = self.low_speed.raw();
-        format!(
-            "{} {} {} {} {} {} {} {}\n",
-            self.reference_count,
-            self.measurement_count,
+        let fields = [
+            self.reference_count.into(),
+            self.measurement_count.into(),
             self.distance,
             self.velocity,
-            self.phase,
-            self.sequence,
-            code,
-            data,
-        )
+            self.phase.into(),
+            self.sequence.into(),
+            code.into(),
+            data.into(),
+        ];
+        for field in fields {
+            push_decimal(line, field);
+            line.push(b' ');
+        }
+        line.pop();
+        line.push(b'\n');
     }
 
     /// Whether the phase may be used.

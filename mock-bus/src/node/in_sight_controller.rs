@@ -18,6 +18,7 @@ use drivers::wire::in_sight::{
     ACQUIRE, CELL_ERROR, COUNT_MAX, Cell, Command, Inspection, Status, TERMINATOR,
 };
 use units::Time;
+use units::portable::{atan2, sin_cos};
 
 use super::Node;
 use crate::plant::{Mark, Plant};
@@ -347,8 +348,8 @@ fn motion(marks: &[Mark]) -> [f64; 3] {
         cosines += ax * bx + ay * by;
         sines += ax * by - ay * bx;
     }
-    let angle = sines.atan2(cosines);
-    let (sin, cos) = angle.sin_cos();
+    let angle = atan2(sines, cosines);
+    let (sin, cos) = sin_cos(angle);
     [
         is[0] - (cos * was[0] - sin * was[1]),
         is[1] - (sin * was[0] + cos * was[1]),

@@ -98,7 +98,7 @@ impl Umd2InterferometerNode {
         let sample = self.sample(&fringes, plant);
         let lost = self.config.lost_sample_every;
         if lost == 0 || !self.samples.is_multiple_of(u64::from(lost)) {
-            self.batch.extend_from_slice(sample.emit().as_bytes());
+            sample.emit_into(&mut self.batch);
         }
         self.batched += 1;
         if self.batched >= self.config.batch_samples {
@@ -109,7 +109,8 @@ impl Umd2InterferometerNode {
     fn hand_over(&mut self) {
         self.batched = 0;
         if !self.batch.is_empty() {
-            let batch = core::mem::take(&mut self.batch);
+            let next = Vec::with_capacity(self.batch.len());
+            let batch = core::mem::replace(&mut self.batch, next);
             self.outbox.push_back(Payload::Bytes(batch));
         }
     }

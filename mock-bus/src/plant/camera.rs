@@ -9,6 +9,7 @@
 
 use crate::random::Stream;
 use serde::Deserialize;
+use units::portable::{hypot, sin_cos};
 
 use super::platform::Pose;
 
@@ -113,7 +114,7 @@ impl Camera {
         // Drawn in any case: a mark out of sight does not shift the noise of the next picture.
         let noise = [self.noise.gaussian(), self.noise.gaussian()];
         let (from, to) = (opened.place_of(built_m), closed.place_of(built_m));
-        let smear_m = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let smear_m = hypot(to[0] - from[0], to[1] - from[1]);
         let place_m = [0, 1].map(|axis| f64::midpoint(from[axis], to[axis]));
         let field_m = self.config.field_mm * 1e-3;
         let outside = |axis: usize| (place_m[axis] - built_m[axis]).abs() > field_m;
@@ -134,7 +135,7 @@ impl Camera {
     }
 
     fn in_frame(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.config.rotation_deg.to_radians().sin_cos();
+        let (sin, cos) = sin_cos(self.config.rotation_deg.to_radians());
         let (x, y) = (cos * x + sin * y, cos * y - sin * x);
         [x, if self.config.mirrored { -y } else { y }]
     }

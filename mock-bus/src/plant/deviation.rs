@@ -12,6 +12,7 @@
 
 use crate::random::Stream;
 use core::f64::consts::TAU;
+use units::portable::{exp, sin};
 
 use super::config::DeviationConfig;
 
@@ -30,7 +31,7 @@ struct Wave {
 
 impl Wave {
     fn at(&self, position_m: f64) -> f64 {
-        self.amplitude_m * (self.per_m * position_m + self.phase).sin()
+        self.amplitude_m * sin(self.per_m * position_m + self.phase)
     }
 }
 
@@ -112,6 +113,13 @@ impl Field {
 
     pub(super) fn at(&self, position_m: f64) -> f64 {
         self.smooth(position_m) + self.cyclic.at(position_m)
+    }
+
+    /// It is not larger at `position_m` than this, which costs less to tell.
+    pub(super) fn at_most(&self, position_m: f64) -> f64 {
+        let waves: f64 = self.waves.iter().map(|wave| wave.amplitude_m.abs()).sum();
+        let periodic_m = waves + self.at_zero_m.abs() + self.cyclic.amplitude_m.abs();
+        (self.slope * position_m).abs() + periodic_m
     }
 }
 
@@ -198,5 +206,9 @@ impl StopError {
 }
 
 fn approach(from: f64, to: f64, lengths: f64) -> f64 {
-    to + (from - to) * (-lengths).exp()
+    // What has arrived stays, as the exponential would have it too.
+    if from == to {
+        return to;
+    }
+    to + (from - to) * exp(-lengths)
 }

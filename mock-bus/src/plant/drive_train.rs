@@ -41,11 +41,12 @@ impl DriveTrain {
         resting
     }
 
-    /// Lets the switches see where the mass is; `true_of` is the place they act by.
-    pub(super) fn watch_switches(&mut self, true_of: impl Fn(f64) -> f64) {
+    /// Lets the switches see where the mass is; `true_of` is the place they act by, never further
+    /// than `error_m` from the scale's.
+    pub(super) fn watch_switches(&mut self, error_m: f64, true_of: impl Fn(f64) -> f64) {
         let scale = self.mass.position_at(Time::ZERO);
         let near = self.switches.iter_mut().flatten();
-        for switch in near.filter(|it| it.is_near(scale)) {
+        for switch in near.filter(|it| it.is_near(scale, error_m)) {
             switch.watch(true_of(scale));
         }
     }

@@ -15,6 +15,7 @@
 //! Absent: shifts along x (uneven demagnetisation), which the method cannot cure either.
 
 use crate::random::Stream;
+use units::portable::atan;
 use units::{Metres, Volts};
 
 use super::config::HallConfig;
@@ -131,7 +132,7 @@ impl HallField {
 
     fn face(&self, x: f64, z: f64) -> f64 {
         let half = self.config.magnet_width_mm * 0.5e-3;
-        ((x + half) / z).atan() - ((x - half) / z).atan()
+        atan((x + half) / z) - atan((x - half) / z)
     }
 
     /// In curve units per metre.

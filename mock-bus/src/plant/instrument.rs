@@ -9,6 +9,7 @@
 //! Absent: air turbulence, polarisation mixing, thermal growth of the optics.
 
 use crate::random::Stream;
+use units::portable::{cos, exp};
 use units::{Celsius, Metres, Pascals, RelativeHumidity};
 
 use super::config::InterferometerConfig;
@@ -60,7 +61,7 @@ pub(super) struct Interferometer {
 impl Interferometer {
     pub(super) fn new(config: InterferometerConfig, seed: u64) -> Self {
         Self {
-            cosine: (config.misalignment_mrad * 1e-3).cos(),
+            cosine: cos(config.misalignment_mrad * 1e-3),
             config,
             noise: Stream::new(seed, "interferometer"),
             beam: Beam::Good,
@@ -124,7 +125,7 @@ fn refractive_index(air: Celsius, pressure: Pascals, humidity: RelativeHumidity)
 
 /// Over water, in pascals (Buck 1996).
 fn saturation_pressure(celsius: f64) -> f64 {
-    611.21 * ((18.678 - celsius / 234.5) * (celsius / (257.14 + celsius))).exp()
+    611.21 * exp((18.678 - celsius / 234.5) * (celsius / (257.14 + celsius)))
 }
 
 #[cfg(test)]

@@ -35,10 +35,16 @@ impl LimitSwitch {
         ]
     }
 
-    /// Whether it may change its state here, by a generous margin; saves looking closer.
-    pub(super) fn is_near(&self, encoder_m: f64) -> bool {
-        const MARGIN_M: f64 = 1e-3;
-        self.pressed || self.side * encoder_m - self.at_m > -MARGIN_M
+    /// Whether it may change its state here, where the true place is within `error_m` of what the
+    /// encoder shows; saves looking closer.
+    pub(super) fn is_near(&self, encoder_m: f64, error_m: f64) -> bool {
+        const MARGIN_M: f64 = 1e-6;
+        let beyond_m = self.side * encoder_m - self.at_m - self.jitter_m;
+        if self.pressed {
+            beyond_m < error_m + MARGIN_M - self.config.hysteresis_um * 1e-6
+        } else {
+            beyond_m > -error_m - MARGIN_M
+        }
     }
 
     pub(super) fn watch(&mut self, true_m: f64) {

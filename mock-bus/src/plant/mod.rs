@@ -103,8 +103,10 @@ impl Plant {
 
     /// Lets the physics run up to `now`; a moment that has passed changes nothing.
     pub fn advance(&mut self, now: Time) {
-        self.now = self.now.max(now);
-        self.machine.advance(self.now);
+        if now > self.now {
+            self.now = now;
+            self.machine.advance(now);
+        }
     }
 
     /// What the drive does to axis `axis` from now on.
@@ -208,7 +210,8 @@ impl Plant {
         let seen = match self.machine.volumetric() {
             Some(volumetric) => volumetric.sighting(self.now),
             None => {
-                let position_m = self.true_position().value();
+                let stage_c = air.stage_temperature.value();
+                let position_m = self.true_position_at(stage_c).value();
                 let stage = self.machine.stage();
                 let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
                 Some(self.interferometer.reflector(position_m, speed))
@@ -255,11 +258,18 @@ impl Plant {
     /// Of the linear stage: what carries the magnets and the reflector. Without one these
     /// stand at their zero.
     fn true_position(&self) -> Metres {
-        let Some(stage) = self.machine.stage() else {
+        if self.machine.stage().is_none() {
             return Metres::ZERO;
-        };
-        let stage_c = self.climate.at(self.now).stage_temperature.value();
-        Metres(stage.true_position_m(self.now, stage_c))
+        }
+        self.true_position_at(self.climate.stage_temperature(self.now).value())
+    }
+
+    /// The same with the stage's temperature known.
+    fn true_position_at(&self, stage_c: f64) -> Metres {
+        let stage = self.machine.stage();
+        stage.map_or(Metres::ZERO, |stage| {
+            Metres(stage.true_position_m(self.now, stage_c))
+        })
     }
 
     /// How far the Hall sensors have drifted.

@@ -62,8 +62,9 @@ impl Stage {
     /// The switches' own place varies by more than the scale grows: expansion is left out.
     fn watch_switches(&mut self) {
         let field = &self.field;
+        let error_m = field.at_most(self.train.mass.position_at(Time::ZERO));
         self.train
-            .watch_switches(|scale_m| scale_m + field.at(scale_m));
+            .watch_switches(error_m, |scale_m| scale_m + field.at(scale_m));
     }
 
     /// Without power the stage can be moved; `now` is when the power is off.

@@ -7,6 +7,7 @@
 
 mod effects;
 mod log;
+mod mains;
 mod port;
 mod traffic;
 
@@ -20,17 +21,17 @@ mod tests;
 mod volumetric_tests;
 
 use core::any::Any;
+use core::cell::Cell;
 use std::collections::VecDeque;
 
 use drivers::wire::can::BusError;
 use drivers::wire::{Payload, Port};
 use units::Time;
 
-use crate::bus::Sender;
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
-use crate::plant::{HallDrift, LineSetUp, Plant, Truth};
+use crate::plant::{Plant, Truth};
 use log::{Direction, Log};
 use port::PortState;
 
@@ -127,6 +128,8 @@ pub struct Simulation {
     outbox: VecDeque<Delivery>,
     mains_back: Time,
     log: Log,
+    /// When something happens by itself next, until something changes that.
+    next: Cell<Option<Time>>,
 }
 
 impl Simulation {
@@ -156,6 +159,7 @@ impl Simulation {
             outbox: VecDeque::new(),
             mains_back: Time::NEVER,
             log: Log::default(),
+            next: Cell::new(None),
             config: config.clone(),
         };
         for fault in &config.faults {
@@ -254,6 +258,7 @@ impl Simulation {
             .get_mut(place)
             .ok_or(DeliverError::NoPort { port })?;
         state.take(self.now, port, payload)?;
+        self.next.set(None);
         self.log
             .payload(self.now, port, Direction::FromHost, payload);
         if let Payload::Bytes(bytes) = payload
@@ -271,11 +276,13 @@ impl Simulation {
     pub fn inject(&mut self, fault: FaultConfig) -> Result<FaultId, ConfigError> {
         self.config
             .check_fault(&fault, |node| self.slot(node).is_some())?;
+        self.next.set(None);
         Ok(self.plan.add(self.now, fault))
     }
 
     /// Ends a fault now.
     pub fn end_fault(&mut self, fault: FaultId) {
+        self.next.set(None);
         self.plan.end(self.now, fault);
     }
 
@@ -284,48 +291,10 @@ impl Simulation {
         self.plan.delivered(fault)
     }
 
-    /// The mains goes off now and comes back after the configured time; meanwhile the Hall
-    /// sensors drift to `drift` and nobody holds the stage.
-    pub fn power_cycle(&mut self, drift: HallDrift) {
-        for place in 0..self.slots.len() {
-            let entry = self.config.nodes.get(place);
-            if !entry.is_some_and(|entry| entry.own_mains || entry.brought_along) {
-                self.power_off(place);
-            }
-        }
-        self.plant.power_cycle(drift);
-        self.mains_back = self.now + self.config.power_off();
-    }
-
-    /// The mains goes off, or comes back, and stays so; sensors do not drift meanwhile.
-    pub fn switch_mains(&mut self, on: bool) {
-        if on {
-            self.mains_back = Time::NEVER;
-            self.switch_on();
-        } else {
-            let drift = self.plant.hall_drift();
-            self.power_cycle(drift);
-            self.mains_back = Time::NEVER;
-        }
-    }
-
     /// Somebody takes up the table's plate, turns it by so many lines against the table and
     /// fixes it again, a little off as ever. Nothing happens on a machine without one.
     pub fn turn_plate(&mut self, lines: f64) {
         self.plant.turn_plate(lines);
-    }
-
-    /// Somebody sets a laser up along a line of three axes, from where their tool stands, and
-    /// switches on what was brought along for it.
-    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
-        self.plant.set_up_line(set_up);
-        self.power_what_was_brought(true);
-    }
-
-    /// Somebody packs the laser up again.
-    pub fn take_line_away(&mut self) {
-        self.plant.take_line_away();
-        self.power_what_was_brought(false);
     }
 
     /// The device called `name`, when it is a `T`: for the faults that only it knows. It is
@@ -335,6 +304,7 @@ impl Simulation {
         let slot = &mut self.slots[place];
         if slot.powered {
             slot.next = self.now;
+            self.next.set(None);
         }
         let node: &mut dyn Any = &mut *slot.node;
         node.downcast_mut()
@@ -371,30 +341,13 @@ impl Simulation {
         self.plant.advance(self.now);
     }
 
-    fn switch_on(&mut self) {
-        for place in 0..self.slots.len() {
-            if !self.is_brought_along(place) {
-                self.power_on(place);
-            }
-        }
-    }
-
-    fn is_brought_along(&self, place: usize) -> bool {
-        let entry = self.config.nodes.get(place);
-        entry.is_some_and(|entry| entry.brought_along)
-    }
-
-    fn power_what_was_brought(&mut self, on: bool) {
-        for place in 0..self.slots.len() {
-            match (self.is_brought_along(place), on) {
-                (true, true) => self.power_on(place),
-                (true, false) => self.power_off(place),
-                (false, _) => {}
-            }
-        }
-    }
-
     fn next_internal(&self) -> Time {
+        let next = self.next.get().unwrap_or_else(|| self.find_next());
+        self.next.set(Some(next));
+        next
+    }
+
+    fn find_next(&self) -> Time {
         let ports = self.ports.iter().map(|port| port.next_event(self.now));
         let slots = self.slots.iter().map(|slot| slot.next);
         let own = self.plan.next_edge().min(self.mains_back);
@@ -404,6 +357,7 @@ impl Simulation {
     /// Everything that is due at `next`; an arbitration only when nothing else is.
     fn step(&mut self, next: Time) {
         self.move_clock(next);
+        self.next.set(None);
         if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
             return;
         }
@@ -423,15 +377,6 @@ impl Simulation {
             }
         }
         any
-    }
-
-    fn step_mains(&mut self) -> bool {
-        if self.mains_back > self.now {
-            return false;
-        }
-        self.mains_back = Time::NEVER;
-        self.switch_on();
-        true
     }
 
     fn step_ports(&mut self) -> bool {
@@ -468,29 +413,6 @@ impl Simulation {
 
     fn slot(&self, name: &str) -> Option<usize> {
         self.slots.iter().position(|slot| slot.name == name)
-    }
-
-    fn power_off(&mut self, place: usize) {
-        let slot = &mut self.slots[place];
-        if !core::mem::take(&mut slot.powered) {
-            return;
-        }
-        slot.next = Time::NEVER;
-        slot.node.power_off(self.now, &mut self.plant);
-        while slot.node.poll_transmit().is_some() {}
-        let port = slot.port;
-        self.ports[port].forget(Sender::Node(place));
-    }
-
-    fn power_on(&mut self, place: usize) {
-        let slot = &mut self.slots[place];
-        if slot.powered {
-            return;
-        }
-        slot.powered = true;
-        slot.node.power_on(self.now, &mut self.plant);
-        slot.next = slot.node.next_event();
-        self.flush(place);
     }
 }
 

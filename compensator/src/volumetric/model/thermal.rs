@@ -15,6 +15,7 @@
 //!
 //! Absent: gradients along a guide, what lags behind its thermometers.
 
+use units::portable::hypot;
 use units::{Celsius, Metres, Radians};
 
 use super::Chain;
@@ -198,7 +199,10 @@ impl ThermalBend {
     /// The share of what its channels' uncertainties make of the gradient that can be: one beyond
     /// what the coefficient is known for is refused, so that it is within that on either side.
     pub(crate) fn share_within(&self, gradient: f64, u_of_channel: impl Fn(usize) -> f64) -> f64 {
-        let u = u_of_channel(self.over).hypot(self.under.map_or(0.0, u_of_channel));
+        let u = hypot(
+            u_of_channel(self.over),
+            self.under.map_or(0.0, u_of_channel),
+        );
         let most = (self.gradient_max + gradient.abs()) / 3.0_f64.sqrt();
         if u > most { most / u } else { 1.0 }
     }

@@ -16,6 +16,7 @@
 //! | h, L, φ | [`RollOptics`]: `height`, `base`, `inclination` |
 //! | x₁, x₂ | the readings of both detectors |
 
+use units::portable::{atan, tan};
 use units::{Metres, Radians};
 
 /// The geometry of the two detectors.
@@ -79,7 +80,7 @@ impl RollOptics {
         inclination: Radians,
         roll_max: Radians,
     ) -> Result<Self, RollError> {
-        let slope = inclination.value().tan();
+        let slope = tan(inclination.value());
         let determined = (2.0 * height.value() - base.value() * slope).abs();
         let sound = base > Metres::ZERO
             && slope.abs() > 1e-6
@@ -115,7 +116,7 @@ impl RollOptics {
         let t = 2.0 * sum / (linear + root.copysign(linear));
         let offset = |x: Metres| Metres((h * t - x.value()) / (f - t));
         let roll = Roll {
-            angle: Radians(t.atan()),
+            angle: Radians(atan(t)),
             first: offset(first),
             second: offset(second),
         };

@@ -1,6 +1,7 @@
 //! Whether a platform can be held, reached and calibrated as it is described.
 
 use compensator::platform::{Platform, Point, Pose};
+use units::portable::hypot;
 use units::{Metres, Radians};
 
 use super::judge::{Finding, Judge};
@@ -124,7 +125,7 @@ fn check_references(
         judge.within("lead_mm", actuator.lead_mm, 1e-3, 1e3);
         judge.within("index_mm", actuator.index_mm, -1e4, 1e4);
         let [x, y] = actuator.direction;
-        judge.within("direction", x.hypot(y), 1e-6, 1e6);
+        judge.within("direction", hypot(x, y), 1e-6, 1e6);
         if let Some(axis) = config.axis.get(&actuator.axis) {
             if actuator.index_mm >= axis.soft_max_mm {
                 judge.say(

@@ -2,6 +2,7 @@
 
 use compensator::platform::{Actuator, Platform, PlatformError, Point, Pose};
 use compensator::screw::{Engagement, ScrewCompensation, ScrewMemory};
+use units::portable::{hypot, sin_cos};
 use units::{Metres, Radians};
 
 use crate::config::{MachineConfig, PlatformConfig};
@@ -85,7 +86,7 @@ pub(crate) fn kinematics(
         .iter()
         .map(|it| {
             let [x, y] = it.direction;
-            let length = x.hypot(y);
+            let length = hypot(x, y);
             let limits = config.axis.get(&it.axis);
             Actuator {
                 name: it.axis.clone(),
@@ -108,7 +109,7 @@ pub(crate) fn from_datum(seen: Pose, datum: Pose) -> Pose {
     let angle = seen.angle - datum.angle;
     // What the camera says jumps by a turn where its angles begin again.
     let angle = angle - angle.whole_turns();
-    let (sin, cos) = angle.value().sin_cos();
+    let (sin, cos) = sin_cos(angle.value());
     let (x, y) = (datum.x.value(), datum.y.value());
     Pose {
         x: seen.x - Metres(cos * x - sin * y),

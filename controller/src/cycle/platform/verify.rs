@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use compensator::platform::Pose;
+use units::portable::powi;
 use units::{Metres, Radians};
 
 use super::failure::PlatformFailure;
@@ -95,7 +96,7 @@ impl Machine {
         let checked = self
             .check_poses(&targets, compensated, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let squares: f64 = checked.iter().map(|it| it.error.value().powi(2)).sum();
+        let squares: f64 = checked.iter().map(|it| powi(it.error.value(), 2)).sum();
         let errors = checked.iter().map(|it| it.error);
         Ok(PlatformVerified {
             largest: errors.fold(Metres::ZERO, Metres::max),

@@ -4,6 +4,7 @@
 
 use compensator::volumetric::model::{Thermal, ThermalChannel};
 use compensator::volumetric::online::{Feed, FeedStatus, TemperatureChannel, Trouble};
+use units::portable::hypot;
 use units::{Celsius, Time};
 
 use super::VolumetricFailure;
@@ -119,7 +120,7 @@ impl Thermometers {
     fn u_of(&self, at: usize) -> f64 {
         let (channel, feed) = (&self.channels[at], &self.each[at].feed);
         if feed.status() == FeedStatus::Good {
-            return channel.u.hypot(feed.left().value());
+            return hypot(channel.u, feed.left().value());
         }
         let shown = self.shown[at];
         let farthest = (channel.high - shown)

@@ -1,6 +1,7 @@
 //! How an image controller is used.
 
 use core::time::Duration;
+use units::portable::sin_cos;
 use units::{Metres, Radians};
 
 use crate::wire::in_sight::Cell;
@@ -19,7 +20,7 @@ impl CameraFrame {
     /// A displacement and a turn in the machine's frame.
     pub(super) fn to_machine(self, [x, y, angle]: [f64; 3]) -> [f64; 3] {
         let sign = if self.mirrored { -1.0 } else { 1.0 };
-        let (sin, cos) = self.rotation.value().sin_cos();
+        let (sin, cos) = sin_cos(self.rotation.value());
         let y = sign * y;
         [cos * x - sin * y, sin * x + cos * y, sign * angle]
     }

@@ -3,8 +3,6 @@
 //! Every entry has three values: the factory's, the one it takes at power-on (what "save" in
 //! 0x1010 stored), and the present one.
 
-use std::collections::BTreeMap;
-
 use drivers::wire::canopen::Object;
 use drivers::wire::canopen::sdo::AbortCode;
 
@@ -208,16 +206,84 @@ impl Entry {
     }
 }
 
-/// All entries of a device.
+/// Index and sub-index of an entry, in the order of the dictionary.
+type Key = (u16, u8);
+
+/// All entries of a device, in the order of their keys.
 #[derive(Clone, Debug, Default)]
 pub struct Dictionary {
-    entries: BTreeMap<(u16, u8), Entry>,
+    entries: Vec<(Key, Entry)>,
+    places: Places,
+}
+
+/// Where each entry lies: a device looks up dozens of its own at every frame. An open table, at
+/// most half of it in use; a slot holds a place plus one, or 0.
+#[derive(Clone, Debug, Default)]
+struct Places {
+    slots: Vec<u16>,
+}
+
+impl Places {
+    fn of(entries: &[(Key, Entry)]) -> Self {
+        let mut places = Self {
+            slots: vec![0; (2 * entries.len()).next_power_of_two()],
+        };
+        for (place, (key, _)) in (1..).zip(entries) {
+            let mut slot = places.first_slot(*key);
+            while places.slots[slot] != 0 {
+                slot = places.next_slot(slot);
+            }
+            places.slots[slot] = place;
+        }
+        places
+    }
+
+    fn find(&self, key: Key, entries: &[(Key, Entry)]) -> Option<usize> {
+        if self.slots.is_empty() {
+            return None;
+        }
+        let mut slot = self.first_slot(key);
+        loop {
+            let place = usize::from(self.slots[slot]).checked_sub(1)?;
+            if entries[place].0 == key {
+                return Some(place);
+            }
+            slot = self.next_slot(slot);
+        }
+    }
+
+    /// Multiplicative hashing (D. E. Knuth, The Art of Computer Programming 3, 6.4).
+    fn first_slot(&self, (index, sub): Key) -> usize {
+        let key = u32::from(index) << 8 | u32::from(sub);
+        (key.wrapping_mul(0x9E37_79B1) >> 16) as usize & (self.slots.len() - 1)
+    }
+
+    fn next_slot(&self, slot: usize) -> usize {
+        (slot + 1) & (self.slots.len() - 1)
+    }
 }
 
 impl Dictionary {
     /// Adds or replaces the entry at `index` and `sub`.
     pub fn insert(&mut self, index: u16, sub: u8, entry: Entry) {
-        self.entries.insert((index, sub), entry);
+        let key = (index, sub);
+        match self.entries.binary_search_by_key(&key, |(key, _)| *key) {
+            Ok(place) => self.entries[place].1 = entry,
+            Err(place) => {
+                self.entries.insert(place, (key, entry));
+                self.places = Places::of(&self.entries);
+            }
+        }
+    }
+
+    fn get(&self, key: Key) -> Option<&Entry> {
+        let place = self.places.find(key, &self.entries)?;
+        Some(&self.entries[place].1)
+    }
+
+    fn get_mut(&mut self, key: Key) -> Option<&mut Entry> {
+        let place = self.places.find(key, &self.entries)?;
+        Some(&mut self.entries[place].1)
     }
 
     /// Adds a record or array: sub-index 0 says how many entries follow.
@@ -230,7 +296,7 @@ impl Dictionary {
 
     /// Whether anything lives at `index` and `sub`.
     pub fn contains(&self, object: Object) -> bool {
-        self.entries.contains_key(&(object.index, object.sub))
+        self.get((object.index, object.sub)).is_some()
     }
 
     /// The number at `index` and `sub`.
@@ -238,7 +304,7 @@ impl Dictionary {
     /// # Panics
     /// When there is none: a device asks only for objects it inserted itself.
     pub fn integer(&self, index: u16, sub: u8) -> i64 {
-        let value = self.entries.get(&(index, sub)).map(|entry| &entry.value);
+        let value = self.get((index, sub)).map(|entry| &entry.value);
         let Some(Value::Integer(number)) = value else {
             panic!("the device has no number {}", Object::new(index, sub));
         };
@@ -251,15 +317,19 @@ impl Dictionary {
     /// # Panics
     /// When there is no such entry: a device sets only objects it inserted itself.
     pub fn set_integer(&mut self, index: u16, sub: u8, value: i64) {
-        let entry = self.entries.get_mut(&(index, sub));
+        let entry = self.get_mut((index, sub));
         let entry = entry.unwrap_or_else(|| panic!("no object {}", Object::new(index, sub)));
-        entry.value = Value::Integer(entry.kind.wrap(value));
+        let value = entry.kind.wrap(value);
+        match &mut entry.value {
+            Value::Integer(present) => *present = value,
+            present @ Value::Bytes(_) => *present = Value::Integer(value),
+        }
     }
 
     /// Makes `value` the factory, the power-on and the present value of a number.
     pub fn set_factory(&mut self, index: u16, sub: u8, value: i64) {
         self.set_integer(index, sub, value);
-        if let Some(entry) = self.entries.get_mut(&(index, sub)) {
+        if let Some(entry) = self.get_mut((index, sub)) {
             entry.factory = entry.value.clone();
             entry.power_on = entry.value.clone();
         }
@@ -267,11 +337,11 @@ impl Dictionary {
 
     fn entry(&self, object: Object) -> Result<&Entry, AbortCode> {
         let Object { index, sub } = object;
-        self.entries.get(&(index, sub)).ok_or_else(|| {
-            let mut subs = self.entries.range((index, 0)..=(index, u8::MAX));
-            match subs.next() {
-                Some(_) => AbortCode::NoSuchSubIndex,
-                None => AbortCode::NoSuchObject,
+        self.get((index, sub)).ok_or_else(|| {
+            if self.entries.iter().any(|(key, _)| key.0 == index) {
+                AbortCode::NoSuchSubIndex
+            } else {
+                AbortCode::NoSuchObject
             }
         })
     }
@@ -312,7 +382,7 @@ impl Dictionary {
 
     /// Takes a value that [`Dictionary::check_value`] gave.
     pub fn put(&mut self, object: Object, value: Value) {
-        if let Some(entry) = self.entries.get_mut(&(object.index, object.sub)) {
+        if let Some(entry) = self.get_mut((object.index, object.sub)) {
             entry.value = value;
         }
     }
@@ -344,7 +414,7 @@ impl Dictionary {
 
     /// 0x1010: the present parameters become the power-on values.
     pub fn store(&mut self) {
-        for entry in self.entries.values_mut() {
+        for (_, entry) in &mut self.entries {
             if entry.access == Access::ReadWrite {
                 entry.power_on = entry.value.clone();
             }
@@ -353,22 +423,25 @@ impl Dictionary {
 
     /// 0x1011: the factory values become the power-on values; the next reset makes them valid.
     pub fn restore_factory(&mut self) {
-        for entry in self.entries.values_mut() {
+        for (_, entry) in &mut self.entries {
             entry.power_on = entry.factory.clone();
         }
     }
 
     /// All entries take their power-on values (power-on, NMT "reset node").
     pub fn reset_all(&mut self) {
-        for entry in self.entries.values_mut() {
+        for (_, entry) in &mut self.entries {
             entry.value = entry.power_on.clone();
         }
     }
 
     /// The communication profile area takes its power-on values (NMT "reset communication").
     pub fn reset_communication(&mut self) {
-        for (_, entry) in self.entries.range_mut((0x1000, 0)..(0x2000, 0)) {
-            entry.value = entry.power_on.clone();
+        let communication = 0x1000..0x2000;
+        for ((index, _), entry) in &mut self.entries {
+            if communication.contains(index) {
+                entry.value = entry.power_on.clone();
+            }
         }
     }
 }

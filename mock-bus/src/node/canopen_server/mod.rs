@@ -250,18 +250,16 @@ impl CanopenServer {
 
     /// An error begins: error register, history, emergency message.
     pub fn raise(&mut self, now: Time, code: EmergencyCode, bits: u8, detail: [u8; 5]) {
-        let message = self.errors.raise(code, bits, detail);
-        self.publish_errors();
-        if let Some(message) = message {
+        if let Some(message) = self.errors.raise(code, bits, detail) {
+            self.publish_errors();
             self.send_emergency(now, message.emit(self.node));
         }
     }
 
     /// An error is over; nothing happens when it was not there.
     pub fn clear(&mut self, now: Time, code: EmergencyCode) {
-        let message = self.errors.clear(code);
-        self.publish_errors();
-        if let Some(message) = message {
+        if let Some(message) = self.errors.clear(code) {
+            self.publish_errors();
             self.send_emergency(now, message.emit(self.node));
         }
     }

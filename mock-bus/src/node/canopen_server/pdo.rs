@@ -106,13 +106,14 @@ impl Tpdo {
 
     /// The payload that the present values give.
     fn payload(&self, dictionary: &Dictionary, exchange: bool) -> [u8; 8] {
-        let mut order: Vec<&MappedObject> = self.parameters.mapping.iter().collect();
-        if exchange && order.len() > 1 {
-            order.swap(0, 1);
-        }
+        let mapping = &self.parameters.mapping;
         let mut payload = [0; 8];
         let mut offset = 0;
-        for mapped in order {
+        for place in 0..mapping.len() {
+            let mapped = match place {
+                0 | 1 if exchange && mapping.len() > 1 => mapping[1 - place],
+                _ => mapping[place],
+            };
             let Object { index, sub } = mapped.object;
             let value = dictionary.integer(index, sub) as u64;
             let inserted = pdo::insert(&mut payload, offset, mapped.bits, value);
@@ -168,7 +169,10 @@ impl Tpdo {
 
     pub(super) fn emit(&mut self, now: Time, dictionary: &Dictionary, exchange: bool) -> CanFrame {
         let payload = self.payload(dictionary, exchange);
-        self.last_sent = Some(self.payload(dictionary, false));
+        self.last_sent = Some(match exchange {
+            true => self.payload(dictionary, false),
+            false => payload,
+        });
         self.pending = false;
         self.inhibited_until = now + self.parameters.inhibit;
         self.timer_due = due(now, self.parameters.timer);

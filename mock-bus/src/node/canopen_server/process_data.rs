@@ -3,6 +3,7 @@
 use drivers::wire::can::CanFrame;
 use drivers::wire::canopen::Object;
 use drivers::wire::canopen::emcy::EmergencyCode;
+use drivers::wire::canopen::sync::is_sync;
 use units::Time;
 
 use super::errors::register;
@@ -100,6 +101,12 @@ impl CanopenServer {
     /// Whether a TPDO is sent at the SYNC that has just come.
     pub fn is_tpdo_turn(&self) -> bool {
         self.phase.is_operational() && self.tpdos.iter().any(Tpdo::is_turn)
+    }
+
+    /// Whether `frame` is a SYNC that does nothing but let the device sample: no event-driven TPDO
+    /// may be due with it.
+    pub fn only_samples_at(&self, frame: &CanFrame) -> bool {
+        is_sync(frame) && self.phase.is_operational() && !self.reports_changes()
     }
 
     /// Whether a TPDO in use is sent at changes: only then must the device look for them.

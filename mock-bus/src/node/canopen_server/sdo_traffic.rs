@@ -118,6 +118,7 @@ impl CanopenServer {
         match (object.index, object.sub) {
             (0x1003, 0) => {
                 self.errors.history.clear();
+                self.publish_errors();
             }
             (0x1010, 1) => {
                 self.set(0x1010, 1, 1);

@@ -15,6 +15,7 @@ use std::time::Duration;
 use drivers::wire::canopen::emcy::EmergencyCode;
 use drivers::wire::cia402::Controlword;
 use units::Time;
+use units::portable::powi;
 
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};
@@ -90,7 +91,7 @@ impl Drive {
     fn interpolation_time(&self) -> Duration {
         let units = self.server.get(0x60C2, 1) as f64;
         let exponent = self.server.get(0x60C2, 2) as i32;
-        Duration::from_secs_f64(units * 10.0_f64.powi(exponent))
+        Duration::from_secs_f64(units * powi(10.0, exponent))
     }
 
     fn sync_due(&self, now: Time, period: Duration) -> Time {

@@ -287,7 +287,10 @@ impl Drive {
         if !self.server.is_powered() || !self.server.concerns(frame) {
             return;
         }
-        self.publish(now, m);
+        // A SYNC asks for no value before the drive has sampled at it.
+        if !self.server.only_samples_at(frame) {
+            self.publish(now, m);
+        }
         self.server.handle(now, frame);
         self.settle(now, m);
     }
@@ -349,12 +352,13 @@ impl Drive {
 
     /// Acts on what the frames said, until nothing is left to act on.
     fn settle(&mut self, now: Time, m: &mut impl Mechanism) {
-        let mut acted = false;
+        let mut stale = false;
         while let Some(event) = self.server.poll_event() {
             self.on_event(now, event, m);
-            acted = true;
+            // Who samples at a SYNC has just published.
+            stale = event != ServerEvent::Synchronised;
         }
-        if acted {
+        if stale {
             self.publish(now, m);
         }
         self.server.send_changes(now);

@@ -2,6 +2,7 @@
 
 use drivers::wire::canopen::pdo::MappedObject;
 use drivers::wire::canopen::{Function, NodeId};
+use units::portable::log10;
 
 use super::config::Cia402DriveConfig;
 use crate::node::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
@@ -154,7 +155,7 @@ fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 /// 0x60A8 and 0x60A9 (CiA 303-2: prefix, numerator, denominator, 0): metre 0x01, second 0x03.
 fn units(resolution_nm: f64) -> (i64, i64) {
     const METRE: i64 = 0x0001_0000;
-    let exponent = (resolution_nm * 1e-9).log10();
+    let exponent = log10(resolution_nm * 1e-9);
     let rounded = exponent.round();
     if (exponent - rounded).abs() > 1e-9 {
         return (UNIT_INCREMENTS, UNIT_INCREMENTS | PER_SECOND);

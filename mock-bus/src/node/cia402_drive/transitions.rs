@@ -54,7 +54,8 @@ impl Drive {
     /// The transition that waits for its time; `None` also where something forbids it.
     pub(super) fn pending_transition(&self) -> Option<Transition> {
         let command = self.command?;
-        let wanted = transition(self.power, command, self.resumable())?;
+        let stopped = self.power == Power::QuickStopActive;
+        let wanted = transition(self.power, command, stopped && self.resumable())?;
         let leaving = matches!(self.activity, Activity::Ramp(After::Off(_)));
         let forbidden = match wanted {
             Transition::T2 => self.safe_torque_off || self.internal_error.is_some(),

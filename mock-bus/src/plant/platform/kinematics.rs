@@ -12,6 +12,7 @@
 
 use super::Pose;
 use super::config::ActuatorConfig;
+use units::portable::{hypot, sin_cos};
 use units::{Metres, Radians};
 
 const ITERATIONS_MAX: usize = 50;
@@ -33,7 +34,7 @@ impl Complex {
     }
 
     fn turn(angle: f64) -> Self {
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = sin_cos(angle);
         Self::new(cos, sin)
     }
 
@@ -69,7 +70,7 @@ impl Kinematics {
             .iter()
             .map(|actuator| {
                 let [x, y] = actuator.direction;
-                let length = x.hypot(y);
+                let length = hypot(x, y);
                 let [px, py] = actuator.point_mm.map(|mm| mm * 1e-3);
                 Joint {
                     point: Complex::new(px, py),
@@ -83,7 +84,7 @@ impl Kinematics {
 
     fn holds_the_platform(&self) -> bool {
         let [xx, xy, yy] = self.moments();
-        let weakest = f64::midpoint(xx, yy) - f64::midpoint(xx, -yy).hypot(xy);
+        let weakest = f64::midpoint(xx, yy) - hypot(f64::midpoint(xx, -yy), xy);
         if weakest.is_nan() || weakest <= SHARE_MIN {
             return false;
         }

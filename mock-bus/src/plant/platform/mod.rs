@@ -17,6 +17,7 @@ mod truth;
 #[cfg(test)]
 mod tests;
 
+use units::portable::sin_cos;
 use units::{Metres, Radians, Time};
 
 pub use truth::PlatformTruth;
@@ -40,7 +41,7 @@ pub struct Pose {
 impl Pose {
     /// Where a point of the body is now, by its place in the body's frame.
     pub(super) fn place_of(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.angle.value().sin_cos();
+        let (sin, cos) = sin_cos(self.angle.value());
         [
             self.x.value() + cos * x_m - sin * y_m,
             self.y.value() + sin * x_m + cos * y_m,

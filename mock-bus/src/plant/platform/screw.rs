@@ -78,7 +78,8 @@ impl Screw {
     fn watch_switches(&mut self) {
         let error = &self.error;
         let nut_m = |screw_m: f64| screw_m + error.at(screw_m);
-        self.train.watch_switches(nut_m);
+        let error_m = error.at_most(self.train.mass.position_at(Time::ZERO));
+        self.train.watch_switches(error_m, nut_m);
     }
 
     /// Without power the screw can be turned, and the table moves within the play.

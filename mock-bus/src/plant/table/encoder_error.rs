@@ -4,6 +4,7 @@
 use core::f64::consts::TAU;
 
 use units::Radians;
+use units::portable::sin;
 
 use crate::random::Stream;
 
@@ -24,7 +25,7 @@ struct Harmonic {
 
 impl Harmonic {
     fn at(self, angle: f64) -> f64 {
-        self.amplitude * (self.order * angle + self.phase).sin()
+        self.amplitude * sin(self.order * angle + self.phase)
     }
 }
 

@@ -4,6 +4,7 @@ use core::f64::consts::TAU;
 use std::collections::BTreeSet;
 
 use units::Radians;
+use units::portable::sin;
 
 use crate::random::Stream;
 
@@ -108,7 +109,7 @@ fn errors(config: &PlateConfig, stream: &mut Stream) -> Vec<f64> {
     let raw: Vec<f64> = (0..config.lines)
         .map(|line| {
             let angle = TAU * f64::from(line) / f64::from(config.lines);
-            config.eccentricity_arcsec * (angle + phase).sin()
+            config.eccentricity_arcsec * sin(angle + phase)
                 + config.division_arcsec * stream.gaussian()
         })
         .collect();

@@ -15,6 +15,7 @@
 use core::f64::consts::{SQRT_2, TAU};
 
 use units::Time;
+use units::portable::sin;
 
 use super::config::BeamConfig;
 use super::guide::Motion;
@@ -39,7 +40,7 @@ impl Wander {
         let seconds = now.seconds();
         let waves = self.0.iter();
         waves
-            .map(|(share, per_s, phase)| share * (per_s * seconds + phase).sin())
+            .map(|(share, per_s, phase)| share * sin(per_s * seconds + phase))
             .sum()
     }
 }

@@ -8,6 +8,7 @@
 
 use core::f64::consts::{PI, TAU};
 
+use units::portable::{atan, sin};
 use units::{Radians, Time};
 
 use super::config::{ErrorsConfig, VolumetricConfig};
@@ -66,7 +67,7 @@ impl Curve {
         let [first, second, third] = self.powers;
         let bends = second * u * (u - 1.0) + third * u * (u - 0.5) * (u - 1.0);
         let waves = (1..).zip(&self.waves).map(|(order, (amplitude, phase))| {
-            amplitude * ((PI * f64::from(order) * u + phase).sin() - phase.sin())
+            amplitude * (sin(PI * f64::from(order) * u + phase) - sin(*phase))
         });
         self.size * (first * u + bends + waves.sum::<f64>())
     }
@@ -147,7 +148,7 @@ impl Guide {
         motion.shift[self.axis] += growth.expansion_per_k * warmer_k * position_m;
         self.bend(&mut motion, u, growth.bow_m_per_k * heat.gradient_k);
         let [first, second] = super::across(self.axis);
-        motion.shift[first] += growth.film_m[0] * heat.film * (PI * u).sin();
+        motion.shift[first] += growth.film_m[0] * heat.film * sin(PI * u);
         motion.shift[second] += growth.film_m[1] * heat.film * u * u;
         motion.turn[self.axis] += growth.film_roll * heat.film * u;
         if now.seconds() >= self.deliberate.from_s {
@@ -169,7 +170,7 @@ impl Guide {
         } else {
             -1.0
         };
-        motion.turn[about] += sign * slope.atan();
+        motion.turn[about] += sign * atan(slope);
     }
 }
 

@@ -7,6 +7,7 @@
 use core::f64::consts::TAU;
 
 use units::Time;
+use units::portable::{atan, exp, sin};
 
 use super::config::{DutyConfig, HeatConfig};
 use crate::random::Stream;
@@ -65,13 +66,13 @@ impl Heat {
         let per_h = TAU / self.config.air_swing_period_h;
         let lag = per_h * time_constant_h;
         let size = self.config.air_swing_k / (1.0 + lag * lag).sqrt();
-        self.config.air_temperature_c + size * (per_h * hours + self.phase - lag.atan()).sin()
+        self.config.air_temperature_c + size * sin(per_h * hours + self.phase - atan(lag))
     }
 }
 
 /// What the duty so far has come to.
 fn warmth(duty: &[DutyConfig], hours: f64, time_constant_min: f64) -> f64 {
-    let left = |since_h: f64| (-(hours - since_h) * 60.0 / time_constant_min).exp();
+    let left = |since_h: f64| exp(-(hours - since_h) * 60.0 / time_constant_min);
     let ends = duty.iter().skip(1).map(|next| next.from_h);
     duty.iter()
         .zip(ends.chain([f64::INFINITY]))

@@ -25,6 +25,7 @@
 
 use core::time::Duration;
 
+use units::portable::{hypot, sin};
 use units::{Metres, Radians, Time};
 
 use super::config::LaserConfig;
@@ -148,7 +149,7 @@ impl Laser {
             start_m: target(offset_m),
             since: now,
             truth: LineTruth {
-                misalignment: Radians(lean[0].hypot(lean[1])),
+                misalignment: Radians(hypot(lean[0], lean[1])),
                 slope: Radians(slope),
             },
         });
@@ -160,7 +161,7 @@ impl Laser {
             LineOptics::Straightness { across } => {
                 let direction = unit(without(*across, along))?;
                 let half_angle = 0.5 * self.config.prism_divergence_deg.to_radians();
-                let per_metre = 2.0 * half_angle.sin();
+                let per_metre = 2.0 * sin(half_angle);
                 let seen = minus(direction, times(along, slope));
                 Optics::Straightness(times(seen, per_metre))
             }

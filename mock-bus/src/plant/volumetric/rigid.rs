@@ -1,4 +1,5 @@
 //! Rigid motions: exact rotations and homogeneous transforms.
+use units::portable::sin_cos;
 
 /// A place or a displacement in metres: x, y, z.
 pub(super) type Vector = [f64; 3];
@@ -22,9 +23,9 @@ pub(super) struct Rotation([Vector; 3]);
 impl Rotation {
     /// First about x, then about y, then about z, all by fixed axes: Rz·Ry·Rx.
     pub(super) fn about_x_y_z([a, b, c]: Vector) -> Self {
-        let (sin_a, cos_a) = a.sin_cos();
-        let (sin_b, cos_b) = b.sin_cos();
-        let (sin_c, cos_c) = c.sin_cos();
+        let (sin_a, cos_a) = sin_cos(a);
+        let (sin_b, cos_b) = sin_cos(b);
+        let (sin_c, cos_c) = sin_cos(c);
         Self([
             [
                 cos_c * cos_b,

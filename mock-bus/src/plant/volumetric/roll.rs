@@ -15,6 +15,7 @@
 //! taken not to see.
 
 use super::config::RollConfig;
+use units::portable::tan;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RollDetectors {
@@ -29,14 +30,14 @@ impl RollDetectors {
         Self {
             half_distance_m: config.distance_mm * 0.5e-3,
             height_m: config.height_mm * 1e-3,
-            slant_tan: config.slant_deg.to_radians().tan(),
+            slant_tan: tan(config.slant_deg.to_radians()),
             v_per_m: config.sensitivity_v_per_mm * 1e3,
         }
     }
 
     /// How high the surface meets the beams: y₁ and y₂.
     fn heights(&self, roll: f64, lift_m: f64) -> [f64; 2] {
-        let tan = roll.tan();
+        let tan = tan(roll);
         // On the beam and on the surface: u = side + (v₀ + u·tan α)·tan φ.
         let meets = |side_m: f64| {
             let u = (side_m + lift_m * self.slant_tan) / (1.0 - tan * self.slant_tan);
@@ -47,7 +48,7 @@ impl RollDetectors {
 
     /// x₁ and x₂ in metres.
     pub(super) fn readings(&self, roll: f64, lift_m: f64) -> [f64; 2] {
-        let tan = roll.tan();
+        let tan = tan(roll);
         self.heights(roll, lift_m)
             .map(|y| (self.height_m + y) * tan - y * self.slant_tan)
     }

@@ -46,7 +46,7 @@ impl Slide {
     pub(super) fn advance(&mut self, now: Time) {
         while let Some((from, to)) = self.train.step_until(now) {
             if to != from {
-                self.train.watch_switches(|scale_m| scale_m);
+                self.train.watch_switches(0.0, |scale_m| scale_m);
             }
         }
         self.train.settle(now);

@@ -7,6 +7,7 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::identify::{ExpansionPlan, Observation, Reading};
 use compensator::volumetric::model::{Chain, Machine as Model, VolumetricModel};
 use compensator::volumetric::online::MovingState;
+use units::portable::powi;
 use units::{Celsius, Metres, Radians};
 
 use super::super::VolumetricFailure;
@@ -81,7 +82,7 @@ impl Known {
         for axis in Axis::ALL {
             let share = along[axis.index()];
             part += seen.along(axis).value() * share;
-            square += (u_seen.along(axis).value() * share).powi(2);
+            square += powi(u_seen.along(axis).value() * share, 2);
         }
         Ok(Reading::Length {
             along,

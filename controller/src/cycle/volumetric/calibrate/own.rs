@@ -2,6 +2,7 @@
 
 use compensator::volumetric::identify::{Observation, Purpose, Reading};
 use compensator::volumetric::{Axis, Point};
+use units::portable::hypot;
 use units::{Metres, Radians};
 
 use super::Session;
@@ -53,7 +54,7 @@ impl Session<'_> {
             let strayed = reference.slider(position)[place];
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             let scale = (strayed - first).value() * BEAM_SCALE;
-            let u = BEAM_FLOOR.value().hypot(u_mean).hypot(scale);
+            let u = hypot(hypot(BEAM_FLOOR.value(), u_mean), scale);
             let at = self.on_axis(axis, position);
             // The slide's tilts act on the detector's place on it alone: not on what an offset of
             // the tool is added to.
@@ -87,7 +88,7 @@ impl Session<'_> {
                 reading: Reading::Angle {
                     about: axis,
                     deviation: reference.at(position) * sense,
-                    u: Radians(ROLL_FLOOR.value().hypot(u)),
+                    u: Radians(hypot(ROLL_FLOOR.value(), u)),
                 },
             }
         });

@@ -3,6 +3,7 @@
 use compensator::volumetric::Point;
 use compensator::volumetric::model::Conditions;
 use compensator::volumetric::online::FeedStatus;
+use units::portable::hypot;
 use units::{Metres, Quantity, Radians};
 
 use super::super::thermometers::Thermometers;
@@ -19,7 +20,7 @@ impl VolumetricCorrection {
             let (slider, end) = it.monitor.status();
             if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
                 let left = it.monitor.left().value();
-                Metres(self.u_displacement.value().hypot(left))
+                Metres(hypot(self.u_displacement.value(), left))
             } else {
                 largest
             }
@@ -31,7 +32,7 @@ impl VolumetricCorrection {
     fn u_roll(&self) -> Radians {
         match &self.roll {
             Some(roll) if roll.feed.status() == FeedStatus::Good => {
-                Radians(self.u_roll.value().hypot(roll.feed.left().value()))
+                Radians(hypot(self.u_roll.value(), roll.feed.left().value()))
             }
             Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
             None => self.u_roll,

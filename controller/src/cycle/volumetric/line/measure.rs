@@ -2,6 +2,7 @@
 
 use compensator::volumetric::identify::Reading;
 use compensator::volumetric::{Axis, Point};
+use units::portable::asin;
 use units::{Metres, Radians};
 
 use super::LineOptics;
@@ -66,7 +67,7 @@ impl Measure {
             },
             Self::Tilt { about, separation } => Reading::Angle {
                 about,
-                deviation: Radians((path / separation).asin()),
+                deviation: Radians(asin(path / separation)),
                 u: Radians(u / separation),
             },
         }

@@ -1,0 +1,234 @@
+//! What each machine that ships does in virtual time where it is timed, and where its log is pinned.
+
+use core::time::Duration;
+
+use truestage::Failure;
+use truestage::cycle::platform::Pose;
+use truestage::cycle::volumetric::WarmUp;
+use truestage::cycle::{CalibrateOptions, VerifyOptions, Way};
+use units::{Metres, Radians};
+
+use crate::hand::Hand;
+use crate::rig::{Bench, LINEAR, ROTARY, Shipped, UVW, UVW_COPLEY, VOLUMETRIC};
+use crate::volume::{Volume, calm, spread};
+
+/// How long three axes warm up between cold and warm lines.
+const WARM_UP: Duration = Duration::from_secs(2 * 3600);
+
+/// What a machine does from its start to its shutting down.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycle {
+    /// The machine's name.
+    pub name: &'static str,
+    shipped: &'static Shipped,
+    machine: fn(String) -> String,
+    run: fn(Bench) -> Result<Bench, Failure>,
+}
+
+impl Cycle {
+    /// The machine with `seed`, not started.
+    pub fn bench(&self, seed: u64) -> Bench {
+        Bench::of(self.shipped, seed, self.machine)
+    }
+
+    /// All that it does; the machine as it is left.
+    ///
+    /// # Panics
+    /// When something fails.
+    pub fn run(&self, bench: Bench) -> Bench {
+        let result = (self.run)(bench);
+        result.unwrap_or_else(|failure| panic!("{}: {failure}", self.name))
+    }
+}
+
+/// The whole cycle of every machine that ships.
+pub const WHOLE: [Cycle; 5] = [
+    cycle("linear", &LINEAR, |text| text, linear),
+    cycle("uvw", &UVW, |text| text, platform),
+    cycle("uvw-copley", &UVW_COPLEY, |text| text, platform),
+    cycle("rotary", &ROTARY, |text| text, rotary),
+    cycle("volumetric", &VOLUMETRIC, calm, volumetric),
+];
+
+/// A part of it that takes a moment: the zero, fewer readings, and compensated moves.
+pub const PARTS: [Cycle; 5] = [
+    cycle("linear", &LINEAR, short_strokes, part_of_linear),
+    cycle("uvw", &UVW, few_strokes, part_of_platform),
+    cycle("uvw-copley", &UVW_COPLEY, few_strokes, part_of_platform),
+    cycle("rotary", &ROTARY, few_placements, part_of_rotary),
+    cycle("volumetric", &VOLUMETRIC, |text| text, part_of_volumetric),
+];
+
+const fn cycle(
+    name: &'static str,
+    shipped: &'static Shipped,
+    machine: fn(String) -> String,
+    run: fn(Bench) -> Result<Bench, Failure>,
+) -> Cycle {
+    Cycle {
+        name,
+        shipped,
+        machine,
+        run,
+    }
+}
+
+/// # Panics
+/// When the configuration that ships has become another one.
+fn changed(text: String, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "`{from}` is not in the text");
+        text.replace(from, to)
+    })
+}
+
+fn short_strokes(text: String) -> String {
+    changed(
+        text,
+        &[("step_mm = 3.0", "step_mm = 6.0"), ("runs = 3", "runs = 1")],
+    )
+}
+
+fn few_strokes(text: String) -> String {
+    changed(
+        text,
+        &[
+            ("step_mm = 0.25", "step_mm = 0.625"),
+            ("runs = 2", "runs = 1"),
+        ],
+    )
+}
+
+fn few_placements(text: String) -> String {
+    let changes = [
+        ("placements = 4 ", "offsets = [0, 73, 162] "),
+        ("optimise = ", "# "),
+        ("amplification_limit = 3.0", "amplification_limit = 5.0"),
+    ];
+    changed(text, &changes)
+}
+
+fn linear(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    let verify = |calibration: Option<String>| VerifyOptions {
+        compensated: calibration.is_some(),
+        calibration,
+        resume: None,
+    };
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero("x", &store)?;
+        machine.verify("x", &store, &verify(None))?;
+        let calibrated = machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        machine.verify("x", &store, &verify(Some(calibrated.id)))?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn part_of_linear(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero("x", &store)?;
+        machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        for mm in [12.5, 44.4, 31.0] {
+            machine.move_to("x", Metres::from_mm(mm))?;
+        }
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn somewhere() -> Pose {
+    Pose {
+        x: Metres::from_mm(0.7),
+        y: Metres::from_mm(-1.1),
+        angle: Radians::from_arcsec(600.0),
+    }
+}
+
+fn platform(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_platform(&store)?;
+        machine.verify_platform(&store, false)?;
+        machine.move_pose(Pose::default())?;
+        machine.calibrate_platform(&store)?;
+        machine.verify_platform(&store, true)?;
+        machine.align_pose(somewhere())?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn part_of_platform(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_platform(&store)?;
+        machine.calibrate_platform(&store)?;
+        machine.move_pose(somewhere())?;
+        machine.move_pose(Pose::default())?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn hand_of(bench: &Bench) -> Hand<'static> {
+    let emulated = bench.emulated.clone();
+    Hand::new(move |lines| emulated.simulation_mut().turn_plate(lines))
+}
+
+fn rotary(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    let mut hand = hand_of(&bench);
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_rotary("c")?;
+        machine.calibrate_rotary("c", &store, &CalibrateOptions::default(), &mut hand)?;
+        machine.verify_rotary("c", &store, true, &mut hand)?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn part_of_rotary(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    let mut hand = hand_of(&bench);
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_rotary("c")?;
+        machine.calibrate_rotary("c", &store, &CalibrateOptions::default(), &mut hand)?;
+        machine.move_rotary("c", Radians::from_degrees(123.4), Way::Shortest)?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+fn volumetric(mut bench: Bench) -> Result<Bench, Failure> {
+    let store = bench.store.clone();
+    let mut hand = bench.emulated.clone();
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero_volumetric()?;
+        machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
+        machine.shut_down()
+    })?;
+    Ok(bench)
+}
+
+/// Corrected by errors that are known: finding them takes hours.
+fn part_of_volumetric(mut bench: Bench) -> Result<Bench, Failure> {
+    bench.machine.start()?;
+    bench.machine.zero_volumetric()?;
+    let mut volume = Volume { bench };
+    volume.know_errors();
+    let store = volume.bench.store.clone();
+    volume.bench.machine.reference_volumetric(&store)?;
+    let (mut mover, _) = volume.corrected();
+    volume.visit(&mut mover, &spread(0, 3), &mut Vec::new());
+    volume.bench.machine.shut_down()?;
+    Ok(volume.bench)
+}
