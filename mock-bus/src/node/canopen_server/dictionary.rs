@@ -3,7 +3,7 @@
 //! Every entry has three values: the factory's, the one it takes at power-on (what "save" in
 //! 0x1010 stored), and the present one.
 
-use std::collections::BTreeMap;
+use core::ops::Range;
 
 use drivers::wire::canopen::Object;
 use drivers::wire::canopen::sdo::AbortCode;
@@ -208,16 +208,46 @@ impl Entry {
     }
 }
 
-/// All entries of a device.
+/// All entries of a device, in the order of their keys. A device looks up its values many times in
+/// every period: the keys are plain numbers side by side, apart from what they lead to.
 #[derive(Clone, Debug, Default)]
 pub struct Dictionary {
-    entries: BTreeMap<(u16, u8), Entry>,
+    keys: Vec<u32>,
+    entries: Vec<Entry>,
+}
+
+/// Index and sub-index as one number, in the same order.
+const fn key(index: u16, sub: u8) -> u32 {
+    (index as u32) << 8 | sub as u32
 }
 
 impl Dictionary {
     /// Adds or replaces the entry at `index` and `sub`.
     pub fn insert(&mut self, index: u16, sub: u8, entry: Entry) {
-        self.entries.insert((index, sub), entry);
+        let key = key(index, sub);
+        match self.keys.binary_search(&key) {
+            Ok(place) => self.entries[place] = entry,
+            Err(place) => {
+                self.keys.insert(place, key);
+                self.entries.insert(place, entry);
+            }
+        }
+    }
+
+    fn get(&self, index: u16, sub: u8) -> Option<&Entry> {
+        let place = self.keys.binary_search(&key(index, sub)).ok()?;
+        self.entries.get(place)
+    }
+
+    fn get_mut(&mut self, index: u16, sub: u8) -> Option<&mut Entry> {
+        let place = self.keys.binary_search(&key(index, sub)).ok()?;
+        self.entries.get_mut(place)
+    }
+
+    /// The places of all entries from index `from` up to `to`, which is not included.
+    fn places(&self, from: u32, to: u32) -> Range<usize> {
+        let first = |index: u32| self.keys.partition_point(|it| *it < index << 8);
+        first(from)..first(to)
     }
 
     /// Adds a record or array: sub-index 0 says how many entries follow.
@@ -230,7 +260,7 @@ impl Dictionary {
 
     /// Whether anything lives at `index` and `sub`.
     pub fn contains(&self, object: Object) -> bool {
-        self.entries.contains_key(&(object.index, object.sub))
+        self.get(object.index, object.sub).is_some()
     }
 
     /// The number at `index` and `sub`.
@@ -238,7 +268,7 @@ impl Dictionary {
     /// # Panics
     /// When there is none: a device asks only for objects it inserted itself.
     pub fn integer(&self, index: u16, sub: u8) -> i64 {
-        let value = self.entries.get(&(index, sub)).map(|entry| &entry.value);
+        let value = self.get(index, sub).map(|entry| &entry.value);
         let Some(Value::Integer(number)) = value else {
             panic!("the device has no number {}", Object::new(index, sub));
         };
@@ -251,7 +281,7 @@ impl Dictionary {
     /// # Panics
     /// When there is no such entry: a device sets only objects it inserted itself.
     pub fn set_integer(&mut self, index: u16, sub: u8, value: i64) {
-        let entry = self.entries.get_mut(&(index, sub));
+        let entry = self.get_mut(index, sub);
         let entry = entry.unwrap_or_else(|| panic!("no object {}", Object::new(index, sub)));
         entry.value = Value::Integer(entry.kind.wrap(value));
     }
@@ -259,7 +289,7 @@ impl Dictionary {
     /// Makes `value` the factory, the power-on and the present value of a number.
     pub fn set_factory(&mut self, index: u16, sub: u8, value: i64) {
         self.set_integer(index, sub, value);
-        if let Some(entry) = self.entries.get_mut(&(index, sub)) {
+        if let Some(entry) = self.get_mut(index, sub) {
             entry.factory = entry.value.clone();
             entry.power_on = entry.value.clone();
         }
@@ -267,11 +297,12 @@ impl Dictionary {
 
     fn entry(&self, object: Object) -> Result<&Entry, AbortCode> {
         let Object { index, sub } = object;
-        self.entries.get(&(index, sub)).ok_or_else(|| {
-            let mut subs = self.entries.range((index, 0)..=(index, u8::MAX));
-            match subs.next() {
-                Some(_) => AbortCode::NoSuchSubIndex,
-                None => AbortCode::NoSuchObject,
+        self.get(index, sub).ok_or_else(|| {
+            let index = u32::from(index);
+            if self.places(index, index + 1).is_empty() {
+                AbortCode::NoSuchObject
+            } else {
+                AbortCode::NoSuchSubIndex
             }
         })
     }
@@ -312,7 +343,7 @@ impl Dictionary {
 
     /// Takes a value that [`Dictionary::check_value`] gave.
     pub fn put(&mut self, object: Object, value: Value) {
-        if let Some(entry) = self.entries.get_mut(&(object.index, object.sub)) {
+        if let Some(entry) = self.get_mut(object.index, object.sub) {
             entry.value = value;
         }
     }
@@ -344,7 +375,7 @@ impl Dictionary {
 
     /// 0x1010: the present parameters become the power-on values.
     pub fn store(&mut self) {
-        for entry in self.entries.values_mut() {
+        for entry in &mut self.entries {
             if entry.access == Access::ReadWrite {
                 entry.power_on = entry.value.clone();
             }
@@ -353,21 +384,22 @@ impl Dictionary {
 
     /// 0x1011: the factory values become the power-on values; the next reset makes them valid.
     pub fn restore_factory(&mut self) {
-        for entry in self.entries.values_mut() {
+        for entry in &mut self.entries {
             entry.power_on = entry.factory.clone();
         }
     }
 
     /// All entries take their power-on values (power-on, NMT "reset node").
     pub fn reset_all(&mut self) {
-        for entry in self.entries.values_mut() {
+        for entry in &mut self.entries {
             entry.value = entry.power_on.clone();
         }
     }
 
     /// The communication profile area takes its power-on values (NMT "reset communication").
     pub fn reset_communication(&mut self) {
-        for (_, entry) in self.entries.range_mut((0x1000, 0)..(0x2000, 0)) {
+        let area = self.places(0x1000, 0x2000);
+        for entry in &mut self.entries[area] {
             entry.value = entry.power_on.clone();
         }
     }
