@@ -167,7 +167,9 @@ fn the_files_example_of_faults_is_right() {
 
 #[test]
 fn a_platform_that_is_held_by_nothing_is_refused() {
-    let text = text().replace("direction = [0.0, 1.0]", "direction = [1.0, 0.0]");
+    let across = "direction = [0.0, 1.0]";
+    assert!(text().contains(across));
+    let text = text().replace(across, "direction = [1.0, 0.0]");
     let error = MachineConfig::parse(&text).unwrap_err().to_string();
     assert!(error.contains("actuators"), "{error}");
 }
