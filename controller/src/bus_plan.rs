@@ -65,6 +65,7 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use crate::config;
 
     /// The shipped linear machine with four axes that follow set-points, on a SYNC of `period_ms`.
@@ -72,18 +73,18 @@ mod tests {
         const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
         let (head, rest) = MACHINE.split_once("[axis.x]").expect("it has an axis");
         let (axis, rest) = rest.split_once("[analog.hall]").expect("it has a module");
-        let axis = axis.replace(
+        let axis = axis.edit(
             "[axis.x.identity]",
             "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 1e5\n\
              deviation_limit_um = 100.0\n[axis.x.identity]",
         );
-        let mut text = head.replace(
+        let mut text = head.edit(
             "sync_period_ms = 5.0",
             &format!("sync_period_ms = {period_ms}"),
         );
         for (name, node) in [("x", 1), ("y", 3), ("z", 4), ("w", 5)] {
-            let own = format!("[axis.{name}]{axis}").replace("axis.x", &format!("axis.{name}"));
-            text += &own.replace("node_id = 1", &format!("node_id = {node}"));
+            let own = format!("[axis.{name}]{axis}").edit("axis.x", &format!("axis.{name}"));
+            text += &own.edit("node_id = 1", &format!("node_id = {node}"));
         }
         config::parse(&format!("{text}[analog.hall]{rest}"), "four.toml")
     }
@@ -106,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_cyclic_axis_needs_its_command_pdo_at_sync() {
-        let text = include_str!("../../configs/machines/linear.toml").replace(
+        let text = include_str!("../../configs/machines/linear.toml").edit(
             "[axis.x.identity]",
             "[axis.x.cyclic]\njerk_mm_per_s3 = 0.5\ndeviation_limit_um = 100.0\n[axis.x.identity]",
         );

@@ -21,6 +21,7 @@ use units::Time;
 use crate::assemble;
 use crate::config::MachineConfig;
 use crate::cycle::volumetric::{LineOperator, LineOptics, LineTask};
+use crate::edit::Edit;
 use crate::failure::Failure;
 use crate::ports::{self, Endpoint, Overrides};
 use compensator::volumetric::{Axis, Point};
@@ -29,14 +30,17 @@ pub use mock_bus::plant::{DriftLimits, HallDrift};
 
 /// The text of a machine file with the shipped heartbeats made rare: hours without SYNC cost little in
 /// virtual time then.
+///
+/// # Panics
+/// When one of them is not in the text.
 pub fn with_rare_heartbeats(text: &str) -> String {
-    text.replace("heartbeat_ms = 50", "heartbeat_ms = 2000")
-        .replace("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .replace(
+    text.edit("master_heartbeat_ms = 50", "master_heartbeat_ms = 2000")
+        .edit("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .edit(
             "heartbeat_consumer_ms = 150",
             "heartbeat_consumer_ms = 7000",
         )
-        .replace("watch_master_ms = 500", "watch_master_ms = 7000")
+        .edit("watch_master_ms = 500", "watch_master_ms = 7000")
 }
 
 /// Why an emulated machine cannot be brought up.

@@ -34,6 +34,7 @@ pub mod camera;
 pub mod config;
 pub mod cycle;
 mod devices;
+mod edit;
 pub mod emulated;
 pub mod engine;
 pub mod failure;
@@ -48,6 +49,7 @@ pub mod store;
 pub mod text;
 mod tick;
 
+pub use edit::Edit;
 pub use failure::Failure;
 pub use machine::{Machine, StopRequest};
 pub use store::Store;

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use tests::Rig;
+use tests::{Edit, Rig, not_run};
 
 use crate::programs::{Bench, live_rigs};
 
 /// The example lives in real time: SYNC periods as shipped, and what a busier computer may bear.
-const TRIES_MS: [&str; 5] = ["5.0", "5.0", "20.0", "20.0", "50.0"];
+const TRIES_MS: [&str; 3] = ["5.0", "20.0", "50.0"];
 
 /// What was measured on some other stage: 20 um off at one end, 2 um apart between directions.
 fn measured() -> String {
@@ -51,14 +51,14 @@ fn streaming(bench: &Bench, text: &str, period_ms: &str) -> String {
         None => panic!("{port} is no CAN bus"),
     };
     let text = text
-        .replace(
+        .edit(
             "sync_period_ms = 5.0",
             &format!("sync_period_ms = {period_ms}"),
         )
-        .replace("[axis.x.identity]", cyclic)
-        .replace("path = \"/dev/ttyACM1\"", &place);
+        .edit("[axis.x.identity]", cyclic)
+        .edit("path = \"/dev/ttyACM1\"", &place);
     match bench.rig() {
-        Rig::Vcan => text.replace("transport = \"slcan\"", "transport = \"socketcan\""),
+        Rig::Vcan => text.edit("transport = \"slcan\"", "transport = \"socketcan\""),
         Rig::Pty | Rig::InProcess => text,
     }
 }
@@ -110,7 +110,8 @@ fn the_example_streams_a_path_and_shows_the_correction_and_its_uncertainty() {
             (well && printed.contains("the path is done")).then_some(printed)
         });
         let Some(printed) = done else {
-            println!("{rig:?}: this computer is too busy: {flagged}");
+            let why = format!("3 times this computer was too busy ({rig:?}): {flagged}");
+            not_run("the example streams a path", &why);
             continue;
         };
         let lives = lives(&printed);

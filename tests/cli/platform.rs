@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tests::{Bench, UVW};
+use tests::{Bench, Edit, UVW};
 use truestage::cycle::platform::Pose;
 
 use crate::programs::{check_says, page, truestage};
@@ -20,8 +20,8 @@ struct Runs {
 
 fn runs() -> Runs {
     let mut bench = Bench::of(&UVW, 2, |text| {
-        text.replace("step_mm = 0.25", "step_mm = 0.625")
-            .replace("poses = 20", "poses = 6")
+        text.edit("step_mm = 0.25", "step_mm = 0.625")
+            .edit("poses = 20", "poses = 6")
     });
     let store = bench.store.clone();
     let machine = &mut bench.machine;
@@ -35,7 +35,7 @@ fn runs() -> Runs {
     let left = machine.verify_platform(&store, true).unwrap();
     machine.shut_down().unwrap();
     let folder = bench.folder.path().display().to_string();
-    let text = UVW.machine.replace("machine-data", &folder);
+    let text = UVW.machine.edit("machine-data", &folder);
     fs::write(bench.folder.path().join("machine.toml"), text).unwrap();
     let place = |path: &Path| path.display().to_string();
     Runs {

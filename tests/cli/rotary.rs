@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tests::MACHINE;
+use tests::{Edit, MACHINE};
 
 use crate::programs::{Ended, truestage};
 
@@ -182,7 +182,7 @@ fn a_table_measured_elsewhere_is_stored_for_the_rotary_axis_it_belongs_to() {
     // A table beyond the limits of the axis is not stored.
     let strict = tests::ROTARY
         .machine
-        .replace("size_limit_arcsec = 60.0", "size_limit_arcsec = 5.0");
+        .edit("size_limit_arcsec = 60.0", "size_limit_arcsec = 5.0");
     fs::write(&machine, strict).expect("a file can be written");
     let refused = fit(folder.path(), &rows, &save).with_code(3);
     assert!(refused["error"].to_string().contains("axis c"), "{refused}");
@@ -243,13 +243,13 @@ fn placements_and_options_of_no_use_are_told_and_nothing_is_stored() {
     let good = csv(&readings(&[0, 1, 7], 0.05));
     let opposite = csv(&readings(&[0, 18], 0.05));
     check_refused(&opposite, &[], &["data.csv:38:1", "harmonic 2"]);
-    let gap = csv(&readings(&[0, 1], 0.05)).replacen("0,9,", "#0,9,", 1);
+    let gap = csv(&readings(&[0, 1], 0.05)).edit_first("0,9,", "#0,9,");
     check_refused(
         &gap,
         &[],
         &["data.csv: ", "line 9 at plate offset 0 is needed"],
     );
-    let turned = csv(&readings(&[0, 1, 9, 11], 0.05)).replace("\n9,", "\n7,");
+    let turned = csv(&readings(&[0, 1, 9, 11], 0.05)).edit("\n9,", "\n7,");
     check_refused(&turned, &[], &["plate offset 7 fits offset 9 far better"]);
     check_refused(&good, &["--reading-noise-arcsec=-1"], &["above zero"]);
     check_refused(

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tests::MACHINE;
+use tests::{Edit, MACHINE};
 
 use crate::programs::truestage;
 
@@ -251,9 +251,9 @@ fn a_fit_is_stored_for_every_axis_or_for_none() {
 
     // Approaches swapped: the lost motion comes out negative, and no screw has that.
     let swapped = rows
-        .replace(",+,", ",#,")
-        .replace(",-,", ",+,")
-        .replace(",#,", ",-,");
+        .edit(",+,", ",#,")
+        .edit(",-,", ",+,")
+        .edit(",#,", ",-,");
     let refused = fit(path, &swapped, &save).with_code(3);
     assert!(
         refused["error"].to_string().contains("approaches swapped"),

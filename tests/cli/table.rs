@@ -3,7 +3,7 @@
 use std::fs;
 
 use nix::sys::signal::Signal;
-use tests::{ROTARY, Rig};
+use tests::{Edit, ROTARY, Rig};
 use truestage::store::{ReadJournal, SweepEntry, read_journal};
 
 use crate::programs::{Bench, live_rigs, number, text};
@@ -14,11 +14,11 @@ const OFFSETS: &str = "offsets = [0, 73, 162]";
 const HAND: &str = "hand_lines = [73.0, 89.0, 38.5]";
 
 fn bench(rig: Rig) -> Bench {
-    let bench = Bench::of(rig, ROTARY, |text| text.replace("hand_lines = []", HAND));
+    let bench = Bench::of(rig, ROTARY, |text| text.edit("hand_lines = []", HAND));
     bench.configure("machine.toml", |text| {
-        let text = text.replace("placements = 4 ", &format!("{OFFSETS} "));
-        let text = text.replace("amplification_limit = 3.0", "amplification_limit = 5.0");
-        text.replace("optimise = ", "# ")
+        let text = text.edit("placements = 4 ", &format!("{OFFSETS} "));
+        let text = text.edit("amplification_limit = 3.0", "amplification_limit = 5.0");
+        text.edit("optimise = ", "# ")
     });
     bench
 }

@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::Value;
 
 use crate::programs::{Bench, live_rigs};
+use tests::Edit;
 
 fn number(value: &Value) -> f64 {
     value
@@ -77,7 +78,7 @@ fn what_is_wrong_is_told_by_exit_code_and_in_one_object() {
 
 fn refuses_before_any_bus(bench: &Bench) {
     bench.configure("wrong.toml", |text| {
-        text.replace("step_mm = 3.0", "step_mm = -3.0")
+        text.edit("step_mm = 3.0", "step_mm = -3.0")
     });
     let checked = bench.run(&["check", "wrong.toml"]);
     assert!(checked.said.contains("wrong.toml:"), "{checked:?}");
@@ -93,8 +94,7 @@ fn refuses_before_any_bus(bench: &Bench) {
 }
 
 fn refuses_on_the_bus(bench: &Bench) {
-    let other =
-        |text: String| text.replace("product_code = 0x00420001", "product_code = 0x00420009");
+    let other = |text: String| text.edit("product_code = 0x00420001", "product_code = 0x00420009");
     bench.configure("other.toml", other);
     let scan = bench.run(&["scan", "other.toml"]).with_code(4);
     assert_eq!(
@@ -106,7 +106,7 @@ fn refuses_on_the_bus(bench: &Bench) {
 /// A bad result is a result: the figures are there, and why they are bad.
 fn out_of_tolerance(bench: &Bench) {
     bench.configure("strict.toml", |text| {
-        text.replace(
+        text.edit(
             "accuracy_tolerance_um = 2.0",
             "accuracy_tolerance_um = 0.01",
         )

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use tests::VOLUMETRIC;
 use tests::volume::{Volume, good, quick};
+use tests::{Edit, VOLUMETRIC};
 use truestage::cycle::volumetric::{VerifyBy, WarmUp};
 use truestage::store::{OpticsName, read_journal};
 
@@ -48,7 +48,7 @@ fn runs() -> Runs {
     good(machine.shut_down());
     let folder = volume.bench.folder.path();
     let text = quick(VOLUMETRIC.machine.to_owned());
-    let text = text.replace("machine-data", &folder.display().to_string());
+    let text = text.edit("machine-data", &folder.display().to_string());
     fs::write(folder.join("machine.toml"), text).expect("there is room");
     Runs {
         calibrated: both,
@@ -187,7 +187,7 @@ fn refuses_files(runs: &Runs, csv: &str) {
     let no_diagonals: String = others.map(|line| format!("{line}\n")).collect();
     let error = refused(&no_diagonals, &[]).with_code(3);
     check_error(&error, &["do not tell", "squareness of y to x"]);
-    let error = refused(&csv.replacen("linear_um", "linear_mm", 1), &[]).with_code(2);
+    let error = refused(&csv.edit_first("linear_um", "linear_mm"), &[]).with_code(2);
     check_error(&error, &["wrong.csv:2:3", "linear_um"]);
     let error = refused(
         &format!("{csv}99,linear_um,0,0,0,0,0,0,0,1\n99,linear_um,900,0,0,0,0,0,0,1\n"),

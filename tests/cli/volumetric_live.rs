@@ -12,7 +12,7 @@ use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use tests::volume::point_mm;
-use tests::{INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
+use tests::{Edit, INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
 use truestage::cycle::volumetric::{LineOptics, LineTask};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::read_journal;
@@ -57,10 +57,9 @@ fn small(machine: &str) -> String {
         ),
         ("points = 11", "points = 3"),
     ];
-    changes.iter().fold(machine.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "`{from}` is not in the text");
-        text.replace(from, to)
-    })
+    changes
+        .iter()
+        .fold(machine.to_owned(), |text, (from, to)| text.edit(from, to))
 }
 
 /// The machine, and where its files are.

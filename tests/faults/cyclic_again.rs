@@ -8,7 +8,7 @@ use std::time::Duration;
 use drivers::transport::in_process::InProcess;
 use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
 use mock_bus::fault::{Fault, FaultConfig};
-use tests::{Bench, machine_config};
+use tests::{Bench, Edit, machine_config};
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, EngineFailure, NoCorrection, State};
 use truestage::machine::StopRequest;
@@ -111,7 +111,7 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     let slippery = |text: String| {
         let rough = "friction_deceleration_m_per_s2 = 2.0";
         assert!(text.contains(rough));
-        text.replace(rough, "friction_deceleration_m_per_s2 = 1.2")
+        text.edit(rough, "friction_deceleration_m_per_s2 = 1.2")
     };
     let seen = Rc::new(RefCell::new(Testimony::default()));
     let witness = Rc::clone(&seen);
@@ -230,9 +230,7 @@ fn a_bus_of_another_period_is_refused_although_no_axis_is_on_it() {
              master_heartbeat_ms = 50\n\n[serial.laser]"
         );
         let folder = tempfile::tempdir().unwrap();
-        let loaded = machine_config(folder.path(), |it| {
-            text(it).replace("[serial.laser]", &second)
-        });
+        let loaded = machine_config(folder.path(), |it| text(it).edit("[serial.laser]", &second));
         let bench = Bench::with(1, text, |text| text);
         let machine = Machine::new(&loaded, Box::new(bench.emulated.transport()));
         let made = Engine::new(&machine, &["x"], Box::new(NoCorrection));

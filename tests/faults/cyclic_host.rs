@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use tests::Bench;
+use tests::{Bench, Edit};
 use truestage::Failure;
 use truestage::engine::{Cause, EngineFailure};
 use truestage::machine::StopRequest;
@@ -97,7 +97,7 @@ fn a_drive_whose_controller_is_killed_stops_by_itself() {
 /// A machine whose axis is under way to `target` at 5 mm/s, and nobody waits for it.
 fn under_way(target: Metres) -> Bench {
     let slow = |text: String| {
-        cyclic(shortened(text)).replace("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 5.0")
+        cyclic(shortened(text)).edit("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 5.0")
     };
     let seen = Rc::new(RefCell::new(Testimony::default()));
     let witness = Rc::clone(&seen);

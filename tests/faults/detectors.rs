@@ -11,7 +11,7 @@ use compensator::volumetric::online::{BeamReference, Sample};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::volume::{Volume, good};
-use tests::{Bench, VOLUMETRIC};
+use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::config::BeamDetectorConfig;
 use truestage::cycle::volumetric::{VolumetricCorrection, VolumetricState};
 use truestage::engine::{
@@ -57,9 +57,9 @@ fn standing(reaction: &'static str) -> (Bench, Seen) {
         _ => ("reaction = \"stop\"", ""),
     };
     let quick = |text: String| {
-        let text = text.replace("reaction = \"fade_out\"", name);
-        let text = text.replace("fade_out_s = 60.0", fade);
-        text.replace("blend_s = 2.0", "blend_s = 0.5")
+        let text = text.edit("reaction = \"fade_out\"", name);
+        let text = text.edit("fade_out_s = 60.0", fade);
+        text.edit("blend_s = 2.0", "blend_s = 0.5")
     };
     let mut bench = Bench::shaped(&VOLUMETRIC, 7, quick, |text| text);
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));
@@ -449,7 +449,7 @@ fn a_module_of_thermometers_alone_is_heard() {
         let own = "channels = [0, 1]              # the roll detectors of the x slide\n\
                    full_scale_v = [3.2, 3.2]\n";
         assert!(text.contains(own));
-        text.replace(own, "")
+        text.edit(own, "")
     };
     let mut volume = Volume::zeroed(7, cold, |text| text);
     good(volume.bench.machine.idle(Duration::from_secs(2)));

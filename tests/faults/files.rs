@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use tests::Bench;
+use tests::{Bench, Edit};
 use truestage::cycle::CalibrateOptions;
 use truestage::store::{CalibrationRecord, Content, Lease, RotaryContent, StoreError};
 use truestage::{Failure, Machine, Store};
@@ -52,7 +52,7 @@ impl Shelf {
         let id = self.store().save(&record).unwrap();
         // A record that this program would not activate: only the pointer changes.
         let path = self.store().root().join("active/x.json");
-        let text = fs::read_to_string(&path).unwrap().replace(&self.newer, &id);
+        let text = fs::read_to_string(&path).unwrap().edit(&self.newer, &id);
         fs::write(path, text).unwrap();
     }
 }

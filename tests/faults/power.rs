@@ -9,19 +9,21 @@ use mock_bus::fault::Fault;
 use mock_bus::node::cia402_drive::DriveQuirks;
 use truestage::Failure;
 use truestage::emulated::Emulated;
+use units::Metres;
 
 use crate::scene::{PERIOD, Phase, STOPPING, Scene, Wanted, check, power_state, with_drive};
 
-fn quirk(scene: Scene, set: fn(&mut DriveQuirks)) -> Scene {
+/// A drive with the quirk `key`, which `set` switches on: it must have made a difference.
+fn quirk(scene: Scene, key: &'static str, set: fn(&mut DriveQuirks)) -> Scene {
     scene.deed(
         move |emulated| with_drive(emulated, |drive| set(drive.quirks_mut())),
-        |_| true,
+        move |emulated| with_drive(emulated, |drive| drive.deliveries().contains_key(key)),
     )
 }
 
 #[test]
 fn a_statusword_that_never_changes_is_named_with_the_state_it_stays_in() {
-    let scene = quirk(Scene::during(Phase::Zero), |quirks| {
+    let scene = quirk(Scene::during(Phase::Zero), "statusword_stuck", |quirks| {
         quirks.statusword_stuck = true
     });
     let wanted = Wanted {
@@ -43,9 +45,13 @@ fn a_statusword_that_never_changes_is_named_with_the_state_it_stays_in() {
 
 #[test]
 fn a_statusword_that_sticks_in_a_move_ends_it_in_bounded_time() {
-    let scene = quirk(Scene::during(Phase::Move).after_ms(100), |quirks| {
-        quirks.statusword_stuck = true;
-    });
+    let scene = quirk(
+        Scene::during(Phase::Move).after_ms(100),
+        "statusword_stuck",
+        |quirks| {
+            quirks.statusword_stuck = true;
+        },
+    );
     let wanted = Wanted {
         cause: |failure| {
             matches!(
@@ -65,7 +71,7 @@ fn a_statusword_that_sticks_in_a_move_ends_it_in_bounded_time() {
 
 #[test]
 fn a_drive_that_refuses_to_enable_is_named_with_its_state() {
-    let scene = quirk(Scene::during(Phase::Zero), |quirks| {
+    let scene = quirk(Scene::during(Phase::Zero), "enable_refused", |quirks| {
         quirks.enable_refused = true
     });
     let wanted = Wanted {
@@ -87,9 +93,11 @@ fn a_drive_that_refuses_to_enable_is_named_with_its_state() {
 
 #[test]
 fn a_target_that_is_never_reached_ends_the_move_in_bounded_time() {
-    let scene = quirk(Scene::during(Phase::Move), |quirks| {
-        quirks.target_never_reached = true
-    });
+    let scene = quirk(
+        Scene::during(Phase::Move),
+        "target_never_reached",
+        |quirks| quirks.target_never_reached = true,
+    );
     let wanted = Wanted {
         cause: |failure| {
             matches!(
@@ -104,7 +112,9 @@ fn a_target_that_is_never_reached_ends_the_move_in_bounded_time() {
         within: Duration::from_secs(10),
         rest: Duration::from_secs(10),
     };
-    check(scene, &wanted);
+    let played = check(scene, &wanted);
+    let off = (played.bench.true_position() - Metres::from_mm(60.0)).abs();
+    assert!(off.um() < 100.0, "it never got there: {} um off", off.um());
 }
 
 /// The drive stops with an error of its own that lasts, and its resets are counted.
@@ -140,6 +150,11 @@ fn a_fault_that_does_not_go_is_reset_once_and_no_more() {
     played.bench.machine.start().unwrap();
     let failure = played.bench.machine.reset_fault("x").unwrap_err();
     assert!(failure.to_string().contains("fault"), "{failure}");
+    let key = "fault_reset_ignored";
+    let ignored = with_drive(&played.bench.emulated, |drive| {
+        drive.deliveries().get(key).copied()
+    });
+    assert_eq!(ignored, Some(1), "the drive has ignored one reset");
     assert_eq!(resets(&played.seen()), 1, "{failure}");
     let failure = played.bench.machine.enable("x").unwrap_err();
     assert!(failure.to_string().contains("fault"), "{failure}");
@@ -160,7 +175,9 @@ fn resets(seen: &crate::witness::Testimony) -> usize {
 }
 
 fn wrong_direction(scene: Scene, farthest: Duration) {
-    let scene = quirk(scene, |quirks| quirks.direction_reversed = true);
+    let scene = quirk(scene, "direction_reversed", |quirks| {
+        quirks.direction_reversed = true
+    });
     let wanted = Wanted {
         cause: |failure| {
             matches!(

@@ -8,7 +8,8 @@ use std::time::Duration;
 use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
-use tests::Bench;
+use mock_bus::simulation::Simulation;
+use tests::{Bench, Edit};
 use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, NoCorrection};
@@ -67,6 +68,7 @@ pub struct Scene {
     stop: bool,
     stall: Option<Duration>,
     full: Option<u16>,
+    held_up: Option<Duration>,
     killed: bool,
 }
 
@@ -75,16 +77,15 @@ struct Killed;
 
 /// The shipped machine with fewer points: the same procedures in less time.
 pub fn shortened(text: String) -> String {
-    text.replace("step_mm = 3.0", "step_mm = 6.0")
-        .replace("targets = 8", "targets = 4")
-        .replace("runs = 5", "runs = 2")
-        .replace("jump_limit_um = 5.0", "jump_limit_um = 15.0")
+    text.edit("step_mm = 3.0", "step_mm = 6.0")
+        .edit("targets = 8", "targets = 4")
+        .edit("runs = 5", "runs = 2")
+        .edit("jump_limit_um = 5.0", "jump_limit_um = 15.0")
 }
 
 /// The same with an axis that follows cyclic set-points.
 pub fn cyclic(text: String) -> String {
-    replaced(
-        &text,
+    text.edit(
         "[axis.x.identity]",
         "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
          deviation_limit_um = 1000.0\n[axis.x.identity]",
@@ -144,6 +145,7 @@ impl Scene {
             stop: false,
             stall: None,
             full: None,
+            held_up: None,
             killed: false,
         }
     }
@@ -186,14 +188,14 @@ impl Scene {
     /// A machine that differs from the shipped one in `key`.
     pub fn machine(mut self, from: &'static str, to: &'static str) -> Self {
         let earlier = self.machine;
-        self.machine = Box::new(move |text| replaced(&earlier(text), from, to));
+        self.machine = Box::new(move |text| earlier(text).edit(from, to));
         self
     }
 
     /// An emulation that differs from the shipped one.
     pub fn emulated(mut self, from: &'static str, to: &'static str) -> Self {
         let earlier = self.emulated;
-        self.emulated = Box::new(move |text| replaced(&earlier(text), from, to));
+        self.emulated = Box::new(move |text| earlier(text).edit(from, to));
         self
     }
 
@@ -215,10 +217,32 @@ impl Scene {
         self
     }
 
+    /// The controller is held up for so long when the fault is due, whatever it does then;
+    /// `look` is shown the machine every millisecond meanwhile, with the time since it began.
+    pub fn held_up(
+        mut self,
+        span: Duration,
+        mut look: impl FnMut(Duration, &Simulation) + 'static,
+    ) -> Self {
+        const STEP: Duration = Duration::from_millis(1);
+        self.held_up = Some(span);
+        self.deed = Some(Box::new(move |emulated| {
+            let mut simulation = emulated.simulation_mut();
+            let began = simulation.now();
+            while simulation.now() < began + span {
+                let next = (simulation.now() + STEP).min(began + span);
+                simulation.advance(next);
+                look(next - began, &simulation);
+            }
+        }));
+        self
+    }
+
     /// The controller is killed when the fault is due: it does nothing any more.
     pub fn killed(mut self) -> Self {
         self.killed = true;
-        self.deed(|_| resume_unwind(Box::new(Killed)), |_| true)
+        self.deed = Some(Box::new(|_| resume_unwind(Box::new(Killed))));
+        self
     }
 
     /// Plays the scene.
@@ -249,8 +273,12 @@ impl Scene {
                 result
             })
         });
-        let result = catch_unwind(guarded).unwrap_or_else(|panic| {
-            if self.killed && panic.is::<Killed>() {
+        let result = catch_unwind(guarded).map(|result| {
+            assert!(!self.killed, "nobody killed the controller: {result:?}");
+            result
+        });
+        let result = result.unwrap_or_else(|panic| {
+            if panic.is::<Killed>() {
                 return Err(Failure::Interrupted);
             }
             resume_unwind(panic)
@@ -266,6 +294,14 @@ impl Scene {
             calibrated,
             cause: cause.get(),
         };
+        if let Some(span) = self.held_up {
+            let unseen = played.seen().unseen_since(due);
+            assert!(
+                unseen >= span,
+                "held up for {unseen:?} in place of {span:?}"
+            );
+        }
+        played.seen().everything_was_done();
         played.rest();
         if let Some(delivered) = &self.delivered {
             assert!(
@@ -301,12 +337,6 @@ impl Scene {
         };
         self.faults.drain(..).map(&mut inject).collect()
     }
-}
-
-#[track_caller]
-fn replaced(text: &str, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "`{from}` is not in the file");
-    text.replace(from, to)
 }
 
 fn prepare(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Failure> {
@@ -349,7 +379,7 @@ fn perform(
         }
         Phase::Calibrate => {
             let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
-            calibrated.replace(Some(done));
+            *calibrated.borrow_mut() = Some(done);
         }
         Phase::Follow => cause.set(Some(follow(machine)?)),
         Phase::Verify => {

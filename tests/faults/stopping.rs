@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use drivers::wire::cia402::PowerState;
 use mock_bus::fault::Fault;
-use tests::Bench;
+use mock_bus::simulation::Simulation;
+use tests::{Bench, Edit};
 use truestage::Failure;
 use units::{Metres, Time};
 
@@ -50,7 +51,7 @@ fn killed_in_motion(watch: &'static str) -> (Bench, Time) {
     let key = "watch_master_ms = 500";
     let mut bench = Bench::wrapped(
         1,
-        |text| text.replace(key, watch),
+        |text| text.edit(key, watch),
         |text| text,
         |inner| Box::new(Witnessed::new(inner, witness)),
     );
@@ -100,35 +101,23 @@ fn the_drive_stops_a_stage_whose_controller_was_killed() {
 
 #[test]
 fn a_controller_held_up_for_a_moment_goes_on() {
-    let held_up = |emulated: &truestage::emulated::Emulated| {
-        let mut simulation = emulated.simulation_mut();
-        let until = simulation.now() + Duration::from_millis(9);
-        simulation.advance(until);
-    };
-    check_harmless(
-        Scene::during(Phase::Calibrate)
-            .after_ms(2500)
-            .deed(held_up, |_| true),
-    );
-    check_harmless(
-        Scene::during(Phase::Move)
-            .after_ms(100)
-            .deed(held_up, |_| true),
-    );
+    let moment = Duration::from_millis(9);
+    for (phase, after_ms) in [(Phase::Calibrate, 2500), (Phase::Move, 100)] {
+        let scene = Scene::during(phase).after_ms(after_ms);
+        check_harmless(scene.held_up(moment, |_, _| {}));
+    }
 }
 
 #[test]
 fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
-    let held_up = |emulated: &truestage::emulated::Emulated| {
-        let mut simulation = emulated.simulation_mut();
-        let began = simulation.now();
-        let mut position_at = |span: Duration| {
-            simulation.advance(began + span);
-            simulation.truth().position()
-        };
-        let stopped = position_at(WATCH_MASTER + STOPPING);
-        let crept = (position_at(Duration::from_secs(2)) - stopped).abs();
-        assert!(crept.um() < 1.0, "it went on by {} µm", crept.um());
+    const HELD_UP: Duration = Duration::from_secs(2);
+    let mut stopped = None;
+    let look = move |since: Duration, simulation: &Simulation| {
+        let here = simulation.truth().position();
+        if since >= WATCH_MASTER + STOPPING {
+            let crept = (here - *stopped.get_or_insert(here)).abs();
+            assert!(crept.um() < 1.0, "it went on by {} µm", crept.um());
+        }
     };
     let wanted = Wanted {
         cause: |failure| matches!(failure, Failure::Alarm { .. } | Failure::Device { .. }),
@@ -139,7 +128,7 @@ fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
     check(
         Scene::during(Phase::Move)
             .after_ms(60)
-            .deed(held_up, |_| true),
+            .held_up(HELD_UP, look),
         &wanted,
     );
 }

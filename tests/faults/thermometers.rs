@@ -7,6 +7,7 @@ use core::time::Duration;
 
 use compensator::volumetric::{Axis, Point};
 use mock_bus::fault::{Fault, FaultConfig};
+use tests::Edit;
 use tests::volume::{Off, Volume, good, point_mm, size};
 use truestage::Failure;
 use truestage::cycle::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
@@ -31,8 +32,7 @@ const OVER: usize = 26;
 const ROLL: usize = 24;
 
 fn replaced(text: &str, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "{from}");
-    text.replace(from, to)
+    text.edit(from, to)
 }
 
 /// Known errors and references; then 2 K and more warmer all through, 5 arcsec of roll.

@@ -49,6 +49,23 @@ impl Testimony {
         self.stall.is_none()
     }
 
+    /// Whatever was ordered to go wrong has gone wrong.
+    #[track_caller]
+    pub fn everything_was_done(&self) {
+        assert!(self.has_stalled(), "the controller was never held up");
+        let left: Vec<Time> = self.deeds.iter().map(|(at, _)| *at).collect();
+        assert!(left.is_empty(), "never done, due at {left:?}");
+        let full = self.full.is_some();
+        assert!(!full || self.refused > 0, "no frame met the full port");
+    }
+
+    /// The longest time that the controller did not look, from `since` on.
+    pub fn unseen_since(&self, since: Time) -> Duration {
+        let looks = self.path.windows(2).filter(|pair| pair[0].0 >= since);
+        let gaps = looks.map(|pair| pair[1].0 - pair[0].0);
+        gaps.max().unwrap_or_default()
+    }
+
     /// The controlwords of RPDO 1 of node 1, with their times.
     pub fn controlwords(&self) -> impl Iterator<Item = (Time, u16)> {
         self.sent

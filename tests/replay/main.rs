@@ -7,7 +7,7 @@ use std::rc::Rc;
 use drivers::transport::record::Recorder;
 use drivers::transport::replay::{Replay, ReplayReport};
 use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
-use tests::{Bench, machine_config};
+use tests::{Bench, Edit, machine_config};
 use truestage::cycle::{Verified, VerifyOptions, Zeroed};
 use truestage::store::PointEntry;
 use truestage::{Failure, Machine, Store, assemble};
@@ -15,7 +15,7 @@ use units::Time;
 
 /// A verification of two points from both sides, twice.
 fn short(text: String) -> String {
-    text.replace("targets = 8\nruns = 5", "targets = 2\nruns = 2")
+    text.edit("targets = 8\nruns = 5", "targets = 2\nruns = 2")
 }
 
 /// What a recorder writes and a test reads.

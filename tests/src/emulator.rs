@@ -13,6 +13,7 @@ use crate::rig::{
     LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC, shipped_config,
 };
 use crate::stream::Watch;
+use truestage::Edit;
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";
@@ -142,10 +143,7 @@ impl Setup {
 /// When there is nothing to replace: the text has changed and the test has not.
 fn replace(text: String, changes: &[Change]) -> String {
     changes.iter().fold(text, |text, change| match change {
-        Change::Replace(from, to) => {
-            assert!(text.contains(from), "`{from}` is not in the text");
-            text.replace(from, to)
-        }
+        Change::Replace(from, to) => text.edit(from, to),
         Change::By(change) => change(text),
     })
 }

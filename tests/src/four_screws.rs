@@ -1,5 +1,7 @@
 //! The alignment platform with a fourth screw: a second one along y, opposite the first.
 
+use truestage::Edit;
+
 const AXIS: &str = "[axis.r]
 device = \"cia402\"
 bus = \"can0\"
@@ -71,27 +73,27 @@ pub fn with_fourth_screw(text: String, limit_um: Option<f64>) -> String {
     let limit = limit_um.map_or(String::new(), |um| {
         format!("inconsistency_limit_um = {um:.3}\n")
     });
-    text.replace("# The job", AXIS)
-        .replace("[platform.zero]", ACTUATOR)
-        .replace("[platform.zero]", "[platform.zero]\nlone_homing = true")
-        .replace("exposures = 4", &format!("{limit}exposures = 4"))
+    text.edit("# The job", AXIS)
+        .edit("[platform.zero]", ACTUATOR)
+        .edit("[platform.zero]", "[platform.zero]\nlone_homing = true")
+        .edit("exposures = 4", &format!("{limit}exposures = 4"))
 }
 
 /// The platform's emulation with the fourth screw and its drive.
 pub fn with_fourth_drive(text: String) -> String {
-    text.replace("[[nodes]]\nname = \"image_controller\"", NODE)
-        .replace("[plant.platform.screw]", PLACE)
+    text.edit("[[nodes]]\nname = \"image_controller\"", NODE)
+        .edit("[plant.platform.screw]", PLACE)
 }
 
 /// The configuration of four screws whose axes follow a set-point every two milliseconds.
 pub fn four_cyclic_axes(text: String) -> String {
     let text = with_fourth_screw(text, Some(1.0));
-    let text = text.replace("sync_period_ms = 5.0", "sync_period_ms = 2.0");
+    let text = text.edit("sync_period_ms = 5.0", "sync_period_ms = 2.0");
     // These machines are zeroed in real time.
-    let text = text.replace("search_speed_mm_per_s = 2.0", "search_speed_mm_per_s = 8.0");
+    let text = text.edit("search_speed_mm_per_s = 2.0", "search_speed_mm_per_s = 8.0");
     ["u", "v", "w", "r"].iter().fold(text, |text, axis| {
         let identity = format!("[axis.{axis}.identity]");
-        text.replace(
+        text.edit(
             &identity,
             &format!("[axis.{axis}.cyclic]\n{CYCLIC}\n{identity}"),
         )

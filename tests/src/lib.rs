@@ -12,6 +12,7 @@ mod four_screws;
 mod group;
 mod hand;
 mod interface;
+mod not_run;
 mod pose_judge;
 mod random;
 mod rig;
@@ -26,6 +27,7 @@ pub use four_screws::{four_cyclic_axes, with_fourth_drive, with_fourth_screw};
 pub use group::{Group, Start};
 pub use hand::Hand;
 pub use interface::{Interface, run};
+pub use not_run::{left_out, not_run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use random::random;
 pub use rig::{
@@ -34,3 +36,4 @@ pub use rig::{
 };
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};
+pub use truestage::Edit;

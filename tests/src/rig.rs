@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use drivers::transport::Transport;
+use truestage::Edit;
 use truestage::config::{self, Loaded};
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::{Machine, Store};
@@ -111,7 +112,7 @@ pub fn shipped_config(
     folder: &Path,
     change: impl Fn(String) -> String,
 ) -> Loaded {
-    let text = change(shipped.machine.replace(
+    let text = change(shipped.machine.edit(
         "\"machine-data\"",
         &format!("{:?}", folder.display().to_string()),
     ));

@@ -22,6 +22,7 @@ use truestage::store::{
 use units::{Celsius, Metres, Radians, Time};
 
 use crate::{Bench, VOLUMETRIC, random};
+use truestage::Edit;
 
 pub use frame::Frame;
 
@@ -39,15 +40,15 @@ pub fn calm(text: String) -> String {
 
 /// Few nodes and short averages, for tests of what is done rather than of how well it is measured.
 pub fn quick(text: String) -> String {
-    let text = text.replace(
+    let text = text.edit(
         "step_mm = 25.0\nsamples = 50",
         "step_mm = 50.0\nsamples = 10",
     );
-    let text = text.replace(
+    let text = text.edit(
         "step_mm = 50.0\nsettle_ms = 100.0",
         "step_mm = 100.0\nsettle_ms = 50.0",
     );
-    calm(text.replace("average_samples = 60", "average_samples = 20"))
+    calm(text.edit("average_samples = 60", "average_samples = 20"))
 }
 
 /// An error of the tool: along x, y, z.

@@ -316,6 +316,44 @@ fn no_test_waits_for_the_clock_on_the_wall() {
 }
 
 #[test]
+fn no_test_edits_a_text_without_noticing_that_nothing_matched() {
+    for (name, text) in sources("tests") {
+        if name == "tests/tidy/main.rs" {
+            continue;
+        }
+        for (line, code) in code_lines(&text) {
+            assert!(
+                !code.contains(".replace(") && !code.contains(".replacen("),
+                "{name}:{line}: use `tests::Edit`: {}",
+                code.trim()
+            );
+        }
+    }
+}
+
+#[test]
+fn every_name_in_the_rules_for_running_tests_is_one_of_tests() {
+    const SYNTAX: &[&str] = &["package", "binary", "test", "not", "mock", "bus"];
+    let text = fs::read_to_string(root().join(".config/nextest.toml")).unwrap();
+    let config: toml::Table = text.parse().unwrap();
+    let overrides = config["profile"]["default"]["overrides"]
+        .as_array()
+        .unwrap();
+    let mut files = sources("tests");
+    files.extend(sources("drivers"));
+    files.extend(sources("mock-bus"));
+    for filter in overrides.iter().map(|it| it["filter"].as_str().unwrap()) {
+        let words = filter.split(|it: char| !it.is_ascii_lowercase() && it != '_');
+        for word in words.filter(|it| it.len() > 2 && !SYNTAX.contains(it)) {
+            let there = files
+                .keys()
+                .any(|name| name.split(['/', '.']).any(|part| part.starts_with(word)));
+            assert!(there, "nothing is called `{word}` any more");
+        }
+    }
+}
+
+#[test]
 fn files_stay_within_a_screenful_of_ideas() {
     for folder in ["units", "drivers", "compensator", "mock-bus", "controller"] {
         for (name, text) in sources(folder) {

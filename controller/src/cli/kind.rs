@@ -63,6 +63,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use truestage::Edit;
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
@@ -90,7 +91,7 @@ mod tests {
     fn of_several_kinds_one_must_be_named() {
         let rotary = ROTARY.find("[rotary.c]").unwrap();
         let mixed = format!("{LINEAR}\n{}", &ROTARY[rotary..])
-            .replace("node_id = 1\ncounts", "node_id = 9\ncounts");
+            .edit("node_id = 1\ncounts", "node_id = 9\ncounts");
         check(&mixed, &[], None);
         check(&mixed, &["x"], Some(Kind::Linear));
         check(&mixed, &["c"], Some(Kind::Rotary));

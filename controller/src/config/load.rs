@@ -242,6 +242,7 @@ fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Edit;
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
@@ -270,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_key_with_the_wrong_unit_is_named_with_line_and_the_right_one() {
-        let text = LINEAR.replace("soft_min_mm", "soft_min_um");
+        let text = LINEAR.edit("soft_min_mm", "soft_min_um");
         let found = &findings(&text)[0];
         assert_eq!((found.line, found.column), (line_of("soft_min_mm"), 1));
         assert!(found.help.contains("`soft_min_mm`"), "{found}");
@@ -281,9 +282,8 @@ mod tests {
     fn a_period_that_a_drive_cannot_be_told_is_refused_when_it_is_loaded() {
         let cyclic = "synchronous_start = true\n[axis.x.cyclic]\njerk_mm_per_s3 = 100000.0\n\
                       deviation_limit_um = 1000.0\n[axis.x.identity]";
-        let text = LINEAR.replace("[axis.x.identity]", cyclic);
-        let with =
-            |ms: &str| text.replace("sync_period_ms = 5.0", &format!("sync_period_ms = {ms}"));
+        let text = LINEAR.edit("[axis.x.identity]", cyclic);
+        let with = |ms: &str| text.edit("sync_period_ms = 5.0", &format!("sync_period_ms = {ms}"));
         parse(&with("5.0"), "m.toml").unwrap_or_else(|error| panic!("{error}"));
         let found = &findings(&with("1.875"))[0];
         assert!(found.cause.contains("0x60C2"), "{found}");
@@ -293,13 +293,13 @@ mod tests {
 
     #[test]
     fn a_missing_key_is_named() {
-        let text = LINEAR.replace("resolution_nm = 10.0", "#");
+        let text = LINEAR.edit("resolution_nm = 10.0", "#");
         assert!(findings(&text)[0].cause.contains("resolution_nm"));
     }
 
     #[test]
     fn impossible_values_are_found_where_they_stand() {
-        let text = LINEAR.replace("soft_max_mm = 63.0", "soft_max_mm = -9.0");
+        let text = LINEAR.edit("soft_max_mm = 63.0", "soft_max_mm = -9.0");
         let found = &findings(&text)[0];
         assert_eq!(found.key, "axis.x.soft_max_mm");
         assert_eq!((found.line, found.column), (line_of("soft_max_mm"), 15));
@@ -356,8 +356,7 @@ mod tests {
             ),
             ("[axis.x]", "[axis.\"../x\"]", "axis.../x"),
         ] {
-            assert!(LINEAR.contains(from), "{from}");
-            let text = LINEAR.replace(from, to).replace(
+            let text = LINEAR.edit(from, to).edit(
                 "[axis.x.",
                 match key {
                     "axis.../x" => "[axis.\"../x\".",
@@ -401,8 +400,7 @@ mod tests {
             ("node_id = 1\n", "node_id = 127\n", "rotary.c.node_id"),
             ("bus = \"can0\"", "bus = \"can9\"", "rotary.c.bus"),
         ] {
-            assert!(ROTARY.contains(from), "{from}");
-            let found = findings(&ROTARY.replace(from, to));
+            let found = findings(&ROTARY.edit(from, to));
             assert!(found.iter().any(|it| it.key == key), "{to}: {found:?}");
         }
     }
@@ -505,8 +503,7 @@ mod tests {
     #[test]
     fn a_rotary_cycle_that_cannot_be_is_refused_before_anybody_turns_a_plate() {
         for (from, to, key, says) in REFUSED {
-            assert!(ROTARY.contains(from), "{from}");
-            let text = ROTARY.replace(from, to).replace("edge = \"positive\"", "#");
+            let text = ROTARY.edit(from, to).edit("edge = \"positive\"", "#");
             let found = findings(&text);
             let key = format!("rotary.c.{key}");
             let told = |it: &Diagnostic| it.key == key && it.cause.contains(says);
@@ -517,7 +514,7 @@ mod tests {
     #[test]
     fn an_axis_and_a_rotary_axis_have_two_names() {
         let rotary = ROTARY.find("[rotary.c]").unwrap();
-        let text = format!("{LINEAR}\n{}", &ROTARY[rotary..]).replace("rotary.c", "rotary.x");
+        let text = format!("{LINEAR}\n{}", &ROTARY[rotary..]).edit("rotary.c", "rotary.x");
         let found = findings(&text);
         assert!(found.iter().any(|it| it.key == "rotary.x"), "{found:?}");
     }
@@ -526,9 +523,9 @@ mod tests {
     fn a_calibration_depends_on_how_a_table_is_counted_and_on_nothing_of_its_speed() {
         let hash = |text: &str| parse(text, "rotary.toml").unwrap().hash;
         let usual = hash(ROTARY);
-        let faster = ROTARY.replace("speed_deg_per_s = 30.0", "speed_deg_per_s = 40.0");
+        let faster = ROTARY.edit("speed_deg_per_s = 30.0", "speed_deg_per_s = 40.0");
         assert_eq!(usual, hash(&faster));
-        let mirrored = ROTARY.replace("node_id = 1\n", "node_id = 1\nreverse = true\n");
+        let mirrored = ROTARY.edit("node_id = 1\n", "node_id = 1\nreverse = true\n");
         assert_ne!(usual, hash(&mirrored));
     }
 
@@ -541,7 +538,7 @@ mod tests {
 
     #[test]
     fn two_devices_with_one_node_id_are_refused() {
-        let text = LINEAR.replace("node_id = 2", "node_id = 1");
+        let text = LINEAR.edit("node_id = 2", "node_id = 1");
         assert!(
             findings(&text)
                 .iter()
@@ -552,13 +549,13 @@ mod tests {
 
     #[test]
     fn a_reference_to_nothing_lists_what_there_is() {
-        let text = LINEAR.replace("instrument = \"laser\"", "instrument = \"lasre\"");
+        let text = LINEAR.edit("instrument = \"laser\"", "instrument = \"lasre\"");
         assert!(findings(&text)[0].help.contains("laser"));
     }
 
     #[test]
     fn a_sync_period_too_short_for_the_bus_names_one_that_fits() {
-        let text = LINEAR.replace("sync_period_ms = 5.0", "sync_period_ms = 0.4");
+        let text = LINEAR.edit("sync_period_ms = 5.0", "sync_period_ms = 0.4");
         let found = &findings(&text)[0];
         assert_eq!(found.key, "can.can0.sync_period_ms");
         assert!(found.help.contains("ms"), "{found}");
@@ -577,7 +574,7 @@ mod tests {
         assert_eq!(usual.home_offset, HomeOffset::IsPositionAtHome);
         let keys = "\nnode_id = 1\nhome_offset = \"zero_from_home\"\n\
                     option_codes = { quick_stop = 2, fault_reaction = -1 }\n";
-        let told = settings(&LINEAR.replacen("\nnode_id = 1\n", keys, 1));
+        let told = settings(&LINEAR.edit_first("\nnode_id = 1\n", keys));
         assert_eq!(told.options.quick_stop, Some(2));
         assert_eq!(told.options.fault_reaction, Some(-1));
         assert_eq!(
@@ -591,8 +588,8 @@ mod tests {
     fn the_hash_of_a_platform_follows_where_its_screws_push() {
         const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
         let hash = |text: &str| parse(text, "m").unwrap().hash;
-        let moved = UVW.replacen("point_mm = [-80.0, 80.0]", "point_mm = [-80.0, 81.0]", 1);
-        let slower = UVW.replacen("settle_ms = 30", "settle_ms = 40", 1);
+        let moved = UVW.edit_first("point_mm = [-80.0, 80.0]", "point_mm = [-80.0, 81.0]");
+        let slower = UVW.edit_first("settle_ms = 30", "settle_ms = 40");
         assert_ne!(hash(UVW), hash(&moved));
         assert_eq!(hash(UVW), hash(&slower));
     }
@@ -601,7 +598,7 @@ mod tests {
     fn a_platform_that_nothing_holds_or_reaches_is_refused_with_the_reason() {
         const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
         let refused = |from: &str, to: &str| {
-            let text = UVW.replacen(from, to, 1);
+            let text = UVW.edit_first(from, to);
             assert_ne!(text, UVW, "{from}");
             parse(&text, "m").unwrap_err().to_string()
         };
@@ -618,7 +615,7 @@ mod tests {
     #[test]
     fn a_key_of_another_kind_of_module_is_refused() {
         let keys = "device = \"cia401\"\npoll_period_ms = 50.0";
-        let text = LINEAR.replacen("device = \"cia401\"", keys, 1);
+        let text = LINEAR.edit_first("device = \"cia401\"", keys);
         let error = parse(&text, "m").unwrap_err().to_string();
         assert!(error.contains("a cia401 module has no such key"), "{error}");
     }
@@ -626,8 +623,8 @@ mod tests {
     #[test]
     fn the_hash_follows_what_a_calibration_depends_on() {
         let hash = |text: &str| parse(text, "m").unwrap().hash;
-        let same = LINEAR.replace("runs = 3", "runs = 4");
-        let other = LINEAR.replace("resolution_nm = 10.0", "resolution_nm = 20.0");
+        let same = LINEAR.edit("runs = 3", "runs = 4");
+        let other = LINEAR.edit("resolution_nm = 10.0", "resolution_nm = 20.0");
         assert_eq!(hash(LINEAR), hash(&same));
         assert_ne!(hash(LINEAR), hash(&other));
     }

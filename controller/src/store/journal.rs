@@ -479,6 +479,7 @@ fn take(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Edit;
 
     fn header() -> JournalHeader {
         JournalHeader {
@@ -679,7 +680,7 @@ mod tests {
         let path = journal.path().to_owned();
         let text = fs::read_to_string(&path)
             .unwrap()
-            .replacen("\"run\":1", "\"run\":7", 1);
+            .edit_first("\"run\":1", "\"run\":7");
         fs::write(&path, text).unwrap();
         let error = read_journal(&path).unwrap_err();
         assert!(

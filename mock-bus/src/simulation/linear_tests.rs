@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fault::Fault;
+use crate::plant::HallDrift;
 use core::time::Duration;
 use drivers::wire::can::CanFrame;
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::fault::Fault;
 use crate::node::in_sight_controller::InSightControllerNode;
+use crate::plant::HallDrift;
 use crate::plant::PlatformTruth;
 use core::time::Duration;
 use drivers::wire::can::CanFrame;
@@ -167,7 +168,9 @@ fn the_files_example_of_faults_is_right() {
 
 #[test]
 fn a_platform_that_is_held_by_nothing_is_refused() {
-    let text = text().replace("direction = [0.0, 1.0]", "direction = [1.0, 0.0]");
+    let across = "direction = [0.0, 1.0]";
+    assert!(text().contains(across));
+    let text = text().replace(across, "direction = [1.0, 0.0]");
     let error = MachineConfig::parse(&text).unwrap_err().to_string();
     assert!(error.contains("actuators"), "{error}");
 }

@@ -1,5 +1,6 @@
 use super::*;
 use crate::fault::Fault;
+use crate::plant::HallDrift;
 use core::time::Duration;
 use drivers::wire::can::{BusErrorClass, CanFrame};
 
@@ -303,13 +304,17 @@ fn a_fault_on_something_that_is_not_there_is_refused() {
 
 #[test]
 fn an_unknown_key_is_refused_with_its_line() {
-    let text = MACHINE.replace("power_off_ms", "power_off_s");
+    let renamed = |from: &str, to: &str| {
+        assert!(MACHINE.contains(from), "{from}");
+        MACHINE.replace(from, to)
+    };
+    let text = renamed("power_off_ms", "power_off_s");
     let error = MachineConfig::parse(&text).unwrap_err().to_string();
     assert!(
         error.contains("power_off_s") && error.contains("line 3"),
         "{error}"
     );
-    let text = MACHINE.replace("checksum = false", "checksums = false");
+    let text = renamed("checksum = false", "checksums = false");
     assert!(MachineConfig::parse(&text).is_err());
 }
 

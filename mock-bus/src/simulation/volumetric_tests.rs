@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fault::Fault;
+use crate::plant::HallDrift;
 use crate::plant::config::PlantConfig;
 use crate::plant::volumetric::config::VolumetricConfig;
 use crate::plant::{LineOptics, LineSetUp};

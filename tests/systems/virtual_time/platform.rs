@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
-use tests::{Bench, EDGE, PoseJudge, Shipped, UVW, UVW_COPLEY, true_pose};
+use tests::{Bench, EDGE, Edit, PoseJudge, Shipped, UVW, UVW_COPLEY, true_pose};
 use truestage::Failure;
 use truestage::cycle::platform::{Pose, PoseMoved};
 use units::{Approach, Metres, Time};
@@ -45,8 +45,8 @@ fn cycle(case: Case, seed: u64) -> Cycle {
     let mut bench = Bench::of(case.shipped, seed, |text| {
         let method = format!("method = \"{}\"", case.method);
         let rule = format!("rule = \"{}\"", case.rule);
-        text.replace("method = \"least_squares\"", &method)
-            .replace("rule = \"engagement\"", &rule)
+        text.edit("method = \"least_squares\"", &method)
+            .edit("rule = \"engagement\"", &rule)
     });
     run(&mut bench, seed, case.shipped).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"))
 }

@@ -1,7 +1,7 @@
 //! What a platform does with what it knows and does not know: play after an interruption, images
 //! that never agree, a fourth screw that contradicts the others.
 
-use tests::{Bench, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
+use tests::{Bench, Edit, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
 use truestage::cycle::platform::Pose;
 use truestage::machine::StopRequest;
 use truestage::{Failure, config};
@@ -17,8 +17,8 @@ fn pose(x_mm: f64, y_mm: f64, arcsec: f64) -> Pose {
 
 /// Fewer strokes than it ships with: these are about other things.
 fn shortened(text: String) -> String {
-    text.replace("step_mm = 0.25", "step_mm = 0.625")
-        .replace("runs = 2", "runs = 1")
+    text.edit("step_mm = 0.25", "step_mm = 0.625")
+        .edit("runs = 2", "runs = 1")
 }
 
 /// A platform that was zeroed, with a judge of its poses.
@@ -63,14 +63,14 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
 fn where_the_soft_limits_leave_no_room_forward_play_is_taken_up_in_reverse() {
     let narrow = |text: String| {
         shortened(text)
-            .replace("soft_max_mm = 4.5", "soft_max_mm = 1.5")
-            .replace("theta_max_deg = 0.5", "theta_max_deg = 0.0")
-            .replace("x_max_mm = 1.5", "x_max_mm = 1.4995")
-            .replace("y_max_mm = 1.5", "y_max_mm = 1.0")
-            .replace("first_mm = -2.5", "first_mm = -1.25")
-            .replace("last_mm = 2.5", "last_mm = 1.25")
-            .replace("step_mm = 0.625", "step_mm = 0.25")
-            .replace("extrapolation_mm = 0.2", "extrapolation_mm = 0.3")
+            .edit("soft_max_mm = 4.5", "soft_max_mm = 1.5")
+            .edit("theta_max_deg = 0.5", "theta_max_deg = 0.0")
+            .edit("x_max_mm = 1.5", "x_max_mm = 1.4995")
+            .edit("y_max_mm = 1.5", "y_max_mm = 1.0")
+            .edit("first_mm = -2.5", "first_mm = -1.25")
+            .edit("last_mm = 2.5", "last_mm = 1.25")
+            .edit("step_mm = 0.625", "step_mm = 0.25")
+            .edit("extrapolation_mm = 0.2", "extrapolation_mm = 0.3")
     };
     let mut bench = Bench::of(&UVW, 5, narrow);
     let judge = zeroed(&mut bench);
@@ -129,8 +129,8 @@ fn alignment_is_bounded_and_told_apart_from_the_open_loop() {
     assert!(truly < Metres::from_um(1.0), "{} µm", truly.um());
 
     let never = |text: String| {
-        text.replace("tolerance_um = 0.5", "tolerance_um = 0.001")
-            .replace("iterations_max = 5", "iterations_max = 3")
+        text.edit("tolerance_um = 0.5", "tolerance_um = 0.001")
+            .edit("iterations_max = 5", "iterations_max = 3")
     };
     let mut bench = Bench::of(&UVW, 3, never);
     zeroed(&mut bench);
@@ -183,19 +183,19 @@ fn how_far_four_screws_may_contradict_each_other_must_be_said_and_three_cannot()
         "{missing}"
     );
     assert_eq!(judged(&with_fourth_screw(text.clone(), Some(5.0))), "");
-    let unneeded = text.replace(
+    let unneeded = text.edit(
         "exposures = 4",
         "inconsistency_limit_um = 5.0\nexposures = 4",
     );
     let unneeded = judged(&unneeded);
     assert!(unneeded.contains("three screws cannot"), "{unneeded}");
-    let strained = with_fourth_screw(text.clone(), Some(5.0)).replace("lone_homing = true", "");
+    let strained = with_fourth_screw(text.clone(), Some(5.0)).edit("lone_homing = true", "");
     let strained = judged(&strained);
     assert!(
         strained.contains("homes while the others stand"),
         "{strained}"
     );
-    let alone = text.replace("[platform.zero]", "[platform.zero]\nlone_homing = true");
+    let alone = text.edit("[platform.zero]", "[platform.zero]\nlone_homing = true");
     let alone = judged(&alone);
     assert!(alone.contains("never strain"), "{alone}");
     let impossible = judged(&with_fourth_screw(text, Some(-1.0)));

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
-use tests::{Bench, Hand};
+use tests::{Bench, Edit, Hand};
 use truestage::cycle::rotary::{
     Operator, PlateMove, PlateTask, RotaryCalibrated, RotaryFailure, RotaryVerified,
 };
@@ -205,7 +205,7 @@ fn twenty_tables_are_right_to_a_few_hundredths_of_an_arcsecond_and_as_sure_as_th
 #[test]
 fn a_plate_that_is_placed_by_hand_does_as_well() {
     let askew = |text: String| {
-        text.replace(
+        text.edit(
             "placement_error_arcsec = 60.0",
             "placement_error_arcsec = 1500.0",
         )
@@ -464,9 +464,8 @@ fn a_run_is_continued_only_with_the_same_plate_and_set_up() {
         ("passes = 1 ", "passes = 2 "),
     ] {
         let loaded = tests::shipped_config(&tests::ROTARY, bench.folder.path(), |text| {
-            assert!(text.contains(from));
-            let text = text.replacen(from, to, 1);
-            text.replace(
+            let text = text.edit_first(from, to);
+            text.edit(
                 "optimise = \"worst\"",
                 if to.starts_with("offsets") {
                     ""
@@ -545,7 +544,7 @@ fn a_calibration_of_another_encoder_or_drive_is_refused() {
         ("TS-ROT-0001", "TS-ROT-0002"),
     ] {
         let loaded = tests::shipped_config(&tests::ROTARY, bench.folder.path(), |text| {
-            text.replacen(from, to, 1)
+            text.edit_first(from, to)
         });
         let mut machine = Machine::new(&loaded, Box::new(bench.emulated.transport()));
         let refused = machine.load_active_rotary(AXIS, &bench.store);

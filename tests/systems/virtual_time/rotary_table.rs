@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use drivers::device::DeviceError;
 use mock_bus::fault::{Fault, FaultConfig};
-use tests::Bench;
+use tests::{Bench, Edit};
 use truestage::Failure;
 use truestage::cycle::{Sweep, SweepOptions, Way};
 use truestage::emulated::HallDrift;
@@ -252,7 +252,7 @@ fn a_table_without_plate_or_detector_says_what_to_look_for() {
     let smudge = "smudged_lines = []";
     let all: Vec<String> = (0..360).map(|line| line.to_string()).collect();
     let all = format!("smudged_lines = [{}]", all.join(", "));
-    let mut bench = Bench::rotary(12, |text| text, |text| text.replace(smudge, &all));
+    let mut bench = Bench::rotary(12, |text| text, |text| text.edit(smudge, &all));
     run(&mut bench, |bench| {
         ready(bench)?;
         let blind = bench.machine.sweep(AXIS, &options(Approach::Forward));

@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::online::Memories;
+use tests::Edit;
 use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
 use truestage::cycle::volumetric::{Remembered, VolumetricState};
 use truestage::store::MemoryName;
@@ -18,10 +19,9 @@ const BEGINS_S: f64 = 360.0;
 /// With its errors known and the detectors' references taken.
 fn known(seed: u64, machine: impl Fn(String) -> String, deliberate: &str, own: &str) -> Volume {
     let emulated = |text: String| {
-        assert!(text.contains(deliberate) && text.contains("deliberate_from_h = 0.0"));
-        text.replace(deliberate, own)
-            .replace("deliberate_from_h = 0.0", "deliberate_from_h = 0.1")
-            .replace(TOOL, &machine(TOOL.to_owned()))
+        text.edit(deliberate, own)
+            .edit("deliberate_from_h = 0.0", "deliberate_from_h = 0.1")
+            .edit(TOOL, &machine(TOOL.to_owned()))
     };
     let mut volume = Volume::zeroed(seed, |text| calm(machine(text)), emulated);
     volume.know_errors();
@@ -223,7 +223,7 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
 /// 5 arcsec on a tool of 200 mm: 4.8 um.
 #[test]
 fn a_roll_is_corrected_at_a_long_tool() {
-    let long = |text: String| text.replace(TOOL, "tool_offset_mm = [0.0, 0.0, -200.0]");
+    let long = |text: String| text.edit(TOOL, "tool_offset_mm = [0.0, 0.0, -200.0]");
     let roll = "deliberate_roll_arcsec = 5.0";
     let mut volume = known(1, long, "deliberate_roll_arcsec = 0.0", roll);
     let places: Vec<[f64; 3]> = (1..=5).map(|n| [f64::from(n) * 90.0, 0.0, 0.0]).collect();

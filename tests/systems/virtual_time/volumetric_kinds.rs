@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use tests::Edit;
 use tests::volume::{Frame, TRAVEL_MM, Volume, calm, good, percentile_95, spread};
 use truestage::cycle::volumetric::WarmUp;
 use units::Metres;
@@ -14,9 +15,9 @@ const WARM_UP: Duration = Duration::from_secs(2 * 3600);
 /// A table under a column, its volume away from the axes' zeros.
 fn table_under_a_column(text: String) -> String {
     calm(text)
-        .replace("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
-        .replace("low_mm = [0.0, 0.0, 0.0]", &format!("low_mm = {LOW_MM:?}"))
-        .replace(
+        .edit("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
+        .edit("low_mm = [0.0, 0.0, 0.0]", &format!("low_mm = {LOW_MM:?}"))
+        .edit(
             "from_mm = [0.0, 0.0, 150.0]",
             "from_mm = [0.0, 100.0, 150.0]",
         )
@@ -36,7 +37,7 @@ fn places(first: u32, count: u32) -> Vec<[f64; 3]> {
 fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
     let zeroed = || {
         Volume::zeroed(3, table_under_a_column, |text| {
-            text.replace("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
+            text.edit("chain = \"FXYZ\" ", "chain = \"XFYZ\" ")
         })
     };
     let mut volume = zeroed();

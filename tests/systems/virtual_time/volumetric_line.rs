@@ -9,7 +9,7 @@ use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::plant::LineTruth;
-use tests::{Bench, VOLUMETRIC};
+use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::Failure;
 use truestage::cycle::volumetric::{
     Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask, VolumetricFailure,
@@ -255,7 +255,7 @@ fn a_tool_that_leaves_the_line_loses_the_beam() {
 
 #[test]
 fn a_line_that_cannot_be_measured_is_refused_before_anything_moves() {
-    let mut bench = zeroed(1, |text| text.replace("straightness_factor = 36.0", ""));
+    let mut bench = zeroed(1, |text| text.edit("straightness_factor = 36.0", ""));
     let before = target(&bench, TOOL, ORIGIN);
     let end = Point::from_mm(500.0, 0.0, 0.0);
     let across = |across| LineOptics::Straightness { across };
@@ -275,7 +275,7 @@ fn a_line_that_cannot_be_measured_is_refused_before_anything_moves() {
 /// A reflector that comes towards the head is counted the other way, and seen at once.
 #[test]
 fn a_count_of_the_wrong_sign_is_no_error_of_the_machine() {
-    let mut bench = zeroed(1, |text| text.replace("reverse = false", "reverse = true"));
+    let mut bench = zeroed(1, |text| text.edit("reverse = false", "reverse = true"));
     let end = Point::from_mm(500.0, 0.0, 0.0);
     let task = task(LineOptics::Linear, ORIGIN, end, TOOL);
     let line = set_up(&mut bench, &task).unwrap_or_else(|it| panic!("{it}"));

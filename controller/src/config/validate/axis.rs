@@ -289,6 +289,7 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use crate::config::parse;
     use crate::config::validate::told::check;
 
@@ -309,7 +310,7 @@ mod tests {
         check(DRIVES, "heartbeat_producer_ms = 50\n", "", key, says);
         let says = "a copley axis needs `line`, `poll_period_ms`";
         let both = "line = \"amps\"\naddress = 0                    # at the cable\n";
-        let gone = AMPLIFIERS.replacen(both, "address = 0\n", 1);
+        let gone = AMPLIFIERS.edit_first(both, "address = 0\n");
         check(&gone, "poll_period_ms = 20.0\n", "", key, says);
         let says = "a copley axis has no such key";
         for (stranger, key) in [
@@ -347,7 +348,7 @@ mod tests {
         let linear = include_str!("../../../../configs/machines/linear.toml");
         let begin = linear.find("[axis.x.zero]").expect("it has a zero");
         let end = linear.find("[axis.x.calibrate]").expect("it comes next");
-        let zero = linear[begin..end].replace("axis.x", "axis.u");
+        let zero = linear[begin..end].edit("axis.x", "axis.u");
         let text = format!("{AMPLIFIERS}\n{zero}");
         check(&text, "", "", "axis.u.zero", "voltages of one SYNC");
     }

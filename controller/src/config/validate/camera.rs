@@ -53,14 +53,14 @@ fn check_camera(judge: &mut Judge<'_>, config: &MachineConfig, camera: &CameraCo
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use crate::config::{ConfigError, parse};
 
     const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
 
     #[track_caller]
     fn check(from: &str, to: &str, key: &str) {
-        assert!(UVW.contains(from), "{from}");
-        match parse(&UVW.replace(from, to), "uvw.toml") {
+        match parse(&UVW.edit(from, to), "uvw.toml") {
             Err(ConfigError::Invalid { findings }) => {
                 assert!(findings.iter().any(|it| it.key == key), "{findings:?}");
             }

@@ -275,13 +275,13 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
 /// What tests of the single parts share.
 #[cfg(test)]
 mod told {
+    use crate::Edit;
     use crate::config::{ConfigError, parse};
 
     /// With the first `from` in `text` become `to`, the finding at `key` says so.
     #[track_caller]
     pub(super) fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
-        assert!(text.contains(from), "{from}");
-        match parse(&text.replacen(from, to, 1), "machine.toml") {
+        match parse(&text.edit_first(from, to), "machine.toml") {
             Err(ConfigError::Invalid { findings }) => {
                 let told = findings
                     .iter()

@@ -207,6 +207,7 @@ impl Thermometry {
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use core::time::Duration;
 
     use super::*;
@@ -221,7 +222,7 @@ mod tests {
     type Shown = [Option<Celsius>; 6];
 
     fn shipped() -> (MachineConfig, VolumetricConfig) {
-        let quick = SHIPPED.replace("fade_out_s = 60.0", "fade_out_s = 1.0");
+        let quick = SHIPPED.edit("fade_out_s = 60.0", "fade_out_s = 1.0");
         let config = crate::config::parse(&quick, "m").unwrap().config;
         let own = config.volumetric.clone().unwrap();
         (config, own)

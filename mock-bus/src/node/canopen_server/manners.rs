@@ -61,7 +61,8 @@ pub struct Manners {
     pub heartbeat_mute: bool,
 }
 
-/// Deliveries by the name of the key in [`Manners`] that asked for them.
+/// Deliveries by the name of the key in [`Manners`], or in the device's own faults, that asked
+/// for them.
 pub type Deliveries = BTreeMap<&'static str, u64>;
 
 /// The manners that are left, and what was delivered.

@@ -165,6 +165,12 @@ impl CanopenServer {
         &self.rudeness.delivered
     }
 
+    /// Counts a fault of the device's own as delivered, under the name of the key that asked
+    /// for it.
+    pub fn count_delivery(&mut self, name: &'static str) {
+        self.rudeness.count(name);
+    }
+
     /// Whether `frame` means anything to this node.
     pub fn concerns(&self, frame: &CanFrame) -> bool {
         let Some(id) = frame.standard_id().filter(|_| !frame.is_remote()) else {

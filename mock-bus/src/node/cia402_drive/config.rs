@@ -154,7 +154,8 @@ pub(super) struct PowerOn {
     pub(super) homing_may_begin_within: i64,
 }
 
-/// What real drives do and a polite one would not; the default is nothing.
+/// What real drives do and a polite one would not; the default is nothing. Each is counted as
+/// delivered, under the name of its key, when it made a difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveQuirks {

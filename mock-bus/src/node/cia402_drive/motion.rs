@@ -120,6 +120,9 @@ impl Drive {
         }
         let mut position = self.demand(now).position;
         if self.config.quirks.direction_reversed {
+            if position != self.enabled_at {
+                self.server.count_delivery("direction_reversed");
+            }
             position = 2.0 * self.enabled_at - position;
         }
         let counts = self.sign() as f64 * (position - self.offset as f64);

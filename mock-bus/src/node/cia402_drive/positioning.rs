@@ -105,6 +105,7 @@ impl Drive {
         let set_point = self.set_point(new.contains(Controlword::MODE_6), m);
         let identical = set_point.target == self.positioning.last_target;
         if identical && self.config.quirks.identical_target_ignored {
+            self.server.count_delivery("identical_target_ignored");
             return false;
         }
         self.positioning.last_target = set_point.target;

@@ -40,9 +40,23 @@ impl Drive {
         }
         let fault = self.fault.map_or(0, |code| i64::from(code.0));
         self.server.set(0x603F, 0, fault);
-        if !self.config.quirks.statusword_stuck {
-            let status = self.statusword(now);
-            self.server.set(0x6041, 0, i64::from(status.bits()));
+        let status = self.statusword(now);
+        self.show_status(now, i64::from(status.bits()));
+    }
+
+    /// Shows the statusword, unless it sticks.
+    fn show_status(&mut self, now: Time, status: i64) {
+        let quirks = self.config.quirks;
+        let reached = self.power == Power::OperationEnabled
+            && self.mode() == PROFILE_POSITION
+            && self.is_at_target(now);
+        if quirks.target_never_reached && reached {
+            self.server.count_delivery("target_never_reached");
+        }
+        if !quirks.statusword_stuck {
+            self.server.set(0x6041, 0, status);
+        } else if status != self.get(0x6041) {
+            self.server.count_delivery("statusword_stuck");
         }
     }
 
@@ -77,10 +91,12 @@ impl Drive {
     /// Bit 10 in profile position: in the window 0x6067 for the time 0x6068, or halted.
     /// It stays 1 from the move before until a new set-point is taken.
     pub(super) fn target_reached(&self, now: Time) -> bool {
+        !self.config.quirks.target_never_reached && self.is_at_target(now)
+    }
+
+    /// The same of a drive that owns up to it.
+    fn is_at_target(&self, now: Time) -> bool {
         use drivers::wire::cia402::Controlword;
-        if self.config.quirks.target_never_reached {
-            return false;
-        }
         if self.controlword.contains(Controlword::HALT) {
             return self.profile.is_done(now);
         }

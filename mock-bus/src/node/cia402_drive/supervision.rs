@@ -197,7 +197,11 @@ impl Drive {
             EmergencyCode::HEARTBEAT_LOST => self.heartbeat_lost,
             _ => self.internal_error.is_some(),
         };
-        if persists || self.config.quirks.fault_reset_ignored {
+        if self.config.quirks.fault_reset_ignored {
+            self.server.count_delivery("fault_reset_ignored");
+            return;
+        }
+        if persists {
             return;
         }
         self.fault = None;

@@ -105,6 +105,7 @@ pub(super) fn expansion_plans(config: &VolumetricConfig) -> Vec<ExpansionPlan> {
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use compensator::volumetric::Point;
 
     use super::*;
@@ -119,8 +120,7 @@ mod tests {
         let more = format!(
             "{own}\ngrowth_um_per_k = [0.0, 0.0, 2.0]\nsquareness_arcsec_per_k = [1.0, 0.0, 0.0]"
         );
-        assert!(SHIPPED.contains(own));
-        let text = SHIPPED.replacen(own, &more, 1);
+        let text = SHIPPED.edit_first(own, &more);
         let config = crate::config::parse(&text, "m").unwrap().config;
         config.volumetric.unwrap()
     }

@@ -205,3 +205,19 @@ fn power_loss_while_moving_leaves_no_torque() {
     assert_eq!(bench.axis.servo, Servo::Off);
     assert!(bench.wait_ms(1000).is_empty());
 }
+
+#[test]
+fn a_reset_that_is_ignored_is_counted_as_delivered() {
+    let mut bench = Bench::new();
+    bench.enable();
+    bench.axis.blocked = true;
+    bench.set_point(10_000_000, 0);
+    let _ = bench.wait_ms(200);
+    bench.check_status(0x0218);
+    bench.drive.config.quirks.fault_reset_ignored = true;
+    assert!(!bench.delivered("fault_reset_ignored"), "nobody has asked");
+    bench.control(0x00);
+    bench.control(0x80);
+    bench.check_status(0x0218);
+    assert!(bench.delivered("fault_reset_ignored"));
+}

@@ -130,6 +130,11 @@ impl Bench {
         bench
     }
 
+    /// Whether the fault of this key made a difference.
+    pub(super) fn delivered(&self, key: &str) -> bool {
+        self.drive.server.deliveries().contains_key(key)
+    }
+
     pub(super) fn sent(&mut self) -> Vec<String> {
         let frames = std::iter::from_fn(|| self.drive.server.poll_transmit());
         frames.map(|frame| frame.to_string()).collect()

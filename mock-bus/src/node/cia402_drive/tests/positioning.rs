@@ -100,6 +100,7 @@ fn an_identical_target_is_acknowledged_and_reached_again() {
     bench.drive.config.quirks.identical_target_ignored = true;
     bench.set_point(0, 0);
     check_bits(&mut bench, REACHED | ACKNOWLEDGED, REACHED);
+    assert!(bench.delivered("identical_target_ignored"));
 }
 
 #[test]
@@ -195,6 +196,7 @@ fn a_target_that_is_never_reached_is_a_quirk() {
     let _ = bench.wait_ms(1000);
     check_bits(&mut bench, REACHED, 0);
     assert_eq!(bench.position(), 100);
+    assert!(bench.delivered("target_never_reached"));
 }
 
 #[test]
@@ -228,8 +230,10 @@ fn a_motor_wired_the_wrong_way_runs_away_into_the_following_error() {
     let mut bench = Bench::with(Cia402DriveConfig::default());
     bench.drive.config.quirks.direction_reversed = true;
     bench.enable();
+    assert!(!bench.delivered("direction_reversed"), "it stands");
     bench.set_point(5_000_000, 0);
     let sent = bench.wait_ms(500);
+    assert!(bench.delivered("direction_reversed"));
     assert!(
         sent.iter().any(|frame| frame.starts_with("081#1186")),
         "{sent:?}"

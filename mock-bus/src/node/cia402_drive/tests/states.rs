@@ -208,9 +208,12 @@ fn quirks_hold_the_drive_back() {
         let _ = bench.wait_ms(20);
     }
     bench.check_status(0x0233);
+    assert!(bench.delivered("enable_refused"));
     bench.drive.config.quirks.statusword_stuck = true;
+    assert!(!bench.delivered("statusword_stuck"), "it is true as yet");
     bench.control(0x00);
     bench.check_status(0x0233);
+    assert!(bench.delivered("statusword_stuck"));
 }
 
 #[test]

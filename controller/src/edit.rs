@@ -1,0 +1,56 @@
+//! Edits of a machine file's text whose maker relies on them.
+
+/// A text of which a passage is exchanged. An edit that matches nothing would leave the text as
+/// it is, and whoever relies on the edit with a machine that they did not mean.
+pub trait Edit {
+    /// The text with every `from` become `to`.
+    ///
+    /// # Panics
+    /// When there is no `from` in it.
+    #[must_use]
+    #[track_caller]
+    fn edit(&self, from: &str, to: &str) -> String;
+
+    /// The text with the first `from` become `to`.
+    ///
+    /// # Panics
+    /// When there is no `from` in it.
+    #[must_use]
+    #[track_caller]
+    fn edit_first(&self, from: &str, to: &str) -> String;
+}
+
+impl Edit for str {
+    fn edit(&self, from: &str, to: &str) -> String {
+        assert!(self.contains(from), "`{from}` is not in the text");
+        self.replace(from, to)
+    }
+
+    fn edit_first(&self, from: &str, to: &str) -> String {
+        assert!(self.contains(from), "`{from}` is not in the text");
+        self.replacen(from, to, 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Edit;
+
+    #[test]
+    fn every_passage_or_the_first_is_exchanged() {
+        assert_eq!("a = 1, b = 1".edit("= 1", "= 2"), "a = 2, b = 2");
+        assert_eq!("a = 1, b = 1".edit_first("= 1", "= 2"), "a = 2, b = 1");
+    }
+
+    #[test]
+    #[should_panic(expected = "`= 3` is not in the text")]
+    fn an_edit_that_matches_nothing_fails() {
+        let _ = "a = 1, b = 1".edit("= 3", "= 2");
+    }
+
+    #[test]
+    #[should_panic(expected = "`= 3` is not in the text")]
+    fn an_edit_of_the_first_that_matches_nothing_fails() {
+        let _ = "a = 1, b = 1".edit_first("= 3", "= 2");
+    }
+}
