@@ -78,7 +78,7 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
 /// Nobody is there to turn the plate: nothing moves, nothing is written.
 fn refuses_without_a_person(bench: &Bench) {
     for verb in ["calibrate", "verify"] {
-        let refused = bench.run(&[verb]).with_code(2);
+        let refused = bench.run(&[verb, "--hand", "ask"]).with_code(2);
         let error = text(&refused["error"]);
         assert!(
             error.contains("turn the plate") && error.contains("--yes"),

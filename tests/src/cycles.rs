@@ -8,6 +8,7 @@ use truestage::cycle::volumetric::WarmUp;
 use truestage::cycle::{CalibrateOptions, VerifyOptions, Way};
 use units::{Metres, Radians};
 
+use crate::Edit;
 use crate::hand::Hand;
 use crate::rig::{Bench, LINEAR, ROTARY, Shipped, UVW, UVW_COPLEY, VOLUMETRIC};
 use crate::volume::{Volume, calm, spread};
@@ -76,10 +77,8 @@ const fn cycle(
 /// # Panics
 /// When the configuration that ships has become another one.
 fn changed(text: String, changes: &[(&str, &str)]) -> String {
-    changes.iter().fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "`{from}` is not in the text");
-        text.replace(from, to)
-    })
+    let changes = changes.iter();
+    changes.fold(text, |text, (from, to)| text.edit(from, to))
 }
 
 fn short_strokes(text: String) -> String {

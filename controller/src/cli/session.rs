@@ -6,7 +6,7 @@ use std::io::BufWriter;
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
 use truestage::config::{self, Loaded};
-use truestage::ports::{self, Overrides, Pace, Use};
+use truestage::ports::{self, Overrides, Use};
 use truestage::store::Lease;
 use truestage::{Failure, Machine, StopRequest, Store, assemble};
 
@@ -35,13 +35,10 @@ impl Session {
         let lease = Lease::take(&store, verb)?;
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();
-        let keeps_time = matches!(pace, Pace::Wall(_));
         let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
         let transport = recorded(transport, args, &loaded)?;
         let mut machine = Machine::new(&loaded, transport);
-        if keeps_time {
-            machine.in_real_time();
-        }
+        machine.in_real_time();
         machine.observe(Box::new(Bars::new(output.is_json())));
         stop_on_signals(&machine.stop_request())?;
         Ok(Self {

@@ -51,11 +51,22 @@ impl Drive {
         self.get(0x605A) >= 5
     }
 
+    /// What the master has commanded and the drive has not done yet.
+    fn wanted_transition(&self) -> Option<Transition> {
+        let stopped = self.power == Power::QuickStopActive;
+        transition(self.power, self.command?, stopped && self.resumable())
+    }
+
+    fn count_refusal(&mut self) {
+        let refused = self.config.quirks.enable_refused;
+        if refused && self.wanted_transition() == Some(Transition::T4) {
+            self.server.count_delivery("enable_refused");
+        }
+    }
+
     /// The transition that waits for its time; `None` also where something forbids it.
     pub(super) fn pending_transition(&self) -> Option<Transition> {
-        let command = self.command?;
-        let stopped = self.power == Power::QuickStopActive;
-        let wanted = transition(self.power, command, stopped && self.resumable())?;
+        let wanted = self.wanted_transition()?;
         let leaving = matches!(self.activity, Activity::Ramp(After::Off(_)));
         let forbidden = match wanted {
             Transition::T2 => self.safe_torque_off || self.internal_error.is_some(),
@@ -78,6 +89,7 @@ impl Drive {
         if now < self.power_free {
             return;
         }
+        self.count_refusal();
         if let Some(transition) = self.pending_transition() {
             self.perform(now, transition, m);
             self.power_free = now + Duration::from_millis(self.config.power_transition_ms);
