@@ -8,6 +8,7 @@ use drivers::device::{
     ServoDrive,
 };
 use drivers::transport::Port;
+use units::Time;
 
 use crate::failure::Failure;
 use crate::machine::{Machine, Unit};
@@ -40,6 +41,31 @@ as_device!(
 );
 
 impl Machine {
+    /// Lets `act` see every device and its port, in the order of their numbers.
+    pub(crate) fn each_device(&mut self, mut act: impl FnMut(Port, &mut dyn Device)) {
+        for unit in &mut self.axes {
+            act(unit.port, &mut *unit.device);
+        }
+        for unit in &mut self.rotaries {
+            act(unit.port, &mut *unit.device);
+        }
+        for unit in &mut self.analogs {
+            act(unit.port, &mut *unit.device);
+        }
+        for unit in &mut self.instruments {
+            act(unit.port, &mut *unit.device);
+        }
+        for unit in &mut self.cameras {
+            act(unit.port, &mut *unit.device);
+        }
+    }
+
+    /// When the first deadline of any device is.
+    pub(crate) fn next_device_deadline(&self) -> Time {
+        let deadlines = self.devices().map(|(_, device)| device.poll_timeout());
+        deadlines.fold(Time::NEVER, Time::min)
+    }
+
     /// Every device with its name.
     fn devices(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
         let axes = self.axes.iter().map(|it| (&it.name, &*it.device as _));

@@ -72,24 +72,20 @@ impl Machine {
         self.supervision = Supervision::Off;
     }
 
-    fn next_deadline(&mut self) -> Time {
+    fn next_deadline(&self) -> Time {
         let beats = self
             .heartbeats
             .iter()
             .map(|(_, producer)| producer.poll_timeout());
-        let first = beats.min().unwrap_or(Time::NEVER);
-        (0..self.device_count())
-            .map(|at| self.device_mut(at).device.poll_timeout())
-            .fold(first, Time::min)
+        beats.fold(self.next_device_deadline(), Time::min)
     }
 
     pub(crate) fn take(&mut self, arrival: &Arrival) -> Result<(), Failure> {
-        for at in 0..self.device_count() {
-            let unit = self.device_mut(at);
-            if unit.port == arrival.port {
-                unit.device.handle(arrival.at, &arrival.input);
+        self.each_device(|port, device| {
+            if port == arrival.port {
+                device.handle(arrival.at, &arrival.input);
             }
-        }
+        });
         if self.supervision == Supervision::Stopping {
             return Ok(());
         }
@@ -155,12 +151,11 @@ impl Machine {
     }
 
     pub(crate) fn fire_deadlines(&mut self, now: Time) {
-        for at in 0..self.device_count() {
-            let device = self.device_mut(at).device;
+        self.each_device(|_, device| {
             if device.poll_timeout() <= now {
                 device.handle_timeout(now);
             }
-        }
+        });
     }
 
     pub(crate) fn send_pending(&mut self) -> Result<(), Failure> {
@@ -187,11 +182,14 @@ impl Machine {
     fn next_payload(&mut self, at: usize) -> Option<(Port, Payload)> {
         let unit = self.device_mut(at);
         let (port, own) = (unit.port, unit.device.line_use());
-        if own == LineUse::Unshared || self.may_speak(at, port, own) {
-            let payload = self.device_mut(at).device.poll_transmit()?;
-            return Some((port, payload));
+        if own == LineUse::Unshared {
+            return unit.device.poll_transmit().map(|payload| (port, payload));
         }
-        None
+        if !self.may_speak(at, port, own) {
+            return None;
+        }
+        let payload = self.device_mut(at).device.poll_transmit()?;
+        Some((port, payload))
     }
 
     /// Whether device number `at` has its turn on a line that it shares.

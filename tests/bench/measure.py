@@ -221,6 +221,7 @@ def main(place, programs):
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
             "cycle": cycle(programs["cycle"], "pty", [("screws", False), ("screws", True)]),
             "cycle_cost": run([programs["cycle"], "cost"])["cases"],
+            "virtual_time": run([programs["virtual_time"], "times"])["cases"],
         }
     measured["seconds"] = round(time.monotonic() - begin)
     print(json.dumps(measured))

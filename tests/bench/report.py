@@ -135,6 +135,19 @@ def show_cycle_cost(cases):
         line((case["case"], 46), (f"{case['us']:.1f} ({case['us_min']:.1f})", 0))
 
 
+def show_virtual_time(cases):
+    print("\nMachines in virtual time, every frame on their buses, by seconds of the processor")
+    heads = ("lived", "processor", "times real time")
+    line(("machine", 14), *((name, 14) for name in heads))
+    for case in cases:
+        line(
+            (case["machine"], 14),
+            (f"{case['lived_s']:.0f} s", 14),
+            (f"{case['processor_s']:.2f} s", 14),
+            (f"{case['times_real_time']:.0f}", 0),
+        )
+
+
 def growth_of(table):
     """How much longer a call takes in the longest table than in the shortest, in a row."""
     least = {}
@@ -154,6 +167,8 @@ def goals_of(measured):
     points = {case["case"]: case["in_a_row_ns"] for case in measured["host"]["volumetric"]["cases"]}
     for name, at_most in POINT_GOALS_NS.items():
         goals[name] = {"measured": points[name], "at_most": at_most}
+    speeds = {it["machine"]: it["times_real_time"] for it in measured["host"]["virtual_time"]}
+    goals["linear_stage_in_virtual_time"] = {"measured": speeds["linear"], "at_least": 1000.0}
     if "bus" in measured:
         ratio = measured["bus"]["sdo"]["ours_to_python"]["median"]
         goals["ours_to_python"] = {"measured": ratio, "at_least": 5.0}
@@ -178,6 +193,7 @@ def main(vcan_host, host_file, bus_file=None):
     show_sync("on the host, without CAN", measured["host"]["sync"])
     show_cycle("on a pseudo-terminal", measured["host"]["cycle"])
     show_cycle_cost(measured["host"]["cycle_cost"])
+    show_virtual_time(measured["host"]["virtual_time"])
     if bus_file:
         with open(bus_file, encoding="utf-8") as file:
             measured["bus"] = json.load(file)

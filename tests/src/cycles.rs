@@ -53,7 +53,7 @@ pub const WHOLE: [Cycle; 5] = [
 
 /// A part of it that takes a moment: the zero, fewer readings, and compensated moves.
 pub const PARTS: [Cycle; 5] = [
-    cycle("linear", &LINEAR, short_strokes, part_of_linear),
+    cycle("linear", &LINEAR, fewer_runs, part_of_linear),
     cycle("uvw", &UVW, few_strokes, part_of_platform),
     cycle("uvw-copley", &UVW_COPLEY, few_strokes, part_of_platform),
     cycle("rotary", &ROTARY, few_placements, part_of_rotary),
@@ -81,11 +81,8 @@ fn changed(text: String, changes: &[(&str, &str)]) -> String {
     changes.fold(text, |text, (from, to)| text.edit(from, to))
 }
 
-fn short_strokes(text: String) -> String {
-    changed(
-        text,
-        &[("step_mm = 3.0", "step_mm = 6.0"), ("runs = 3", "runs = 1")],
-    )
+fn fewer_runs(text: String) -> String {
+    changed(text, &[("runs = 3", "runs = 2")])
 }
 
 fn few_strokes(text: String) -> String {

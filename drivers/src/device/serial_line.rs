@@ -30,6 +30,25 @@ impl LineAssembler {
         }
     }
 
+    /// Takes bytes up to and with the next terminator, and leaves the others in `bytes`; returns
+    /// the message that ended.
+    pub fn take(&mut self, bytes: &mut &[u8]) -> Option<AssembledLine> {
+        let all = *bytes;
+        let end = all.iter().position(|byte| *byte == self.terminator);
+        let (run, left) = all.split_at(end.unwrap_or(all.len()));
+        if self.line.len() + run.len() > self.limit {
+            self.line.clear();
+            self.discarding = true;
+        }
+        if !self.discarding {
+            self.line.extend_from_slice(run);
+        }
+        *bytes = left;
+        let (terminator, left) = left.split_first()?;
+        *bytes = left;
+        self.push(*terminator)
+    }
+
     /// Takes one byte; returns the message that it ends.
     pub fn push(&mut self, byte: u8) -> Option<AssembledLine> {
         if byte == self.terminator {
@@ -86,7 +105,28 @@ mod tests {
         assert_eq!(lines(&mut assembler, bytes), expected);
     }
 
+    fn by_runs(assembler: &mut LineAssembler, mut bytes: &[u8]) -> Vec<AssembledLine> {
+        let mut lines = Vec::new();
+        while !bytes.is_empty() {
+            lines.extend(assembler.take(&mut bytes));
+        }
+        lines
+    }
+
     proptest! {
+        #[test]
+        fn runs_of_bytes_are_taken_as_their_bytes_one_by_one(
+            runs in prop::collection::vec(
+                prop::collection::vec(prop_oneof![Just(b'\n'), any::<u8>()], 0..40), 0..10),
+        ) {
+            let mut one_by_one = LineAssembler::new(b'\n', 16);
+            let mut at_once = LineAssembler::new(b'\n', 16);
+            for run in runs {
+                let expected = lines(&mut one_by_one, &run);
+                prop_assert_eq!(by_runs(&mut at_once, &run), expected);
+            }
+        }
+
         #[test]
         fn where_the_bytes_are_cut_means_nothing(
             bytes in prop::collection::vec(prop_oneof![Just(b'\n'), any::<u8>()], 0..200),

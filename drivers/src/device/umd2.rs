@@ -119,9 +119,9 @@ impl Umd2 {
         }
     }
 
-    fn bytes(&mut self, now: Time, bytes: &[u8]) {
-        for byte in bytes {
-            match self.lines.push(*byte) {
+    fn bytes(&mut self, now: Time, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            match self.lines.take(&mut bytes) {
                 None => {}
                 Some(AssembledLine::Overlong) => self.garbage(),
                 Some(AssembledLine::Whole(line)) => self.line(now, &line),

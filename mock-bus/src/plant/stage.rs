@@ -1,5 +1,7 @@
 //! One linear-motor stage: mass, encoder, deviation and limit switches in one.
 
+use core::cell::Cell;
+
 use crate::random::Stream;
 use units::Time;
 
@@ -20,6 +22,9 @@ pub(super) struct Stage {
     config: StageConfig,
     train: DriveTrain,
     field: Field,
+    /// Where the field was asked for last, and what it was: sensors ask one after the other, and
+    /// again and again while the stage stands.
+    asked: Cell<(f64, f64)>,
     path: Path,
     shift: Stream,
 }
@@ -41,6 +46,7 @@ impl Stage {
                 switches: Some(LimitSwitch::pair(&config.limits, seed, "")),
             },
             field: Field::new(&config.deviation, seed),
+            asked: Cell::new((f64::NAN, f64::NAN)),
             path: Path::new(&config.deviation, seed),
             shift,
             config,
@@ -91,7 +97,17 @@ impl Stage {
 
     pub(super) fn true_position_m(&self, now: Time, stage_c: f64) -> f64 {
         let scale_m = self.train.mass.position_at(now);
-        self.grown(scale_m, stage_c) + self.field.at(scale_m) + self.path.deviation_m()
+        self.grown(scale_m, stage_c) + self.field_at(scale_m) + self.path.deviation_m()
+    }
+
+    fn field_at(&self, scale_m: f64) -> f64 {
+        let (place_m, known_m) = self.asked.get();
+        if place_m == scale_m {
+            return known_m;
+        }
+        let field_m = self.field.at(scale_m);
+        self.asked.set((scale_m, field_m));
+        field_m
     }
 
     fn grown(&self, scale_m: f64, stage_c: f64) -> f64 {

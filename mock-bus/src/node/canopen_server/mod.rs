@@ -229,19 +229,10 @@ impl CanopenServer {
             Phase::Off => return Time::NEVER,
             Phase::Running(_) => Time::NEVER,
         };
-        let timers = [
-            boot,
-            self.heartbeat_due,
-            self.sdo.deadline(),
-            self.outbox.next_event(),
-            self.next_process_event(),
-        ];
+        let own = boot.min(self.heartbeat_due).min(self.sdo.deadline());
+        let frames = self.outbox.next_event().min(self.next_process_event());
         let consumers = self.consumers.iter().flatten().map(Consumer::deadline);
-        timers
-            .into_iter()
-            .chain(consumers)
-            .min()
-            .unwrap_or(Time::NEVER)
+        consumers.fold(own.min(frames), Time::min)
     }
 
     /// The next frame the node sends.

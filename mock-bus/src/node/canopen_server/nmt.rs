@@ -165,10 +165,13 @@ impl CanopenServer {
         if self.nmt_state().is_none() {
             return;
         }
-        let watching = self.consumers.iter_mut().flatten();
-        let lost = watching.filter_map(|c| c.expires(now).then_some(c.producer));
-        for producer in lost.collect::<Vec<_>>() {
-            self.lose_heartbeat(now, producer);
+        for place in 0..self.consumers.len() {
+            if let Some(consumer) = &mut self.consumers[place]
+                && consumer.expires(now)
+            {
+                let producer = consumer.producer;
+                self.lose_heartbeat(now, producer);
+            }
         }
     }
 

@@ -78,17 +78,20 @@ impl CanopenServer {
         if !self.phase.is_operational() {
             return;
         }
-        let buffered: Vec<_> = self.rpdos.iter_mut().flat_map(Rpdo::synchronise).collect();
+        let mut buffered = Vec::new();
+        for rpdo in &mut self.rpdos {
+            buffered.extend(rpdo.synchronise());
+        }
         self.take_over(&buffered);
         self.events.push_back(ServerEvent::Synchronised);
     }
 
     pub(super) fn expire_rpdos(&mut self, now: Time) {
-        let expired = self
-            .rpdos
-            .iter_mut()
-            .filter_map(|rpdo| rpdo.expires(now).then_some(()));
-        if expired.count() > 0 && self.phase.is_operational() {
+        let mut expired = false;
+        for rpdo in &mut self.rpdos {
+            expired |= rpdo.expires(now);
+        }
+        if expired && self.phase.is_operational() {
             self.raise(now, RPDO_TIMEOUT, register::COMMUNICATION, [0; 5]);
         }
     }
@@ -171,7 +174,8 @@ impl CanopenServer {
             return Time::NEVER;
         }
         let tpdos = self.tpdos.iter().map(Tpdo::next_event);
+        let first = tpdos.fold(Time::NEVER, Time::min);
         let rpdos = self.rpdos.iter().map(Rpdo::deadline);
-        tpdos.chain(rpdos).min().unwrap_or(Time::NEVER)
+        rpdos.fold(first, Time::min)
     }
 }
