@@ -10,6 +10,7 @@ use drivers::transport::live::{Live, LiveBuilder, SerialSettings, SlcanSettings}
 use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
+use crate::patience::Patience;
 
 /// Where a bus or a line is really found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,17 +83,11 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
 }
 
 /// The patience ([`Loaded::patience`]) that a machine needs whose clock runs `clock_speed`
-/// times as fast as the wall's: none in real time. Beyond it, a host under load pauses for
-/// tens of milliseconds, which the fastest supervision must outlast.
+/// times as fast as the wall's: none in real time.
 ///
 /// [`Loaded::patience`]: crate::config::Loaded::patience
-pub fn patience(clock_speed: f64) -> u32 {
-    const PAUSES: f64 = 25.0;
-    if clock_speed <= 1.0 {
-        1
-    } else {
-        (clock_speed * PAUSES).min(2000.0).ceil() as u32
-    }
+pub fn patience(clock_speed: f64) -> Patience {
+    Patience::with_clock(clock_speed)
 }
 
 /// What a verb will do, which says what it needs.
