@@ -19,6 +19,7 @@ pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
 pub(crate) use cyclic::cyclic_settings;
 pub(crate) use line::{angular_separation, line_corrections};
+pub(crate) use patience::patient_search;
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};
@@ -59,6 +60,7 @@ use crate::config::{
 };
 use crate::failure::Failure;
 use crate::machine::Unit;
+use crate::patience::Patience;
 
 /// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
 const CO2_UMOL_PER_MOL: f64 = 450.0;
@@ -80,7 +82,7 @@ pub fn ports(config: &MachineConfig) -> BTreeMap<String, Port> {
 pub(crate) fn axes(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
-    patience: u32,
+    patience: Patience,
 ) -> Vec<Unit<dyn Axis>> {
     config
         .axis
@@ -111,7 +113,7 @@ pub(crate) fn axes(
 pub(crate) fn analogs(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
-    patience: u32,
+    patience: Patience,
 ) -> Vec<Unit<dyn AnalogInput>> {
     config
         .analog
@@ -145,7 +147,7 @@ pub(crate) fn analogs(
 pub(crate) fn instruments(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
-    patience: u32,
+    patience: Patience,
 ) -> Vec<Unit<dyn DisplacementInstrument>> {
     config
         .instrument
@@ -217,7 +219,7 @@ fn node_settings(
     bus: &CanBus,
     identity: &IdentityConfig,
     heartbeat_ms: (u16, u16, u16),
-    patience: u32,
+    patience: Patience,
 ) -> NodeSettings {
     let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
     let (producer, consumer, watch_master) = heartbeat_ms;
@@ -231,9 +233,9 @@ fn node_settings(
             serial: identity.serial_number,
         },
         heartbeat_period: millis(producer),
-        consumer_time: millis(consumer) * patience,
+        consumer_time: patience.of(millis(consumer)),
         // 0x1016 has 16 bits of milliseconds.
-        master_consumer_time: (millis(watch_master) * patience).min(millis(u16::MAX)),
+        master_consumer_time: patience.of(millis(watch_master)).min(millis(u16::MAX)),
         missed_pdos_max: patient_pdos(&usual, millis(consumer), patience),
         timeouts: patient_node(usual.timeouts, patience),
         ..usual
@@ -268,7 +270,7 @@ pub(crate) fn reference_limit(zero: &ZeroConfig, axis: &AxisConfig) -> Duration 
 ///
 /// # Panics
 /// When the axis has another device.
-pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402Settings {
+pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: Patience) -> Cia402Settings {
     let can = axis.can().expect(CHECKED);
     let heartbeats = (
         can.heartbeat_producer_ms,
@@ -294,7 +296,7 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
         position_window: Metres::from_um(axis.position_window_um),
         position_window_time: millis(axis.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
-        stall_max: usual.common.sync_period * (patience - 1),
+        stall_max: patience.beyond(usual.common.sync_period),
         home_offset: home_offset(can.home_offset),
         options: option_codes(&can.option_codes, usual.options),
         synchronous_start: can.synchronous_start,
@@ -313,7 +315,7 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: u32) -> Cia402
 ///
 /// # Panics
 /// When the module is of another kind.
-pub fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia401Settings {
+pub fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: Patience) -> Cia401Settings {
     let heartbeats = (
         analog.heartbeat_producer_ms.expect(CHECKED),
         analog.heartbeat_consumer_ms.expect(CHECKED),
@@ -350,7 +352,7 @@ pub(crate) fn dcon_range(full_scale_v: &[f64]) -> Option<InputRange> {
 ///
 /// # Panics
 /// When the module is of another kind.
-pub fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
+pub fn dcon_settings(analog: &AnalogConfig, patience: Patience) -> DconSettings {
     let period = analog.poll_period_ms.expect(CHECKED);
     let address = analog.address.expect(CHECKED);
     let range = dcon_range(&analog.full_scale_v).expect(CHECKED);
@@ -358,14 +360,14 @@ pub fn dcon_settings(analog: &AnalogConfig, patience: u32) -> DconSettings {
     DconSettings {
         checksum: analog.checksum,
         period: Duration::from_secs_f64(period * 1e-3),
-        answer_timeout: usual.answer_timeout * patience,
-        stale_after: usual.stale_after * patience,
+        answer_timeout: patience.of(usual.answer_timeout),
+        stale_after: patience.of(usual.stale_after),
         ..usual
     }
 }
 
 /// A µMD interferometer, as its driver is told.
-pub fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settings {
+pub fn umd2_settings(instrument: &InstrumentConfig, patience: Patience) -> Umd2Settings {
     let usual = Umd2Settings::default();
     Umd2Settings {
         optics_factor: instrument.optics_factor,
@@ -375,9 +377,9 @@ pub fn umd2_settings(instrument: &InstrumentConfig, patience: u32) -> Umd2Settin
             Direction::AsCounted
         },
         sample_rate_hz: instrument.sample_rate_hz,
-        stream_timeout: usual.stream_timeout * patience,
-        start_timeout: usual.start_timeout * patience,
-        environment_age_max: usual.environment_age_max * patience,
+        stream_timeout: patience.of(usual.stream_timeout),
+        start_timeout: patience.of(usual.start_timeout),
+        environment_age_max: patience.of(usual.environment_age_max),
         ..usual
     }
 }
@@ -403,15 +405,6 @@ pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::
         rail_high: Volts(zero.rail_high_v),
         noise: Volts(zero.noise_mv * 1e-3),
         ..hall_zero::Settings::default()
-    }
-}
-
-/// The same for a machine whose clock runs faster than the wall's: see [`crate::ports::patience`].
-pub(crate) fn patient_search(usual: hall_zero::Settings, patience: u32) -> hall_zero::Settings {
-    hall_zero::Settings {
-        stall_limit: usual.stall_limit * patience,
-        wrong_way: usual.wrong_way * f64::from(patience),
-        ..usual
     }
 }
 

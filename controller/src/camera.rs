@@ -12,11 +12,12 @@ use units::{Metres, Radians};
 use crate::config::{CameraConfig, CameraDevice, MachineConfig};
 use crate::failure::Failure;
 use crate::machine::{Machine, Unit};
+use crate::patience::Patience;
 
 pub(crate) fn cameras(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
-    patience: u32,
+    patience: Patience,
 ) -> Vec<Unit<dyn PoseInstrument>> {
     config
         .camera
@@ -40,7 +41,7 @@ pub(crate) fn cameras(
 ///
 /// # Panics
 /// When the result cell is none.
-pub fn in_sight_settings(camera: &CameraConfig, patience: u32) -> InSightSettings {
+pub fn in_sight_settings(camera: &CameraConfig, patience: Patience) -> InSightSettings {
     let cell = Cell::parse(&camera.result_cell).expect("the configuration was checked");
     let usual = InSightSettings::new(&camera.job, cell);
     InSightSettings {
@@ -54,9 +55,9 @@ pub fn in_sight_settings(camera: &CameraConfig, patience: u32) -> InSightSetting
         targets: camera.targets,
         score_min: camera.score_min_percent / 100.0,
         rejects_max: camera.rejects_max,
-        start_timeout: usual.start_timeout * patience,
-        answer_timeout: usual.answer_timeout * patience,
-        inspection_timeout: inspection_timeout(camera) * patience,
+        start_timeout: patience.of(usual.start_timeout),
+        answer_timeout: patience.of(usual.answer_timeout),
+        inspection_timeout: patience.of(inspection_timeout(camera)),
         ..usual
     }
 }

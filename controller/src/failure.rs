@@ -14,7 +14,7 @@ use units::Metres;
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
 use crate::cycle::rotary::RotaryFailure;
-use crate::cycle::volumetric::VolumetricFailure;
+use crate::cycle::volumetric::{PathRefusal, VolumetricFailure};
 use crate::emulated::EmulatedError;
 use crate::engine::EngineFailure;
 use crate::store::StoreError;
@@ -413,6 +413,31 @@ pub enum Failure {
     /// Somebody asked to stop (Ctrl-C).
     #[error("stopped on request")]
     Interrupted,
+    /// Another program asked to stop (SIGTERM), or the terminal is gone (SIGHUP).
+    #[error("stopped on request (signal {signal})")]
+    Terminated {
+        /// Its number.
+        signal: u8,
+    },
+    /// A run that was stopped on request, and can be continued.
+    #[error(
+        "{source}; what was measured is kept in {}: the same command with --resume continues it",
+        journal.display()
+    )]
+    Resumable {
+        /// Who asked.
+        source: Box<Failure>,
+        /// Where the run is written.
+        journal: PathBuf,
+    },
+    /// A path cannot be driven as it is.
+    #[error("{}: {source}; nothing was moved", path.display())]
+    Path {
+        /// The file.
+        path: PathBuf,
+        /// What cannot be driven.
+        source: PathRefusal,
+    },
     /// The command line asks for something that is not there.
     #[error("{what}; {help}")]
     Usage {

@@ -42,12 +42,15 @@ pub mod json;
 pub mod machine;
 pub mod observer;
 mod outbox;
+pub mod patience;
 pub mod ports;
 pub mod report;
+mod stop_request;
 mod stopping;
 pub mod store;
 pub mod text;
 mod tick;
+mod waiting;
 
 pub use edit::Edit;
 pub use failure::Failure;

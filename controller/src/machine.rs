@@ -7,8 +7,6 @@
 
 use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::Compensation;
@@ -31,27 +29,8 @@ use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
-
-/// Set from anywhere (a signal handler) to stop the machine in a controlled way.
-#[derive(Clone, Debug, Default)]
-pub struct StopRequest(Arc<AtomicBool>);
-
-impl StopRequest {
-    /// Asks for the stop.
-    pub fn stop(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether somebody asked.
-    pub fn is_requested(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-
-    /// The flag itself, for a signal handler that sets it.
-    pub fn flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.0)
-    }
-}
+use crate::patience::Patience;
+pub use crate::stop_request::StopRequest;
 
 /// A device with its name and its port.
 pub(crate) struct Unit<D: ?Sized> {
@@ -99,7 +78,7 @@ pub(crate) enum Supervision {
 pub struct Machine {
     pub(crate) config: MachineConfig,
     pub(crate) config_hash: String,
-    pub(crate) patience: u32,
+    pub(crate) patience: Patience,
     pub(crate) transport: Box<dyn Transport>,
     pub(crate) outbox: Outbox,
     pub(crate) port_names: BTreeMap<Port, String>,
@@ -296,7 +275,7 @@ impl Machine {
             self.device_mut(at).device.start(now);
         }
         for at in 0..machine_devices {
-            self.await_outcome(at, "start", START_LIMIT)?;
+            self.await_start(at)?;
         }
         self.supervision = Supervision::On;
         Ok(())
@@ -313,7 +292,7 @@ impl Machine {
         if !self.started_instruments.contains(name) {
             let now = self.now();
             self.device_mut(at).device.start(now);
-            self.await_outcome(at, "start", START_LIMIT)?;
+            self.await_start(at)?;
             self.started_instruments.insert(name.to_owned());
         }
         self.instrument_in_use = Some(name.to_owned());
@@ -377,31 +356,6 @@ impl Machine {
         Ok(())
     }
 
-    /// Waits for the outcome of device number `at`.
-    pub(crate) fn await_outcome(
-        &mut self,
-        at: usize,
-        step: &'static str,
-        limit: Duration,
-    ) -> Result<(), Failure> {
-        let limit = limit * self.patience;
-        let deadline = self.now() + limit;
-        loop {
-            if let Some(outcome) = self.device_mut(at).device.poll_outcome() {
-                let device = self.device_name(at);
-                return outcome.map_err(|source| Failure::Device { device, source });
-            }
-            if self.now() >= deadline {
-                return Err(Failure::Overdue {
-                    device: self.device_name(at),
-                    step,
-                    waited: limit,
-                });
-            }
-            self.tick(deadline)?;
-        }
-    }
-
     pub(crate) fn remember(&mut self, axis: &str) -> &mut AxisMemory {
         self.memory.entry(axis.to_owned()).or_default()
     }
@@ -431,7 +385,5 @@ impl Machine {
     }
 }
 
-/// The longest a device may take to start: some boot for seconds.
-const START_LIMIT: Duration = Duration::from_secs(15);
 /// The longest a stop may take before the next drive is tried.
 pub(crate) const STOP_LIMIT: Duration = Duration::from_secs(2);

@@ -32,6 +32,10 @@ pub trait Observer {
 
     /// Something that a person should look after, although the machine goes on.
     fn warning(&mut self, _text: &str) {}
+
+    /// What is waited for or looked for, told while that goes on: nobody should take a machine for
+    /// dead that searches.
+    fn waiting(&mut self, _text: &str) {}
 }
 
 /// Hears nothing.

@@ -10,6 +10,8 @@ use std::collections::VecDeque;
 use drivers::transport::{Payload, Port, SendError, Transport};
 use units::Time;
 
+use crate::patience::Patience;
+
 /// How long a transmit queue may stay full.
 const FULL_LIMIT: Duration = Duration::from_millis(15);
 /// How soon the queue is tried again.
@@ -68,17 +70,17 @@ impl Outbox {
     /// Sends what waits, as far as the queues take it.
     ///
     /// # Errors
-    /// When a queue has been full for too long (`patience` times 15 ms), or a port failed.
+    /// When a queue has been full for too long (15 ms and what `patience` adds), or a port failed.
     pub(crate) fn flush(
         &mut self,
         transport: &mut dyn Transport,
-        patience: u32,
+        patience: Patience,
     ) -> Result<(), (Sender, SendError)> {
         while let Some(first) = self.waiting.front() {
             match transport.send(first.port, &first.payload) {
                 Ok(()) => {}
                 Err(SendError::QueueFull { .. })
-                    if transport.now().since(first.since) <= FULL_LIMIT * patience =>
+                    if transport.now().since(first.since) <= patience.of(FULL_LIMIT) =>
                 {
                     return Ok(());
                 }
@@ -169,9 +171,9 @@ mod tests {
     fn a_queue_that_was_full_for_a_moment_gets_everything_in_order() {
         let (mut outbox, mut narrow) = full_after(1);
         narrow.now = Time::ZERO + Duration::from_millis(5);
-        outbox.flush(&mut narrow, 1).unwrap();
+        outbox.flush(&mut narrow, Patience::NONE).unwrap();
         narrow.room = 9;
-        outbox.flush(&mut narrow, 1).unwrap();
+        outbox.flush(&mut narrow, Patience::NONE).unwrap();
         assert_eq!(narrow.taken, [payload(0), payload(1), payload(2)]);
         assert_eq!(outbox.poll_timeout(narrow.now), Time::NEVER);
     }
@@ -180,7 +182,7 @@ mod tests {
     fn a_queue_that_stays_full_is_an_error_that_names_the_device() {
         let (mut outbox, mut narrow) = full_after(1);
         narrow.now = Time::ZERO + Duration::from_millis(21);
-        let (sender, error) = outbox.flush(&mut narrow, 1).unwrap_err();
+        let (sender, error) = outbox.flush(&mut narrow, Patience::NONE).unwrap_err();
         assert_eq!(sender, Sender::Device(1));
         assert_eq!(error, SendError::QueueFull { port: Port(0) });
     }

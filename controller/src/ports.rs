@@ -12,6 +12,7 @@ use drivers::transport::lockstep::Participant;
 use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
+use crate::patience::Patience;
 
 /// Where a bus or a line is really found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,10 +114,10 @@ impl Pace {
     /// under load pauses for tens of milliseconds, which the fastest supervision must outlast.
     ///
     /// [`Loaded::patience`]: crate::config::Loaded::patience
-    pub fn patience(&self) -> u32 {
+    pub fn patience(&self) -> Patience {
         match self {
-            Self::Wall(speed) => patience(*speed),
-            Self::Lockstep(_) => 1,
+            Self::Wall(speed) => Patience::with_clock(*speed),
+            Self::Lockstep(_) => Patience::NONE,
         }
     }
 
@@ -134,16 +135,6 @@ impl Pace {
     /// Whether a machine of metal can live by it.
     fn is_real(&self) -> bool {
         matches!(self, Self::Wall(speed) if *speed == 1.0)
-    }
-}
-
-/// [`Pace::patience`] on the wall's clock.
-pub fn patience(clock_speed: f64) -> u32 {
-    const PAUSES: f64 = 25.0;
-    if clock_speed <= 1.0 {
-        1
-    } else {
-        (clock_speed * PAUSES).min(2000.0).ceil() as u32
     }
 }
 

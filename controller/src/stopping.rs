@@ -43,7 +43,7 @@ impl Machine {
         self.run_until(until)?;
         self.set_sync(true)?;
         let resumed = self.now();
-        let deadline = resumed + AWAKE_LIMIT * self.patience;
+        let deadline = resumed + self.patience.of(AWAKE_LIMIT);
         while let Some(device) = self.silent_since(resumed) {
             if self.now() >= deadline {
                 return Err(Failure::Overdue {

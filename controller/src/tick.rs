@@ -40,7 +40,7 @@ impl Machine {
         self.send_pending()?;
         self.judge_alarms()?;
         if self.supervision != Supervision::Stopping && self.stop.is_requested() {
-            return Err(Failure::Interrupted);
+            return Err(self.stop.failure());
         }
         Ok(())
     }

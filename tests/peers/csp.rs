@@ -15,6 +15,7 @@ use tests::{Edit, INTERFACE, Rig, SlcanHub, VOLUMETRIC, left_out, not_run, shipp
 use truestage::Machine;
 use truestage::config::Loaded;
 use truestage::engine::{Cause, Engine, NoCorrection};
+use truestage::patience::Patience;
 use units::Metres;
 
 use crate::peer::Peer;
@@ -24,7 +25,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// From SYNC to SYNC: Python serves three drives in it on a busy computer.
 const PERIOD_MS: u16 = 40;
 /// What Python may be late by in everything but the SYNC period itself.
-const PATIENCE: u32 = 20;
+const PATIENCE: f64 = 5.0;
 /// How often a run is begun anew when Python missed three SYNCs.
 const TRIES: u32 = 3;
 const COUNT: Metres = Metres(10e-9);
@@ -198,7 +199,7 @@ fn python_canopen_drives_with_the_eds_of_a_real_one_follow_our_set_points() {
     for rig in crate::rigs() {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let mut loaded = shipped_config(&VOLUMETRIC, folder.path(), drives_only);
-        loaded.patience = PATIENCE;
+        loaded.patience = Patience::with_clock(PATIENCE);
         let done = (0..TRIES).any(|_| {
             let mut talk = Talk::begin(rig, &loaded, &eds.display().to_string());
             let done = talk.follow(&points);

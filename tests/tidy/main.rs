@@ -389,3 +389,27 @@ fn every_package_is_in_the_workspace() {
         "tell this test what the new package may import"
     );
 }
+
+/// Machines of one name share a folder, and what one of them activates the other refuses.
+#[test]
+fn machines_that_ship_share_no_name_no_serial_number_and_no_folder() {
+    let folder = root().join("configs/machines");
+    let mut owners = BTreeMap::new();
+    let mut machines = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let loaded = truestage::config::load(&path).unwrap_or_else(|error| panic!("{error}"));
+        let machine = &loaded.config.machine;
+        let store = truestage::Store::of(machine);
+        machines += 1;
+        for what in [
+            format!("name {}", machine.name),
+            format!("serial number {}", machine.stage_serial),
+            format!("folder {}", store.root().display()),
+        ] {
+            let before = owners.insert(what.clone(), path.clone());
+            assert_eq!(before, None, "{what} is that of {}, too", path.display());
+        }
+    }
+    assert!(machines >= 5, "{machines} machines ship");
+}

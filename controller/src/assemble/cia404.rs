@@ -5,6 +5,7 @@ use units::portable::powi;
 
 use super::{CHECKED, node_settings};
 use crate::config::{AnalogConfig, CanBus};
+use crate::patience::Patience;
 
 /// What 16 bits reach in volts when a count is a millivolt.
 const REACH_V: f64 = 32.767;
@@ -22,7 +23,7 @@ pub(crate) fn voltage_digits(full_scale_v: f64) -> Option<u8> {
 ///
 /// # Panics
 /// When the module is of another kind.
-pub fn cia404_settings(analog: &AnalogConfig, bus: &CanBus, patience: u32) -> Cia404Settings {
+pub fn cia404_settings(analog: &AnalogConfig, bus: &CanBus, patience: Patience) -> Cia404Settings {
     let heartbeats = (
         analog.heartbeat_producer_ms.expect(CHECKED),
         analog.heartbeat_consumer_ms.expect(CHECKED),

@@ -8,12 +8,13 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 
 use super::{CHECKED, millis, reference_limit};
 use crate::config::{AxisConfig, SerialLine};
+use crate::patience::Patience;
 
 /// A Copley amplifier, as its driver is told; the configuration has been checked.
 ///
 /// # Panics
 /// When the axis has another device.
-pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: u32) -> CopleySettings {
+pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: Patience) -> CopleySettings {
     let serial = axis.serial().expect(CHECKED);
     let address = Address::node(serial.address).expect(CHECKED);
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
@@ -47,17 +48,17 @@ pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: u32) -> C
 }
 
 /// See [`crate::config::Loaded::patience`].
-fn patient(usual: CopleyTimeouts, patience: u32) -> CopleyTimeouts {
+fn patient(usual: CopleyTimeouts, patience: Patience) -> CopleyTimeouts {
     CopleyTimeouts {
-        reply: usual.reply * patience,
-        quiet: usual.quiet * patience,
-        find: usual.find * patience,
-        drain: usual.drain * patience,
-        silence: usual.silence * patience,
-        transition: usual.transition * patience,
-        motion: usual.motion * patience,
-        settling: usual.settling * patience,
-        standing: usual.standing * patience,
-        homing: usual.homing * patience,
+        reply: patience.of(usual.reply),
+        quiet: patience.of(usual.quiet),
+        find: patience.of(usual.find),
+        drain: patience.of(usual.drain),
+        silence: patience.of(usual.silence),
+        transition: patience.of(usual.transition),
+        motion: patience.of(usual.motion),
+        settling: patience.of(usual.settling),
+        standing: patience.of(usual.standing),
+        homing: patience.of(usual.homing),
     }
 }

@@ -20,11 +20,12 @@ use crate::config::{
 };
 use crate::failure::Failure;
 use crate::machine::Unit;
+use crate::patience::Patience;
 
 pub(crate) fn rotaries(
     config: &MachineConfig,
     ports: &BTreeMap<String, Port>,
-    patience: u32,
+    patience: Patience,
 ) -> Vec<Unit<dyn RotaryAxis>> {
     config
         .rotary
@@ -53,7 +54,7 @@ pub(crate) fn rotaries(
 pub fn rotary_settings(
     rotary: &RotaryConfig,
     bus: &CanBus,
-    patience: u32,
+    patience: Patience,
 ) -> Cia402Settings<Radians> {
     let heartbeats = (
         rotary.heartbeat_producer_ms,
@@ -90,7 +91,7 @@ pub fn rotary_settings(
         position_window_time: millis(rotary.position_window_time_ms),
         quick_stop_deceleration: Some(quick_stop),
         homing_acceleration: acceleration,
-        stall_max: usual.common.sync_period * (patience - 1),
+        stall_max: patience.beyond(usual.common.sync_period),
         home_offset: home_offset(rotary.home_offset),
         options: option_codes(&rotary.option_codes, usual.options),
         timeouts: patient_drive(

@@ -8,7 +8,7 @@ use truestage::config::Loaded;
 use truestage::cycle::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
 use truestage::store::MemoryName;
 use truestage::store::{
-    CalibrationRecord, Content, LinearContent, NodeRecord, RecordHead, Store, short,
+    CalibrationRecord, Content, Lease, LinearContent, NodeRecord, RecordHead, Store, short,
 };
 use truestage::{Failure, config};
 use units::Metres;
@@ -216,6 +216,8 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let section = &loaded.config.machine;
     let store = Store::of(&loaded.config.machine);
+    // Whoever measures with a calibration must find it there to the end.
+    let _lease = Lease::take(&store, "cal activate")?;
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
     let CalibrationRecord { head, .. } = record;
@@ -253,6 +255,7 @@ const PLATFORM: &str = "platform";
 fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let store = Store::of(&loaded.config.machine);
+    let _lease = Lease::take(&store, "cal rollback")?;
     if let (PLATFORM, Some(platform)) = (axis, &loaded.config.platform) {
         let screws = platform.actuator.iter().map(|it| it.axis.as_str());
         return rollback_all(&store, &screws.collect::<Vec<_>>(), output);

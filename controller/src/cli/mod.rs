@@ -10,6 +10,7 @@ mod page;
 mod part;
 mod platform;
 mod progress;
+mod resume;
 mod rotary;
 mod scan;
 mod screw;
@@ -30,9 +31,14 @@ use output::Output;
 use truestage::Failure;
 use truestage::ports::Pace;
 
+/// What a shell script learns of an end: [`truestage::Failure::exit_code`].
+const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
+                          4 device or bus, 5 out of tolerance,\n130 stopped by Ctrl-C, 143 by \
+                          SIGTERM, 129 by SIGHUP";
+
 /// Makes precision motion stages go where they are told.
 #[derive(Debug, Parser)]
-#[command(name = "truestage", version, arg_required_else_help = true)]
+#[command(name = "truestage", version, arg_required_else_help = true, after_help = EXIT_CODES)]
 struct Cli {
     /// Print one JSON object on stdout instead of text.
     #[arg(long, global = true)]
@@ -66,6 +72,11 @@ enum Command {
     /// Zero, then take down what the detectors of three axes read, for the errors in use.
     Reference(MachineArgs),
     /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
+    ///
+    /// Between its rows each axis goes along the cubic spline through them, at rest at both ends, not
+    /// along straight lines: where rows turn a corner or suddenly end, it swings out. By how much at
+    /// most, and where, is said before anything moves. Everything that will be driven is judged
+    /// first (soft limits, speed, acceleration, jerk, calibrated volume), not only the rows.
     Run(RunArgs),
     /// What three axes are to keep although it deviates.
     #[command(subcommand)]
@@ -109,7 +120,7 @@ struct MachineArgs {
     /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, who sits here.
     #[arg(long, value_name = "PATH")]
     hand: Option<PathBuf>,
-    /// Write everything on the buses to this file, in candump's log format.
+    /// Write everything on the buses to this file, in candump's log format; it must not exist yet.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
 }

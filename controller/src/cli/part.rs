@@ -5,8 +5,8 @@ use std::path::Path;
 
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
-use truestage::cycle::volumetric::{FirstPart, GEOMETRY, Mover, Remembered};
-use truestage::engine::{Lack, Live, Validity, read_path};
+use truestage::cycle::volumetric::{FirstPart, GEOMETRY, Mover, PathRefusal, Remembered};
+use truestage::engine::{CsvPath, Departure, Lack, Live, Validity, read_path};
 use truestage::ports::Use;
 use truestage::store::{MemoryName, short};
 use truestage::{Failure, Machine, Store};
@@ -41,7 +41,9 @@ pub(super) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     let session = Session::open(args, "run", Use::Motion, output)?;
     let is_measured = session.store.active(GEOMETRY)?.current.is_some();
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
-    let points = judged(&session.machine, (file, &path), is_measured)?;
+    let path = judged(&session.machine, (file, &path), is_measured)?;
+    output.note(&before_it_moves(file, &path));
+    let CsvPath { points, departure } = path;
     let ready = |machine: &Machine, store: &Store| {
         if is_first {
             let (mover, part) = machine.first_part(store)?;
@@ -61,6 +63,7 @@ pub(super) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     let (count, timing) = (followed.count, &followed.timing);
     let mut text = format!("{count} points followed, {said}\n{timing}");
     let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
+                           "largest_departure": departure_value(&departure),
                            "thread": followed.thread, "counters": counters});
     if let Some(corrected) = &followed.corrected {
         corrected.write_into(&mut value);
@@ -76,32 +79,61 @@ pub(super) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     output.result(&text, &value)
 }
 
-/// Reads and judges all of the path: what cannot be made to its end is not begun.
+/// What is driven, for whoever may still stop it: rows that turn a corner are not joined straight.
+fn before_it_moves(file: &Path, path: &CsvPath) -> String {
+    let CsvPath { points, departure } = path;
+    let at = Axis::ALL.into_iter().zip(&departure.place);
+    let at: Vec<String> = at
+        .map(|(axis, it)| format!("{axis} {:.3}", it.mm()))
+        .collect();
+    let [from, to] = departure.lines;
+    format!(
+        "{}: {} points along the cubic spline through the rows; it leaves their straight joins by \
+         {:.3} mm at most, at {:.3} s (lines {from} to {to}), {} mm",
+        file.display(),
+        points.len(),
+        departure.size.mm(),
+        departure.at_s,
+        at.join(" "),
+    )
+}
+
+fn departure_value(departure: &Departure) -> Value {
+    let place = departure.place.iter().map(|it| it.mm());
+    json!({"mm": departure.size.mm(), "at_s": departure.at_s, "lines": departure.lines,
+           "place_mm": place.collect::<Vec<_>>()})
+}
+
+/// Reads and judges all of the path, point by point as it will be driven: what cannot be made to
+/// its end is not begun.
 fn judged(
     machine: &Machine,
     (file, text): (&Path, &str),
     is_corrected: bool,
-) -> Result<Vec<Vec<Metres>>, Failure> {
-    let wrong = |what: String| Failure::Usage {
-        what: format!("{}: {what}", file.display()),
-        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm, README.md says more"
-            .into(),
+) -> Result<CsvPath, Failure> {
+    let refused = |source| Failure::Path {
+        path: file.to_owned(),
+        source,
     };
     let mover = machine.uncorrected_mover()?;
     let engine = mover.engine();
-    let points = read_path(text, engine.axes(), engine.period());
-    let points = points.map_err(|source| wrong(source.to_string()))?;
-    let checked = mover.check_path(&points);
-    checked.map_err(|source| wrong(source.to_string()))?;
+    let path = read_path(text, engine.axes(), engine.period());
+    let path = path.map_err(|source| Failure::Usage {
+        what: format!("{}: {source}", file.display()),
+        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm, README.md says more"
+            .into(),
+    })?;
+    let checked = mover.check_path(&path.points);
+    checked.map_err(|source| refused(source.into()))?;
     if is_corrected {
-        for (point, period) in points.iter().zip(0..) {
+        for (point, period) in path.points.iter().zip(0..) {
             let place = Point::new(point[0], point[1], point[2]);
-            let at = f64::from(period) * engine.period().as_secs_f64();
-            let checked = machine.check_volume(place);
-            checked.map_err(|source| wrong(format!("at {at:.4} s: {source}")))?;
+            let at_s = f64::from(period) * engine.period().as_secs_f64();
+            let checked = machine.check_volume(place).map_err(Box::new);
+            checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
         }
     }
-    Ok(points)
+    Ok(path)
 }
 
 fn followed(
@@ -253,4 +285,95 @@ pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
         &text,
         &json!({"cleared": before, "foreign_second": foreign}),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+    use truestage::config;
+    use units::Time;
+
+    use super::*;
+
+    /// Nobody is there, and nobody is asked.
+    struct Nobody;
+
+    impl Transport for Nobody {
+        fn now(&self) -> Time {
+            Time::ZERO
+        }
+
+        fn send(&mut self, _: Port, _: &Payload) -> Result<(), SendError> {
+            panic!("nothing is sent before a path is judged")
+        }
+
+        fn receive(&mut self, _: Time) -> Option<Arrival> {
+            None
+        }
+
+        fn sleep_until(&mut self, _: Time) {}
+
+        fn set_sync(&mut self, _: Port, _: Option<Duration>) -> Result<(), SendError> {
+            Ok(())
+        }
+    }
+
+    fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
+        let toml = include_str!("../../../configs/machines/volumetric.toml");
+        let loaded = config::parse(toml, "volumetric.toml").unwrap();
+        let machine = Machine::new(&loaded, Box::new(Nobody));
+        judged(&machine, (Path::new("path.csv"), text), is_corrected)
+    }
+
+    /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.
+    fn sudden_end(end_mm: f64) -> String {
+        let rows = (0..=8).map(|row: u32| {
+            let left = 5.0 * f64::from(4_u32.saturating_sub(row));
+            format!("{row},{},100,100\n", end_mm - left)
+        });
+        "time_s,x_mm,y_mm,z_mm\n".to_owned() + &rows.collect::<String>()
+    }
+
+    #[track_caller]
+    fn check_refused(text: &str, is_corrected: bool, why: &str) {
+        let refused = judge(text, is_corrected).unwrap_err();
+        assert_eq!(refused.exit_code(), 3, "{refused}");
+        let said = refused.to_string();
+        for part in ["path.csv", why, "nothing was moved"] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
+
+    #[test]
+    fn a_path_is_judged_as_its_spline_runs_between_the_rows() {
+        // x may go to 503 mm, and is calibrated to 500 mm and 0.25 mm beyond.
+        check_refused(&sudden_end(502.9), false, "axis x: ");
+        check_refused(&sudden_end(499.9), true, "outside the calibrated");
+        judge(&sudden_end(499.0), true).unwrap();
+        judge(&sudden_end(502.0), false).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_is_no_path_is_a_matter_of_usage() {
+        let refused = judge("time_s,x_mm\n", false).unwrap_err();
+        assert_eq!(refused.exit_code(), 2, "{refused}");
+    }
+
+    #[test]
+    fn before_it_moves_it_is_said_how_far_a_corner_is_overshot_and_where() {
+        let path = judge(&sudden_end(400.0), false).unwrap();
+        let said = before_it_moves(Path::new("path.csv"), &path);
+        let by = path.departure.size.mm();
+        assert!((0.3..0.6).contains(&by), "{said}");
+        for part in [
+            "path.csv: 4001 points",
+            "cubic spline",
+            "lines 6 to 7",
+            "x 400.",
+        ] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
 }

@@ -36,6 +36,16 @@ impl Bars {
     }
 }
 
+impl Bars {
+    /// A line on stderr, above a bar that is drawn there.
+    fn say(&self, line: &str) {
+        match &self.current {
+            Some((_, bar)) if !bar.is_finished() => bar.suspend(|| eprintln!("{line}")),
+            _ => eprintln!("{line}"),
+        }
+    }
+}
+
 impl Observer for Bars {
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64) {
         let running =
@@ -53,12 +63,11 @@ impl Observer for Bars {
     }
 
     fn warning(&mut self, text: &str) {
-        match &self.current {
-            Some((_, bar)) if !bar.is_finished() => {
-                bar.suspend(|| eprintln!("warning: {text}"));
-            }
-            _ => eprintln!("warning: {text}"),
-        }
+        self.say(&format!("warning: {text}"));
+    }
+
+    fn waiting(&mut self, text: &str) {
+        self.say(&format!("  {text}"));
     }
 }
 

@@ -14,8 +14,8 @@ use units::Radians;
 use super::operator::Terminal;
 use super::output::{Ended, Output};
 use super::platform::angle;
+use super::resume::{journal_to_resume, resumable};
 use super::session::{Session, choose_axis};
-use super::verbs::journal_to_resume;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs, WayName};
 
 pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
@@ -53,7 +53,10 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
             accept_drift: args.accept_drift,
         };
-        machine.calibrate_rotary(axis, store, &options, &mut operator)
+        let resumed = options.resume.clone();
+        resumable(store, "calibrate", axis, resumed.as_deref(), || {
+            machine.calibrate_rotary(axis, store, &options, &mut operator)
+        })
     };
     let (axis, calibrated, counters) =
         with_zeroed_table(&args.axis, "calibrate", Use::Measurement, output, run)?;

@@ -6,13 +6,14 @@ use drivers::wire::cia402::PowerState;
 use serde_json::{Value, json};
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
 use truestage::ports::Use;
-use truestage::store::{Store, read_journal};
+use truestage::store::Store;
 use truestage::{Failure, Machine, config, json as to_json, text};
 use units::Metres;
 
 use super::output::{Ended, Output};
+use super::resume::{journal_to_resume, resumable};
 use super::session::{Session, choose_axis};
-use super::{AxisArgs, CalibrateArgs, MoveArgs, NEWEST_RUN, VerifyArgs};
+use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 
 pub(super) fn check(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
@@ -74,7 +75,10 @@ fn with_zeroed_axis<R>(
             calibration,
             resume,
         };
-        let result = procedure(machine, &axis, &store, prepared)?;
+        let resumed = prepared.resume.clone();
+        let result = resumable(&store, verb, &axis, resumed.as_deref(), || {
+            procedure(machine, &axis, &store, prepared)
+        })?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.counters())))
     })
@@ -328,40 +332,6 @@ pub(super) fn parse_target(text: &str) -> Result<(String, Metres), Failure> {
         return Err(usage());
     }
     Ok((axis.to_owned(), Metres(value * scale)))
-}
-
-/// The journal named, or, for a bare `--resume`, the newest incomplete one of this axis.
-pub(super) fn journal_to_resume(
-    resume: Option<&PathBuf>,
-    store: &Store,
-    verb: &str,
-    axis: &str,
-) -> Result<Option<PathBuf>, Failure> {
-    let Some(path) = resume else { return Ok(None) };
-    if path.extension().is_some_and(|it| it == "toml") {
-        return Err(Failure::Usage {
-            what: format!("--resume {}: that is no journal", path.display()),
-            help: format!(
-                "write the configuration first: truestage {verb} {} --resume",
-                path.display()
-            ),
-        });
-    }
-    if path.as_os_str() != NEWEST_RUN {
-        return Ok(Some(path.clone()));
-    }
-    let newest = store.newest_run(verb, axis)?;
-    let incomplete = match &newest {
-        Some(path) => !read_journal(path)?.complete,
-        None => false,
-    };
-    match newest.filter(|_| incomplete) {
-        Some(path) => Ok(Some(path)),
-        None => Err(Failure::Usage {
-            what: format!("axis {axis} has no interrupted {verb} run"),
-            help: "start a new one without --resume".into(),
-        }),
-    }
 }
 
 #[cfg(test)]

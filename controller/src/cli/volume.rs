@@ -18,8 +18,9 @@ use units::Metres;
 
 use super::operator::Terminal;
 use super::output::{Ended, Output};
+use super::resume::{journal_to_resume, resumable};
 use super::session::Session;
-use super::verbs::{journal_to_resume, parse_target};
+use super::verbs::parse_target;
 use super::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 
 /// How long the tool is seen to stand at its target.
@@ -128,7 +129,10 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
     };
     let run = |machine: &mut Machine, store: &Store, resume: Option<PathBuf>| {
-        machine.calibrate_volumetric(store, warm_up, resume.as_deref(), &mut operator)
+        let resume = resume.as_deref();
+        resumable(store, "calibrate", GEOMETRY, resume, || {
+            machine.calibrate_volumetric(store, warm_up, resume, &mut operator)
+        })
     };
     let (machine, purpose) = (&args.axis.machine, Use::Measurement);
     let (made, counters) = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run)?;

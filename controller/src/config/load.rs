@@ -8,6 +8,7 @@ use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
 use super::validate::{Finding, validate};
 use super::volumetric::{BeamDetectorConfig, VolumetricConfig};
+use crate::patience::Patience;
 
 /// A configuration that was read and judged sound.
 #[derive(Clone, Debug)]
@@ -16,10 +17,10 @@ pub struct Loaded {
     pub config: MachineConfig,
     /// BLAKE3 of everything in it that a calibration depends on, in hexadecimal.
     pub hash: String,
-    /// By how much every supervision and answer time-out is longer than configured: 1, except
-    /// for emulated machines. One that lives faster than real time still meets a host whose
-    /// own pauses do not shrink, so its time-outs must grow with its speed.
-    pub patience: u32,
+    /// By how much every supervision and answer time-out is longer than configured: not at all,
+    /// except for emulated machines. One that lives faster than real time still meets a host whose
+    /// own pauses do not shrink, so its time-outs must bear them.
+    pub patience: Patience,
 }
 
 /// Reads and judges the configuration at `path`.
@@ -53,7 +54,7 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
         return Ok(Loaded {
             hash: calibration_hash(&config),
             config,
-            patience: 1,
+            patience: Patience::NONE,
         });
     }
     let mut findings: Vec<_> = findings
@@ -567,7 +568,7 @@ mod tests {
         let settings = |text: &str| {
             let config = parse(text, "m").unwrap().config;
             let (axis, bus) = (&config.axis["x"], &config.can["can0"]);
-            crate::assemble::cia402_settings(axis, bus, 1)
+            crate::assemble::cia402_settings(axis, bus, Patience::NONE)
         };
         let usual = settings(LINEAR);
         assert_eq!(usual.options.quick_stop, None);

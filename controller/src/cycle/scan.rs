@@ -2,7 +2,7 @@
 //!
 //! Every node number of every CAN bus is asked for its device type (0x1000) and identity
 //! (0x1018) by expedited SDO upload; nothing is written and no node changes its state. Devices on
-//! serial lines are asked by their drivers.
+//! serial lines are asked by their drivers, all at once; those that share a line take turns.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -42,15 +42,27 @@ const IDENTITY: [Object; 4] = [
 ];
 /// So many requests are sent before answers are collected: no transmit queue overflows.
 const BATCH: usize = 8;
-/// So often a node of the configuration that did not answer is asked again.
-const ASKED_AGAIN_MAX: u32 = 2;
+/// What the nodes of one batch usually take to answer.
+const BATCH_TIME: Duration = Duration::from_millis(10);
 /// How long the last answers may take.
-const PATIENCE: Duration = Duration::from_millis(300);
+const ANSWER_LIMIT: Duration = Duration::from_millis(300);
+/// For so long nodes of the configuration that did not answer are asked again.
+const AGAIN_LIMIT: Duration = Duration::from_millis(600);
 
 /// Devices on serial lines say themselves what is wrong, before this has passed.
 const SERIAL_LIMIT: Duration = Duration::from_secs(15);
 
-type Answers = BTreeMap<NodeId, BTreeMap<Object, u32>>;
+/// What each node said of each object; `None`: that it does not have it, or does not tell.
+type Answers = BTreeMap<NodeId, BTreeMap<Object, Option<u32>>>;
+
+/// A device on a serial line that was asked.
+struct Asked {
+    /// Its number.
+    at: usize,
+    port: Port,
+    /// How it went; `None`: it has not answered yet.
+    result: Option<Result<(), String>>,
+}
 
 impl Machine {
     /// Asks who is there. Only a bus that fails is an error: what is missing or wrong is in
@@ -70,7 +82,7 @@ impl Machine {
                 found.extend(self.scan_can(port, &name)?);
             }
         }
-        found.extend(self.scan_serial());
+        found.extend(self.scan_serial()?);
         Ok(found)
     }
 
@@ -79,10 +91,20 @@ impl Machine {
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
         let expected = assemble::expected_nodes(&self.config, name);
         let awaited: Vec<_> = expected.keys().filter_map(|it| NodeId::new(*it)).collect();
-        self.ask(port, &all, &awaited, DEVICE_TYPE, &mut answers)?;
+        self.observer
+            .waiting(&format!("{name}: nodes 1 to 127 are asked who they are"));
+        self.ask_once(port, &all, DEVICE_TYPE, &mut answers)?;
+        let silent = silent(&awaited, DEVICE_TYPE, &answers);
+        if !silent.is_empty() {
+            let nodes: Vec<_> = silent.iter().map(ToString::to_string).collect();
+            let text = format!("{name}: {} did not answer, asking again", nodes.join(", "));
+            self.observer.waiting(&text);
+        }
+        self.ask_again(port, &awaited, DEVICE_TYPE, &mut answers)?;
         let present: Vec<_> = answers.keys().copied().collect();
         for object in IDENTITY {
-            self.ask(port, &present, &present, object, &mut answers)?;
+            self.ask_once(port, &present, object, &mut answers)?;
+            self.ask_again(port, &present, object, &mut answers)?;
         }
         let mut found: Vec<_> = answers
             .iter()
@@ -96,28 +118,26 @@ impl Machine {
         Ok(found)
     }
 
-    /// Asks `nodes`, and waits a while for answers. Those that are `awaited` are asked again: a
-    /// node that has just been switched on boots for a moment.
-    fn ask(
+    /// Asks those of `awaited` again that did not answer: a node that has just been switched on
+    /// boots for a moment.
+    fn ask_again(
         &mut self,
         port: Port,
-        nodes: &[NodeId],
         awaited: &[NodeId],
         object: Object,
         answers: &mut Answers,
     ) -> Result<(), Failure> {
-        self.ask_once(port, nodes, object, answers)?;
-        for _ in 0..ASKED_AGAIN_MAX * self.patience {
-            let has = |node| answers.get(node).is_some_and(|it| it.contains_key(&object));
-            let silent: Vec<_> = awaited.iter().filter(|it| !has(it)).copied().collect();
-            if silent.is_empty() {
-                break;
+        let until = self.now() + self.patience.of(AGAIN_LIMIT);
+        loop {
+            let silent = silent(awaited, object, answers);
+            if silent.is_empty() || self.now() >= until {
+                return Ok(());
             }
             self.ask_once(port, &silent, object, answers)?;
         }
-        Ok(())
     }
 
+    /// Asks `nodes`, and waits a while for answers, no longer than until all have come.
     fn ask_once(
         &mut self,
         port: Port,
@@ -136,54 +156,139 @@ impl Machine {
                         source,
                     })?;
             }
-            self.collect(port, Duration::from_millis(10), answers);
+            self.collect(port, BATCH_TIME, (batch, object), answers)?;
         }
-        self.collect(port, PATIENCE, answers);
-        Ok(())
+        self.collect(port, ANSWER_LIMIT, (nodes, object), answers)
     }
 
-    fn collect(&mut self, port: Port, patience: Duration, answers: &mut Answers) {
-        let until = self.transport.now() + patience;
-        while self.transport.now() < until {
+    /// Takes answers until all `nodes` have said `object`, for `limit` at most.
+    fn collect(
+        &mut self,
+        port: Port,
+        limit: Duration,
+        (nodes, object): (&[NodeId], Object),
+        answers: &mut Answers,
+    ) -> Result<(), Failure> {
+        let until = self.now() + limit;
+        while self.now() < until && !silent(nodes, object, answers).is_empty() {
             if let Some(arrival) = self.transport.receive(until) {
                 note_answer(&arrival, port, answers);
             }
+            if self.stop.is_requested() {
+                return Err(self.stop.failure());
+            }
         }
+        Ok(())
     }
 
     /// Everything on a serial line: amplifiers, analog modules and instruments.
-    fn scan_serial(&mut self) -> Vec<Found> {
-        let lines: Vec<_> = (0..self.device_count())
-            .filter(|at| {
-                let port = self.device_mut(*at).port;
-                self.config.serial.contains_key(&self.port_names[&port])
-            })
-            .collect();
-        lines
-            .into_iter()
-            .map(|at| {
-                let now = self.now();
-                self.device_mut(at).device.identify(now);
-                let started = self.await_outcome(at, "answer", SERIAL_LIMIT);
-                let port = self.device_mut(at).port;
-                Found {
-                    port: self.port_names[&port].clone(),
-                    node: None,
-                    name: Some(self.device_name(at)),
-                    identity: self
-                        .device_mut(at)
-                        .device
-                        .identity()
-                        .filter(|_| started.is_ok()),
-                    mismatches: started
-                        .err()
-                        .map(|error| error.to_string())
-                        .into_iter()
-                        .collect(),
+    fn scan_serial(&mut self) -> Result<Vec<Found>, Failure> {
+        let mut asked = self.ask_lines();
+        let begun = self.now();
+        let deadline = begun + self.patience.of(SERIAL_LIMIT);
+        let mut tell = self.silent_until();
+        while self.take_outcomes(&mut asked) && self.now() < deadline {
+            if self.now() >= tell {
+                for it in asked.iter().filter(|it| it.result.is_none()) {
+                    self.tell_waiting(it.at, self.now().since(begun), deadline.since(begun));
                 }
-            })
-            .collect()
+                tell = self.silent_until();
+            }
+            match self.tick(deadline.min(tell)) {
+                Ok(()) => {}
+                Err(failure) => self.blame(failure, &mut asked)?,
+            }
+        }
+        let waited = self.now().since(begun);
+        let found = asked
+            .into_iter()
+            .map(|it| self.found_on_line(it, waited))
+            .collect();
+        Ok(found)
     }
+
+    /// Asks every device on a serial line who it is.
+    fn ask_lines(&mut self) -> Vec<Asked> {
+        let now = self.now();
+        let mut asked = Vec::new();
+        for at in 0..self.device_count() {
+            let port = self.device_mut(at).port;
+            if self.config.serial.contains_key(&self.port_names[&port]) {
+                self.device_mut(at).device.identify(now);
+                let result = None;
+                asked.push(Asked { at, port, result });
+            }
+        }
+        let names: Vec<_> = asked.iter().map(|it| self.device_name(it.at)).collect();
+        if !names.is_empty() {
+            let text = format!("serial lines: {} are asked who they are", names.join(", "));
+            self.observer.waiting(&text);
+        }
+        asked
+    }
+
+    /// Whether somebody has not answered yet.
+    fn take_outcomes(&mut self, asked: &mut [Asked]) -> bool {
+        let mut is_waited_for = false;
+        for it in asked.iter_mut().filter(|it| it.result.is_none()) {
+            if let Some(outcome) = self.device_mut(it.at).device.poll_outcome() {
+                let device = self.device_name(it.at);
+                let failed = |source| Failure::Device { device, source }.to_string();
+                it.result = Some(outcome.map_err(failed));
+            }
+            is_waited_for |= it.result.is_none();
+        }
+        is_waited_for
+    }
+
+    /// A line that cannot be used is the trouble of those on it, and of nobody else.
+    fn blame(&self, failure: Failure, asked: &mut [Asked]) -> Result<(), Failure> {
+        let is_theirs = |it: &Asked| match &failure {
+            Failure::Link { port, .. } => self.port_name(it.port) == *port,
+            Failure::Send { device, .. } | Failure::Alarm { device, .. } => {
+                self.device_name(it.at) == *device
+            }
+            _ => false,
+        };
+        let mut theirs = asked.iter_mut().filter(|it| is_theirs(it)).peekable();
+        if theirs.peek().is_none() {
+            return Err(failure);
+        }
+        for it in theirs {
+            it.result.get_or_insert(Err(failure.to_string()));
+        }
+        Ok(())
+    }
+
+    fn found_on_line(&mut self, asked: Asked, waited: Duration) -> Found {
+        let Asked { at, port, result } = asked;
+        let result = result.unwrap_or_else(|| {
+            let (device, step) = (self.device_name(at), "answer");
+            let overdue = Failure::Overdue {
+                device,
+                step,
+                waited,
+            };
+            Err(overdue.to_string())
+        });
+        let identity = self.device_mut(at).device.identity();
+        Found {
+            port: self.port_names[&port].clone(),
+            node: None,
+            name: Some(self.device_name(at)),
+            identity: identity.filter(|_| result.is_ok()),
+            mismatches: result.err().into_iter().collect(),
+        }
+    }
+}
+
+/// Those of `nodes` that have not answered about `object`.
+fn silent(nodes: &[NodeId], object: Object, answers: &Answers) -> Vec<NodeId> {
+    let has = |node: &&NodeId| {
+        let said = answers.get(*node);
+        said.is_some_and(|it| it.contains_key(&object))
+    };
+    nodes.iter().filter(|it| !has(it)).copied().collect()
 }
 
 fn note_answer(arrival: &Arrival, port: Port, answers: &mut Answers) {
@@ -196,30 +301,26 @@ fn note_answer(arrival: &Arrival, port: Port, answers: &mut Answers) {
     let Some((Function::SdoResponse, node)) = frame.standard_id().and_then(Function::of) else {
         return;
     };
-    match SdoResponse::parse(frame.data()) {
+    let (object, value) = match SdoResponse::parse(frame.data()) {
         Ok(SdoResponse::UploadExpedited { object, data }) => {
             let mut bytes = [0; 4];
             bytes[..data.data().len()].copy_from_slice(data.data());
-            answers
-                .entry(node)
-                .or_default()
-                .insert(object, u32::from_le_bytes(bytes));
+            (object, Some(u32::from_le_bytes(bytes)))
         }
         // An abort is an answer too: somebody is there.
-        Ok(SdoResponse::Abort { .. }) => {
-            answers.entry(node).or_default();
-        }
-        _ => {}
-    }
+        Ok(SdoResponse::Abort { object, .. }) => (object, None),
+        _ => return,
+    };
+    answers.entry(node).or_default().insert(object, value);
 }
 
 fn judge(
     port: &str,
     node: NodeId,
-    values: &BTreeMap<Object, u32>,
+    values: &BTreeMap<Object, Option<u32>>,
     expected: Option<&(String, IdentityConfig)>,
 ) -> Found {
-    let value = |object: Object| values.get(&object).copied().unwrap_or(0);
+    let value = |object: Object| values.get(&object).copied().flatten().unwrap_or(0);
     let identity = Identity {
         device_type: value(DEVICE_TYPE),
         vendor: value(IDENTITY[0]),

@@ -124,7 +124,7 @@ impl Machine {
     /// Waits until the rotary axis has stood without a break, by samples that were taken since:
     /// the host's clock alone would count old ones.
     pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
-        let limit = REST_LIMIT * self.patience;
+        let limit = self.patience.of(REST_LIMIT);
         let start = self.now();
         let mut first = None;
         loop {

@@ -135,7 +135,7 @@ impl Machine {
 
     /// Waits until `axis` has stood still for `span` without a break.
     pub(crate) fn stand_still(&mut self, axis: &str, span: Duration) -> Result<(), Failure> {
-        let limit = SETTLING_LIMIT * self.patience + span;
+        let limit = self.patience.of(SETTLING_LIMIT) + span;
         let start = self.now();
         let mut since = start;
         while self.now().since(since) < span {

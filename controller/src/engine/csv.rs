@@ -2,7 +2,10 @@
 //!
 //! Between the rows runs the cubic spline with continuous acceleration (C. de Boor, "A Practical
 //! Guide to Splines", chapter IV), at rest at both ends, sampled once in every SYNC period. Rows
-//! may be any time apart. Comment lines begin with `#`.
+//! may be any time apart. Comment lines begin with `#`; a byte-order mark is passed over.
+//!
+//! A spline through rows that turn a corner swings out before and behind it. How far the curve
+//! leaves the straight joins of its rows at most is told with the points: [`Departure`].
 
 use core::time::Duration;
 
@@ -51,18 +54,36 @@ pub enum CsvFault {
     Length { seconds: f64 },
 }
 
+/// What is driven of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CsvPath {
+    /// One point for each period; the order of its positions is that of the axes.
+    pub points: Vec<Vec<Metres>>,
+    /// Where they are farthest from the straight joins of the rows.
+    pub departure: Departure,
+}
+
+/// Where a curve is farthest from the straight line between the two rows that it runs between.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Departure {
+    /// How far, in the space of all axes.
+    pub size: Metres,
+    /// When, in seconds from the path's beginning.
+    pub at_s: f64,
+    /// The lines of the two rows in the file, counted from 1.
+    pub lines: [usize; 2],
+    /// Where the curve is then.
+    pub place: Vec<Metres>,
+}
+
 /// Reads a path of `axes` (names as in the configuration), one point for each `period`.
 ///
-/// The order of a point's positions is that of `axes`. Nothing is checked against the machine's
-/// limits here; [`PathWriter::push`](super::PathWriter::push) does that.
+/// Nothing is checked against the machine's limits here;
+/// [`PathWriter::push`](super::PathWriter::push) does that, with every point of the curve.
 ///
 /// # Errors
 /// The first line that cannot be used.
-pub fn read_path(
-    text: &str,
-    axes: &[String],
-    period: Duration,
-) -> Result<Vec<Vec<Metres>>, CsvError> {
+pub fn read_path(text: &str, axes: &[String], period: Duration) -> Result<CsvPath, CsvError> {
     let rows = read_rows(text, axes)?;
     let last = rows.times.last().copied().unwrap_or_default();
     let seconds = period.as_secs_f64();
@@ -74,23 +95,72 @@ pub fn read_path(
     // The last row is a point of its own even when it is not on the grid.
     let count = (last / seconds - 1e-9).ceil() as usize;
     let times = (0..=count).map(|at| (at as f64 * seconds).min(last));
-    Ok(times
-        .map(|time| {
-            splines
-                .iter()
-                .map(|it| Metres::from_mm(it.at(time)))
-                .collect()
-        })
-        .collect())
+    let mut departure = Departure {
+        size: Metres::ZERO,
+        at_s: 0.0,
+        lines: [rows.lines[0], rows.lines[1]],
+        place: rows
+            .positions
+            .iter()
+            .map(|it| Metres::from_mm(it[0]))
+            .collect(),
+    };
+    let mut points = Vec::with_capacity(count + 1);
+    for at_s in times {
+        let point: Vec<f64> = splines.iter().map(|it| it.at(at_s)).collect();
+        let place: Vec<Metres> = point.iter().map(|mm| Metres::from_mm(*mm)).collect();
+        let row = interval(&rows.times, at_s);
+        let size = Metres::from_mm(rows.beside_join(row, &point));
+        if size > departure.size {
+            departure = Departure {
+                size,
+                at_s,
+                lines: [rows.lines[row], rows.lines[row + 1]],
+                place: place.clone(),
+            };
+        }
+        points.push(place);
+    }
+    Ok(CsvPath { points, departure })
+}
+
+/// Between which row and the next one `time` is.
+fn interval(times: &[f64], time: f64) -> usize {
+    let after = times.partition_point(|it| *it <= time);
+    after.clamp(1, times.len() - 1) - 1
 }
 
 struct Rows {
+    /// Where in the file, counted from 1.
+    lines: Vec<usize>,
     times: Vec<f64>,
     /// By axis.
     positions: Vec<Vec<f64>>,
 }
 
+impl Rows {
+    /// How far `point` is from the straight line between `row` and the next one, in mm.
+    fn beside_join(&self, row: usize, point: &[f64]) -> f64 {
+        let ends = |axis: &Vec<f64>| (axis[row], axis[row + 1] - axis[row]);
+        let (mut along, mut length) = (0.0, 0.0);
+        for ((begin, join), at) in self.positions.iter().map(ends).zip(point) {
+            along += (at - begin) * join;
+            length += join * join;
+        }
+        let share = if length > 0.0 {
+            (along / length).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let axes = self.positions.iter().map(ends).zip(point);
+        let squares = axes.map(|((begin, join), at)| (at - begin - share * join).powi(2));
+        squares.sum::<f64>().sqrt()
+    }
+}
+
 fn read_rows(text: &str, axes: &[String]) -> Result<Rows, CsvError> {
+    // Spreadsheets mark their files so; it is no part of the heading.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text
         .lines()
         .zip(1..)
@@ -99,6 +169,7 @@ fn read_rows(text: &str, axes: &[String]) -> Result<Rows, CsvError> {
     let (heading, line) = lines.next().unwrap_or(("", 1));
     let columns = read_heading(heading, line, axes)?;
     let mut rows = Rows {
+        lines: Vec::new(),
         times: Vec::new(),
         positions: vec![Vec::new(); axes.len()],
     };
@@ -207,7 +278,10 @@ fn read_row(
                     },
                 );
             }
-            (None, _) => rows.times.push(value),
+            (None, _) => {
+                rows.lines.push(line);
+                rows.times.push(value);
+            }
         }
     }
     Ok(())
@@ -248,8 +322,7 @@ impl<'a> Spline<'a> {
     }
 
     fn at(&self, time: f64) -> f64 {
-        let after = self.times.partition_point(|it| *it <= time);
-        let i = after.clamp(1, self.times.len() - 1) - 1;
+        let i = interval(self.times, time);
         let span = self.times[i + 1] - self.times[i];
         let u = (time - self.times[i]) / span;
         let rise = self.values[i + 1] - self.values[i];
@@ -280,7 +353,7 @@ mod tests {
     #[test]
     fn a_step_is_the_cubic_between_two_rests() {
         let text = "# a step\ntime_s,y_mm,x_mm\n0,5,1\n0.010,5,3\n";
-        let path = read_path(text, &axes(), MS).unwrap();
+        let path = read_path(text, &axes(), MS).unwrap().points;
         assert_eq!(path.len(), 11);
         for (at, point) in path.iter().enumerate() {
             let u = at as f64 / 10.0;
@@ -298,7 +371,7 @@ mod tests {
         for t in [0.0, 0.1, 0.15, 0.4, 0.85, 1.0] {
             text += &format!("{t},{},0\n", cubic(t));
         }
-        let path = read_path(&text, &axes(), 10 * MS).unwrap();
+        let path = read_path(&text, &axes(), 10 * MS).unwrap().points;
         for (at, point) in path.iter().enumerate() {
             let expected = cubic(at as f64 * 0.01);
             assert!((point[0].mm() - expected).abs() < 1e-9, "{at}");
@@ -307,7 +380,9 @@ mod tests {
 
     #[test]
     fn the_last_row_is_reached_off_the_grid() {
-        let path = read_path("time_s,x_mm,y_mm\n0,0,0\n0.0105,1,1\n", &axes(), MS).unwrap();
+        let path = read_path("time_s,x_mm,y_mm\n0,0,0\n0.0105,1,1\n", &axes(), MS)
+            .unwrap()
+            .points;
         assert_eq!(path.len(), 12);
         assert!((path[11][0].mm() - 1.0).abs() < 1e-12);
     }
@@ -349,5 +424,55 @@ mod tests {
             "",
             "line 1: the heading is ``, expected `time_s,x_mm,y_mm` (the axes in any order)",
         );
+    }
+
+    #[test]
+    fn a_byte_order_mark_before_the_heading_is_passed_over() {
+        let text = "time_s,x_mm,y_mm\n0,0,0\n0.010,1,2\n";
+        let marked = format!("\u{feff}{text}");
+        assert_eq!(
+            read_path(&marked, &axes(), MS),
+            read_path(text, &axes(), MS)
+        );
+    }
+
+    /// Along x, then along y, rows of 5 mm: beyond the corner x goes on, and before it y goes back.
+    #[test]
+    fn how_far_a_corner_is_overshot_is_told_with_its_place() {
+        let mut text = "time_s,x_mm,y_mm\n".to_owned();
+        for row in 0..=20 {
+            let (x, y) = (row.min(10), (row - 10).max(0));
+            text += &format!("{},{},{}\n", f64::from(row) * 0.1, x * 5, y * 5);
+        }
+        let path = read_path(&text, &axes(), MS).unwrap();
+        let highest = path.points.iter().map(|it| it[0].mm()).fold(0.0, f64::max);
+        let departure = &path.departure;
+        assert!((50.4..50.5).contains(&highest), "{highest}");
+        assert!(
+            (departure.size.mm() - (highest - 50.0)).abs() < 0.01,
+            "{departure:?}"
+        );
+        let around = [[11, 12], [12, 13]];
+        assert!(around.contains(&departure.lines), "{departure:?}");
+        assert!((0.9..1.1).contains(&departure.at_s), "{departure:?}");
+        let farthest = path.points.iter().find(|it| **it == departure.place);
+        assert!(farthest.is_some(), "{departure:?}");
+    }
+
+    #[test]
+    fn a_straight_path_leaves_its_joins_nowhere_however_its_speed_changes() {
+        let text = "time_s,x_mm,y_mm\n0,0,0\n0.2,1,2\n0.4,3,6\n0.6,4,8\n";
+        let departure = read_path(text, &axes(), MS).unwrap().departure;
+        assert!(departure.size.nm() < 1.0, "{departure:?}");
+    }
+
+    /// Between two equal rows it goes on, and comes back.
+    #[test]
+    fn going_beyond_the_last_row_of_a_straight_line_is_a_departure_too() {
+        let text = "time_s,x_mm,y_mm\n0,0,0\n1,10,0\n2,10,0\n3,10,0\n";
+        let departure = read_path(text, &axes(), MS).unwrap().departure;
+        assert!(departure.size.mm() > 0.5, "{departure:?}");
+        assert_eq!(departure.lines, [3, 4]);
+        assert!(departure.place[0].mm() > 10.5, "{departure:?}");
     }
 }

@@ -15,6 +15,7 @@ use super::judge::Differences;
 use super::motion::{Moment, Motion};
 use super::path::Item;
 use super::{AXES_MAX, AxisLimits, PerAxis};
+use crate::patience::Patience;
 
 /// So many samples of an axis in a row may be missing before it is not safe to go on.
 const MISSING_MAX: u32 = 3;
@@ -92,10 +93,9 @@ impl Core {
         }
     }
 
-    /// Bears so many times as many missing samples: those of a machine in simulated time, whose
-    /// host pauses.
-    pub(super) const fn be_patient(&mut self, patience: u32) {
-        self.missing_max = MISSING_MAX.saturating_mul(patience);
+    /// Bears more missing samples: those of a machine in simulated time, whose host pauses.
+    pub(super) fn be_patient(&mut self, patience: Patience) {
+        self.missing_max = patience.periods(MISSING_MAX, self.period);
     }
 
     /// Begins at rest, with the set-points that the drives hold: what was added to them when the

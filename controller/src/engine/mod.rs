@@ -44,7 +44,7 @@ pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
     THERMOMETERS_MAX, ThermometerSample, Validity,
 };
-pub use csv::{CsvError, CsvFault, read_path};
+pub use csv::{CsvError, CsvFault, CsvPath, Departure, read_path};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use judge::{PathError, PathFault};

@@ -169,7 +169,7 @@ impl Machine {
     /// it likes.
     fn await_rest(&mut self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
         let begun = self.now();
-        let deadline = begun + REST_LIMIT * self.patience;
+        let deadline = begun + self.patience.of(REST_LIMIT);
         while let Some(axis) = (0..seats.count).find(|axis| self.moves(seats.drive[*axis])) {
             if self.now() >= deadline {
                 let axis = engine.axes[axis].clone();
@@ -362,7 +362,7 @@ impl Machine {
                 .note(now.since(before).abs_diff(period));
         }
         pace.synced = Some(now);
-        if missed < self.patience {
+        if missed < self.patience.periods(1, period) {
             return Ok(0);
         }
         pace.held_up = Some((now, missed));

@@ -1,20 +1,32 @@
 //! Writing a file so that a crash at any moment leaves the old one or the new one.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Permissions};
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use super::{StoreError, io_error};
 
+/// What a file is created with that everybody may use; the umask takes its share off.
+const ORDINARY_MODE: u32 = 0o666;
+
 /// Writes `bytes` to `path`: temporary file in the same folder, fsync, rename, fsync of the
-/// folder. Whatever happens, `path` holds the old content or the whole new one.
+/// folder. Whatever happens, `path` holds the old content or the whole new one. A file that is
+/// replaced keeps its mode; a new one has the ordinary one, because a calibration is for everybody
+/// who uses the machine, while a temporary file is for its maker only.
 pub(crate) fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
     let mut file = tempfile::Builder::new()
         .prefix(".new-")
+        .permissions(Permissions::from_mode(ORDINARY_MODE))
         .tempfile_in(folder)
         .map_err(io_error("create a temporary file beside", path))?;
+    if let Ok(replaced) = fs::metadata(path) {
+        file.as_file()
+            .set_permissions(replaced.permissions())
+            .map_err(io_error("set the mode of the file beside", path))?;
+    }
     file.write_all(bytes).map_err(io_error("write", path))?;
     file.as_file()
         .sync_all()
@@ -43,6 +55,34 @@ mod tests {
         write_new_or_replace(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    fn mode(path: &Path) -> u32 {
+        fs::metadata(path).unwrap().permissions().mode() & 0o7777
+    }
+
+    #[test]
+    fn a_new_file_is_for_whom_any_other_new_file_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, ordinary) = (folder.path().join("a.json"), folder.path().join("ordinary"));
+        fs::write(&ordinary, b"x").unwrap();
+        write_new_or_replace(&path, b"one").unwrap();
+        assert_eq!(mode(&path), mode(&ordinary));
+    }
+
+    #[test]
+    fn a_replaced_file_keeps_its_mode() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        for wanted in [0o600, 0o640, 0o664] {
+            fs::write(&path, b"one").unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(wanted)).unwrap();
+            write_new_or_replace(&path, b"two").unwrap();
+            assert_eq!(
+                (fs::read(&path).unwrap(), mode(&path)),
+                (b"two".to_vec(), wanted)
+            );
+        }
     }
 
     #[test]

@@ -52,6 +52,19 @@ impl Lease {
 mod tests {
     use super::*;
 
+    /// Whoever is refused must be able to read who has the machine.
+    #[test]
+    fn the_lease_can_be_read_by_whom_any_other_new_file_can_be() {
+        use std::os::unix::fs::MetadataExt;
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path(), "m");
+        let _lease = Lease::take(&store, "calibrate").unwrap();
+        let ordinary = store.root().join("ordinary");
+        fs::write(&ordinary, b"x").unwrap();
+        let mode = |path| fs::metadata(path).unwrap().mode();
+        assert_eq!(mode(store.root().join("lease")), mode(ordinary));
+    }
+
     #[test]
     fn a_second_program_is_told_who_has_the_machine() {
         let folder = tempfile::tempdir().unwrap();

@@ -66,6 +66,11 @@ pub trait Device {
         self.start(now);
     }
 
+    /// What it looks for at the moment, for a person who waits and wonders; `None`: nothing.
+    fn looks_for(&self) -> Option<String> {
+        None
+    }
+
     /// How the last command (or the start) went, once, when it has ended.
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>>;
 

@@ -364,7 +364,6 @@ impl VolumetricFailure {
             | Self::Chain(_)
             | Self::Volume(_)
             | Self::Influence(_)
-            | Self::Path { .. }
             | Self::NoPlan
             | Self::Roll(_) => 2,
             Self::OutOfTolerance { .. } => 5,
@@ -386,7 +385,8 @@ impl VolumetricFailure {
             | Self::Conditions(_)
             | Self::NoCorrection(_)
             | Self::Model(_)
-            | Self::TooFast { .. } => 3,
+            | Self::TooFast { .. }
+            | Self::Path { .. } => 3,
             Self::NoSamples { .. }
             | Self::NoLight { .. }
             | Self::NotThere { .. }

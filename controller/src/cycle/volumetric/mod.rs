@@ -35,7 +35,7 @@ pub use failure::VolumetricFailure;
 pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};
 pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};
 pub use memory::Remembered;
-pub use moves::Mover;
+pub use moves::{Mover, PathRefusal};
 pub use reference::{References, VolumetricReferenced, measured_geometry};
 pub use state::{GEOMETRY, REFERENCES, VolumetricRecords, memory_pointer};
 pub use verify::{VerifyBy, VolumetricVerified, VolumetricVerifiedPoint};

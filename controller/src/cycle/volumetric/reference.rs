@@ -310,7 +310,7 @@ impl Machine {
     pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
         let expected = samples as usize;
         let started = self.now();
-        let limit = SAMPLE_LIMIT * self.patience;
+        let limit = self.patience.of(SAMPLE_LIMIT);
         let mut seen: Vec<Still> = Vec::with_capacity(expected);
         let (mut last, mut deadline) = (started, started + limit);
         while seen.len() < expected {

@@ -54,12 +54,17 @@ pub(super) struct Finding {
     stage: Stage,
     wake: Time,
     deadline: Time,
+    /// It was asked at every rate that it can be at.
+    asked_everywhere: bool,
 }
 
 impl Finding {
-    /// Begins at the line's own rate.
+    /// Begins at the line's own rate. `since` when this axis has wanted to: while it waited for its
+    /// turn another one has looked for the same amplifier, so that time counts, and each rate is
+    /// tried once at least.
     pub(super) fn begin(
         now: Time,
+        since: Time,
         rate: u32,
         timeouts: &CopleyTimeouts,
         out: &mut VecDeque<Payload>,
@@ -68,7 +73,8 @@ impl Finding {
             rate,
             stage: Stage::Resting { rate, tries: 0 },
             wake: now,
-            deadline: now + timeouts.find,
+            deadline: since + timeouts.find,
+            asked_everywhere: false,
         };
         finding.try_rate(now, rate, REST, out);
         finding
@@ -151,7 +157,9 @@ impl Finding {
                 let tries = tries + 1;
                 self.stage = Stage::Resting { rate, tries };
             }
-            Stage::Probing { .. } if now >= self.deadline => return Found::No,
+            Stage::Probing { .. } if self.asked_everywhere && now >= self.deadline => {
+                return Found::No;
+            }
             Stage::Probing { rate, .. } if rate == self.rate => {
                 out.push_back(Payload::Control(LineControl::Break(true)));
                 self.stage = Stage::Breaking;
@@ -163,6 +171,7 @@ impl Finding {
             }
             Stage::Breaking => {
                 out.push_back(Payload::Control(LineControl::Break(false)));
+                self.asked_everywhere = true;
                 self.try_rate(now, BAUD_AT_RESET, REST, out);
             }
             Stage::Switching => {

@@ -49,7 +49,7 @@ use super::{
 use crate::transport::{Input, LinkState};
 use crate::wire::Payload;
 use crate::wire::cia402::PowerState;
-use crate::wire::copley::{Bank, EventStatus, Parameter};
+use crate::wire::copley::{BAUD_AT_RESET, Bank, EventStatus, Parameter};
 use homing::{Homing, HomingPlace};
 use image::{Image, Look};
 use link::Link;
@@ -347,6 +347,15 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
     fn identify(&mut self, now: Time) {
         self.begin_start(now);
         self.asks_only = true;
+    }
+
+    fn looks_for(&self) -> Option<String> {
+        let (baud, at_reset) = (self.settings.baud, BAUD_AT_RESET);
+        self.link.is_searching().then(|| {
+            format!(
+                "the amplifier at the cable, at {baud} bit/s and, after a BREAK, {at_reset} bit/s"
+            )
+        })
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {

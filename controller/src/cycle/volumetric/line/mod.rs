@@ -222,7 +222,7 @@ impl Machine {
     /// cyclic motion no drive has a target that it could report as reached.
     fn rest_all(&mut self, span: Duration) -> Result<(), Failure> {
         let axes = self.volumetric_config()?.axes.clone();
-        let limit = SETTLING_LIMIT * self.patience + span;
+        let limit = self.patience.of(SETTLING_LIMIT) + span;
         let begin = self.now();
         let mut since = begin;
         while self.now().since(since) < span {
@@ -263,7 +263,7 @@ impl Machine {
         self.use_instrument(instrument)?;
         self.instrument_in_use = None;
         let at = self.instrument_index(instrument);
-        let limit = self.now() + LIGHT_LIMIT * self.patience;
+        let limit = self.now() + self.patience.of(LIGHT_LIMIT);
         loop {
             let now = self.now();
             self.instruments[at].device.set_datum(now);

@@ -180,6 +180,14 @@ impl Link {
         )
     }
 
+    /// Whether the amplifier at the cable is being looked for, or is going to be.
+    pub(super) const fn is_searching(&self) -> bool {
+        matches!(
+            self.state,
+            State::Seeking { .. } | State::Beginning { .. } | State::Finding { .. }
+        )
+    }
+
     pub(super) const fn is_free(&self) -> bool {
         matches!(self.state, State::Free)
     }
@@ -423,7 +431,7 @@ impl Link {
     fn begin_finding(&mut self, now: Time, since: Time, then: Then) {
         self.counts.searches += 1;
         self.lines.clear();
-        let finding = Finding::begin(now, self.baud, &self.timeouts, &mut self.outbox);
+        let finding = Finding::begin(now, since, self.baud, &self.timeouts, &mut self.outbox);
         self.state = State::Finding {
             finding,
             since,

@@ -285,6 +285,35 @@ fn a_line_without_an_amplifier_is_given_up_in_time() {
     assert_eq!(rig.axis.line_use(), LineUse::Idle);
 }
 
+/// Another axis has looked for the same amplifier meanwhile.
+#[test]
+fn an_axis_that_waited_for_the_line_asks_at_each_rate_once_and_gives_up() {
+    let mut rig = Rig::new();
+    rig.fake.on = false;
+    rig.axis.start(rig.now);
+    rig.now = rig.now + MS * 11_000;
+    let begun = rig.now;
+    let failed = rig.outcome();
+    assert!(
+        matches!(failed, Err(DeviceError::Timeout { .. })),
+        "{failed:?}"
+    );
+    let took = rig.now.since(begun);
+    assert!(took < MS * 1500, "{took:?}");
+    assert_eq!(rig.sent.iter().filter(|it| *it == "<9600>").count(), 1);
+}
+
+#[test]
+fn an_axis_says_what_it_looks_for_as_long_as_it_does() {
+    let mut rig = Rig::new();
+    assert_eq!(rig.axis.looks_for(), None);
+    rig.axis.start(rig.now);
+    let said = rig.axis.looks_for().expect("it looks for something");
+    assert!(said.contains("115200") && said.contains("9600"), "{said}");
+    rig.outcome().unwrap();
+    assert_eq!(rig.axis.looks_for(), None);
+}
+
 /// 3 mm of 10 nm; 20 mm/s in 0.1 counts/s; 0.2 m/s² in 10 counts/s².
 #[test]
 fn a_move_is_loaded_read_back_and_started() {
