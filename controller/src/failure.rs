@@ -89,6 +89,21 @@ pub enum Failure {
         /// What did not come or go.
         missing: Box<Failure>,
     },
+    /// Something went wrong shortly after the program was kept from its buses.
+    #[error(
+        "{failure}. This program was kept from its buses for {:.3} s, until {:.3} s before, which may be \
+         the whole cause: the computer is too busy for real time. Give it SCHED_FIFO (`ulimit -r`) or \
+         less to do; an emulated machine can wait for it (--clock lockstep:PATH)",
+        pause.as_secs_f64(), ago.as_secs_f64()
+    )]
+    HeldUp {
+        /// For how long, by the machine's clock.
+        pause: Duration,
+        /// How long before.
+        ago: Duration,
+        /// What went wrong.
+        failure: Box<Self>,
+    },
     /// A device raised an alarm.
     #[error("{device}: {alarm}")]
     Alarm {

@@ -38,6 +38,7 @@ mod edit;
 pub mod emulated;
 pub mod engine;
 pub mod failure;
+mod host_watch;
 pub mod json;
 pub mod machine;
 pub mod observer;

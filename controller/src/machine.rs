@@ -27,6 +27,7 @@ use crate::cycle::platform::PlatformState;
 use crate::cycle::rotary::TableInUse;
 use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
+use crate::host_watch::HostWatch;
 use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
 use crate::patience::Patience;
@@ -93,6 +94,7 @@ pub struct Machine {
     pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
+    pub(crate) host_watch: HostWatch,
     /// The instruments and cameras that were started, by name.
     pub(crate) started_instruments: BTreeSet<String>,
     /// The instrument or camera whose readings a procedure needs now: only its alarms count.
@@ -126,6 +128,7 @@ impl Machine {
             cameras: camera::cameras(&config, &ports, loaded.patience),
             heartbeats: assemble::heartbeats(&config, &ports),
             bus_watch: BusWatch::new(&config, &ports),
+            host_watch: HostWatch::default(),
             memory: config
                 .axis
                 .keys()

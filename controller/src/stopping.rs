@@ -87,6 +87,7 @@ impl Machine {
         let now = self.now();
         result.map_err(|failure| {
             let failure = self.bus_watch.explain(now, failure);
+            let failure = self.host_watch.explain(now, failure);
             self.make_safe();
             failure
         })

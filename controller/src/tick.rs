@@ -26,6 +26,7 @@ impl Machine {
         self.send_pending()?;
         let again = self.outbox.poll_timeout(self.transport.now());
         let deadline = until.min(self.next_deadline()).min(again);
+        self.host_watch.waits(deadline);
         let arrival = self.transport.receive(deadline);
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only
@@ -162,6 +163,7 @@ impl Machine {
         let flushed = self.outbox.flush(&mut *self.transport, self.patience);
         flushed.or_else(|refusal| self.judge_refusal(refusal))?;
         let now = self.transport.now();
+        self.host_watch.looks(now);
         for at in 0..self.heartbeats.len() {
             let (port, producer) = &mut self.heartbeats[at];
             producer.handle_timeout(now);

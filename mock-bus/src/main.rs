@@ -16,7 +16,7 @@ use nix::sys::signalfd::SignalFd;
 
 use mock_bus::config::MachineConfig;
 use mock_bus::fault::FaultConfig;
-use mock_bus::runner::{self, Options, Pace, Running, hand};
+use mock_bus::runner::{self, Options, Pace, Pauses, Running, hand};
 
 /// Runs an emulated machine until it is interrupted, and prints where its ports are.
 #[derive(Parser)]
@@ -147,7 +147,9 @@ fn emulate(config: &Path, arguments: Arguments) -> Result<(), Box<dyn std::error
 fn wait_for_the_end(signals: &SigSet, machine: &Running) -> Result<(), Errno> {
     const LOOK_EVERY_MS: u16 = 500;
     let signals = SignalFd::new(signals)?;
+    let mut told = 0;
     while !machine.has_ended() {
+        told = tell_pauses(machine.pauses(), told);
         let mut fds = [PollFd::new(signals.as_fd(), PollFlags::POLLIN)];
         match poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS)) {
             Ok(0) | Err(Errno::EINTR) => {}
@@ -156,6 +158,21 @@ fn wait_for_the_end(signals: &SigSet, machine: &Running) -> Result<(), Errno> {
         }
     }
     Ok(())
+}
+
+/// Names the computer, where that is to blame; says how many pauses have been told.
+fn tell_pauses(pauses: Pauses, told: u64) -> u64 {
+    if let Some((at, pause)) = pauses.last.filter(|_| pauses.count > told) {
+        eprintln!(
+            "mock-bus: this computer held the emulated machine up for {:.3} s, until {:.3} s of its \
+             time ({} pauses so far): what its controller misses then is no fault of the machine; \
+             with --clock lockstep:PATH it does not matter",
+            pause.as_secs_f64(),
+            at.seconds(),
+            pauses.count
+        );
+    }
+    pauses.count
 }
 
 fn options(config: &MachineConfig, arguments: Arguments) -> Options {

@@ -285,6 +285,7 @@ pub const fn is_lateness(failure: &Failure) -> bool {
             | Failure::Alarm { .. }
             | Failure::Device { .. }
             | Failure::Overdue { .. }
+            | Failure::HeldUp { .. }
     )
 }
 

@@ -18,6 +18,7 @@ impl Failure {
             Self::Table(failure) => failure.exit_code(),
             Self::Engine(failure) => failure.exit_code(),
             Self::Resumable { source, .. } => source.exit_code(),
+            Self::HeldUp { failure, .. } => failure.exit_code(),
             Self::Interrupted => STOPPED_BY + SIGINT,
             Self::Terminated { signal } => STOPPED_BY.saturating_add(*signal),
             Self::Volumetric(failure) => failure.exit_code(),

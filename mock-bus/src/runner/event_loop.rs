@@ -3,6 +3,7 @@
 use std::io::{self, Read};
 use std::os::fd::AsFd;
 use std::sync::mpsc::TryRecvError;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
@@ -11,24 +12,28 @@ use nix::sys::time::TimeSpec;
 use units::Time;
 
 use super::endpoint::Endpoint;
-use super::{Job, Site};
+use super::{Job, Pauses, Site};
 
 /// Shorter waits are not worth a system call; what is due meanwhile is done together.
 const WAIT_MIN: Duration = Duration::from_micros(100);
 const WAIT_MAX: Duration = Duration::from_secs(1);
+/// A shorter pause is an ordinary computer's.
+const PAUSE_MIN: Duration = Duration::from_millis(20);
 
 pub(super) struct EventLoop {
     site: Site,
     started: Instant,
     speed: f64,
+    pauses: Arc<Mutex<Pauses>>,
 }
 
 impl EventLoop {
-    pub(super) fn new(site: Site, speed: f64) -> Self {
+    pub(super) fn new(site: Site, speed: f64, pauses: Arc<Mutex<Pauses>>) -> Self {
         Self {
             site,
             started: Instant::now(),
             speed,
+            pauses,
         }
     }
 
@@ -36,6 +41,7 @@ impl EventLoop {
     pub(super) fn run(mut self) -> io::Result<()> {
         loop {
             let now = self.now();
+            self.note_pause(now);
             for endpoint in &mut self.site.endpoints {
                 endpoint.receive(now, &mut self.site.machine)?;
             }
@@ -48,6 +54,17 @@ impl EventLoop {
                 self.hand_out()?;
             }
             self.wait()?;
+        }
+    }
+
+    /// What was due and was not done: the computer has kept this thread from it.
+    fn note_pause(&self, now: Time) {
+        let late = now.since(self.site.machine.next_event());
+        let pause = late.div_f64(self.speed);
+        if pause >= PAUSE_MIN {
+            let mut pauses = self.pauses.lock().unwrap_or_else(PoisonError::into_inner);
+            pauses.count += 1;
+            pauses.last = Some((now, pause));
         }
     }
 

@@ -22,7 +22,9 @@ use std::collections::BTreeMap;
 use std::io::{self, PipeReader, PipeWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{FaultConfig, FaultId};
@@ -31,6 +33,7 @@ use crate::simulation::Simulation;
 use endpoint::Endpoint;
 use event_loop::EventLoop;
 use lockstep::Lockstep;
+use units::Time;
 use visitors::{Door, Visitors};
 
 /// How an emulated machine's time passes.
@@ -136,11 +139,22 @@ enum Job {
     Stop,
 }
 
+/// How often the computer has kept a machine that lives by the wall's clock from its work: what
+/// its controller missed then is no fault of the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pauses {
+    /// How many there were.
+    pub count: u64,
+    /// The last one: when it ended, by the machine's clock, and its length on the wall.
+    pub last: Option<(Time, Duration)>,
+}
+
 /// A machine that runs on its own thread until it is dropped.
 pub struct Running {
     ports: Vec<PathBuf>,
     jobs: Sender<Job>,
     wake: PipeWriter,
+    pauses: Arc<Mutex<Pauses>>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
@@ -198,6 +212,8 @@ pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunEr
     let door = options.door().map(open_door).transpose()?;
     let (jobs, inbox) = mpsc::channel();
     let (waker, wake) = io::pipe()?;
+    let pauses = Arc::<Mutex<Pauses>>::default();
+    let noted = Arc::clone(&pauses);
     let thread = std::thread::Builder::new()
         .name("mock-bus".to_owned())
         .spawn(move || {
@@ -210,7 +226,7 @@ pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunEr
                 visitors: Visitors::new(door),
             };
             match options.pace {
-                Pace::Wall(speed) => EventLoop::new(site, speed).run(),
+                Pace::Wall(speed) => EventLoop::new(site, speed, noted).run(),
                 Pace::Lockstep(_) => Lockstep::new(site, options.outlive).run(),
             }
         })?;
@@ -218,6 +234,7 @@ pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunEr
         ports,
         jobs,
         wake,
+        pauses,
         thread: Some(thread),
     })
 }
@@ -333,6 +350,11 @@ impl Running {
     /// When the machine has stopped.
     pub fn take_line_away(&self) -> Result<(), RunError> {
         self.with(Simulation::take_line_away)
+    }
+
+    /// How often the computer has held it up so far.
+    pub fn pauses(&self) -> Pauses {
+        *self.pauses.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the machine has come to an end by itself; [`Running::stop`] says why.
