@@ -32,7 +32,7 @@ use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
 #[cfg(test)]
-use crate::plant::{HallDrift, LineSetUp};
+use crate::plant::HallDrift;
 use crate::plant::{Plant, Truth};
 use log::{Direction, Log};
 use port::PortState;
