@@ -3,6 +3,7 @@
 
 mod linear;
 mod linear_zero;
+mod patience;
 mod platform;
 mod platform_knowledge;
 mod repeatable;
