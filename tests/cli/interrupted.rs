@@ -68,7 +68,8 @@ fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
         process.signal(Signal::SIGINT);
         let ended = process.end();
         assert!(ended.said.contains("stopped on request"), "{ended:?}");
-        ended.with_code(4);
+        assert!(ended.said.contains("--resume"), "{ended:?}");
+        ended.with_code(130);
         let before = journal(&bench).expect("the points are kept");
         assert!(!before.complete);
         assert!(before.points.len() >= RUN + 3);

@@ -245,7 +245,8 @@ fn refuses_before_anything_moves(live: &Live) {
 /// Somebody stops it before its third line, and goes on later. Returns the errors' name.
 fn calibrates(live: &Live) -> Value {
     let (stopped, asked) = live.run_with_hand(&["calibrate", "machine.toml"], Some(3));
-    stopped.with_code(4);
+    let stopped = stopped.with_code(130);
+    check_error(&stopped, &["stopped on request", "--resume"]);
     assert_eq!(asked, [1, 2, 3]);
     let (made, asked) = live.run_with_hand(&["calibrate", "machine.toml", "--resume"], None);
     assert_eq!(asked.first(), Some(&3), "{made:?}");
@@ -320,13 +321,15 @@ fn follows(live: &Live) {
         text(&next["thread"]).contains("memory"),
         "it did not ask for real time: {next}"
     );
-    for (rows, why) in [
-        ("0.0,0,0,0\n0.040,zero,0,0\n", "`zero` is no number"),
-        ("0.0,0,0,0\n9.0,900,0,0\n", "axis x: a stop from here"),
-        ("0.0,0,0,0\n40.0,61,0,0\n", "outside the calibrated"),
+    for (rows, why, code) in [
+        ("0.0,0,0,0\n0.040,zero,0,0\n", "`zero` is no number", 2),
+        ("0.0,0,0,0\n9.0,900,0,0\n", "axis x: a stop from here", 3),
+        ("0.0,0,0,0\n40.0,61,0,0\n", "outside the calibrated", 3),
     ] {
         live.write("wrong.csv", rows);
-        let refused = live.run(&["run", "machine.toml", "wrong.csv"]).with_code(2);
+        let refused = live
+            .run(&["run", "machine.toml", "wrong.csv"])
+            .with_code(code);
         check_error(&refused, &["wrong.csv", why]);
         assert!(
             refused.get("counters").is_none(),

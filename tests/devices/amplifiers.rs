@@ -1,6 +1,8 @@
 //! Three servo amplifiers behind one serial line, and the same three axes on CAN.
 
 use core::time::Duration;
+use std::cell::RefCell;
+use std::rc::Rc;
 
 use drivers::device::{Alarm, AmplifierTrouble, AxisCommand, DeviceError, DriveCommand};
 use drivers::wire::cia402::PowerState;
@@ -9,6 +11,7 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
 use mock_bus::simulation::Simulation;
 use tests::{Emulator, Group, Rig, Setup, Stand, rigs};
+use truestage::observer::{Observer, Stage};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 
 const NODE: &str = "amplifiers";
@@ -533,6 +536,65 @@ fn a_scan_says_who_is_on_the_line_and_who_should_be() {
         assert!(
             of("w").mismatches[0].contains("amplifier 5"),
             "{rig:?}: {found:?}"
+        );
+    }
+}
+
+/// Writes down what is told while somebody waits.
+struct Listener(Rc<RefCell<Vec<String>>>);
+
+impl Observer for Listener {
+    fn progress(&mut self, _: Stage, _: &str, _: u64, _: u64) {}
+
+    fn waiting(&mut self, text: &str) {
+        self.0.borrow_mut().push(text.to_owned());
+    }
+}
+
+/// A stand whose line of amplifiers is dead, and what is told of it.
+fn dead_line() -> (Stand, Rc<RefCell<Vec<String>>>) {
+    let mut stand = Stand::new(Rig::InProcess, &over_serial());
+    let port = "amps".to_owned();
+    stand.simulation(|simulation| {
+        let silence = FaultConfig::permanent(Fault::Silence { port });
+        simulation.inject(silence).expect("there is such a line");
+    });
+    let told = Rc::new(RefCell::new(Vec::new()));
+    stand.machine.observe(Box::new(Listener(Rc::clone(&told))));
+    (stand, told)
+}
+
+#[test]
+fn a_scan_of_a_dead_line_takes_hardly_longer_than_one_search_and_says_what_it_looks_for() {
+    let (mut stand, told) = dead_line();
+    let begun = stand.machine.now();
+    let found = stand.machine.scan().expect("what is missing is no failure");
+    let took = stand.machine.now().since(begun);
+    assert!(took < Duration::from_secs(13), "{took:?}");
+    for name in ["u", "v", "w"] {
+        let it = found.iter().find(|it| it.name.as_deref() == Some(name));
+        let it = it.unwrap_or_else(|| panic!("{name} is not in {found:?}"));
+        assert!(it.identity.is_none());
+        assert!(it.mismatches[0].contains("line"), "{found:?}");
+    }
+    let eye = found.iter().find(|it| it.name.as_deref() == Some("eye"));
+    assert!(eye.is_some_and(|it| it.mismatches.is_empty()), "{found:?}");
+    let told = told.borrow();
+    assert!(told[0].contains("u, v, w"), "{told:?}");
+    let searches = told.iter().filter(|it| it.contains("9600 bit/s"));
+    assert!(searches.count() >= 4, "{told:?}");
+}
+
+#[test]
+fn a_start_that_finds_no_amplifier_says_what_it_looks_for_meanwhile() {
+    let (mut stand, told) = dead_line();
+    assert!(stand.machine.start().is_err());
+    let told = told.borrow();
+    assert!(told.len() >= 4, "{told:?}");
+    for it in told.iter() {
+        assert!(
+            it.contains("u: looking for the amplifier at the cable"),
+            "{it}"
         );
     }
 }

@@ -4,6 +4,7 @@
 mod linear;
 mod linear_zero;
 mod pinned;
+mod patience;
 mod platform;
 mod platform_knowledge;
 mod repeatable;

@@ -291,7 +291,7 @@ fn an_axis_that_waited_for_the_line_asks_at_each_rate_once_and_gives_up() {
     let mut rig = Rig::new();
     rig.fake.on = false;
     rig.axis.start(rig.now);
-    rig.now = rig.now + MS * 11_000;
+    rig.now += MS * 11_000;
     let begun = rig.now;
     let failed = rig.outcome();
     assert!(

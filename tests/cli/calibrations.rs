@@ -1,0 +1,55 @@
+//! What is in use is not changed under somebody who measures with it.
+
+use std::fs;
+
+use tests::LINEAR;
+use truestage::Store;
+use truestage::store::Lease;
+
+use crate::programs::{check_error, text, truestage};
+
+/// Two runs of three positions, from both sides.
+fn data(deviation_mm: f64) -> String {
+    let mut text = "run,approach,target_mm,measured_mm\n".to_owned();
+    for run in 1..=2 {
+        for (approach, targets) in [("+", [0.0, 30.0, 60.0]), ("-", [60.0, 30.0, 0.0])] {
+            for target in targets {
+                let measured = target + deviation_mm * target;
+                text += &format!("{run},{approach},{target},{measured:.7}\n");
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn no_calibration_is_activated_or_rolled_back_while_another_program_has_the_machine() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let here = folder.path();
+    fs::write(here.join("machine.toml"), LINEAR.machine).expect("there is room");
+    let ids = [1e-5, 2e-5].map(|slope| {
+        fs::write(here.join("data.csv"), data(slope)).expect("there is room");
+        let words = ["fit", "linear", "data.csv", "--save", "machine.toml"];
+        let fitted = truestage(here, &words).with_code(0);
+        text(&fitted["calibration"]).to_owned()
+    });
+    let [first, second] = &ids;
+    let activate = |id: &str| truestage(here, &["cal", "activate", "machine.toml", id]);
+    let back = || truestage(here, &["cal", "rollback", "machine.toml", "--axis", "x"]);
+    activate(first).with_code(0);
+    let store = Store::new(&here.join("machine-data"), "linear");
+    let verify = Lease::take(&store, "verify").expect("nobody else has it");
+    for refused in [activate(second), back()] {
+        check_error(
+            &refused.with_code(3),
+            &["in use by truestage verify, process"],
+        );
+    }
+    let active = || store.active("x").expect("it can be read").current;
+    assert_eq!(active().as_ref(), Some(first));
+    drop(verify);
+    activate(second).with_code(0);
+    assert_eq!(active().as_ref(), Some(second));
+    back().with_code(0);
+    assert_eq!(active().as_ref(), Some(first));
+}
