@@ -78,7 +78,6 @@ pub fn shortened(text: String) -> String {
     text.replace("step_mm = 3.0", "step_mm = 6.0")
         .replace("targets = 8", "targets = 4")
         .replace("runs = 5", "runs = 2")
-        .replace("jump_limit_um = 5.0", "jump_limit_um = 15.0")
 }
 
 /// The same with an axis that follows cyclic set-points.

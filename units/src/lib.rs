@@ -7,6 +7,7 @@
 mod coordinate;
 mod counts;
 mod quantity;
+mod short;
 mod time;
 
 pub use coordinate::{Coordinate, LengthOrAngle};
@@ -15,6 +16,7 @@ pub use quantity::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Pascals,
     Quantity, Radians, RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
 };
+pub use short::{Short, ShortSpan};
 pub use time::Time;
 
 /// The direction from which a target is reached.

@@ -16,3 +16,4 @@ mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
 mod volumetric_resume;
+mod wrong_position;
