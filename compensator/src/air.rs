@@ -30,7 +30,8 @@ pub const EQUATION_STANDARD_UNCERTAINTY: f64 = 1e-8;
 
 /// An input outside the range for which the equation is used here.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("refractive index of air: {input} {seen} is outside {low} to {high} {unit}")]
+#[error("refractive index of air: {input} {seen} is outside {low} to {high} {unit}",
+    seen = units::Short(*seen), low = units::Short(*low), high = units::Short(*high))]
 pub struct OutOfRange {
     /// Which input.
     pub input: Input,

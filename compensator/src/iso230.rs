@@ -46,7 +46,7 @@ pub enum EvaluationError {
     /// A target with fewer than two measurements from one side.
     #[error(
         "ISO 230-2: target {} mm has {seen} measurement(s) with approach `{}`; at least 2 are \
-         needed for a standard deviation", target.mm(), approach.symbol()
+         needed for a standard deviation", units::Short(target.mm()), approach.symbol()
     )]
     TooFewRuns {
         /// The target.
@@ -104,6 +104,8 @@ pub struct Directional {
 pub struct Conformity {
     /// The fewest measurements of any target from any side.
     pub runs: usize,
+    /// Runs from each side that the standard asks for.
+    pub runs_wanted: usize,
     /// The number of targets.
     pub targets: usize,
     /// Targets per metre needed by the standard over the range measured, at least 5.
@@ -113,7 +115,7 @@ pub struct Conformity {
 impl Conformity {
     /// Five runs from each side, and five targets per metre, at least five.
     pub fn conforms(&self) -> bool {
-        self.runs >= RUNS_WANTED && self.targets >= self.targets_wanted
+        self.runs >= self.runs_wanted && self.targets >= self.targets_wanted
     }
 }
 
@@ -242,6 +244,7 @@ fn axis_figures(targets: Vec<TargetFigures>, runs: usize) -> Figures {
     let sum: Metres = targets.iter().map(|t| t.reversal_value).sum();
     let conformity = Conformity {
         runs,
+        runs_wanted: RUNS_WANTED,
         targets: targets.len(),
         targets_wanted: per_metre.max(TARGETS_WANTED),
     };

@@ -9,6 +9,7 @@ mod cyclic;
 mod line;
 mod patience;
 mod rotary;
+mod table;
 mod volumetric;
 
 use core::time::Duration;
@@ -23,6 +24,7 @@ pub(crate) use patience::patient_search;
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
 pub use rotary::{periodic_compensation, rotary_settings};
+pub use table::{compensation, harmless};
 pub(crate) use volumetric::point_of_mm;
 pub use volumetric::{
     BeamDetectorError, beam_detector, beam_drift, bend_plans, feed_settings, function_shape,
@@ -30,7 +32,6 @@ pub use volumetric::{
     volumetric_chain, work_volume,
 };
 
-use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use compensator::hall_zero;
 use compensator::length_correction::{
     self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
@@ -54,11 +55,9 @@ use units::{
 };
 
 use crate::config::{
-    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, CompensationConfig, EndPolicyName,
-    HomeOffsetName, IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName,
-    MachineConfig, OptionCodesConfig, ZeroConfig,
+    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, HomeOffsetName, IdentityConfig,
+    InstrumentConfig, InstrumentDevice, MachineConfig, OptionCodesConfig, ZeroConfig,
 };
-use crate::failure::Failure;
 use crate::machine::Unit;
 use crate::patience::Patience;
 
@@ -456,38 +455,4 @@ pub(crate) fn correction_environment(environment: &Environment) -> length_correc
             .material_temperature
             .unwrap_or(Celsius(f64::NAN)),
     }
-}
-
-/// A table made ready to be applied within the limits of the configuration.
-///
-/// # Errors
-/// When it jumps, or breaks a limit of size or slope.
-pub fn compensation(
-    config: &CompensationConfig,
-    axis: &str,
-    table: ErrorTable,
-) -> Result<Compensation, Failure> {
-    let axis = axis.to_owned();
-    if let Err(source) = table.check_jumps(Metres::from_um(config.jump_limit_um)) {
-        return Err(Failure::Jump { axis, source });
-    }
-    let interpolation = match config.interpolation {
-        InterpolationName::PiecewiseConstant => Interpolation::PiecewiseConstant,
-        InterpolationName::Linear => Interpolation::Linear,
-        InterpolationName::MonotoneCubic => Interpolation::MonotoneCubic,
-    };
-    let ends = match config.end_policy {
-        EndPolicyName::Refuse => EndPolicy::Refuse,
-        EndPolicyName::Hold => EndPolicy::Hold,
-        EndPolicyName::FadeOut => {
-            EndPolicy::FadeOut(Metres::from_mm(config.fade_out_mm.expect(CHECKED)))
-        }
-    };
-    let limits = Limits {
-        size: Metres::from_um(config.size_limit_um),
-        slope: config.slope_limit,
-        rate: MetresPerSecond(config.rate_limit_um_per_s * 1e-6),
-    };
-    Compensation::new(table, interpolation, limits, ends)
-        .map_err(|source| Failure::Compensation { axis, source })
 }

@@ -1,5 +1,6 @@
 //! Why the machine stopped or refused: each says where, what was expected, what was seen.
 
+mod advice;
 mod exit_code;
 
 use core::time::Duration;
@@ -121,7 +122,7 @@ pub enum Failure {
         source: DeviceError,
     },
     /// A command did not end in time.
-    #[error("{device}: {step} not done within {waited:?}")]
+    #[error("{device}: {step} not done within {}", units::ShortSpan(*waited))]
     Overdue {
         /// The device's name in the configuration.
         device: String,
@@ -216,13 +217,13 @@ pub enum Failure {
         /// Where, and what is calibrated.
         source: compensator::error_table::OutOfRange,
     },
-    /// The error table jumps.
-    #[error("axis {axis}: {source}")]
-    Jump {
+    /// A position of the error table does not fit its neighbours.
+    #[error("axis {axis}: {source}{}", advice::of_stand_off(axis, source))]
+    StandsOff {
         /// Which axis.
         axis: String,
-        /// Which interval.
-        source: compensator::error_table::JumpError,
+        /// Which position.
+        source: compensator::error_table::StandOff,
     },
     /// Measurements do not make a series.
     #[error(transparent)]
@@ -271,7 +272,7 @@ pub enum Failure {
         "axis {axis}: run {run}, between {} and {} mm the interferometer jumped by {:.3} µm \
          against the encoder, {half_wavelengths} half wavelengths: fringes were lost or gained; \
          keep the beam free and steady, set a new datum and measure again",
-        from.mm(), to.mm(), jump.um()
+        units::Short(from.mm()), units::Short(to.mm()), jump.um()
     )]
     FringeJump {
         /// Which axis.
@@ -337,7 +338,7 @@ pub enum Failure {
         source: FitError,
     },
     /// The error table cannot be applied.
-    #[error("axis {axis}: {source}")]
+    #[error("axis {axis}: {source}{}", advice::of_limit(axis, source))]
     Compensation {
         /// Which axis.
         axis: String,

@@ -53,6 +53,10 @@ pub fn figures(figures: &Figures) -> Value {
         "accuracy": directional(&figures.accuracy),
         "runs": figures.runs,
         "conforms_to_iso_230_2": figures.conforms(),
+        "iso_230_2_asks_for": {
+            "runs": figures.conformity.runs_wanted,
+            "targets": figures.conformity.targets_wanted,
+        },
         "targets": targets,
     })
 }

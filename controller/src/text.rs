@@ -1,9 +1,13 @@
 //! What a person reads on a terminal.
 
-use compensator::iso230::{Directional, Figures};
+use compensator::error_table::FALSE_ALARMS;
+use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
 use drivers::transport::LinkState;
 use units::Metres;
+
+use crate::assemble;
+use crate::config::MachineConfig;
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
 pub(crate) type Row = (&'static str, &'static str, fn(&Figures) -> Metres);
@@ -47,7 +51,30 @@ pub fn figures_table(columns: &[(&str, &Figures)]) -> String {
             text += &format!(" {:>22.3}", figure(figures).um());
         }
     }
-    text
+    let lacks = columns
+        .iter()
+        .filter_map(|(title, figures)| Some(format!("\n{title}: {}", lack(&figures.conformity)?)));
+    text + &lacks.collect::<String>()
+}
+
+/// What a measurement lacks of the standard's: the figures are computed all the same.
+fn lack(conformity: &Conformity) -> Option<String> {
+    let Conformity {
+        runs,
+        runs_wanted,
+        targets,
+        targets_wanted,
+    } = conformity;
+    let few_runs = format!("{runs} runs from each side, it asks for {runs_wanted}");
+    let few_targets = format!("{targets} targets, it asks for {targets_wanted} over this range");
+    let lacks: Vec<String> = [
+        (runs < runs_wanted, few_runs),
+        (targets < targets_wanted, few_targets),
+    ]
+    .into_iter()
+    .filter_map(|(is_so, text)| is_so.then_some(text))
+    .collect();
+    (!lacks.is_empty()).then(|| format!("NOT AS ISO 230-2 ASKS: {}", lacks.join("; ")))
 }
 
 /// The largest mean deviation's magnitude: what "as found ±x µm" means.
@@ -59,6 +86,41 @@ pub fn largest_deviation(figures: &Figures) -> Metres {
         .fold(Metres::ZERO, |largest, deviation| {
             largest.max(deviation.abs())
         })
+}
+
+/// Which positions of its tables each linear axis believes, and why.
+pub fn table_notes(config: &MachineConfig) -> Vec<String> {
+    let axes = config.axis.iter();
+    let own = axes.filter_map(|(name, it)| Some((name, it.compensation.as_ref()?)));
+    own.map(|(name, limits)| {
+        let harmless = assemble::harmless(config, name).um();
+        let by = match limits.jump_limit_um {
+            None => "half of what its instrument counts; `jump_limit_um` is not needed",
+            Some(_) => {
+                "its `jump_limit_um`: wise only where finer positions showed that the stage is like that, \
+                 for a wrong position within it is corrected like a right one"
+            }
+        };
+        format!(
+            "axis {name}: a position of a table is refused when it stands off its neighbours by more \
+             than one good table in {:.0} shows and by more than {harmless:.3} µm ({by})",
+            1.0 / FALSE_ALARMS
+        )
+    })
+    .collect()
+}
+
+/// How wrong a position of a table could be without being noticed.
+pub fn noticed(smallest: Option<Metres>) -> String {
+    smallest.map_or_else(
+        || "too few positions to notice a wrong one by its neighbours".into(),
+        |error| {
+            format!(
+                "one position wrong by more than {:.2} µm would have been noticed by its neighbours",
+                error.um()
+            )
+        },
+    )
 }
 
 /// One line: `A = 1.234 µm (↑ 1.0, ↓ 1.1)`.
@@ -117,5 +179,31 @@ pub(crate) fn link_text(state: LinkState) -> &'static str {
              set it up and start again"
         }
         LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(runs: u32, targets: u32) -> Figures {
+        let mut rows = String::from("run,approach,target_mm,measured_mm\n");
+        for run in 1..=runs {
+            let row = |sign, mm: u32| format!("{run},{sign},{mm},{mm}.00{run}\n");
+            rows.extend((1..=targets).map(|it| row('+', it * 10)));
+            rows.extend((1..=targets).rev().map(|it| row('-', it * 10)));
+        }
+        let series = compensator::measurement::LinearSeries::from_csv(&rows, "rows").unwrap();
+        compensator::iso230::evaluate(&series).unwrap()
+    }
+
+    #[test]
+    fn what_a_measurement_lacks_of_the_standard_is_said_below_its_figures() {
+        let (poor, good) = (figures(3, 4), figures(5, 5));
+        let text = figures_table(&[("as found", &poor), ("as left", &good)]);
+        let told = "\nas found: NOT AS ISO 230-2 ASKS: 3 runs from each side, it asks for 5; \
+                    4 targets, it asks for 5 over this range";
+        assert!(text.ends_with(told), "{text}");
+        assert!(!figures_table(&[("as left", &good)]).contains("NOT AS"));
     }
 }

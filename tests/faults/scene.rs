@@ -80,7 +80,6 @@ pub fn shortened(text: String) -> String {
     text.edit("step_mm = 3.0", "step_mm = 6.0")
         .edit("targets = 8", "targets = 4")
         .edit("runs = 5", "runs = 2")
-        .edit("jump_limit_um = 5.0", "jump_limit_um = 15.0")
 }
 
 /// The same with an axis that follows cyclic set-points.

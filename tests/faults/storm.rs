@@ -75,7 +75,7 @@ fn optics(failure: &Failure) -> bool {
             | Failure::ScaleMismatch { .. }
             | Failure::Closure { .. }
             | Failure::Fit { .. }
-            | Failure::Jump { .. }
+            | Failure::StandsOff { .. }
             | Failure::Correction { .. }
             | Failure::MadeWorse { .. }
             | Failure::Compensation { .. }

@@ -9,6 +9,7 @@ mod coordinate;
 mod counts;
 pub mod portable;
 mod quantity;
+mod short;
 mod time;
 
 pub use coordinate::{Coordinate, LengthOrAngle};
@@ -17,6 +18,7 @@ pub use quantity::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Pascals,
     Quantity, Radians, RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
 };
+pub use short::{Short, ShortSpan};
 pub use time::Time;
 
 /// The direction from which a target is reached.

@@ -54,7 +54,8 @@ pub enum LimitName {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CompensationError {
     /// A limit that is not positive and finite, or a slope limit of 1 and more.
-    #[error("compensation: limit {name:?} is {seen}; it must be positive (the slope below 1)")]
+    #[error("compensation: limit {name:?} is {seen}; it must be positive (the slope below 1)",
+        seen = units::Short(*seen))]
     Limit {
         /// Which limit.
         name: LimitName,
@@ -65,7 +66,7 @@ pub enum CompensationError {
     #[error(
         "compensation: the deviation at {} mm (approach `{}`) is {:.3} um, the limit {:.3} um; \
          millimetres taken for micrometres, or the table of another axis?",
-        position.mm(), approach.symbol(), seen.um(), limit.um()
+        units::Short(position.mm()), approach.symbol(), seen.um(), limit.um()
     )]
     TooLarge {
         /// Where.
@@ -81,7 +82,7 @@ pub enum CompensationError {
     #[error(
         "compensation: between {} mm and {} mm (approach `{}`) the deviation has a slope of \
          {:.1} um/mm, the limit is {:.1} um/mm",
-        from.mm(), to.mm(), approach.symbol(), seen * 1e3, limit * 1e3
+        units::Short(from.mm()), units::Short(to.mm()), approach.symbol(), seen * 1e3, limit * 1e3
     )]
     TooSteep {
         /// Start of the piece.
@@ -99,7 +100,7 @@ pub enum CompensationError {
     #[error(
         "compensation: between {} mm and {} mm (approach `{}`) the deviation has a slope of \
          {seen:.3}; from 1 on the correction has no unique inverse",
-        from.mm(), to.mm(), approach.symbol()
+        units::Short(from.mm()), units::Short(to.mm()), approach.symbol()
     )]
     NotInvertible {
         /// Start of the piece.
@@ -118,7 +119,7 @@ pub enum CompensationError {
 pub enum OutOfRange {
     /// Outside the table, and the policy is to refuse.
     #[error("compensation: {} mm is outside the calibrated {} to {} mm",
-        seen.mm(), first.mm(), last.mm())]
+        units::Short(seen.mm()), units::Short(first.mm()), units::Short(last.mm()))]
     Position {
         /// The position asked for (or NaN).
         seen: Metres,

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use units::{Approach, Metres};
 
 use super::robust::{self, MeasuredPoint, Robust};
-use super::{ErrorTable, JumpError, Node, TableError};
+use super::{ErrorTable, Node, TableError};
 use crate::measurement::LinearSeries;
 use crate::uncertainty::{combine, mean};
 
@@ -40,13 +40,11 @@ pub struct FitOptions {
     pub remove_drift: bool,
     /// Largest closure error accepted, if one is set.
     pub closure_max: Option<Metres>,
-    /// Largest difference of neighbouring nodes accepted, if one is set.
-    pub jump_max: Option<Metres>,
 }
 
 impl Default for FitOptions {
     /// Pooled scatter, a perfect instrument of 1 nm resolution, points beyond 6 scatters left
-    /// out, at most 20 % of them; drift reported, not removed; no limit on closure and jumps.
+    /// out, at most 20 % of them; drift reported, not removed; no limit on closure.
     fn default() -> Self {
         Self {
             scatter: NodeScatter::Pooled,
@@ -56,7 +54,6 @@ impl Default for FitOptions {
             scatter_floor: Metres(1e-9),
             remove_drift: false,
             closure_max: None,
-            jump_max: None,
         }
     }
 }
@@ -105,7 +102,7 @@ pub enum FitError {
          limit is {:.0} %; the first is run {}, approach `{}`, target {} mm, off by {:.2} um. \
          Look for vibration, a loose reflector or an unsteady beam and measure again",
         points.len(), share * 100.0, limit * 100.0, points[0].run,
-        points[0].approach.symbol(), points[0].target.mm(), points[0].residual.um()
+        points[0].approach.symbol(), units::Short(points[0].target.mm()), points[0].residual.um()
     )]
     TooManyOutliers {
         /// Share of points left out.
@@ -117,7 +114,7 @@ pub enum FitError {
     },
     /// A target not measured in an approach that other targets have.
     #[error("error table: target {} mm was not measured with approach `{}`, others were",
-        target.mm(), approach.symbol())]
+        units::Short(target.mm()), approach.symbol())]
     MissingTarget {
         /// The target.
         target: Metres,
@@ -126,7 +123,7 @@ pub enum FitError {
     },
     /// One measurement only, where the scatter of each node is asked for.
     #[error("error table: target {} mm has one measurement with approach `{}`; per-node scatter \
-         needs two", target.mm(), approach.symbol())]
+         needs two", units::Short(target.mm()), approach.symbol())]
     TooFewRuns {
         /// The target.
         target: Metres,
@@ -142,9 +139,6 @@ pub enum FitError {
         /// The limit.
         limit: Metres,
     },
-    /// Neighbouring nodes differ too much.
-    #[error(transparent)]
-    Jump(#[from] JumpError),
     /// The nodes do not form a table.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -163,7 +157,7 @@ pub fn fit(series: &LinearSeries, options: &FitOptions) -> Result<ErrorTable, Fi
 /// One approach alone is allowed; the table then knows only that one.
 ///
 /// # Errors
-/// Too many outliers, a target missing in one approach, or closure or a jump above its limit.
+/// Too many outliers, a target missing in one approach, or closure above its limit.
 pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, FitError> {
     let (bad, robust) = robust::find(series, options.outlier_threshold, options.scatter_floor);
     if robust.share > options.outlier_share_max {
@@ -205,9 +199,6 @@ pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, Fi
         }
     }
     let table = ErrorTable::new(nodes)?;
-    if let Some(limit) = options.jump_max {
-        table.check_jumps(limit)?;
-    }
     let (s_forward, s_reverse) = (s_forward.map(Metres), s_reverse.map(Metres));
     Ok(Fitted {
         table,

@@ -241,16 +241,3 @@ fn a_single_run_has_no_scatter_and_says_so() {
         Err(FitError::TooFewRuns { .. })
     ));
 }
-
-#[test]
-fn a_jump_is_refused_by_the_fit_when_a_limit_is_set() {
-    let data = series(3, |_, _, mm| if mm > 31.0 { 6.0 } else { 0.0 });
-    let options = FitOptions {
-        jump_max: Some(Metres::from_um(4.0)),
-        ..Default::default()
-    };
-    let Err(FitError::Jump(jump)) = fit(&data, &options) else {
-        panic!("no jump seen")
-    };
-    assert_eq!((jump.from.mm().round(), jump.to.mm().round()), (30.0, 33.0));
-}

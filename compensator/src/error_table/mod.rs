@@ -3,7 +3,7 @@
 //! Source: CN104076739A, steps 1–7: run step by step, read the laser interferometer at every
 //! step, negate the errors into a compensation table, and for every job coordinate P find its
 //! interval x_n and drive to P' = P + compensation(x_n). The patent holds for errors without
-//! abrupt jumps; [`ErrorTable::check_jumps`] makes that a refusal which names the interval.
+//! abrupt jumps; [`ErrorTable::judge_neighbours`] makes that a refusal which names the position.
 //!
 //! | symbol | name here |
 //! |---|---|
@@ -23,6 +23,7 @@ mod compensation;
 mod curve;
 mod fit;
 mod robust;
+mod stand_off;
 
 use units::{Approach, Metres};
 
@@ -32,6 +33,7 @@ pub(crate) use curve::Curve;
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};
 pub use robust::{MeasuredPoint, Robust};
+pub use stand_off::{FALSE_ALARMS, StandOff};
 
 /// One position of the table. Plain data, so that a store can write its own form of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +105,7 @@ pub enum TableError {
     },
     /// A position not beyond the one before it.
     #[error("error table, node {index}: position {} mm does not follow {} mm",
-        seen.mm(), previous.mm())]
+        units::Short(seen.mm()), units::Short(previous.mm()))]
     NotIncreasing {
         /// Which node.
         index: usize,
@@ -124,28 +126,6 @@ pub enum TableError {
     /// No approach at all.
     #[error("error table: no deviation in either approach")]
     Empty,
-}
-
-/// A jump of the deviation between neighbouring nodes beyond the limit.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "error table: the deviation jumps from {:.3} um at {} mm to {:.3} um at {} mm (approach \
-     `{}`), more than the limit of {:.3} um; measure finer there or find the mechanical cause",
-    deviation_from.um(), from.mm(), deviation_to.um(), to.mm(), approach.symbol(), limit.um()
-)]
-pub struct JumpError {
-    /// Where the interval begins.
-    pub from: Metres,
-    /// Where it ends.
-    pub to: Metres,
-    /// The approach in which it jumps.
-    pub approach: Approach,
-    /// Deviation at `from`.
-    pub deviation_from: Metres,
-    /// Deviation at `to`.
-    pub deviation_to: Metres,
-    /// The largest difference allowed.
-    pub limit: Metres,
 }
 
 impl ErrorTable {
@@ -241,36 +221,6 @@ impl ErrorTable {
             range: (Metres(low), Metres(high)),
         })
     }
-
-    /// Refuses a table whose deviation differs by more than `limit` between neighbours.
-    ///
-    /// # Errors
-    /// The first such interval, with its direction, both values and the limit.
-    pub fn check_jumps(&self, limit: Metres) -> Result<(), JumpError> {
-        for pair in self.nodes.windows(2) {
-            for approach in [Approach::Forward, Approach::Reverse] {
-                let values = (pair[0].deviation(approach), pair[1].deviation(approach));
-                let (Some(deviation_from), Some(deviation_to)) = values else {
-                    continue;
-                };
-                let jump = (deviation_to - deviation_from).abs();
-                // Written so that a NaN limit refuses.
-                if jump <= limit {
-                    continue;
-                }
-                let (from, to) = (pair[0].position, pair[1].position);
-                return Err(JumpError {
-                    from,
-                    to,
-                    approach,
-                    deviation_from,
-                    deviation_to,
-                    limit,
-                });
-            }
-        }
-        Ok(())
-    }
 }
 
 fn is_sound(node: &Node) -> bool {
@@ -347,26 +297,5 @@ mod tests {
             ErrorTable::new(vec![node(0.0, Some(1.0), None), node(3.0, Some(2.0), None)]).unwrap();
         assert_eq!(table.lost_motion(), None);
         assert!(!table.knows(Approach::Reverse));
-    }
-
-    #[test]
-    fn a_jump_beyond_the_limit_is_refused_with_its_interval_and_both_values() {
-        let nodes = vec![
-            both(0.0, 0.0, 0.0),
-            both(3.0, 1.0, 1.0),
-            both(6.0, 1.5, 4.5),
-        ];
-        let table = ErrorTable::new(nodes).unwrap();
-        assert_eq!(table.check_jumps(Metres::from_um(3.6)), Ok(()));
-        assert_eq!(
-            table
-                .check_jumps(Metres::from_um(3.0))
-                .unwrap_err()
-                .to_string(),
-            "error table: the deviation jumps from 1.000 um at 3 mm to 4.500 um at 6 mm \
-             (approach `-`), more than the limit of 3.000 um; measure finer there or find the \
-             mechanical cause"
-        );
-        assert!(table.check_jumps(Metres(f64::NAN)).is_err());
     }
 }

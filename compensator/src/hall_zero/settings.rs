@@ -91,7 +91,8 @@ impl Default for Settings {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// Not a positive finite number.
-    #[error("hall zero: {setting} is {seen}; it must be a positive number")]
+    #[error("hall zero: {setting} is {seen}; it must be a positive number",
+        seen = units::Short(*seen))]
     NotPositive {
         /// Which setting.
         setting: &'static str,
@@ -99,7 +100,8 @@ pub enum SettingsError {
         seen: f64,
     },
     /// One that must be smaller than another.
-    #[error("hall zero: {small} ({small_value}) must be below {large} ({large_value})")]
+    #[error("hall zero: {small} ({small_value}) must be below {large} ({large_value})",
+        small_value = units::Short(*small_value), large_value = units::Short(*large_value))]
     Order {
         /// The one that must be smaller.
         small: &'static str,
@@ -127,7 +129,7 @@ pub enum SettingsError {
     },
     /// The nominal zero is not inside the soft limits.
     #[error("hall zero: the nominal zero at {} mm is outside the soft limits {} to {} mm",
-        nominal.mm(), soft_min.mm(), soft_max.mm())]
+        units::Short(nominal.mm()), units::Short(soft_min.mm()), units::Short(soft_max.mm()))]
     NominalOutside {
         /// The nominal zero.
         nominal: Metres,

@@ -76,7 +76,8 @@ pub enum EnvironmentError {
     /// A sensor outside what a machine hall can have.
     #[error(
         "environment: {channel} is {seen} {unit}, outside {low} to {high}; sensor broken, \
-             disconnected or in another unit?"
+             disconnected or in another unit?",
+        seen = units::Short(*seen), low = units::Short(*low), high = units::Short(*high)
     )]
     OutOfRange {
         /// Which sensor.
@@ -91,8 +92,8 @@ pub enum EnvironmentError {
         unit: &'static str,
     },
     /// A sensor that has not changed by one bit for too long.
-    #[error("environment: {channel} has been exactly {seen} for {} s (limit {} s); sensor frozen?",
-        since.as_secs(), limit.as_secs())]
+    #[error("environment: {channel} has been exactly {} for {} s (limit {} s); sensor frozen?",
+        units::Short(*seen), since.as_secs(), limit.as_secs())]
     Frozen {
         /// Which sensor.
         channel: Channel,
@@ -116,7 +117,7 @@ pub enum EnvironmentError {
     #[error(transparent)]
     Air(#[from] air::OutOfRange),
     /// A setting that is not finite or of impossible size.
-    #[error("length correction: {setting} is {seen}")]
+    #[error("length correction: {setting} is {seen}", seen = units::Short(*seen))]
     Setting {
         /// Which setting.
         setting: &'static str,

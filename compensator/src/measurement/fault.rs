@@ -1,5 +1,7 @@
 //! What can be wrong with a data file, told to whoever has to mend it.
 
+use super::units_of::Unbelievable;
+
 /// A data file that cannot be used: where, what was seen, what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {fault}")]
@@ -117,7 +119,8 @@ pub enum Fault {
         seen: String,
     },
     /// The same point twice.
-    #[error("target {target_mm} mm of run {run} ({approach}) is already in the file; keep one")]
+    #[error("target {} mm of run {run} ({approach}) is already in the file; keep one",
+        units::Short(*target_mm))]
     Duplicate {
         /// Its run.
         run: u32,
@@ -136,8 +139,9 @@ pub enum Fault {
     },
     /// Targets against the approach.
     #[error(
-        "target {seen_mm} mm comes after {previous_mm} mm, which is not approach `{approach}`; \
-         keep the rows in the order measured"
+        "target {} mm comes after {} mm, which is not approach `{approach}`; \
+         keep the rows in the order measured",
+        units::Short(*seen_mm), units::Short(*previous_mm)
     )]
     TargetOrder {
         /// `+` or `-`.
@@ -155,8 +159,8 @@ pub enum Fault {
     },
     /// Nothing can be said about a screw that made one stroke only.
     #[error(
-        "axis {axis} has no other stroke than {stroke_um} um; measure at least two different \
-         strokes, better five and more"
+        "axis {axis} has no other stroke than {} um; measure at least two different \
+         strokes, better five and more", units::Short(*stroke_um)
     )]
     OneStroke {
         /// Which axis.
@@ -166,8 +170,9 @@ pub enum Fault {
     },
     /// A stroke a thousand times shorter than the others.
     #[error(
-        "axis {axis}: a stroke of {stroke_um} um stands beside strokes from {least_um} to {most_um} um; \
-         are micrometres and millimetres mixed?"
+        "axis {axis}: a stroke of {} um stands beside strokes from {} to {} um; \
+         are micrometres and millimetres mixed?",
+        units::Short(*stroke_um), units::Short(*least_um), units::Short(*most_um)
     )]
     MixedUnits {
         /// Which axis.
@@ -181,8 +186,9 @@ pub enum Fault {
     },
     /// A deviation larger than any stroke of its axis.
     #[error(
-        "axis {axis}: the deviation of {deviation_um} um is larger than its longest stroke, \
-         {stroke_um} um; are micrometres and millimetres mixed?"
+        "axis {axis}: the deviation of {} um is larger than its longest stroke, \
+         {} um; are micrometres and millimetres mixed?",
+        units::Short(*deviation_um), units::Short(*stroke_um)
     )]
     Implausible {
         /// Which axis.
@@ -192,10 +198,44 @@ pub enum Fault {
         /// The longest stroke.
         stroke_um: f64,
     },
+    /// Positions that grow otherwise than their targets, by more than any stage does.
+    #[error(
+        "`measured_mm` grows by {} mm for each millimetre of `target_mm`, which no stage does: {cause}",
+        digits(*slope)
+    )]
+    OtherUnit {
+        /// Measured over target.
+        slope: f64,
+        /// What it looks like.
+        cause: &'static str,
+    },
+    /// Positions that do not follow their targets.
+    #[error(
+        "`measured_mm` lies {:.0} % of the range off a line with `target_mm`, which no stage does: are \
+         the columns what their names say?", share * 100.0
+    )]
+    Scattered {
+        /// The scatter about the line, as a share of the range.
+        share: f64,
+    },
     /// Something that only data of a rotary table can have.
     #[error(transparent)]
     Rotary(#[from] super::RotaryFault),
     /// Something that only data of three axes can have.
     #[error(transparent)]
     Volume(#[from] super::VolumeFault),
+}
+
+/// Three significant digits: a slope is a hint, not a result.
+fn digits(value: f64) -> units::Short {
+    units::Short(format!("{value:.2e}").parse().unwrap_or(value))
+}
+
+impl From<Unbelievable> for Fault {
+    fn from(reason: Unbelievable) -> Self {
+        match reason {
+            Unbelievable::Slope { slope, cause } => Self::OtherUnit { slope, cause },
+            Unbelievable::Scatter { share } => Self::Scattered { share },
+        }
+    }
 }

@@ -24,6 +24,7 @@ mod fault;
 mod rotary;
 mod stroke;
 mod table;
+mod units_of;
 mod volume;
 
 use std::collections::BTreeSet;
@@ -70,7 +71,7 @@ pub enum SeriesError {
     },
     /// The same target twice in one run and approach.
     #[error("measurement {index}: target {} mm of run {run} ({}) was already measured",
-        target.mm(), approach.symbol())]
+        units::Short(target.mm()), approach.symbol())]
     Duplicate {
         /// Which measurement.
         index: usize,
@@ -93,7 +94,7 @@ pub enum SeriesError {
     },
     /// A target against the sense of its approach.
     #[error("measurement {index}: target {} mm ({}) comes after {} mm",
-        seen.mm(), approach.symbol(), previous.mm())]
+        units::Short(seen.mm()), approach.symbol(), units::Short(previous.mm()))]
     TargetOrder {
         /// Which measurement.
         index: usize,
@@ -195,7 +196,11 @@ impl LinearSeries {
                 measured: Metres::from_mm(table.number(row, 3)?),
             });
         }
-        Self::new(measurements).map_err(|error| table.series_error(error))
+        let series = Self::new(measurements).map_err(|error| table.series_error(error))?;
+        match units_of::judge(&series) {
+            Ok(()) => Ok(series),
+            Err(reason) => Err(table.fail(0, 3, reason.into())),
+        }
     }
 
     /// The series in the format [`Self::from_csv`] reads, to the last bit of every number.

@@ -46,7 +46,7 @@ pub enum StrokeError {
     /// All strokes of an axis are equal.
     #[error(
         "axis {axis}: no other stroke than {} um; measure at least two different strokes, better \
-         five and more", stroke.um()
+         five and more", units::Short(stroke.um())
     )]
     OneStroke {
         /// The first of them.
@@ -58,8 +58,8 @@ pub enum StrokeError {
     },
     /// A stroke a thousand times shorter than the others.
     #[error(
-        "axis {axis}: a stroke of {} um beside strokes from {} to {} um", stroke.um(),
-        others.0.um(), others.1.um()
+        "axis {axis}: a stroke of {} um beside strokes from {} to {} um", units::Short(stroke.um()),
+        units::Short(others.0.um()), units::Short(others.1.um())
     )]
     MixedUnits {
         /// Which one.
@@ -74,7 +74,7 @@ pub enum StrokeError {
     /// A deviation larger than any stroke of its axis.
     #[error(
         "axis {axis}: the deviation of {} um is larger than its longest stroke, {} um",
-        deviation.um(), longest.um()
+        units::Short(deviation.um()), units::Short(longest.um())
     )]
     Implausible {
         /// Which one.

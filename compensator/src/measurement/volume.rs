@@ -69,7 +69,7 @@ pub enum VolumeFault {
         seen: String,
     },
     /// A standard uncertainty that is none.
-    #[error("`u` is {seen}; a standard uncertainty is above zero")]
+    #[error("`u` is {seen}; a standard uncertainty is above zero", seen = units::Short(*seen))]
     Uncertainty {
         /// The cell.
         seen: f64,

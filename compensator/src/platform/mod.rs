@@ -92,7 +92,8 @@ pub enum PlatformError {
         name: String,
     },
     /// A direction that is no direction.
-    #[error("platform: the direction of actuator `{name}` has the length {length}; it must be 1")]
+    #[error("platform: the direction of actuator `{name}` has the length {length}; it must be 1",
+        length = units::Short(*length))]
     Direction {
         /// Which actuator.
         name: String,
@@ -103,7 +104,7 @@ pub enum PlatformError {
     #[error(
         "platform: actuator `{name}` travels from {} to {} mm; strokes count from pose zero, \
          which must be within",
-        min.mm(), max.mm()
+        units::Short(min.mm()), units::Short(max.mm())
     )]
     Travel {
         /// Which actuator.
@@ -114,7 +115,8 @@ pub enum PlatformError {
         max: Metres,
     },
     /// A condition limit that is no limit.
-    #[error("platform: the condition limit is {seen}; it must be above 1")]
+    #[error("platform: the condition limit is {seen}; it must be above 1",
+        seen = units::Short(*seen))]
     ConditionLimit {
         /// The value.
         seen: f64,

@@ -78,8 +78,7 @@ pub enum PeriodicError {
     /// A limit that is not positive and finite, or a slope limit of 1 and more.
     #[error(
         "rotary compensation: the limits are {:.3} arcsec and a slope of {slope}; both must be \
-         positive, the slope below 1", size.arcsec()
-    )]
+         positive, the slope below 1", size.arcsec(), slope = units::Short(*slope))]
     Limits {
         /// The limit of size.
         size: Radians,
@@ -129,7 +128,7 @@ pub enum PeriodicError {
 
 /// A command or target that is no angle.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("rotary compensation: an angle of {seen} rad is none")]
+#[error("rotary compensation: an angle of {seen} rad is none", seen = units::Short(*seen))]
 pub struct NotAnAngle {
     /// What was asked for: a NaN or an infinity.
     pub seen: f64,

@@ -39,7 +39,7 @@ pub enum Rule {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "screw compensation: {} mm is outside {} to {} mm, what was measured and may be extrapolated",
-    seen.mm(), first.mm(), last.mm()
+    units::Short(seen.mm()), units::Short(first.mm()), units::Short(last.mm())
 )]
 pub struct OutOfRange {
     /// The target (or NaN).

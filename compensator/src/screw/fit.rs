@@ -107,13 +107,14 @@ pub struct Fitted {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A significance level that is none.
-    #[error("screw: the significance level is {seen}; it must be between 0 and 1")]
+    #[error("screw: the significance level is {seen}; it must be between 0 and 1",
+        seen = units::Short(*seen))]
     Level {
         /// The value.
         seen: f64,
     },
     /// A lead that is none.
-    #[error("screw: the lead is {} mm; it must be positive", seen.mm())]
+    #[error("screw: the lead is {} mm; it must be positive", units::Short(seen.mm()))]
     Lead {
         /// The value.
         seen: Metres,
@@ -141,7 +142,7 @@ pub enum FitError {
     #[error(
         "screw: the strokes stand at {places} place(s) of the {} mm lead, so its periodic error is \
          not observable (it cannot be told from offset and slope); measure at five or more places \
-         spread over more than one turn, or leave the lead out", lead.mm()
+         spread over more than one turn, or leave the lead out", units::Short(lead.mm())
     )]
     Periodic {
         /// The lead.

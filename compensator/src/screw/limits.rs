@@ -40,8 +40,7 @@ pub enum ScrewError {
     /// A limit that is none.
     #[error(
         "screw compensation: limit {name:?} is {seen}; size and slope must be positive (the slope \
-         below 1), the others not negative"
-    )]
+         below 1), the others not negative", seen = units::Short(*seen))]
     Limit {
         /// Which limit.
         name: LimitName,
@@ -69,7 +68,7 @@ pub enum ScrewError {
     #[error(
         "screw compensation: deviations reach {:.3} um between {} and {} mm, the limit is {:.3} um; \
          millimetres taken for micrometres, or the model of another screw?",
-        seen.um(), first.mm(), last.mm(), limit.um()
+        seen.um(), units::Short(first.mm()), units::Short(last.mm()), limit.um()
     )]
     TooLarge {
         /// A bound of the deviations.

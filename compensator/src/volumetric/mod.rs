@@ -36,7 +36,7 @@ use units::Metres;
 pub enum NoCorrection {
     /// Outside the calibrated volume, or not a number.
     #[error("axis {axis}: {} mm is outside the calibrated {} to {} mm; nothing is corrected there",
-        seen.mm(), low.mm(), high.mm())]
+        units::Short(seen.mm()), units::Short(low.mm()), units::Short(high.mm()))]
     Outside {
         /// Which axis.
         axis: Axis,

@@ -11,6 +11,7 @@ use compensator::iso230;
 use compensator::measurement::{HallSeries, LinearSeries};
 use drivers::device::Identity;
 use serde_json::json;
+use truestage::config::MachineConfig;
 use truestage::cycle::utc_now;
 use truestage::cycle::volumetric::VolumetricFailure;
 use truestage::store::{
@@ -18,6 +19,7 @@ use truestage::store::{
     RecordHead, SCHEMA_VERSION, Store, short,
 };
 use truestage::{Failure, assemble, config, json as to_json, text};
+use units::Metres;
 
 use super::output::{Ended, Output};
 use super::{rotary, screw, volume_fit};
@@ -59,10 +61,7 @@ pub(super) fn read(path: &Path) -> Result<String, Failure> {
 pub(super) fn iso230(path: &Path, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let figures = iso230::evaluate(&series)?;
-    let mut text = text::figures_table(&[("measured", &figures)]);
-    if !figures.conforms() {
-        text += "\nnote: ISO 230-2 asks for five runs from each side and five targets";
-    }
+    let text = text::figures_table(&[("measured", &figures)]);
     output.result(&text, &to_json::figures(&figures))
 }
 
@@ -99,6 +98,13 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
             u.map_or("unknown (one run)".into(), |u| format!("{:.3} µm", u.um()))
         );
     }
+    let judged = fitted.table.judge_neighbours(Metres::ZERO);
+    text += &match judged {
+        Ok(noticed) => format!("\n{}", text::noticed(noticed)),
+        Err(stand_off) => format!("\nNOT TO BE BELIEVED AS IT IS: {stand_off}"),
+    };
+    value["wrong_position_noticed_um"] = json!(judged.ok().flatten().map(to_json::um));
+    value["stands_off"] = json!(judged.err().map(|it| it.to_string()));
     if let Some(config) = save {
         let id = store_fit(config, axis, path, &series, &fitted)?;
         text += &format!(
@@ -122,22 +128,10 @@ fn store_fit(
 ) -> Result<String, Failure> {
     let loaded = config::load(config_path)?;
     let axes = &loaded.config.axis;
-    let name = match (axis, axes.len()) {
-        (Some(axis), _) => axis.to_owned(),
-        (None, 1) => axes.keys().next().expect("there is one").clone(),
-        (None, _) => {
-            return Err(Failure::Usage {
-                what: "the machine has several axes".into(),
-                help: format!(
-                    "add --axis with one of {}",
-                    axes.keys().cloned().collect::<Vec<_>>().join(", ")
-                ),
-            });
-        }
-    };
+    let name = linear_axis(config_path, &loaded.config, axis)?;
     let head = head_of(&loaded, &name, data)?;
-    if let Some(limits) = &axes[&name].compensation {
-        assemble::compensation(limits, &name, fitted.table.clone())?;
+    if axes[&name].compensation.is_some() {
+        assemble::compensation(&loaded.config, &name, fitted.table.clone())?;
     }
     let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
     let record = CalibrationRecord {
@@ -145,6 +139,35 @@ fn store_fit(
         content: Content::LinearErrorTable(content),
     };
     Ok(Store::of(&loaded.config.machine).save(&record)?)
+}
+
+/// The linear axis that a table is stored for.
+fn linear_axis(path: &Path, config: &MachineConfig, axis: Option<&str>) -> Result<String, Failure> {
+    let names: Vec<&str> = config.axis.keys().map(String::as_str).collect();
+    let usage = |what, help| Err(Failure::Usage { what, help });
+    match (axis, names.as_slice()) {
+        (Some(axis), [_, ..]) => Ok(axis.to_owned()),
+        (None, [only]) => Ok((*only).to_owned()),
+        (None, [_, ..]) => usage(
+            "the machine has several linear axes".into(),
+            format!("add --axis with one of {}", names.join(", ")),
+        ),
+        (_, []) => {
+            let rotary: Vec<&str> = config.rotary.keys().map(String::as_str).collect();
+            let what = match rotary.as_slice() {
+                [] => "no axis at all".to_owned(),
+                _ => format!("only the rotary {}", rotary.join(", ")),
+            };
+            usage(
+                format!(
+                    "{}: a linear table is for a linear axis, and this machine has {what}",
+                    path.display()
+                ),
+                "name the configuration of a linear axis; `truestage fit rotary` is for rotary ones"
+                    .into(),
+            )
+        }
+    }
 }
 
 /// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be
@@ -241,4 +264,39 @@ fn hall(path: &Path, output: Output) -> Ended {
         estimate.mid_voltage.value()
     );
     output.result(&text, &to_json::zero(&estimate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+
+    #[track_caller]
+    fn check(text: &str, axis: Option<&str>, expected: Result<&str, &str>) {
+        let config = config::parse(text, "m.toml").unwrap().config;
+        match (linear_axis(Path::new("m.toml"), &config, axis), expected) {
+            (Ok(name), Ok(wanted)) => assert_eq!(name, wanted),
+            (Err(failure), Err(words)) => {
+                let said = failure.to_string();
+                assert!(said.contains(words), "{said}");
+            }
+            (seen, _) => panic!("{seen:?}"),
+        }
+    }
+
+    #[test]
+    fn a_linear_table_is_stored_for_a_linear_axis_or_it_is_said_that_there_is_none() {
+        check(LINEAR, None, Ok("x"));
+        check(UVW, None, Err("add --axis with one of u, v, w"));
+        check(UVW, Some("v"), Ok("v"));
+        check(ROTARY, None, Err("this machine has only the rotary c"));
+        check(
+            ROTARY,
+            Some("c"),
+            Err("a linear table is for a linear axis"),
+        );
+    }
 }

@@ -4,6 +4,7 @@ mod cal;
 mod data;
 mod demo;
 mod kind;
+mod moved;
 mod operator;
 mod output;
 mod page;

@@ -143,7 +143,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     text += if calibrated {
         ""
     } else {
-        "\nnote: not every screw is calibrated"
+        "\nNOT CORRECTED: not every screw is calibrated; run `truestage calibrate`"
     };
     text += &moved.as_ref().map_or(String::new(), moved_text);
     text += &aligned.as_ref().map_or(String::new(), aligned_text);
@@ -151,6 +151,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         "target": pose_value(target),
         "seen": pose_value(seen),
         "calibrations": calibrations,
+        "corrected": calibrated,
         "move": moved.as_ref().map(moved_value),
         "alignment": aligned.as_ref().map(aligned_value),
         "counters": counters,

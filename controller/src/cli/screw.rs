@@ -13,7 +13,7 @@ use truestage::json::screw as to_json;
 use truestage::store::{CalibrationRecord, Content, ScrewContent, ScrewMethodName, Store, short};
 use truestage::text::ScrewTerm;
 use truestage::{Failure, config, text};
-use units::Metres;
+use units::{Metres, Short};
 
 use super::data::{head_of, read};
 use super::output::{Ended, Output};
@@ -111,8 +111,8 @@ fn patent(strokes: &AxisStrokes) -> Result<Estimated<'_>, FitError> {
     let text = format!(
         "{} strokes from {} to {} um, residual {:.3} µm\n  {:<24} {slope}\n  {:<24} {lost_motion}",
         estimate.rows,
-        estimate.at_m.um(),
-        estimate.at_n.um(),
+        Short(estimate.at_m.um()),
+        Short(estimate.at_n.um()),
         estimate.residual.um(),
         "slope",
         "mean lost motion",
@@ -136,8 +136,8 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
     let rows = strokes.strokes.len();
     let mut text = format!(
         "{rows} strokes from {} to {} um, residual {:.3} µm, {} degrees of freedom{}",
-        fitted.model.first.um(),
-        fitted.model.last.um(),
+        Short(fitted.model.first.um()),
+        Short(fitted.model.last.um()),
         fitted.residual.um(),
         fitted.degrees_of_freedom,
         model_text(&fitted.model)
@@ -174,7 +174,7 @@ pub(super) fn outlier_lines(outliers: &[StrokeOutlier], lines: &[usize]) -> Stri
             "\n  left out: {}approach {}, stroke {} um, deviation {:.3} µm, {:+.3} µm off the others",
             line.map_or(String::new(), |line| format!("line {line}, ")),
             it.stroke.approach.symbol(),
-            it.stroke.stroke.um(),
+            Short(it.stroke.stroke.um()),
             it.stroke.deviation.um(),
             it.residual.um()
         )
@@ -253,8 +253,8 @@ pub(super) fn shown(content: &ScrewContent) -> String {
     format!(
         "{} strokes{left_out} from {} to {} mm by {}{scatter}{}",
         content.rows,
-        Metres(content.first_stroke_m).mm(),
-        Metres(content.last_stroke_m).mm(),
+        Short(Metres(content.first_stroke_m).mm()),
+        Short(Metres(content.last_stroke_m).mm()),
         content.method.in_words(),
         model_text(&content.model()),
     )

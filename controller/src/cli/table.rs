@@ -152,15 +152,28 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 }
 
 pub(super) fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
-    let by = calibration.map_or("no calibration".to_owned(), short);
+    let by = calibration.map_or("not corrected".to_owned(), short);
     let u = moved
         .standard_uncertainty
         .map_or(String::new(), |u| format!(", u = {:.4}″", u.arcsec()));
     format!(
-        "axis {axis}: told {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u})",
+        "axis {axis}: told {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
         moved.target.degrees(),
         moved.set_point.degrees(),
         moved.expected.degrees(),
+        uncorrected(axis, calibration)
+    )
+}
+
+/// A table without a calibration goes by its encoder alone.
+fn uncorrected(axis: &str, calibration: Option<&str>) -> String {
+    if calibration.is_some() {
+        return String::new();
+    }
+    format!(
+        "\naxis {axis}: NOT CORRECTED: the axis has no calibration and is off by whatever its encoder \
+         deviates there; run `truestage calibrate`, or activate a calibration with `truestage cal \
+         activate`"
     )
 }
 
@@ -172,6 +185,7 @@ pub(super) fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&
         "expected_deg": moved.expected.degrees(),
         "standard_uncertainty_arcsec": moved.standard_uncertainty.map(arcsec),
         "calibration": calibration,
+        "corrected": calibration.is_some(),
     })
 }
 

@@ -8,8 +8,9 @@ use truestage::cycle::{CalibrateOptions, VerifyOptions};
 use truestage::ports::Use;
 use truestage::store::Store;
 use truestage::{Failure, Machine, config, json as to_json, text};
-use units::Metres;
+use units::{Metres, Short};
 
+use super::moved;
 use super::output::{Ended, Output};
 use super::resume::{journal_to_resume, resumable};
 use super::session::{Session, choose_axis};
@@ -31,9 +32,11 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
         loaded.config.camera.len(),
         &loaded.hash[..12],
     );
+    let notes = text::table_notes(&loaded.config);
+    let text = notes.iter().fold(text, |text, note| text + "\n" + note);
     output.result(
         &text,
-        &json!({"ok": true, "machine": machine.name, "hash": loaded.hash}),
+        &json!({"ok": true, "machine": machine.name, "hash": loaded.hash, "notes": notes}),
     )
 }
 
@@ -174,12 +177,13 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         calibrated.path.display(),
         calibrated.journal.display()
     );
+    text += &format!("\n  {}", text::noticed(calibrated.noticed));
     for point in &fitted.robust.outliers {
         text += &format!(
             "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
             point.run,
             point.approach.symbol(),
-            point.target.mm(),
+            Short(point.target.mm()),
             point.residual.um()
         );
     }
@@ -189,6 +193,7 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         "journal": calibrated.journal,
         "closure_um": to_json::um(calibrated.measured.closure),
         "fit": to_json::fitted(fitted),
+        "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
         "counters": counters,
     });
     output.result(&text, &value)
@@ -280,31 +285,19 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         for (axis, target) in &targets {
             let calibration = machine.load_active(axis, &store)?;
             machine.zero(axis, &store)?;
-            let set_point = machine.move_to(axis, *target)?;
-            moved.push((axis.clone(), *target, set_point, calibration));
+            let one = machine.move_and_read(axis, *target)?;
+            moved.push((axis, one, calibration));
         }
         machine.shut_down()?;
         Ok(moved)
     })?;
     let lines: Vec<_> = moved
         .iter()
-        .map(|(axis, target, set_point, calibration)| {
-            let by = calibration
-                .as_ref()
-                .map_or("no calibration".to_owned(), |id| id[..12].to_owned());
-            format!(
-                "axis {axis}: at {:.6} mm (set-point {:.6} mm, {by})",
-                target.mm(),
-                set_point.mm()
-            )
-        })
+        .map(|(axis, moved, calibration)| moved::text(axis, moved, calibration.as_deref()))
         .collect();
     let value: Vec<_> = moved
         .iter()
-        .map(|(axis, target, set_point, calibration)| {
-            json!({"axis": axis, "target_mm": target.mm(), "set_point_mm": set_point.mm(),
-                   "calibration": calibration})
-        })
+        .map(|(axis, moved, calibration)| moved::value(axis, moved, calibration.as_deref()))
         .collect();
     output.result(&lines.join("\n"), &json!({"moves": value}))
 }

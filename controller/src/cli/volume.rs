@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use compensator::volumetric::identify::Identified;
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
+use truestage::config::MachineConfig;
 use truestage::cycle::volumetric::{
     GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
     VolumetricVerified, WarmUp, measured_geometry,
@@ -13,7 +14,7 @@ use truestage::cycle::volumetric::{
 use truestage::engine::Live;
 use truestage::ports::Use;
 use truestage::store::{UnknownRecord, short};
-use truestage::{Failure, Machine, Store, json as to_json};
+use truestage::{Failure, Machine, Store, config, json as to_json};
 use units::Metres;
 
 use super::operator::Terminal;
@@ -73,12 +74,27 @@ pub(super) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(super) fn reference(args: &MachineArgs, output: Output) -> Ended {
+    // Before any bus: a machine of another kind would be asked for a calibration of this one's.
+    has_a_volume(&config::load(&args.config)?.config)?;
     let ready = |_: &Machine, store: &Store| measured_geometry(store);
     let run = |machine: &mut Machine, store: &Store, _| machine.reference_volumetric(store);
     let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;
     let mut value = referenced_value(&taken);
     value["counters"] = counters;
     output.result(&referenced_text(&taken), &value)
+}
+
+fn has_a_volume(config: &MachineConfig) -> Result<(), Failure> {
+    if config.volumetric.is_some() {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what:
+            "`reference` is for three axes corrected throughout their volume, and this machine has \
+               no [volumetric]"
+                .into(),
+        help: "to find an axis's origin run `truestage zero`".into(),
+    })
 }
 
 pub(super) fn referenced_text(taken: &VolumetricReferenced) -> String {
@@ -343,7 +359,7 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let machine = &args.machine;
     let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
     let Some(live) = live else {
-        let text = "moved without correction: the errors were never measured";
+        let text = "NOT CORRECTED: the errors of these axes were never measured; run `truestage calibrate`";
         return output.result(text, &json!({"corrected": false, "counters": counters}));
     };
     let value =
@@ -373,4 +389,23 @@ fn live_value(live: &Live) -> Value {
                "u_um": live.uncertainty[k].um()})
     });
     axes.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_without_a_volume_is_told_so_and_not_asked_for_its_calibration() {
+        let judge = |text| has_a_volume(&config::parse(text, "m.toml").unwrap().config);
+        let linear = judge(include_str!("../../../configs/machines/linear.toml"));
+        let failure = linear.unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        let text = failure.to_string();
+        assert!(
+            text.contains("three axes") && !text.contains("calibrate"),
+            "{text}"
+        );
+        assert!(judge(include_str!("../../../configs/machines/volumetric.toml")).is_ok());
+    }
 }

@@ -466,5 +466,5 @@ pub struct CompensationConfig {
     pub size_limit_um: f64,
     pub slope_limit: f64,
     pub rate_limit_um_per_s: f64,
-    pub jump_limit_um: f64,
+    pub jump_limit_um: Option<f64>,
 }

@@ -43,6 +43,8 @@ pub struct Calibrated {
     pub fitted: Fitted,
     /// What was measured.
     pub measured: Measured,
+    /// The smallest error of one position that would have been noticed by its neighbours.
+    pub noticed: Option<Metres>,
 }
 
 impl Machine {
@@ -78,6 +80,8 @@ impl Machine {
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
         let fitted = self.fit_table(axis, &plan, &measured)?;
         let compensation = self.prepare(axis, fitted.table.clone())?;
+        let harmless = assemble::harmless(&self.config, axis);
+        let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
         let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
         let id = store.save(&record)?;
         store.activate(axis, &id)?;
@@ -89,6 +93,7 @@ impl Machine {
             record,
             fitted,
             measured,
+            noticed,
         })
     }
 
@@ -131,9 +136,7 @@ impl Machine {
         axis: &str,
         table: error_table::ErrorTable,
     ) -> Result<Compensation, Failure> {
-        let config = self.axis_config(axis)?.compensation.as_ref();
-        let config = config.ok_or_else(|| missing(axis, "compensation"))?;
-        assemble::compensation(config, axis, table)
+        assemble::compensation(&self.config, axis, table)
     }
 
     fn calibration_record(

@@ -16,23 +16,26 @@ use crate::store::{ClosureEntry, PointEntry};
 const SIDE: usize = 3;
 /// A jump is this near to a whole number of half wavelengths, in half wavelengths.
 const NEAR: f64 = 0.25;
+/// Samples of a stage at rest lie within nanometres; these are of one that is shaken.
+const SHAKEN: Metres = Metres(2.5e-6);
 
 /// What a stage can do, and what the instrument counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plausible {
     /// Largest relative change of the deviation along the axis.
     pub(super) slope: f64,
-    /// Largest change without travel: lost motion, cyclic error, noise.
+    /// Largest change without travel. Lost motion, cyclic error and noise are part of the
+    /// deviation, so that this is the largest deviation that will be corrected.
     pub(super) step: Metres,
+    /// Largest relative difference of instrument and encoder believed, in millionths.
+    pub(super) scale_limit_ppm: f64,
     /// What the instrument's counter counts.
     pub(super) half_wavelength: Metres,
 }
 
-impl Plausible {
-    /// Whether samples that scatter so much say nothing of the place.
-    pub(super) fn is_shaken(&self, scatter: Metres) -> bool {
-        scatter > self.step / 2.0
-    }
+/// Whether samples of one reading that scatter so much say nothing of the place.
+pub(super) fn is_shaken(scatter: Metres) -> bool {
+    scatter > SHAKEN
 }
 
 /// A whole run, and its datum's place before and after it.
@@ -65,17 +68,13 @@ impl CrossCheck {
         }
     }
 
-    pub(super) const fn plausible(&self) -> &Plausible {
-        &self.plausible
-    }
-
     /// Judges a point against the one before it. A point whose own samples lie far apart says
     /// nothing of the count: vibration is for the fit to judge.
     ///
     /// # Errors
     /// When the instrument went another way than the encoder, beyond what a stage can do.
     pub(super) fn take(&mut self, point: &PointEntry) -> Result<(), Failure> {
-        if self.plausible.is_shaken(Metres(point.scatter_m)) {
+        if is_shaken(Metres(point.scatter_m)) {
             return Ok(());
         }
         let Some(last) = self.last.replace(*point) else {
@@ -84,13 +83,20 @@ impl CrossCheck {
         self.steps += 1;
         let travel = point.encoder_m - last.encoder_m;
         let jump = deviation(point) - deviation(&last);
-        let Plausible { slope, step, .. } = self.plausible;
+        let Plausible {
+            slope,
+            step,
+            scale_limit_ppm,
+            ..
+        } = self.plausible;
+        let slope = slope.max(scale_limit_ppm * 1e-6);
         if jump.abs() <= slope * travel.abs() + step.value() {
             return Ok(());
         }
         if self.steps == 1 {
             let ratio = (point.measured_m - last.measured_m) / travel;
-            return Err(scale_mismatch(&self.axis, travel.abs(), ratio, slope * 1e6));
+            let travel = travel.abs();
+            return Err(scale_mismatch(&self.axis, travel, ratio, scale_limit_ppm));
         }
         Err(self.fringe_jump(jump, &last, point))
     }
@@ -118,7 +124,7 @@ impl CrossCheck {
         let start = [run.closure.start_m - before.closure.start_m; SIDE];
         let end = [run.closure.closure_m - before.closure.closure_m; SIDE];
         let changes = [&start, changes.as_slice(), &end].concat();
-        let Some(slip) = find_slip(&changes, half_wavelength_m) else {
+        let Some(slip) = find_slip(&changes, SIDE, half_wavelength_m) else {
             return Ok(());
         };
         // Up to there both runs agree or differ alike: the slip is in the later run when the
@@ -162,8 +168,9 @@ impl Slip {
     }
 }
 
-/// The step of a whole number of half wavelengths in `changes`, if that explains them.
-fn find_slip(changes: &[f64], half_wavelength_m: f64) -> Option<Slip> {
+/// The step of a whole number of half wavelengths in `changes`, if that explains them. The first and
+/// last `repeated` are one reading each, which says nothing of how the readings scatter.
+fn find_slip(changes: &[f64], repeated: usize, half_wavelength_m: f64) -> Option<Slip> {
     let candidates = (SIDE..changes.len().saturating_sub(SIDE - 1)).map(|at| {
         let (before, after) = changes.split_at(at);
         let (before_m, after_m) = (median(before), median(after));
@@ -184,7 +191,8 @@ fn find_slip(changes: &[f64], half_wavelength_m: f64) -> Option<Slip> {
     let count = slip.jump_m / half_wavelength_m;
     let whole = count.round() != 0.0 && (count - count.round()).abs() < NEAR;
     // What grows slowly is drift: it leaves a rest in proportion to itself.
-    let quiet = 1.5 * median(&rest) < 0.25 * slip.jump_m.abs();
+    let scatter = median(&rest[repeated..rest.len() - repeated]);
+    let quiet = 1.5 * scatter < 0.25 * slip.jump_m.abs();
     (whole && quiet).then_some(slip)
 }
 
@@ -245,13 +253,14 @@ fn likely_cause(ratio: f64) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::EnvironmentRecord;
 
     const HALF: f64 = 316.4e-9;
 
     #[track_caller]
     fn check(changes: &[f64], expected: Option<(usize, f64)>) {
         let changes: Vec<f64> = changes.iter().map(|nm| nm * 1e-9).collect();
-        let seen = find_slip(&changes, HALF).map(|slip| (slip.at, slip.sign() * slip.jump_m));
+        let seen = find_slip(&changes, 0, HALF).map(|slip| (slip.at, slip.sign() * slip.jump_m));
         match (seen, expected) {
             (None, None) => {}
             (Some((at, jump)), Some((wanted_at, wanted))) => {
@@ -273,6 +282,80 @@ mod tests {
             &[5.0, -9.0, 12.0, 7.0, -2.0 * s, -2.0 * s, 4.0 - 2.0 * s],
             Some((4, -2.0)),
         );
+    }
+
+    /// A stage that repeats to 250 nm puts its datum a half wavelength off now and then.
+    #[test]
+    fn a_datum_that_scatters_like_its_points_is_no_slip() {
+        let points = [
+            310.0, -180.0, 40.0, -260.0, 400.0, 20.0, -90.0, 210.0, -330.0, 150.0,
+        ];
+        let row = |start: f64, points: &[f64]| -> Vec<f64> {
+            let all = [&[start; SIDE], points, &[30.0; SIDE]].concat();
+            all.iter().map(|nm| nm * 1e-9).collect()
+        };
+        assert_eq!(find_slip(&row(383.0, &points), SIDE, HALF), None);
+        let calm = points.map(|nm| nm / 10.0);
+        assert!(find_slip(&row(316.0, &calm), SIDE, HALF).is_some());
+    }
+
+    fn point(approach: char, encoder_mm: f64, measured_mm: f64) -> PointEntry {
+        PointEntry {
+            run: 1,
+            approach,
+            target_m: encoder_mm * 1e-3,
+            set_point_m: encoder_mm * 1e-3,
+            encoder_m: encoder_mm * 1e-3,
+            measured_m: measured_mm * 1e-3,
+            scatter_m: 1e-9,
+            at_s: 0.0,
+            environment: EnvironmentRecord::default(),
+        }
+    }
+
+    fn judge(scale_limit_ppm: f64, points: &[PointEntry]) -> Result<(), Failure> {
+        let plausible = Plausible {
+            slope: 0.01,
+            step: Metres::from_um(50.0),
+            half_wavelength: Metres(HALF),
+            scale_limit_ppm,
+        };
+        let mut check = CrossCheck::new("x", plausible);
+        points.iter().try_for_each(|point| check.take(point))
+    }
+
+    /// The limit in the refusal is the one in the file, whichever check finds the scale wrong.
+    #[test]
+    fn a_wrong_scale_is_refused_by_the_figure_of_the_configuration() {
+        for (limit_ppm, factor) in [(1000.0, 2.0), (1000.0, 25.4), (20_000.0, 1.1)] {
+            let points = [point('+', 0.0, 0.0), point('+', 3.0, 3.0 * factor)];
+            let limit = format!("the limit is {limit_ppm:.0} ppm");
+            for refused in [
+                judge(limit_ppm, &points),
+                judge_scale("x", limit_ppm, &points),
+            ] {
+                let text = refused.unwrap_err().to_string();
+                assert!(text.contains(&limit), "{text}");
+            }
+        }
+        let points = [point('+', 0.0, 0.0), point('+', 3.0, 3.0 * 1.04)];
+        assert!(judge(50_000.0, &points).is_ok(), "a scale within its limit");
+    }
+
+    #[test]
+    fn lost_motion_at_the_turn_is_no_slip_of_the_count() {
+        let turn = [
+            point('+', 0.0, 0.0),
+            point('+', 3.0, 3.001),
+            point('-', 3.0, 3.021),
+            point('-', 0.0, 0.02),
+        ];
+        judge(1000.0, &turn).unwrap_or_else(|failure| panic!("{failure}"));
+        let slipped = [turn[0], turn[1], point('+', 6.0, 6.3)];
+        assert!(matches!(
+            judge(1000.0, &slipped),
+            Err(Failure::FringeJump { .. })
+        ));
     }
 
     #[test]

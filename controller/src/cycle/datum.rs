@@ -6,7 +6,7 @@ use compensator::length_correction::LengthCorrection;
 use drivers::device::{DisplacementReading, Environment};
 use units::Metres;
 
-use super::cross_check::Plausible;
+use super::cross_check::is_shaken;
 use super::measure::RunPlan;
 use super::travel::Correction;
 use crate::assemble;
@@ -51,18 +51,13 @@ impl Machine {
     }
 
     /// Goes to the axis's zero, forward, and makes the instrument read zero there.
-    pub(super) fn set_datum(
-        &mut self,
-        axis: &str,
-        plan: &RunPlan,
-        plausible: &Plausible,
-    ) -> Result<Datum, Failure> {
+    pub(super) fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<Datum, Failure> {
         self.go_to_datum(axis, plan)?;
         self.stand_still(axis, plan.settle)?;
         let now = self.now();
         let at = self.instrument_index(&plan.instrument);
         self.instruments[at].device.set_datum(now);
-        let offset = self.read_calm(axis, plan, plausible)?.vacuum;
+        let offset = self.read_calm(axis, plan)?.vacuum;
         let environment = self.instrument_environment(&plan.instrument);
         let config = &self.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
@@ -85,11 +80,10 @@ impl Machine {
         &mut self,
         axis: &str,
         plan: &RunPlan,
-        plausible: &Plausible,
     ) -> Result<DisplacementReading, Failure> {
         let mut reading = self.read_displacement(axis, plan)?;
         for _ in 1..ATTEMPTS {
-            if !plausible.is_shaken(reading.standard_deviation) {
+            if !is_shaken(reading.standard_deviation) {
                 break;
             }
             self.stand_still(axis, CALM)?;

@@ -130,7 +130,7 @@ struct Session<'a> {
 const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
 /// What a stage can do at most where the configuration says nothing.
 const SLOPE_MAX: f64 = 0.01;
-const STEP_MAX: Metres = Metres(5e-6);
+const SIZE_MAX: Metres = Metres(50e-6);
 
 impl Machine {
     /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
@@ -157,7 +157,7 @@ impl Machine {
         }
         self.use_instrument(&plan.instrument)?;
         let plausible = self.plausible(axis, plan)?;
-        let datum = self.set_datum(axis, plan, &plausible)?;
+        let datum = self.set_datum(axis, plan)?;
         self.remember(axis).datum = Some((plan.clone(), datum));
         let counter = Counter {
             stage: options.stage,
@@ -264,7 +264,7 @@ impl Machine {
         points: &[PointEntry],
     ) -> Result<ClosureEntry, Failure> {
         self.go_to_datum(session.axis, session.plan)?;
-        let reading = self.read_calm(session.axis, session.plan, session.check.plausible())?;
+        let reading = self.read_calm(session.axis, session.plan)?;
         let environment = self.watched_environment(session)?;
         let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let closure = ClosureEntry {
@@ -293,7 +293,8 @@ impl Machine {
         let limits = self.axis_config(axis)?.compensation.as_ref();
         Ok(Plausible {
             slope: limits.map_or(SLOPE_MAX, |it| it.slope_limit),
-            step: limits.map_or(STEP_MAX, |it| Metres::from_um(it.jump_limit_um)),
+            step: limits.map_or(SIZE_MAX, |it| Metres::from_um(it.size_limit_um)),
+            scale_limit_ppm: plan.scale_limit_ppm,
             half_wavelength: assemble::half_wavelength(&self.config.instrument[&plan.instrument]),
         })
     }

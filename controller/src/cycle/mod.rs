@@ -6,6 +6,7 @@ mod calibrate;
 mod cross_check;
 mod datum;
 mod measure;
+mod moved;
 pub mod platform;
 pub mod rotary;
 mod scan;
@@ -18,6 +19,7 @@ mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
 pub use measure::{MeasureOptions, Measured, RunPlan};
+pub use moved::{Corrected, Moved};
 pub use scan::Found;
 pub use sweep::{Sweep, SweepOptions};
 pub use turn::Way;

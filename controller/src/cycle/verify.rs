@@ -62,7 +62,13 @@ impl Machine {
         store: &Store,
         options: &VerifyOptions,
     ) -> Result<Verified, Failure> {
-        let config = self.axis_config(axis)?.verify.clone();
+        let of_axis = self.axis_config(axis)?;
+        // One figure for both runs: the scale is the same.
+        let scale_limit_ppm = of_axis
+            .calibrate
+            .as_ref()
+            .map_or(SCALE_LIMIT_PPM, |it| it.scale_limit_ppm);
+        let config = of_axis.verify.clone();
         let config = config.ok_or_else(|| missing(axis, "verify"))?;
         self.require_zeroed(axis)?;
         if options.compensated && self.compensation(axis).is_none() {
@@ -71,7 +77,7 @@ impl Machine {
                 help: "load or make one, or verify uncompensated".into(),
             });
         }
-        let plan = run_plan(&config);
+        let plan = run_plan(&config, scale_limit_ppm);
         // Before the header, which says who measures.
         self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
@@ -158,7 +164,7 @@ fn systematic_deviation(table: &ErrorTable) -> Metres {
     largest - smallest
 }
 
-fn run_plan(config: &VerifyConfig) -> RunPlan {
+fn run_plan(config: &VerifyConfig, scale_limit_ppm: f64) -> RunPlan {
     let step = (config.end_mm - config.start_mm) / f64::from(config.targets - 1);
     let targets = (0..config.targets)
         .map(|at| Metres::from_mm(config.start_mm + f64::from(at) * step))
@@ -170,7 +176,7 @@ fn run_plan(config: &VerifyConfig) -> RunPlan {
         overrun: Metres::from_mm(config.overrun_mm),
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
-        scale_limit_ppm: SCALE_LIMIT_PPM,
+        scale_limit_ppm,
         closure_limit: None,
     }
 }

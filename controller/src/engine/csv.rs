@@ -41,16 +41,17 @@ pub enum CsvFault {
     #[error("`{seen}` is no number; write a decimal point, no units")]
     Number { seen: String },
     /// The first row is not at time 0.
-    #[error("the path begins at {seen} s; it must begin at 0")]
+    #[error("the path begins at {} s; it must begin at 0", units::Short(*seen))]
     Begin { seen: f64 },
     /// Times do not grow.
-    #[error("time {seen} s after {before} s; rows must be in the order of time")]
+    #[error("time {} s after {} s; rows must be in the order of time", units::Short(*seen),
+        units::Short(*before))]
     Order { before: f64, seen: f64 },
     /// Nothing to drive.
     #[error("the file has {rows} rows; a path needs two or more")]
     Rows { rows: usize },
     /// Longer than anybody meant.
-    #[error("the path takes {seconds} s; more than a day is not believed")]
+    #[error("the path takes {} s; more than a day is not believed", units::Short(*seconds))]
     Length { seconds: f64 },
 }
 

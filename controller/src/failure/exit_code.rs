@@ -53,7 +53,7 @@ impl Failure {
             | Self::ScrewCompensation { .. }
             | Self::RotaryCompensation { .. }
             | Self::OutOfCalibration { .. }
-            | Self::Jump { .. }
+            | Self::StandsOff { .. }
             | Self::ScaleMismatch { .. } => 3,
             Self::Open(_)
             | Self::Send { .. }

@@ -19,7 +19,7 @@ use crate::wire::copley::Faults;
 )]
 pub enum Alarm {
     /// No heartbeat for the consumer time.
-    #[error("{node}: no heartbeat for {waited:?}; power, cable or drive lost")]
+    #[error("{node}: no heartbeat for {}; power, cable or drive lost", units::ShortSpan(*waited))]
     HeartbeatLost { node: NodeId, waited: Duration },
     /// The node booted by itself: it was reset or lost power, its reference is gone.
     #[error("{node}: booted by itself; it lost power or was reset, zero again")]
@@ -110,13 +110,13 @@ pub enum Alarm {
     #[error("interferometer: was reset; set a new datum")]
     CountRestarted,
     /// The stream ended.
-    #[error("interferometer: no sample for {waited:?}; cable or power?")]
+    #[error("interferometer: no sample for {}; cable or power?", units::ShortSpan(*waited))]
     StreamSilent { waited: Duration },
     /// Lines that are not understood came in a row: wrong baud rate?
     #[error("{lines} lines in a row not understood; wrong baud rate?")]
     Garbage { lines: u64 },
     /// An analog channel's sample is too old.
-    #[error("analog input: no sample for {waited:?}")]
+    #[error("analog input: no sample for {}", units::ShortSpan(*waited))]
     StaleSample { waited: Duration },
     /// An amplifier on a serial line says that something is wrong.
     #[error("{device}: {trouble}")]
@@ -128,7 +128,8 @@ pub enum Alarm {
     #[error("{device}: has restarted; it lost power or was reset, zero again")]
     AmplifierRestarted { device: DeviceName },
     /// An amplifier does not answer.
-    #[error("{device}: no answer for {waited:?}; power or cable lost? the axis may still move")]
+    #[error("{device}: no answer for {}; power or cable lost? the axis may still move",
+        units::ShortSpan(*waited))]
     AmplifierSilent {
         device: DeviceName,
         waited: Duration,

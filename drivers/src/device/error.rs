@@ -3,7 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 
-use units::LengthOrAngle;
+use units::{LengthOrAngle, Short};
 
 use super::Alarm;
 use crate::wire::canopen::nmt::NmtState;
@@ -25,7 +25,8 @@ pub enum DeviceError {
         step: &'static str,
     },
     /// A transfer was not answered.
-    #[error("{node}, {object}: no answer within {waited:?} ({attempts} attempts) while {step}")]
+    #[error("{node}, {object}: no answer within {} ({attempts} attempts) while {step}",
+        units::ShortSpan(*waited))]
     SdoTimeout {
         node: NodeId,
         object: Object,
@@ -64,7 +65,7 @@ pub enum DeviceError {
     /// The drive's units are not those of the configuration.
     #[error(
         "{node}, {object}: one encoder increment is {seen} position units, the configured scale \
-         says {expected}; correct the scale or the drive's factors"
+         says {expected}; correct the scale or the drive's factors", seen = Short(*seen), expected = Short(*expected)
     )]
     WrongScale {
         node: NodeId,
@@ -73,7 +74,7 @@ pub enum DeviceError {
         seen: f64,
     },
     /// Something that was awaited did not come.
-    #[error("{device}: waited {waited:?} for {awaited}, last saw {seen}")]
+    #[error("{device}: waited {} for {awaited}, last saw {seen}", units::ShortSpan(*waited))]
     Timeout {
         device: DeviceName,
         awaited: &'static str,
@@ -95,7 +96,10 @@ pub enum DeviceError {
         needs: &'static str,
     },
     /// A value cannot be represented in the drive's units.
-    #[error("{node}: {what} {value} {unit} does not fit {object} (limit {limit} {unit})")]
+    #[error(
+        "{node}: {what} {} {unit} does not fit {object} (limit {} {unit})",
+        Short(*value), Short(*limit)
+    )]
     OutOfRange {
         node: NodeId,
         object: Object,
@@ -173,7 +177,8 @@ pub enum DeviceError {
     },
     /// A value cannot be represented in the amplifier's units.
     #[error(
-        "{device}: {what} {value} {unit} does not fit parameter {parameter} (limit {limit} {unit})"
+        "{device}: {what} {} {unit} does not fit parameter {parameter} (limit {} {unit})",
+        Short(*value), Short(*limit)
     )]
     ParameterOutOfRange {
         device: DeviceName,

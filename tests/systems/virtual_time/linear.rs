@@ -2,7 +2,7 @@
 
 use compensator::iso230::Figures;
 use tests::Bench;
-use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::cycle::{CalibrateOptions, Corrected, VerifyOptions};
 use truestage::{Failure, text};
 use units::{Metres, Time};
 
@@ -56,6 +56,37 @@ fn twenty_stages_are_brought_within_two_micrometres_between_the_calibrated_posit
         least.um(),
         worst.um()
     );
+}
+
+/// Without a calibration, within it, and beyond it where its end is held: each is told, and the place
+/// is the encoder's, not the target's.
+#[test]
+fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
+    let calibrated_to_30 = |text: String| {
+        let changed = text.replacen("end_mm = 60.0\nstep_mm", "end_mm = 30.0\nstep_mm", 1);
+        assert_ne!(changed, text);
+        changed
+    };
+    let mut bench = Bench::with(3, calibrated_to_30, |text| text);
+    let store = bench.store.clone();
+    let go = |machine: &mut truestage::Machine, mm: f64| {
+        let moved = machine.move_and_read("x", Metres::from_mm(mm)).unwrap();
+        let off = moved.encoder - moved.set_point;
+        assert!(off.abs() < Metres::from_um(0.1), "{} µm", off.um());
+        assert_ne!(moved.encoder, moved.target);
+        moved
+    };
+    bench.machine.start().unwrap();
+    bench.machine.zero("x", &store).unwrap();
+    let moved = go(&mut bench.machine, 12.345_678_9);
+    assert_eq!(moved.corrected, Corrected::No);
+    assert_eq!(moved.set_point, moved.target);
+    let options = CalibrateOptions::default();
+    bench.machine.calibrate("x", &store, &options).unwrap();
+    assert_eq!(go(&mut bench.machine, 20.0).corrected, Corrected::Within);
+    let (first, last) = (Metres::ZERO, Metres::from_mm(30.0));
+    let moved = go(&mut bench.machine, 45.0);
+    assert_eq!(moved.corrected, Corrected::Held { first, last });
 }
 
 #[test]

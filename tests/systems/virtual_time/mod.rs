@@ -3,8 +3,8 @@
 
 mod linear;
 mod linear_zero;
-mod pinned;
 mod patience;
+mod pinned;
 mod platform;
 mod platform_knowledge;
 mod repeatable;
@@ -18,3 +18,4 @@ mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
 mod volumetric_resume;
+mod wrong_position;

@@ -15,7 +15,7 @@ use truestage::{Machine, Store, ports};
 fn told_after(fault: &Fault, speed: f64) -> Duration {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut loaded = machine_config(folder.path(), |text| text);
-    loaded.patience = ports::patience(speed);
+    loaded.patience = ports::Pace::Wall(speed).patience();
     let emulated = Emulated::new(EMULATED, 7, &loaded.config);
     let emulated = emulated.unwrap_or_else(|error| panic!("{error}"));
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));

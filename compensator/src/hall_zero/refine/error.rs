@@ -25,7 +25,7 @@ pub enum RefineError {
     },
     /// Too few samples altogether, or in one window.
     #[error("hall refinement: {seen} samples around {} mm, at least {needed} are needed; \
-             sweep slower or further", around.mm())]
+             sweep slower or further", units::Short(around.mm()))]
     TooFewSamples {
         /// Centre of the window.
         around: Metres,
@@ -61,7 +61,7 @@ pub enum RefineError {
     },
     /// A polynomial has no solution in its window.
     #[error("hall refinement: the {sensor} does not reach {:.4} V in the window around {} mm",
-        level.value(), around.mm())]
+        level.value(), units::Short(around.mm()))]
     NoCrossing {
         /// Whose polynomial.
         sensor: Sensor,
@@ -72,7 +72,8 @@ pub enum RefineError {
     },
     /// The residuals are well above the noise whatever the degree.
     #[error("hall refinement: the {sensor}'s curve around {} mm is {:.2} mV off any smooth curve, \
-             its noise is {:.2} mV; interference, or the axis was disturbed", around.mm(),
+             its noise is {:.2} mV; interference,
+             or the axis was disturbed", units::Short(around.mm()),
              residual.value() * 1e3, noise.value() * 1e3)]
     LackOfFit {
         /// Whose curve.
@@ -95,7 +96,7 @@ pub enum RefineError {
     },
     /// The curves are each other's.
     #[error("hall refinement: curve 1 is odd and curve 2 even around {} mm; the sensors (or the \
-             columns of the file) look swapped", around.mm())]
+             columns of the file) look swapped", units::Short(around.mm()))]
     Swapped {
         /// Centre of the symmetry found.
         around: Metres,
@@ -111,7 +112,7 @@ pub enum RefineError {
     },
     /// The origin is not where the search stands.
     #[error("hall refinement: the origin at {} mm is further from P0 at {} mm than {:.2} um",
-        origin.mm(), p0.mm(), limit.um())]
+        units::Short(origin.mm()), units::Short(p0.mm()), limit.um())]
     Disagrees {
         /// Refined origin.
         origin: Metres,
@@ -121,7 +122,7 @@ pub enum RefineError {
         limit: Metres,
     },
     /// The samples of a window do not determine a polynomial.
-    #[error("hall refinement around {} mm: {source}", around.mm())]
+    #[error("hall refinement around {} mm: {source}", units::Short(around.mm()))]
     Fit {
         /// Centre of the window.
         around: Metres,

@@ -79,7 +79,8 @@ pub enum GridError {
     /// A deviation larger than the limit, or not a number.
     #[error("deviation map, node ({}, {}, {}) mm: the deviation is {:.3} um, the limit {:.3} um; \
         millimetres taken for micrometres, or the map of another machine?",
-        at.x.mm(), at.y.mm(), at.z.mm(), seen.um(), limit.um())]
+        units::Short(at.x.mm()), units::Short(at.y.mm()), units::Short(at.z.mm()), seen.um(),
+        limit.um())]
     TooLarge {
         /// Where.
         at: Point,

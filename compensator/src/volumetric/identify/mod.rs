@@ -220,7 +220,8 @@ pub enum IdentifyError {
         name: SquarenessName,
     },
     /// The point where functions are zero is not within their nodes.
-    #[error("identification: {name} is to be zero at {} mm, which its nodes do not reach", zero.mm())]
+    #[error("identification: {name} is to be zero at {} mm, which its nodes do not reach",
+        units::Short(zero.mm()))]
     Zero {
         /// Which function.
         name: ErrorName,
@@ -248,7 +249,7 @@ pub enum IdentifyError {
     },
     /// A reading outside a function's nodes.
     #[error("identification, reading {index}: {axis} = {} mm is not between the nodes of {name}",
-        seen.mm())]
+        units::Short(seen.mm()))]
     Outside {
         /// Which reading.
         index: usize,

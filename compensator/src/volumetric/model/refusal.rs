@@ -29,7 +29,9 @@ pub enum ModelError {
     },
     /// A function that does not reach over the volume.
     #[error("volumetric model: {function} is known from {} to {} mm, the volume reaches from {} \
-        to {} mm", first.mm(), last.mm(), low.mm(), high.mm())]
+        to {} mm",
+        units::Short(first.mm()), units::Short(last.mm()), units::Short(low.mm()),
+        units::Short(high.mm()))]
     NotCovered {
         /// Which function.
         function: ErrorName,
@@ -82,7 +84,8 @@ pub enum ModelError {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ConditionsError {
     /// A tool offset beyond what was proven for.
-    #[error("tool offset along {axis}: {} mm, at most {} mm are permitted", seen.mm(), limit.mm())]
+    #[error("tool offset along {axis}: {} mm, at most {} mm are permitted", units::Short(seen.mm()),
+        units::Short(limit.mm()))]
     Tool {
         /// Along which direction.
         axis: Axis,

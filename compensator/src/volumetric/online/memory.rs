@@ -85,7 +85,7 @@ pub struct RecorderSettings {
 pub enum MemoryError {
     /// A spacing or gap that is not positive, or so small that memory would not do.
     #[error("state memory: a spacing of {} mm and gaps of {} mm cannot be used",
-        spacing.mm(), gap_max.mm())]
+        units::Short(spacing.mm()), units::Short(gap_max.mm()))]
     Settings {
         /// The spacing.
         spacing: Metres,
@@ -97,7 +97,7 @@ pub enum MemoryError {
     Empty,
     /// A long stretch was not met.
     #[error("state memory, axis {axis}: nothing was recorded from {} to {} mm, at most {} mm may \
-        be bridged", from.mm(), to.mm(), limit.mm())]
+        be bridged", units::Short(from.mm()), units::Short(to.mm()), units::Short(limit.mm()))]
     Gap {
         /// Which axis.
         axis: Axis,

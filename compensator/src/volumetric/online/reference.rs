@@ -38,7 +38,7 @@ pub enum BeamDrift {
 pub enum DriftError {
     /// Source and detector at the same place.
     #[error("beam: the source at {} mm and the detector at {} mm are at the same place",
-        beam.mm(), end.mm())]
+        units::Short(beam.mm()), units::Short(end.mm()))]
     NoLength {
         /// The source.
         beam: Metres,
@@ -46,7 +46,8 @@ pub enum DriftError {
         end: Metres,
     },
     /// A share that is none.
-    #[error("beam: a share of translation of {seen} is not between 0 and 1")]
+    #[error("beam: a share of translation of {seen} is not between 0 and 1",
+        seen = units::Short(*seen))]
     Share {
         /// The share.
         seen: f64,

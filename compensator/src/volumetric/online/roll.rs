@@ -45,7 +45,8 @@ pub enum RollError {
     /// An arrangement in which readings of zero do not mean a roll of zero alone.
     #[error(
         "roll detectors: with height {} mm, base {} mm and an inclination of {} degrees the \
-         readings do not determine the roll", height.mm(), base.mm(), inclination.degrees()
+         readings do not determine the roll",
+        units::Short(height.mm()), units::Short(base.mm()), units::Short(inclination.degrees())
     )]
     Geometry {
         /// h.
@@ -57,7 +58,7 @@ pub enum RollError {
     },
     /// Readings that no roll of the permitted size makes.
     #[error("roll detectors: readings of {} mm and {} mm fit no roll up to {:.1} arcsec",
-        first.mm(), second.mm(), limit.arcsec())]
+        units::Short(first.mm()), units::Short(second.mm()), limit.arcsec())]
     NoRoll {
         /// x₁.
         first: Metres,

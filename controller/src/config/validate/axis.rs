@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use drivers::device::cia402::{interpolation_period, period_from};
 
+use units::Short;
+
 use super::judge::{Finding, Judge};
 use super::{check_heartbeat, check_watch};
 use crate::config::model::{AxisConfig, AxisDevice, CyclicConfig, MachineConfig};
@@ -66,6 +68,58 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
             format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
             "use a coarser resolution or a shorter range",
         );
+    }
+    check_drive_units(judge, axis);
+}
+
+/// Drives hold speeds and accelerations in 32 bits, in units of their counts.
+fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    // What an amplifier counts in: 0.1 counts/s and 10 counts/s².
+    let (speed_counts, acceleration_counts) = match axis.device {
+        AxisDevice::Cia402 => (1.0, 1.0),
+        AxisDevice::Copley => (0.1, 10.0),
+    };
+    let largest_mm = f64::from(i32::MAX) * axis.resolution_nm.abs() * 1e-6;
+    let reference_speed = axis.zero.as_ref().map(|it| it.reference_speed_mm_per_s);
+    for (key, value, counts, unit) in [
+        (
+            "speed_mm_per_s",
+            Some(axis.speed_mm_per_s),
+            speed_counts,
+            "mm/s",
+        ),
+        (
+            "zero.reference_speed_mm_per_s",
+            reference_speed,
+            speed_counts,
+            "mm/s",
+        ),
+        (
+            "acceleration_mm_per_s2",
+            Some(axis.acceleration_mm_per_s2),
+            acceleration_counts,
+            "mm/s²",
+        ),
+        (
+            "quick_stop_deceleration_mm_per_s2",
+            Some(axis.quick_stop_deceleration_mm_per_s2),
+            acceleration_counts,
+            "mm/s²",
+        ),
+    ] {
+        let largest = largest_mm * counts;
+        if let Some(value) = value.filter(|it| *it > largest) {
+            judge.say(
+                key,
+                format!(
+                    "{} {unit} do not fit the drive's 32 bits: with a resolution of {} nm it takes \
+                     {largest:.0} {unit} at most",
+                    Short(value),
+                    Short(axis.resolution_nm)
+                ),
+                "lower it, or let the drive count more coarsely",
+            );
+        }
     }
 }
 
@@ -341,6 +395,29 @@ mod tests {
         check(AMPLIFIERS, from, "line = \"ampz\"", key, "ampz");
         let (from, key) = ("poll_period_ms = 20.0", "axis.u.poll_period_ms");
         check(AMPLIFIERS, from, "poll_period_ms = 0.0", key, "");
+    }
+
+    /// Twenty metres per second squared are 4e9 counts of 5 nm: the start would be refused.
+    #[test]
+    fn what_a_drive_cannot_hold_at_its_resolution_is_found_before_the_start() {
+        let linear = include_str!("../../../../configs/machines/linear.toml");
+        let (from, to) = ("resolution_nm = 10.0", "resolution_nm = 5.0");
+        let key = "axis.x.quick_stop_deceleration_mm_per_s2";
+        let says = "20000 mm/s² do not fit the drive's 32 bits: with a resolution of 5 nm it takes \
+                    10737 mm/s² at most";
+        check(linear, from, to, key, says);
+        let to = "resolution_nm = 2.0";
+        check(
+            linear,
+            from,
+            to,
+            "axis.x.acceleration_mm_per_s2",
+            "4295 mm/s²",
+        );
+        let to = "resolution_nm = 0.05";
+        check(linear, from, to, "axis.x.speed_mm_per_s", "107 mm/s");
+        let (from, key) = ("resolution_nm = 10.0", "axis.u.speed_mm_per_s");
+        check(AMPLIFIERS, from, "resolution_nm = 0.02", key, "do not fit");
     }
 
     #[test]

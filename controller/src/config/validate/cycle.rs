@@ -1,9 +1,12 @@
 //! What the steps of the cycle are asked to do.
 
+use units::Short;
+
 use super::judge::{Finding, Judge};
 use crate::assemble;
 use crate::config::model::{
-    AxisConfig, CalibrateConfig, EndPolicyName, MachineConfig, VerifyConfig, ZeroConfig,
+    AxisConfig, CalibrateConfig, CompensationConfig, EndPolicyName, MachineConfig, VerifyConfig,
+    ZeroConfig,
 };
 
 pub(super) fn check_cycle(
@@ -53,7 +56,7 @@ pub(super) fn check_cycle(
             1e-3,
             1e9,
         );
-        judge.within("jump_limit_um", compensation.jump_limit_um, 1e-3, 1e5);
+        check_jump_limit(judge, axis, compensation);
         let fades = compensation.end_policy == EndPolicyName::FadeOut;
         if fades != compensation.fade_out_mm.is_some() {
             judge.say(
@@ -65,6 +68,29 @@ pub(super) fn check_cycle(
         if let Some(fade_out_mm) = compensation.fade_out_mm {
             judge.within("fade_out_mm", fade_out_mm, 1e-3, 1e4);
         }
+    }
+}
+
+/// A position that stands off by more than the slope allows is refused for its slope.
+fn check_jump_limit(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &CompensationConfig) {
+    let Some(jump_limit_um) = limits.jump_limit_um else {
+        return;
+    };
+    judge.within("jump_limit_um", jump_limit_um, 1e-3, 1e5);
+    let Some(run) = &axis.calibrate else { return };
+    let steepest_um = limits.slope_limit * run.step_mm * 1e3;
+    if jump_limit_um > steepest_um {
+        judge.say(
+            "jump_limit_um",
+            format!(
+                "{} um accept nothing more: `slope_limit` refuses changes above {} um over the \
+                 {} mm from one position to the next",
+                Short(jump_limit_um),
+                Short(steepest_um),
+                Short(run.step_mm)
+            ),
+            "leave it out: the table's own positions then say what is believed of one of them",
+        );
     }
 }
 
@@ -191,7 +217,7 @@ fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, o
             "overrun_mm",
             format!(
                 "the datum at 0 mm is approached from {} mm, outside the soft limits",
-                -overrun
+                Short(-overrun)
             ),
             "shorten it, or lower soft_min_mm",
         );
@@ -200,10 +226,11 @@ fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, o
         if !reachable.contains(&value) {
             judge.say(
                 key,
-                format!("with its overrun reaches {value} mm"),
+                format!("with its overrun reaches {} mm", Short(value)),
                 format!(
                     "stay within {} to {} mm",
-                    axis.soft_min_mm, axis.soft_max_mm
+                    Short(axis.soft_min_mm),
+                    Short(axis.soft_max_mm)
                 ),
             );
         }

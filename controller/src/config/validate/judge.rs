@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use units::Short;
+
 /// Something that cannot be, at a dotted key.
 #[derive(Clone, Debug)]
 pub(in crate::config) struct Finding {
@@ -38,8 +40,8 @@ impl<'a> Judge<'a> {
         if !(low..=high).contains(&value) {
             self.say(
                 key,
-                format!("{value} is impossible"),
-                format!("give {low} to {high}"),
+                format!("{} is impossible", Short(value)),
+                format!("give {} to {}", Short(low), Short(high)),
             );
         }
     }
@@ -50,7 +52,10 @@ impl<'a> Judge<'a> {
         if !in_order {
             let cause = format!(
                 "{} must be greater than {} ({} and {})",
-                high.0, low.0, high.1, low.1
+                high.0,
+                low.0,
+                Short(high.1),
+                Short(low.1)
             );
             self.say(
                 high.0,

@@ -2,7 +2,7 @@
 
 use compensator::platform::{Platform, Point, Pose};
 use units::portable::hypot;
-use units::{Metres, Radians};
+use units::{Metres, Radians, Short};
 
 use super::judge::{Finding, Judge};
 use crate::config::model::MachineConfig;
@@ -217,9 +217,9 @@ fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &P
             format!(
                 "the work range reaches x = {} mm, y = {} mm, theta = {}°, which the screws do not: \
                  {cause}",
-                pose.x.mm(),
-                pose.y.mm(),
-                pose.angle.value().to_degrees(),
+                Short(pose.x.mm()),
+                Short(pose.y.mm()),
+                Short(pose.angle.value().to_degrees()),
             ),
             "lower x_max_mm, y_max_mm or theta_max_deg, or widen the axes' soft limits",
         );

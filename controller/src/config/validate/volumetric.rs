@@ -1,5 +1,7 @@
 //! Whether three axes that are corrected throughout their volume make sense as described.
 
+use units::Short;
+
 use super::detectors::check_detectors;
 use super::judge::{Finding, Judge};
 use crate::assemble;
@@ -102,9 +104,11 @@ fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volu
             judge.say(
                 "low_mm",
                 format!(
-                    "{low} to {high} mm with corrections of {room_mm} mm leave the soft limits \
+                    "{low} to {high} mm with corrections of {} mm leave the soft limits \
                      of axis {name}, {} to {} mm",
-                    axis.soft_min_mm, axis.soft_max_mm
+                    Short(room_mm),
+                    axis.soft_min_mm,
+                    axis.soft_max_mm
                 ),
                 "make the volume smaller, or the soft limits wider",
             );

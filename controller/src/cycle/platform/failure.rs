@@ -27,8 +27,7 @@ pub enum PlatformFailure {
     /// The pose is outside the work range.
     #[error(
         "platform: {what} = {seen:.6} {unit} is outside the work range of ±{limit} {unit}; nothing \
-         was moved"
-    )]
+         was moved", limit = units::Short(*limit))]
     OutOfRange {
         /// Which coordinate.
         what: &'static str,

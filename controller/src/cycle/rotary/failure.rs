@@ -34,8 +34,7 @@ pub enum RotaryFailure {
         "axis {axis}: the lines of the placement at offset {offset} moved by {:.3} arcsec while they \
          were read, the limit is {:.3} arcsec; fix plate and detector, let the temperature settle; \
          what was read of this placement is void, those before are kept: continue with --resume",
-        seen.arcsec(), limit.arcsec()
-    )]
+        seen.arcsec(), limit.arcsec(), offset = units::Short(*offset))]
     Slipped {
         /// Which axis.
         axis: String,
@@ -62,8 +61,8 @@ pub enum RotaryFailure {
         "axis {axis}: the plate does not lie at offset {expected} but at {seen} (the readings differ \
          by {:.3} arcsec rms from what the calibration says of the plate there, by {:.3} where it was \
          to lie); turn it by {} lines and verify again",
-        residual.arcsec(), residual_expected.arcsec(), expected - seen
-    )]
+        residual.arcsec(), residual_expected.arcsec(), expected - seen,
+        expected = units::Short(*expected), seen = units::Short(*seen))]
     LiesElsewhere {
         /// Which axis.
         axis: String,

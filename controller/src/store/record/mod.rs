@@ -182,8 +182,10 @@ impl RecordHead {
 
     fn resolution(&self) -> String {
         match (self.resolution_m, self.resolution_rad) {
-            (Some(metres), _) => format!("{metres} m"),
-            (None, Some(radians)) => format!("{radians} rad"),
+            (Some(metres), _) => format!("{} nm", units::Short(metres * 1e9)),
+            (None, Some(radians)) => {
+                format!("{} arcsec", units::Short(units::Radians(radians).arcsec()))
+            }
             (None, None) => "unknown".into(),
         }
     }

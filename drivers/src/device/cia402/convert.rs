@@ -77,6 +77,7 @@ fn positive<Q: Coordinate>(
     let count = settings.scale.resolution().abs().value();
     let counts = (value / count).round();
     // Drives hold these in 32 bits, some of them signed.
+    let limit = limit.min(f64::from(i32::MAX) * count);
     if value > 0.0 && value <= limit && counts <= f64::from(i32::MAX) {
         Ok((counts as u32).max(1))
     } else {

@@ -52,6 +52,7 @@ fn positive<Q: Coordinate>(
 ) -> Result<i64, DeviceError> {
     let count = settings.scale.resolution().abs().value();
     let number = (value / count * per_count).round();
+    let limit = limit.min(f64::from(i32::MAX) * count / per_count);
     if value > 0.0 && value <= limit && number <= f64::from(i32::MAX) {
         return Ok((number as i64).max(1));
     }

@@ -1,0 +1,88 @@
+//! A move and what became of it: where the drive's encoder stands, and what corrected the move.
+
+use compensator::error_table::{Compensation, EndPolicy};
+use units::Metres;
+
+use crate::failure::Failure;
+use crate::machine::Machine;
+
+/// What corrected a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Corrected {
+    /// Nothing: no calibration is in use.
+    No,
+    /// The calibration, between its first and last position.
+    Within,
+    /// Beyond the calibrated range, from `first` to `last`: the deviation of its end, which nobody
+    /// measured there.
+    Held {
+        /// First calibrated position.
+        first: Metres,
+        /// Last calibrated position.
+        last: Metres,
+    },
+    /// Beyond the calibrated range: the deviation of its end, fading to nothing over `distance`.
+    Fading {
+        /// First calibrated position.
+        first: Metres,
+        /// Last calibrated position.
+        last: Metres,
+        /// Where nothing is left of it, from the end on.
+        distance: Metres,
+    },
+}
+
+/// A finished move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Where the point was told to go.
+    pub target: Metres,
+    /// Where the drive was sent for that.
+    pub set_point: Metres,
+    /// Where the drive's encoder says that it stands, read after the move.
+    pub encoder: Metres,
+    /// What corrected the move.
+    pub corrected: Corrected,
+}
+
+impl Machine {
+    /// [`Self::move_to`], then the encoder's place once the axis stands, and what corrected the move.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`]; an axis that does not come to rest.
+    pub fn move_and_read(&mut self, axis: &str, target: Metres) -> Result<Moved, Failure> {
+        let corrected = self
+            .compensation(axis)
+            .map_or(Corrected::No, |table| corrected_at(table, target));
+        let set_point = self.move_to(axis, target)?;
+        self.stand_still(axis, STAND)?;
+        let reading = self.reading(axis)?;
+        let encoder = reading.expect("an axis that moved has been read").position;
+        Ok(Moved {
+            target,
+            set_point,
+            encoder,
+            corrected,
+        })
+    }
+}
+
+/// How long an axis stands before its place is read.
+const STAND: core::time::Duration = core::time::Duration::from_millis(20);
+
+fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
+    let (first, last) = table.table().range();
+    if target >= first && target <= last {
+        return Corrected::Within;
+    }
+    match table.end_policy() {
+        // Never driven: the move itself is refused.
+        EndPolicy::Refuse => Corrected::Within,
+        EndPolicy::Hold => Corrected::Held { first, last },
+        EndPolicy::FadeOut(distance) => Corrected::Fading {
+            first,
+            last,
+            distance,
+        },
+    }
+}
