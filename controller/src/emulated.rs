@@ -402,6 +402,12 @@ impl World for Emulated {
         self.simulation.borrow_mut().advance(to);
     }
 
+    fn advance_until_arrival(&mut self, to: Time) -> Time {
+        let mut simulation = self.simulation.borrow_mut();
+        simulation.advance_until_delivery(to);
+        simulation.now()
+    }
+
     fn deliver(&mut self, at: Time, port: Port, payload: &Payload) -> Result<(), SendError> {
         let inner = *self.ports.get(&port).ok_or(SendError::WrongKind { port })?;
         self.simulation

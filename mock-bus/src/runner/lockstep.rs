@@ -11,6 +11,7 @@
 //! leave (unless that was asked for), hangs, or computes without end is named, and the
 //! machine ends.
 
+use core::time::Duration;
 use std::io::{self, Read};
 use std::os::fd::AsFd;
 use std::sync::mpsc::TryRecvError;
@@ -29,7 +30,7 @@ use super::{Job, Site};
 
 /// The machine lives no further at once, so that whoever asks for something meanwhile is
 /// heard, however long everybody else waits.
-const STRIDE: core::time::Duration = core::time::Duration::from_secs(1);
+const STRIDE: Duration = Duration::from_secs(1);
 /// How often to look whether somebody hangs.
 const LOOK_EVERY_MS: u16 = 500;
 
@@ -40,14 +41,17 @@ pub(super) struct Lockstep {
     site: Site,
     /// The processors on which this thread may compute.
     allowed: Option<CpuSet>,
+    patience: Duration,
     outlive: bool,
 }
 
 impl Lockstep {
-    /// `outlive`: a participant that ends without taking leave does not end the machine.
-    pub(super) fn new(site: Site, outlive: bool) -> Self {
+    /// A participant may compute or hang for `patience`; with `outlive` one that ends without
+    /// taking leave does not end the machine.
+    pub(super) fn new(site: Site, patience: Duration, outlive: bool) -> Self {
         Self {
             site,
+            patience,
             outlive,
             allowed: sched_getaffinity(OWN).ok(),
         }
@@ -236,7 +240,7 @@ impl Lockstep {
         let at = self.site.machine.now().seconds();
         for peer in &mut self.site.visitors.peers {
             if let Doing::Working(watch) = &mut peer.doing
-                && let Some(complaint) = watch.complaint()
+                && let Some(complaint) = watch.complaint(self.patience)
             {
                 let who = peer.who();
                 let text = format!("{who} {complaint}; the machine stands still at {at:.6} s");

@@ -16,6 +16,8 @@ mod vcan;
 mod visitors;
 
 #[cfg(test)]
+mod lockstep_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
@@ -56,6 +58,9 @@ pub struct Options {
     /// Where hands reach it ([`hand`]) while it lives by the wall's clock; a lockstep clock's
     /// side channel serves them too.
     pub control: Option<PathBuf>,
+    /// On a lockstep clock: how long a participant may compute or hang while everybody waits for
+    /// it; in its own processor time, where it gets any.
+    pub patience: Duration,
     /// On a lockstep clock: a participant that ends without taking leave is named, and the next
     /// one goes on with the machine, which ends otherwise.
     pub outlive: bool,
@@ -71,6 +76,7 @@ impl Default for Options {
             seed: 0,
             pace: Pace::Wall(1.0),
             control: None,
+            patience: Duration::from_secs(10),
             outlive: false,
             interfaces: BTreeMap::new(),
             links: BTreeMap::new(),
@@ -227,7 +233,7 @@ pub fn spawn(config: &MachineConfig, options: &Options) -> Result<Running, RunEr
             };
             match options.pace {
                 Pace::Wall(speed) => EventLoop::new(site, speed, noted).run(),
-                Pace::Lockstep(_) => Lockstep::new(site, options.outlive).run(),
+                Pace::Lockstep(_) => Lockstep::new(site, options.patience, options.outlive).run(),
             }
         })?;
     Ok(Running {
@@ -381,6 +387,13 @@ impl Running {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
         }
+    }
+
+    /// What the machine ended by, of itself.
+    #[cfg(test)]
+    fn thread_result(mut self) -> io::Result<()> {
+        let thread = self.thread.take().expect("it was not stopped");
+        thread.join().expect("it does not panic")
     }
 
     fn wake_up(&self) {

@@ -10,9 +10,6 @@ use drivers::wire::Port;
 use drivers::wire::lockstep::{Entry, LINE_MAX, Reply, Request};
 use units::Time;
 
-/// How long a participant may compute, or hang, while everybody waits for it.
-const PATIENCE: Duration = Duration::from_secs(10);
-
 /// Whether it has something left to do.
 #[derive(Debug)]
 pub(super) enum Doing {
@@ -151,11 +148,11 @@ impl Watch {
     }
 
     /// What is wrong with it, if anything is.
-    pub(super) fn complaint(&mut self) -> Option<String> {
-        if self.begun.elapsed() < PATIENCE {
+    pub(super) fn complaint(&mut self, patience: Duration) -> Option<String> {
+        if self.begun.elapsed() < patience {
             return None;
         }
-        let limit = PATIENCE.as_secs();
+        let limit = patience.as_secs_f64();
         let Some(used) = processor_time(self.pid) else {
             return Some(format!("has not answered for {limit} s"));
         };
@@ -164,10 +161,10 @@ impl Watch {
             self.worked += used - before;
             self.seen = Some((Instant::now(), used));
         }
-        if self.worked >= PATIENCE {
+        if self.worked >= patience {
             return Some(format!("has computed for more than {limit} s"));
         }
-        (since.elapsed() >= PATIENCE)
+        (since.elapsed() >= patience)
             .then(|| format!("hangs: it has neither answered nor used the processor for {limit} s"))
     }
 }

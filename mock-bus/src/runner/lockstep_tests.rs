@@ -1,0 +1,194 @@
+//! The clock that both ends share, by its lines: what passes, who is waited for, who is named.
+
+use super::*;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::net::UnixStream;
+
+const MACHINE: &str = r#"
+    name = "test"
+    [[ports]]
+    kind = "serial"
+    name = "adc"
+    baud_bit_per_s = 9600
+    [[nodes]]
+    name = "adc"
+    port = "adc"
+    device = { kind = "dcon_module", checksum = false, boot_ms = 0.0 }
+"#;
+
+/// A machine with a serial line, and the folder of its side channel.
+struct Bench {
+    machine: Running,
+    clock: PathBuf,
+}
+
+impl Bench {
+    fn new(name: &str, change: impl FnOnce(&mut Options)) -> Self {
+        let file = format!("truestage-{}-{name}", std::process::id());
+        let clock = std::env::temp_dir().join(file);
+        let mut options = Options {
+            pace: Pace::Lockstep(clock.clone()),
+            ..Options::default()
+        };
+        change(&mut options);
+        let config = MachineConfig::parse(MACHINE).unwrap();
+        let machine = spawn(&config, &options).unwrap();
+        Self { machine, clock }
+    }
+
+    fn client(&self) -> Client {
+        Client(BufReader::new(UnixStream::connect(&self.clock).unwrap()))
+    }
+
+    fn terminal(&self) -> String {
+        self.machine.ports()[0].display().to_string()
+    }
+
+    /// What the machine ended by.
+    fn ended(self) -> String {
+        let ended = self.machine.thread_result();
+        ended.expect_err("it goes on").to_string()
+    }
+}
+
+struct Client(BufReader<UnixStream>);
+
+impl Client {
+    fn say(&mut self, line: &str) {
+        let line = format!("{line}\n");
+        self.0.get_mut().write_all(line.as_bytes()).unwrap();
+    }
+
+    fn hear(&mut self) -> String {
+        let mut line = String::new();
+        self.0.read_line(&mut line).unwrap();
+        line.trim_end().to_owned()
+    }
+
+    fn ask(&mut self, line: &str) -> String {
+        self.say(line);
+        self.hear()
+    }
+}
+
+#[test]
+fn an_answer_comes_at_its_own_time_whenever_it_is_asked_for() {
+    let bench = Bench::new("answer", |_| {});
+    let mut client = bench.client();
+    assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
+    let mut line = File::options()
+        .read(true)
+        .write(true)
+        .open(bench.terminal())
+        .unwrap();
+    let attach = format!("attach 4 {}", bench.terminal());
+    assert_eq!(client.ask(&attach), "attached");
+    line.write_all(b"$01M\r").unwrap();
+    let heard = client.ask("idle 1000000000 4:5");
+    let (time, passed) = heard.strip_prefix("go ").unwrap().split_once(' ').unwrap();
+    // Five bytes there and eight back, ten bits each, at 9600 bit/s, and what the module takes.
+    let time: u64 = time.parse().unwrap();
+    assert!(time > 13 * 10 * 1_000_000_000 / 9600 && time < 1_000_000_000);
+    assert_eq!(passed, "4:8");
+    let mut answer = [0; 8];
+    line.read_exact(&mut answer).unwrap();
+    assert_eq!(&answer, b"!014117\r");
+    assert_eq!(client.ask("idle 1000000000"), "go 1000000000");
+    client.say("bye");
+    drop(bench);
+}
+
+#[test]
+fn time_passes_to_the_first_moment_that_somebody_waits_for_and_not_while_one_works() {
+    let bench = Bench::new("two", |_| {});
+    let (mut one, mut other) = (bench.client(), bench.client());
+    one.ask("hello 1 0 one");
+    other.ask("hello 1 0 other");
+    one.say("idle 5000000");
+    // It works as yet: whatever it asks for is still at the beginning.
+    assert!(other.ask("do truth").starts_with("done {\"time_s\":0,"));
+    assert_eq!(other.ask("idle 2000000"), "go 2000000");
+    assert_eq!(other.ask("idle 5000000"), "go 5000000");
+    assert_eq!(one.hear(), "go 5000000");
+    one.say("bye");
+    other.say("bye");
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_what_there_is() {
+    let bench = Bench::new("refused", |_| {});
+    let mut client = bench.client();
+    assert!(client.ask("hello 9 0 me").contains("version 9"));
+    assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
+    let unknown = client.ask("attach 0 /dev/null");
+    assert!(unknown.starts_with("refused") && unknown.contains(&bench.terminal()));
+    let attach = format!("attach 0 {}", bench.terminal());
+    assert_eq!(client.ask(&attach), "attached");
+    let mut other = bench.client();
+    other.ask("hello 1 0 other");
+    assert!(other.ask(&attach).contains("`me` has"));
+    assert!(other.ask("what?").contains("no message"));
+    client.say("bye");
+    other.say("bye");
+}
+
+#[test]
+fn somebody_who_ends_without_taking_leave_is_named_and_ends_the_machine() {
+    let bench = Bench::new("gone", |_| {});
+    let mut client = bench.client();
+    client.ask("hello 1 4711 a killed one");
+    drop(client);
+    let said = bench.ended();
+    assert!(
+        said.contains("`a killed one` (process 4711) ended without"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_machine_that_outlives_its_controllers_goes_on_with_the_next_one() {
+    let bench = Bench::new("outlive", |options| options.outlive = true);
+    let mut client = bench.client();
+    client.ask("hello 1 0 a killed one");
+    assert_eq!(client.ask("idle 3000000"), "go 3000000");
+    drop(client);
+    let mut next = bench.client();
+    assert_eq!(next.ask("hello 1 0 the next one"), "welcome 3000000");
+    assert_eq!(next.ask("idle 4000000"), "go 4000000");
+    next.say("bye");
+}
+
+#[test]
+fn somebody_who_hangs_is_named_and_ends_the_machine() {
+    let bench = Bench::new("hangs", |options| {
+        options.patience = Duration::from_millis(1);
+    });
+    let mut client = bench.client();
+    // No process has this number: nothing is known of what it does.
+    client.ask("hello 1 999999999 a sleeper");
+    let said = bench.ended();
+    assert!(
+        said.contains("`a sleeper`") && said.contains("has not answered"),
+        "{said}"
+    );
+    drop(client);
+}
+
+#[test]
+fn a_side_channel_that_a_killed_program_has_left_behind_is_made_anew_and_a_living_one_is_not() {
+    let bench = Bench::new("left", |_| {});
+    let options = Options {
+        pace: Pace::Lockstep(bench.clock.clone()),
+        ..Options::default()
+    };
+    let config = MachineConfig::parse(MACHINE).unwrap();
+    let taken = spawn(&config, &options).err().unwrap().to_string();
+    assert!(taken.contains("nobody else"), "{taken}");
+    let clock = bench.clock.clone();
+    drop(bench);
+    drop(std::os::unix::net::UnixListener::bind(&clock).unwrap());
+    assert!(clock.exists(), "a socket's file outlives its listener");
+    drop(spawn(&config, &options).unwrap());
+    assert!(!clock.exists());
+}
