@@ -120,7 +120,10 @@ mod tests {
         check_refused(&csv(1.0, |t, d| 2.0 * sum(t, d)), "factor");
         check_refused(&csv(1.0, |_, d| d), "are they deviations?");
         check_refused(&csv(1.0, |t, d| 1.3 * t + d), "what their names say");
-        check_refused(&csv(1.0, |t, d| t + d * 1e4), "off a line");
+        check_refused(
+            &csv(1.0, |t, d| t + d + 15.0 * (0.35 * t).sin()),
+            "off a line",
+        );
     }
 
     #[test]
