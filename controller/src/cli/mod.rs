@@ -14,6 +14,8 @@ mod rotary;
 mod scan;
 mod screw;
 mod session;
+#[cfg(test)]
+mod stored_tests;
 mod table;
 mod verbs;
 mod volume;
