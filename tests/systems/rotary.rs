@@ -32,7 +32,7 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
         "as found {:.3}, as left {:.3} arcsec at most; {missing} readings missing, table error {:.3}",
         left.found.largest.arcsec(),
         figures.largest.arcsec(),
-        calibrated.largest.arcsec(),
+        calibrated.content.largest_error().arcsec(),
     );
     assert!(left.is_within_tolerance());
     assert!(left.found.largest.arcsec() > 8.0);

@@ -137,10 +137,10 @@ impl ScrewModel {
     /// The same with its standard uncertainty, which grows outside the strokes measured.
     pub fn predict(&self, stroke: Metres, approach: Approach) -> Prediction {
         let gradient = self.gradient(stroke.value(), approach);
-        let u = |covariance: &Vec<f64>| Metres(propagate(&gradient, covariance).max(0.0).sqrt());
+        let u = |covariance: &[f64]| Metres(propagate(&gradient, covariance).max(0.0).sqrt());
         Prediction {
             deviation: self.deviation(stroke, approach),
-            standard_uncertainty: self.covariance.as_ref().map(u),
+            standard_uncertainty: self.known_covariance().map(u),
         }
     }
 
@@ -164,17 +164,29 @@ impl ScrewModel {
         let harmonic = self.harmonics.get(index)?;
         let at = BASE + 2 * index;
         let mut gradient = vec![0.0; self.parameters()];
+        let (u_sine, u_cosine) = (Metres(self.u(at)?), Metres(self.u(at + 1)?));
         let amplitude = harmonic.amplitude();
+        if amplitude == Metres::ZERO {
+            // Nothing says in which phase it would grow.
+            return Some([u_sine, u_cosine, u_sine.max(u_cosine)]);
+        }
         gradient[at] = harmonic.sine / amplitude;
         gradient[at + 1] = harmonic.cosine / amplitude;
-        let variance = propagate(&gradient, self.covariance.as_ref()?);
-        let u_amplitude = Metres(variance.max(0.0).sqrt());
-        Some([Metres(self.u(at)?), Metres(self.u(at + 1)?), u_amplitude])
+        let variance = propagate(&gradient, self.known_covariance()?);
+        Some([u_sine, u_cosine, Metres(variance.max(0.0).sqrt())])
     }
 
     fn u(&self, index: usize) -> Option<f64> {
-        let covariance = self.covariance.as_ref()?;
-        Some(covariance.get(index * self.parameters() + index)?.sqrt())
+        let covariance = self.known_covariance()?;
+        let variance = covariance.get(index * self.parameters() + index)?;
+        Some(variance.max(0.0).sqrt())
+    }
+
+    /// One of another size than the parameters need says nothing of them.
+    fn known_covariance(&self) -> Option<&[f64]> {
+        let covariance = self.covariance.as_deref()?;
+        let parameters = self.parameters();
+        (covariance.len() == parameters * parameters).then_some(covariance)
     }
 
     fn parameters(&self) -> usize {

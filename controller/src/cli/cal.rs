@@ -77,6 +77,12 @@ fn store_of(config: &std::path::Path) -> Result<Store, Failure> {
 }
 
 fn list(store: &Store, output: Output) -> Ended {
+    let (text, value) = listed(store)?;
+    output.result(&text, &value)
+}
+
+/// All calibrations, as text and as JSON.
+pub(super) fn listed(store: &Store) -> Result<(String, Value), Failure> {
     let mut lines = Vec::new();
     let mut values = Vec::new();
     for id in store.list()? {
@@ -106,10 +112,16 @@ fn list(store: &Store, output: Output) -> Ended {
     if lines.is_empty() {
         lines.push("no calibrations yet; `truestage calibrate` makes one".into());
     }
-    output.result(&lines.join("\n"), &json!({"calibrations": values}))
+    Ok((lines.join("\n"), json!({"calibrations": values})))
 }
 
 fn show(store: &Store, id: &str, output: Output) -> Ended {
+    let (text, value) = shown(store, id)?;
+    output.result(&text, &value)
+}
+
+/// One calibration, as text and as JSON.
+pub(super) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure> {
     let id = store.resolve(id)?;
     let record = store.load(&id)?;
     let head = &record.head;
@@ -125,7 +137,7 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
         Content::BeamReferences(_) | Content::StateMemory(_) => record.content.summary(),
     };
     let value = serde_json::to_value(&record).expect("plain data always serialises");
-    output.result(&text, &json!({"id": id, "record": value}))
+    Ok((text, json!({"id": id, "record": value})))
 }
 
 fn linear_lines(content: &LinearContent) -> String {
@@ -155,6 +167,17 @@ fn node_line(node: &NodeRecord) -> String {
 }
 
 fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
+    let (text, value) = compared(store, before, after, output)?;
+    output.result(&text, &value)
+}
+
+/// Two calibrations, as text and as JSON.
+pub(super) fn compared(
+    store: &Store,
+    before: &str,
+    after: &str,
+    output: Output,
+) -> Result<(String, Value), Failure> {
     let (before_id, after_id) = (store.resolve(before)?, store.resolve(after)?);
     let (before, after) = (store.load(&before_id)?, store.load(&after_id)?);
     let (old_axis, new_axis) = (&before.head.axis, &after.head.axis);
@@ -175,7 +198,7 @@ fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
             });
         }
     };
-    output.result(&lines.join("\n"), &json!({"changes": values}))
+    Ok((lines.join("\n"), json!({"changes": values})))
 }
 
 fn linear_changes(before: &LinearContent, after: &LinearContent) -> (Vec<String>, Vec<Value>) {

@@ -16,6 +16,8 @@ mod rotary;
 mod scan;
 mod screw;
 mod session;
+#[cfg(test)]
+mod stored_tests;
 mod table;
 mod verbs;
 mod volume;

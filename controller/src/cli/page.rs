@@ -21,18 +21,22 @@ pub(super) struct ReportArgs {
     output: Option<PathBuf>,
 }
 
-pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
-    let journal = read_journal(&args.run)?;
-    let is_platform = journal.arrangement.is_some();
-    let html = if is_platform {
-        platform(&args.run, &journal)?
+/// The page of the journal at `run`.
+pub(super) fn html(run: &Path) -> Result<String, Failure> {
+    let journal = read_journal(run)?;
+    if journal.arrangement.is_some() {
+        platform(run, &journal)
     } else if journal.plate_plan.is_some() {
-        report::rotary::render(&journal, &made_from(&args.run)?)
+        Ok(report::rotary::render(&journal, &made_from(run)?))
     } else if journal.volume.plan.is_some() || journal.volume.check.is_some() {
-        report::volumetric::render(&journal, &made_from(&args.run)?)
+        Ok(report::volumetric::render(&journal, &made_from(run)?))
     } else {
-        axis(&journal)?
-    };
+        axis(&journal)
+    }
+}
+
+pub(super) fn run(args: &ReportArgs, output: Output) -> Ended {
+    let html = html(&args.run)?;
     let path = args
         .output
         .clone()

@@ -188,7 +188,7 @@ fn noise(arcsec: f64) -> Result<Radians, Failure> {
 fn solution_text(solution: &Solution) -> String {
     let design = &solution.design;
     let largest = |values: &[Radians]| values.iter().fold(Radians::ZERO, |a, b| a.max(b.abs()));
-    let plate: Vec<Radians> = solution.plate_error.iter().copied().flatten().collect();
+    let content = RotaryContent::new(solution);
     let (harmonic, worst) = design.worst();
     let mut text = format!(
         "{} lines, offsets {:?}\n  {:<34} {:>9.4} ″\n  {:<34} {:>9.4} ″\n  {:<34} {:>9.4} ″ \
@@ -196,9 +196,9 @@ fn solution_text(solution: &Solution) -> String {
         design.lines(),
         design.offsets(),
         "largest table error",
-        largest(&solution.table_error).arcsec(),
+        content.largest_error().arcsec(),
         "largest plate error",
-        largest(&plate).arcsec(),
+        content.largest_plate_error().arcsec(),
         "residual rms",
         solution.residual_rms.arcsec(),
         solution.degrees_of_freedom,

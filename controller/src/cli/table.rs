@@ -191,25 +191,23 @@ pub(super) fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&
 
 pub(super) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
     let solution = &calibrated.solution;
-    let largest = |values: &[Radians]| values.iter().fold(Radians::ZERO, |a, b| a.max(b.abs()));
-    let plate: Vec<Radians> = solution.plate_error.iter().copied().flatten().collect();
-    let u = solution
-        .standard_uncertainty()
-        .map_or("unknown".to_owned(), |u| {
-            format!("{:.4}″ at most", largest(&u).arcsec())
-        });
+    let content = &calibrated.content;
+    let u = content.uncertainty_max();
+    let u = u.map_or("unknown".to_owned(), |u| {
+        format!("{:.4}″ at most", u.arcsec())
+    });
     let scatter = calibrated
         .scatter
         .map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
     let mut text = format!(
-        "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″, \
-         plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
+        "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″ at \
+         the lines, plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
          the plate moved by {:.3}″ at most while it was read\n  {}\n  passes in {}",
         short(&calibrated.id),
         solution.design.lines(),
         solution.design.offsets(),
-        calibrated.largest.arcsec(),
-        largest(&plate).arcsec(),
+        content.largest_error().arcsec(),
+        content.largest_plate_error().arcsec(),
         calibrated.closure.arcsec(),
         calibrated.path.display(),
         calibrated.journal.display(),
@@ -234,7 +232,7 @@ pub(super) fn calibrated_value(calibrated: &RotaryCalibrated) -> Value {
     value["journal"] = json!(calibrated.journal);
     value["closure_arcsec"] = json!(arcsec(calibrated.closure));
     value["pass_scatter_arcsec"] = json!(calibrated.scatter.map(arcsec));
-    value["largest_deviation_arcsec"] = json!(arcsec(calibrated.largest));
+    value["largest_deviation_arcsec"] = json!(arcsec(calibrated.content.largest_error()));
     value
 }
 

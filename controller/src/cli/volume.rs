@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use compensator::volumetric::identify::Identified;
+use compensator::volumetric::identify::{Identified, scatter_limit};
 use compensator::volumetric::{Axis, Point};
 use serde_json::{Value, json};
 use truestage::config::MachineConfig;
@@ -158,19 +158,13 @@ pub(super) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 }
 
 pub(super) fn calibrated_text(made: &VolumetricCalibrated) -> String {
-    let found = &made.found;
-    let birge = found
-        .birge_ratio
-        .map_or("–".into(), |it| format!("{it:.2}"));
     format!(
-        "errors {} and references {} are in use: {} lines, {} readings beyond the unknowns, scatter {birge} \
-         of what was stated\n  tool: standard uncertainty {:.3} µm at most{}",
+        "errors {} and references {} are in use: {}\n  {}{}",
         short(&made.id),
         short(&made.references),
-        made.lines,
-        found.degrees_of_freedom,
-        made.u_max.um(),
-        warmth_text(found) + &unknown_text(&made.unknown),
+        made.agreement.readings_text(),
+        made.agreement.tool_text(),
+        warmth_text(&made.found) + &unknown_text(&made.unknown),
     )
 }
 
@@ -243,6 +237,7 @@ pub(super) fn found_value(found: &Identified) -> Value {
     json!({
         "degrees_of_freedom": found.degrees_of_freedom,
         "birge_ratio": found.birge_ratio,
+        "birge_ratio_limit": scatter_limit(found.degrees_of_freedom),
         "expansions": expansions.collect::<Vec<_>>(),
         "bends": bends.collect::<Vec<_>>(),
     })

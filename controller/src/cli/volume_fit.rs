@@ -72,18 +72,10 @@ pub(super) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
     let evaluated = evaluated.map_err(|it| placed(it, &args.data, &given.rows))?;
     let found = &evaluated.found;
     let content = evaluated.content(own);
-    let birge = found.birge_ratio;
-    let birge = birge.map_or("–".into(), |it| format!("{it:.2}"));
-    let mut text = format!(
-        "{} readings of {} lines, {} beyond the unknowns, scatter {birge} of what was stated\n  tool: \
-         standard uncertainty {:.3} µm at most{}{}",
-        evaluated.readings,
-        evaluated.lines,
-        found.degrees_of_freedom,
-        evaluated.u_max.um(),
-        shown(&content),
-        warmth_text(found) + &unknown_text(&content.unknown),
-    );
+    let mut text = shown(&content) + &warmth_text(found) + &unknown_text(&content.unknown);
+    if let Some(scatter) = &evaluated.scatter {
+        text += &format!("\n  not to be stored: {scatter}");
+    }
     let mut value = found_value(found);
     value["lines"] = json!(evaluated.lines);
     value["readings"] = json!(evaluated.readings);
@@ -166,7 +158,7 @@ fn entry(number: usize, line: &VolumeLine) -> LineEntry {
     LineEntry {
         optics,
         sees: sees.and_then(|it| it.to_string().chars().next()),
-        purpose: format!("line {}", line.number),
+        purpose: format!("line {} of the file", line.number),
         points: line.points.len(),
         // A straightedge was laid by hand.
         angle: (optics == OpticsName::Straightness).then_some(number),
@@ -291,4 +283,127 @@ fn stored_text(config: &Path, (geometry, references): &(String, Option<String>))
         short(geometry),
         activate(geometry)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::Value;
+    use truestage::report;
+
+    use super::*;
+    use crate::cli::stored_tests::lines_of;
+
+    const JOURNAL: &str = include_str!("stored_tests/files/volumetric_calibrate.jsonl");
+    const MACHINE: &str = include_str!("../../../configs/machines/volumetric.toml");
+    const HALF_WAVELENGTH_M: f64 = 0.316_4e-6;
+    /// The first diagonal, counted from 0.
+    const DIAGONAL: usize = 16;
+
+    /// The machine's folder with a run of it, whose readings `change` has changed.
+    struct Desk {
+        folder: tempfile::TempDir,
+        config: PathBuf,
+        store: Store,
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let config = folder.path().join("machine.toml");
+            let data = format!("data_dir = {:?}", folder.path().join("data"));
+            let text = MACHINE.replace("data_dir = \"machine-data\"", &data);
+            assert_ne!(text, MACHINE);
+            fs::write(&config, text).unwrap();
+            let loaded = config::load(&config).unwrap();
+            Self {
+                folder,
+                config,
+                store: Store::of(&loaded.config.machine),
+            }
+        }
+
+        /// As if that configuration had been used.
+        fn journal(&self, name: &str, change: impl Fn(usize, &mut Value)) -> PathBuf {
+            let hash = config::load(&self.config).unwrap().hash;
+            let mut lines = lines_of(JOURNAL);
+            lines[0]["config_hash"] = hash.into();
+            let own = |it: &&mut Value| it["entry"] == "line_reading" && it["line"] == DIAGONAL;
+            let diagonal = lines.iter_mut().filter(own).enumerate();
+            diagonal.for_each(|(at, line)| change(at, line));
+            let text = lines.iter().map(|it| {
+                let json = it.to_string();
+                format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()))
+            });
+            let runs = self.store.runs();
+            fs::create_dir_all(&runs).unwrap();
+            fs::write(runs.join(name), text.collect::<String>()).unwrap();
+            runs.join(name)
+        }
+
+        fn save(&self, data: PathBuf) -> Ended {
+            let args = VolumetricArgs {
+                data,
+                config: self.config.clone(),
+                temperatures_c: Vec::new(),
+                without: Vec::new(),
+                save: true,
+            };
+            fit(&args, Output::new(true))
+        }
+    }
+
+    fn add(line: &mut Value, metres: f64) {
+        for key in ["read_si", "deviation_si"] {
+            line[key] = (line[key].as_f64().unwrap() + metres).into();
+        }
+    }
+
+    #[test]
+    fn lines_that_lost_half_wavelengths_or_have_a_wild_reading_are_not_stored() {
+        let desk = Desk::new();
+        let jumped = desk.journal("jumped.jsonl", |at, line| {
+            if at > 5 {
+                add(line, 30.0 * HALF_WAVELENGTH_M);
+            }
+        });
+        let wild = desk.journal("wild.jsonl", |at, line| {
+            if at == 3 {
+                add(line, 1e-3);
+            }
+        });
+        for path in [jumped, wild] {
+            let refused = desk.save(path).expect_err("they scatter");
+            assert_eq!(refused.exit_code(), 5, "{refused}");
+            let text = refused.to_string();
+            assert!(text.contains("times as much as was stated"), "{text}");
+            assert!(text.contains(&format!("line {}", DIAGONAL + 1)), "{text}");
+            assert!(desk.store.list().unwrap().is_empty());
+        }
+        let sound = desk.journal("sound.jsonl", |_, _| ());
+        desk.save(sound).expect("it is sound");
+        assert_eq!(desk.store.list().unwrap().len(), 2);
+        drop(desk.folder);
+    }
+
+    #[test]
+    fn a_page_states_the_figures_that_were_stored_and_the_screen_does() {
+        let desk = Desk::new();
+        let path = desk.journal("run.jsonl", |_, _| ());
+        desk.save(path.clone()).expect("it is sound");
+        let made = desk.store.made_from("run.jsonl").unwrap();
+        let stored = made.iter().find_map(|(id, it)| it.geometry(id).ok());
+        let stored = stored.expect("it was stored");
+        let agreement = stored.agreement.expect("with its figures");
+        let html = report::volumetric::render(&read_journal(&path).unwrap(), &made);
+        for text in [agreement.readings_text(), agreement.tool_text()] {
+            assert_eq!(html.matches(&text).count(), 1, "{text}");
+            assert!(shown(stored).contains(&text), "{text}");
+        }
+        assert_eq!(html.matches("standard uncertainty 0").count(), 1);
+        // Without what was made, it is evaluated alike.
+        let html = report::volumetric::render(&read_journal(&path).unwrap(), &[]);
+        assert!(html.contains(&agreement.tool_text()));
+    }
 }

@@ -3,9 +3,12 @@
 use serde_json::{Value, json};
 use truestage::store::{FunctionRecord, GeometryContent};
 
-/// By name, each function's largest value and uncertainty, and the squarenesses.
+/// How well the readings agree; by name, each function's largest value and uncertainty; the
+/// squarenesses.
 pub(super) fn shown(content: &GeometryContent) -> String {
-    let head = "\n  error     nodes   largest        u (largest)".to_owned();
+    let agreement = content.agreement.as_ref();
+    let agreement = agreement.map(|it| format!("{}\n  {}", it.readings_text(), it.tool_text()));
+    let head = agreement.unwrap_or_default() + "\n  error     nodes   largest        u (largest)";
     let mut text = content.functions.iter().fold(head, |text, it| {
         let unit = unit(it);
         let u = it.standard_uncertainties_si.as_deref().map(largest);

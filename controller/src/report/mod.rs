@@ -1,5 +1,7 @@
 //! A self-contained page of a run: facts, plots, figures. No script, no network.
 
+mod agreement;
+mod band;
 mod chart;
 pub mod platform;
 pub mod rotary;

@@ -5,6 +5,7 @@ use core::fmt::Write as _;
 
 use units::Radians;
 
+use super::band::{Sure, band, enlargement, said};
 use super::chart::{BLUE, Mark, ORANGE, Series, chart};
 use super::{document, escape, facts, facts_of};
 use crate::cycle::rotary::{Evaluated, evaluated};
@@ -136,38 +137,35 @@ const fn series(
 fn calibration(content: &RotaryContent) -> String {
     let lines = content.lines;
     let table = || content.table_error_rad.iter().copied();
-    let mut table_series = vec![series(
-        "table error",
-        BLUE,
-        Mark::Line,
-        points(table().map(Some), lines),
-    )];
-    let u = content.standard_uncertainty_rad.as_ref();
-    if let Some(u) = u {
-        for sign in [2.0, -2.0] {
-            let band = table().zip(u).map(move |(value, u)| Some(value + sign * u));
-            table_series.push(series("", ORANGE, Mark::Line, points(band, lines)));
-        }
+    let curve = points(table().map(Some), lines);
+    let sure = content.standard_uncertainty_rad.iter().flatten();
+    let sure = curve.iter().zip(sure);
+    let sure = sure.map(|((x, y), u)| (*x, *y, arcsec(*u)));
+    let sure: Vec<Sure> = sure.collect();
+    let factor = enlargement([sure.as_slice()].into_iter());
+    let mut table_series = vec![series("table error", BLUE, Mark::Line, curve)];
+    let mut shaded = String::new();
+    if !sure.is_empty() {
+        // Beneath the curve.
+        table_series.insert(0, band("2 u", ORANGE, &sure, factor));
+        shaded = said(factor);
     }
     let plate = points(content.plate_error_rad.iter().copied(), lines);
     let plate = [series("plate error", BLUE, Mark::Dots, plate)];
-    let largest = table().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let u = content.uncertainty_max();
     let u = u.map_or("unknown".to_owned(), |u| {
-        format!(
-            "{:.4} ″ at most",
-            arcsec(u.iter().copied().fold(0.0, f64::max))
-        )
+        format!("{:.4} ″ at most", u.arcsec())
     });
     let mut html = format!(
-        "<h2>Table error</h2><p>Up to {:.3} ″; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
-         degrees of freedom; noise of a reading amplified {:.3} times.</p><figure>{}</figure>\
+        "<h2>Table error</h2><p>Up to {:.3} ″ at the lines; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
+         degrees of freedom; noise of a reading amplified {:.3} times.</p><figure>{}</figure>{shaded}\
          <h2>Plate error</h2><figure>{}</figure>",
-        arcsec(largest),
+        content.largest_error().arcsec(),
         arcsec(content.residual_rms_rad),
         content.degrees_of_freedom,
         content.noise_amplification,
         chart(
-            "Table error with twice its standard uncertainty",
+            "Table error and how sure it is",
             ("table angle (°)", "reading − true angle (″)"),
             &table_series,
             None,
@@ -273,4 +271,48 @@ fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal) -> Stri
         );
     }
     html
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 40 lines; the interpolation between them goes beyond the largest of them.
+    fn content() -> RotaryContent {
+        let error = |line: u32| 5e-5 * (f64::from(line) * 0.7 + 0.3).sin();
+        RotaryContent {
+            lines: 40,
+            offsets: vec![0, 1],
+            table_error_rad: (0..40).map(error).collect(),
+            standard_uncertainty_rad: Some(vec![5e-8; 40]),
+            plate_error_rad: vec![Some(1e-6); 40],
+            ..RotaryContent::default()
+        }
+    }
+
+    #[test]
+    fn the_curve_lies_on_its_band_which_is_enlarged_until_it_is_seen() {
+        let html = calibration(&content());
+        let (band, curve) = (html.find("<polygon"), html.find("<polyline"));
+        assert!(band.is_some() && band < curve, "{band:?} {curve:?}");
+        assert!(html.contains("enlarged 50 times"), "{html}");
+        let unsure = RotaryContent {
+            standard_uncertainty_rad: None,
+            ..content()
+        };
+        let html = calibration(&unsure);
+        assert!(!html.contains("<polygon") && !html.contains("Shaded"));
+    }
+
+    #[test]
+    fn the_page_shows_the_largest_error_that_lists_show() {
+        let largest = format!("{:.3}", content().largest_error().arcsec());
+        let listed = crate::store::Content::RotaryErrorTable(content()).summary();
+        assert!(
+            listed.contains(&format!("up to {largest} arcsec")),
+            "{listed}"
+        );
+        let html = calibration(&content());
+        assert!(html.contains(&format!("Up to {largest} ″ at the lines")));
+    }
 }

@@ -81,7 +81,9 @@ pub(super) fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64
     if low > high {
         return (0.0, 1.0);
     }
-    let margin = ((high - low) * share).max(1e-6);
+    // What is the same but for rounding has a range that its places can be told in.
+    let rounding = low.abs().max(high.abs()) * 1e-12;
+    let margin = ((high - low) * share).max(1e-6).max(rounding);
     (low - margin, high + margin)
 }
 
@@ -96,11 +98,18 @@ fn step(range: f64, wanted: f64) -> f64 {
     factor * power
 }
 
+/// Ticks of an axis at most: rounding makes no more of those that are wanted.
+const TICKS_MAX: usize = 100;
+
 fn ticks(range: (f64, f64), wanted: f64) -> Vec<f64> {
     let step = step(range.1 - range.0, wanted);
+    if !(step > 0.0 && step.is_finite()) {
+        return Vec::new();
+    }
     let first = (range.0 / step).ceil() as i64;
     let last = (range.1 / step).floor() as i64;
-    (first..=last).map(|at| at as f64 * step).collect()
+    let each = (first..=last).take(TICKS_MAX);
+    each.map(|at| at as f64 * step).collect()
 }
 
 /// As few digits as tell the ticks apart.

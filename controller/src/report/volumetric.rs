@@ -4,12 +4,12 @@
 use core::fmt::Write as _;
 
 use compensator::volumetric::Axis;
-use compensator::volumetric::function::Shape;
 use units::{Metres, Radians};
 
+use super::agreement;
+use super::band::{Sure, band, enlargement, said};
 use super::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
 use super::{document, escape, facts};
-use crate::cycle::volumetric::VolumetricEvaluated;
 use crate::store::{
     CalibrationRecord, Content, FunctionRecord, GeometryContent, LineEntry, LineReadingEntry,
     OpticsName, ReadJournal, VolumeRead,
@@ -64,8 +64,7 @@ pub fn render_day(
 }
 
 const NOTE: &str = "deviation = actual − target, at the tool; tilts are right-handed. E of an axis \
-                    and a direction: e_yx is the displacement of x along y, e_ax its tilt about x. \
-                    Shaded: twice the standard uncertainty to both sides.";
+                    and a direction: e_yx is the displacement of x along y, e_ax its tilt about x.";
 
 fn facts_of_run(
     journal: &ReadJournal,
@@ -184,13 +183,12 @@ fn verification(journal: &ReadJournal) -> String {
     let range = um(range_of(journal));
     let points = deviations(journal);
     let readings = &journal.volume.readings;
-    let pairs = points.iter().zip(readings);
-    let upper = pairs
-        .clone()
-        .map(|((x, y), it)| (*x, y + 2.0 * um(it.u_si)));
-    let lower = pairs.map(|((x, y), it)| (*x, y - 2.0 * um(it.u_si)));
+    let sure = points.iter().zip(readings);
+    let sure = sure.map(|((x, y), it)| (*x, *y, um(it.u_si)));
+    let sure: Vec<Sure> = sure.collect();
+    let factor = enlargement([sure.as_slice()].into_iter());
     let series = [
-        band(BLUE, upper.collect(), lower.collect()),
+        band("", BLUE, &sure, factor),
         line("deviation", BLUE, points),
     ];
     let mut html = format!(
@@ -201,6 +199,7 @@ fn verification(journal: &ReadJournal) -> String {
         um(check.limit_m),
     );
     html += &section("Deviation along the line", ALONG, &series);
+    html += &said(factor);
     html += "<table><tr><th>place (mm)</th><th>deviation (µm)</th><th>u (µm)</th>\
              <th>correction x, y, z (µm)</th></tr>";
     for (it, (_, deviation)) in readings.iter().zip(deviations(journal)) {
@@ -251,14 +250,13 @@ fn temperatures(readings: &[LineReadingEntry]) -> String {
 }
 
 fn calibration(journal: &ReadJournal, made: &[(String, CalibrationRecord)]) -> String {
-    let mut html = String::new();
-    for (_, record) in made {
-        if let Content::VolumetricGeometry(content) = &record.content {
-            html += &geometry(content);
-        }
-    }
+    let stored = made.iter().filter_map(|(_, record)| match &record.content {
+        Content::VolumetricGeometry(content) => Some(content),
+        _ => None,
+    });
+    let mut html: String = stored.clone().map(geometry).collect();
     let read = &journal.volume;
-    html += &residuals(read);
+    html += &agreement::residuals(read, stored.clone().next());
     html += &temperatures(&read.readings);
     html + &lines(read)
 }
@@ -266,6 +264,10 @@ fn calibration(journal: &ReadJournal, made: &[(String, CalibrationRecord)]) -> S
 /// The error functions with their uncertainties, squarenesses, and what warmth does.
 pub(super) fn geometry(content: &GeometryContent) -> String {
     let mut html = String::from("<h2>Errors</h2>");
+    html += &content
+        .agreement
+        .as_ref()
+        .map_or_else(String::new, agreement::figures);
     for (axis, names) in Axis::ALL.into_iter().zip(NAMES) {
         let [along, about] = names;
         let title = format!("Displacements of {axis}");
@@ -323,46 +325,56 @@ fn functions(
     names: [&'static str; 3],
     unit: fn(f64) -> f64,
 ) -> String {
-    let mut series = Vec::new();
-    for (name, colour) in names.into_iter().zip(COLOURS) {
-        let Some(it) = record(content, name) else {
-            continue;
-        };
-        let Ok(function) = it.function::<Metres>("the page") else {
-            continue;
-        };
-        let at = |position: Metres| (position.mm(), unit(function.at(position).value()));
-        if let Some(u) = &it.standard_uncertainties_si {
-            let shifted = |sign: f64| {
-                let pairs = function.nodes().zip(u);
-                let point = pairs.map(|(node, u)| (node.mm(), at(node).1 + sign * unit(2.0 * u)));
-                point.collect::<Vec<_>>()
-            };
-            series.push(band(colour, shifted(1.0), shifted(-1.0)));
-        }
-        let nodes: Vec<Metres> = function.nodes().collect();
-        let between = nodes.windows(2).flat_map(|pair| {
-            let step = (pair[1] - pair[0]) / PARTS as f64;
-            (0..PARTS).map(move |part| pair[0] + step * part as f64)
-        });
-        let points = between.chain(nodes.last().copied()).map(at).collect();
-        series.push(line(name, colour, points));
-    }
-    if series.is_empty() {
+    let drawn: Vec<Drawn> = names
+        .into_iter()
+        .zip(COLOURS)
+        .filter_map(|(name, colour)| drawn(record(content, name)?, (name, colour), unit))
+        .collect();
+    if drawn.is_empty() {
         return String::new();
     }
-    section(title, labels, &series)
+    let known = drawn.iter().filter(|it| it.is_sure);
+    let factor = enlargement(known.clone().map(|it| it.curve.as_slice()));
+    let bands = known.map(|it| band("", it.colour, &it.curve, factor));
+    let curves = drawn.iter().map(|it| {
+        let points = it.curve.iter().map(|(x, y, _)| (*x, *y));
+        line(it.name, it.colour, points.collect())
+    });
+    let series: Vec<Series> = bands.chain(curves).collect();
+    section(title, labels, &series) + &said(factor)
 }
 
-/// Upper edge, then the lower one backwards.
-fn band(colour: &'static str, upper: Vec<(f64, f64)>, mut lower: Vec<(f64, f64)>) -> Series {
-    lower.reverse();
-    Series {
-        name: "",
+/// An error function as it is drawn.
+struct Drawn {
+    name: &'static str,
+    colour: &'static str,
+    curve: Vec<Sure>,
+    /// Whether its uncertainty is known.
+    is_sure: bool,
+}
+
+fn drawn(
+    record: &FunctionRecord,
+    (name, colour): (&'static str, &'static str),
+    unit: fn(f64) -> f64,
+) -> Option<Drawn> {
+    let function = record.function::<Metres>("the page").ok()?;
+    let at = |position: Metres| {
+        let u = function.standard_uncertainty(position);
+        let u = u.map_or(0.0, |it| unit(it.value()));
+        (position.mm(), unit(function.at(position).value()), u)
+    };
+    let nodes: Vec<Metres> = function.nodes().collect();
+    let between = nodes.windows(2).flat_map(|pair| {
+        let step = (pair[1] - pair[0]) / PARTS as f64;
+        (0..PARTS).map(move |part| pair[0] + step * part as f64)
+    });
+    Some(Drawn {
+        name,
         colour,
-        mark: Mark::Band,
-        points: [upper, lower].concat(),
-    }
+        curve: between.chain(nodes.last().copied()).map(at).collect(),
+        is_sure: record.standard_uncertainties_si.is_some(),
+    })
 }
 
 fn largest(content: &GeometryContent) -> String {
@@ -390,44 +402,6 @@ fn largest(content: &GeometryContent) -> String {
         );
     }
     html + "</table>"
-}
-
-/// What is left of each reading, evaluated again from what was written down.
-fn residuals(read: &VolumeRead) -> String {
-    // Between the nodes nothing is evaluated: any shape will do.
-    let evaluated = match VolumetricEvaluated::of(read, Shape::Linear) {
-        Ok(it) => it,
-        Err(failure) => {
-            let why = escape(&failure.to_string());
-            return format!("<p class=\"note\">No errors follow from these readings: {why}.</p>");
-        }
-    };
-    let found = &evaluated.found;
-    let points = (0..).zip(&found.residuals);
-    let points = points.map(|(at, residual): (u32, _)| (f64::from(at), *residual));
-    let dots = [Series {
-        name: "one reading",
-        colour: BLUE,
-        mark: Mark::Dots,
-        points: points.collect(),
-    }];
-    let birge = found.birge_ratio;
-    let birge = birge.map_or("–".to_owned(), |it| format!("{it:.2}"));
-    format!(
-        "<h2>Residuals</h2><p>{} readings of {} lines, {} beyond the unknowns; their scatter is \
-         {birge} of what was stated. Standard uncertainty of the tool in the volume: {:.3} µm at \
-         most.</p><figure>{}</figure>",
-        evaluated.readings,
-        evaluated.lines,
-        found.degrees_of_freedom,
-        evaluated.u_max.um(),
-        chart(
-            "Residuals",
-            ("reading", "(reading − model) / u"),
-            &dots,
-            None
-        )
-    )
 }
 
 fn lines(read: &VolumeRead) -> String {

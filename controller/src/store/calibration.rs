@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::record::CalibrationRecord;
-use super::{SCHEMA_VERSION, StoreError, io_error, write_new_or_replace};
+use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound, write_new_or_replace};
 use crate::config::MachineSection;
 
 /// Which calibration an axis uses, and which it used before (oldest first).
@@ -86,10 +86,11 @@ impl Store {
         Ok(id)
     }
 
-    /// Reads calibration `id` and checks that its bytes are those that were stored.
+    /// Reads calibration `id` and checks that its bytes are those that were stored, and that what it
+    /// says can be so.
     ///
     /// # Errors
-    /// When it is not there, damaged, or written by a newer program.
+    /// When it is not there, damaged, written by a newer program, or says what cannot be.
     pub fn load(&self, id: &str) -> Result<CalibrationRecord, StoreError> {
         let path = self.calibration_path(id);
         let bytes = fs::read(&path).map_err(io_error("read", &path))?;
@@ -97,7 +98,9 @@ impl Store {
         if seen != id {
             return Err(StoreError::Damaged { path, seen });
         }
-        parse_versioned(&path, &bytes)
+        let record = parse_versioned(&path, &bytes)?;
+        sound::record(&record).map_err(unsound(&path, None))?;
+        Ok(record)
     }
 
     /// The full name of the one calibration that begins with `prefix`.

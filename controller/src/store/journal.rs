@@ -16,7 +16,7 @@ use super::volume::{
     LineReadEntry, LineReadingEntry, VolumeCheckEntry, VolumePlanEntry, VolumeRead,
     VolumeReferencesEntry,
 };
-use super::{SCHEMA_VERSION, StoreError, io_error};
+use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound};
 
 /// What a run is: written first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -362,7 +362,8 @@ fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(),
 /// Reads a journal up to its last whole line.
 ///
 /// # Errors
-/// When it cannot be read, has no header, or a line before the last one is damaged.
+/// When it cannot be read, has no header, a line before the last one is damaged, or one says what
+/// cannot be.
 pub fn read_journal(path: &Path) -> Result<ReadJournal, StoreError> {
     let bytes = fs::read(path).map_err(io_error("read", path))?;
     let mut read: Option<ReadJournal> = None;
@@ -418,6 +419,9 @@ fn take(
         line,
         cause: "the header must be the first line and the only one".into(),
     };
+    if let Some(read) = &read {
+        sound::entry(read, &entry).map_err(unsound(path, Some(line)))?;
+    }
     match (entry, read.as_mut()) {
         (Entry::Header(header), None) if header.schema_version > SCHEMA_VERSION => {
             return Err(StoreError::Newer {
@@ -426,6 +430,7 @@ fn take(
             });
         }
         (Entry::Header(header), None) => {
+            sound::header(&header).map_err(unsound(path, Some(line)))?;
             *read = Some(ReadJournal {
                 header,
                 points: Vec::new(),
@@ -494,7 +499,7 @@ mod tests {
             started: "2026-01-01T00:00:00Z".into(),
             calibration: None,
             targets_m: vec![0.0, 0.003],
-            runs: 2,
+            runs: 3,
         }
     }
 
@@ -618,8 +623,18 @@ mod tests {
         let sweep = |offset| {
             Entry::Sweep(SweepEntry {
                 offset,
+                pass: 1,
+                approach: '+',
+                deviations_rad: vec![None; 360],
                 ..SweepEntry::default()
             })
+        };
+        let plan = PlatePlanEntry {
+            plate: "p".into(),
+            lines: 360,
+            offsets: vec![0.0, 73.0, 162.0],
+            passes: 1,
+            speed_rad_per_s: 1.0,
         };
         let placed = |offset| {
             Entry::Placed(PlacementEntry {
@@ -629,6 +644,7 @@ mod tests {
             })
         };
         for entry in [
+            Entry::PlatePlan(plan),
             sweep(0.0),
             sweep(0.0),
             placed(0.0),

@@ -17,6 +17,7 @@ mod lease;
 mod plate;
 mod pose;
 mod record;
+mod sound;
 mod volume;
 
 use std::path::{Path, PathBuf};
@@ -29,11 +30,11 @@ pub use lease::Lease;
 pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
-    BeamRecord, BeamReferencesContent, BendRecord, CalibrationRecord, Content, EnvironmentRecord,
-    ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent, HarmonicRecord,
-    IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord, NodeRecord,
-    ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName, StateMemoryContent,
-    StrokeRecord, UnknownRecord,
+    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, CalibrationRecord, Content,
+    EnvironmentRecord, ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent,
+    HarmonicRecord, IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord,
+    NodeRecord, ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName,
+    StateMemoryContent, StrokeRecord, UnknownRecord,
 };
 pub use volume::{
     BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
@@ -78,6 +79,24 @@ pub enum StoreError {
         line: usize,
         /// The parser's words.
         cause: String,
+    },
+    /// Whole, but it cannot be so.
+    #[error(
+        "{}: {place}: {expected} is expected there, seen: {seen}; the file was edited, or another \
+         program wrote it, and nothing of it is used: restore it, or measure again",
+        at_line(path, *line)
+    )]
+    Unsound {
+        /// Which file.
+        path: PathBuf,
+        /// Of a journal, which line, from 1.
+        line: Option<usize>,
+        /// Which key of it.
+        place: String,
+        /// What can stand there.
+        expected: String,
+        /// What does.
+        seen: String,
     },
     /// Written by a newer program.
     #[error(
@@ -206,6 +225,22 @@ pub enum StoreError {
         /// What this run would be.
         seen: String,
     },
+}
+
+fn at_line(path: &Path, line: Option<usize>) -> String {
+    let line = line.map_or_else(String::new, |it| format!(": line {it}"));
+    path.display().to_string() + &line
+}
+
+fn unsound(path: &Path, line: Option<usize>) -> impl FnOnce(sound::Unsound) -> StoreError {
+    let path = path.to_owned();
+    move |it| StoreError::Unsound {
+        path,
+        line,
+        place: it.place,
+        expected: it.expected,
+        seen: it.seen,
+    }
 }
 
 pub(crate) fn io_error(

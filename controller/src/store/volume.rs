@@ -7,7 +7,7 @@ use compensator::volumetric::{Axis, Point};
 use serde::{Deserialize, Serialize};
 use units::{Metres, Radians};
 
-use super::record::{AXES, BeamReferencesContent, IdentityRecord};
+use super::record::{AXES, BeamReferencesContent, FunctionShape, IdentityRecord};
 
 /// What a line is read with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,6 +98,9 @@ pub struct VolumePlanEntry {
     pub nodes_m: [Vec<f64>; 3],
     /// Which error functions, by the letters of ISO 230-1.
     pub functions: Vec<String>,
+    /// How they run between the nodes; `None` in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<FunctionShape>,
     /// The lines, in the order in which they are read.
     pub lines: Vec<LineEntry>,
     /// Standard uncertainty of what a thermometer shows, kelvin.

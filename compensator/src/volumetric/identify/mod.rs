@@ -28,13 +28,17 @@
 //! that bends while the tool is on a lever looks like a scale that grows. Runs too much alike are
 //! refused, and thermometers' uncertainties are in those of the coefficients.
 //!
-//! Absent: outliers, hysteresis, laser tracker lengths from unknown stations, the instrument's own
+//! Readings that scatter more than what was stated of them are told ([`Identified::scattered`]), with
+//! those that fit least.
+//!
+//! Absent: leaving out outliers, hysteresis, laser tracker lengths from unknown stations, the instrument's own
 //! temperature and air (correct the readings first: [`crate::length_correction`]), temperatures
 //! that change within a run.
 
 mod design;
 mod diagonals;
 mod observe;
+mod scatter;
 mod solve;
 mod standard;
 mod straightness;
@@ -46,6 +50,7 @@ use units::{Metres, Quantity, Radians};
 
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
+pub use scatter::{Conspicuous, SCATTER_RATIO_MAX, Scattered, scatter_limit};
 pub use solve::{Identified, IdentifiedFunction};
 pub use standard::{Optics, Purpose, StandardDesign, StandardLine, standard_design};
 pub use straightness::{ReferenceLine, Straightness, straightness};
@@ -321,6 +326,8 @@ impl Plan {
     }
 }
 
+#[cfg(test)]
+mod scatter_tests;
 #[cfg(test)]
 mod standard_tests;
 #[cfg(test)]

@@ -5,7 +5,7 @@ use units::{Celsius, Metres, Radians};
 use super::design::{Block, Design, error_row};
 use super::thermal::{IdentifiedBend, IdentifiedExpansion, add_heat};
 use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
-use crate::least_squares;
+use crate::least_squares::{self, Fit};
 use crate::volumetric::function::{Function, FunctionError, Shape};
 use crate::volumetric::model::{AxisErrors, ErrorName, Squareness};
 
@@ -45,6 +45,9 @@ pub struct Identified {
     pub birge_ratio: Option<f64>,
     /// Reading − model of each reading, in units of its uncertainty.
     pub residuals: Vec<f64>,
+    /// How much of an error of each reading is left in its own residual: 1 when all of it is, 0
+    /// when nothing else tells what this reading does.
+    pub redundancies: Vec<f64>,
     /// Of the parameters of functions, squarenesses and warmth alone.
     covariance: Vec<f64>,
 }
@@ -160,9 +163,17 @@ pub(super) fn solve(
         bends,
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio,
+        redundancies: redundancies(design, &fit),
         residuals: fit.residuals,
         covariance,
     })
+}
+
+/// One less what each reading has to say of its own model value.
+fn redundancies(design: &Design, fit: &Fit) -> Vec<f64> {
+    let rows = design.rows.chunks_exact(design.columns());
+    rows.map(|row| (1.0 - fit.variance(row, 1.0)).clamp(0.0, 1.0))
+        .collect()
 }
 
 /// By `known` of their number: value and standard uncertainty.

@@ -12,7 +12,7 @@ use crate::volumetric::online::MovingState;
 
 /// The machine of three axes that is shipped: its volume, a node every 50 mm.
 const SPAN_M: [f64; 3] = [0.5, 0.4, 0.3];
-const NODES: [usize; 3] = [11, 9, 7];
+pub(super) const NODES: [usize; 3] = [11, 9, 7];
 const READINGS: usize = 21;
 const ARCSEC: f64 = 4.848_137e-6;
 
@@ -20,17 +20,22 @@ fn volume() -> Volume {
     Volume::new(Point::ZERO, Point::of(SPAN_M)).unwrap()
 }
 
-fn working_tool() -> Point {
+pub(super) fn working_tool() -> Point {
     Point::from_mm(0.0, 0.0, -100.0)
 }
 
 /// The reflector on an arm.
-fn arm() -> Point {
+pub(super) fn arm() -> Point {
     Point::from_mm(250.0, 0.0, -100.0)
 }
 
 /// ±5 µm and ±3″ that keep the conventions, from one node to the next: worse than any real one.
-fn truth(chain: &str, without: &[ErrorName], shape: Shape, chance: &mut Chance) -> VolumetricModel {
+pub(super) fn truth(
+    chain: &str,
+    without: &[ErrorName],
+    shape: Shape,
+    chance: &mut Chance,
+) -> VolumetricModel {
     let mut axes: [AxisErrors; 3] = Default::default();
     for axis in Axis::ALL {
         let i = axis.index();
@@ -96,7 +101,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// 0.1 µm and 0.1″ of noise, an unknown zero, and a straight edge that leans by up to 100 µrad.
-fn measure(
+pub(super) fn measure(
     truth: &VolumetricModel,
     design: &StandardDesign,
     chance: &mut Chance,
@@ -147,7 +152,7 @@ fn corners_and_middles() -> Vec<Point> {
     (0..27).map(place).collect()
 }
 
-fn design(chain: &str, tools: &[Point], rolls: [bool; 3]) -> StandardDesign {
+pub(super) fn design(chain: &str, tools: &[Point], rolls: [bool; 3]) -> StandardDesign {
     standard_design(chain.parse().unwrap(), &volume(), tools, rolls)
 }
 

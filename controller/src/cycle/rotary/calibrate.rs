@@ -36,8 +36,8 @@ pub struct RotaryCalibrated {
     pub closure: Radians,
     /// The scatter of one line in one pass, by what the directions differ, of the worst placement.
     pub scatter: Option<Radians>,
-    /// The largest deviation that the compensation takes away, between the lines too.
-    pub largest: Radians,
+    /// What was stored.
+    pub content: RotaryContent,
 }
 
 impl Machine {
@@ -82,12 +82,11 @@ impl Machine {
             plate_phase_rad: placed.first().map(|it| it.phase.value()),
             ..RotaryContent::new(&solution)
         };
-        let stored = self.store_table(axis, store, &run, &journal, content);
+        let stored = self.store_table(axis, store, &run, &journal, content.clone());
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
         let closures = placed.iter().map(|it| it.closure.abs());
-        let largest = self.rotary_compensation(axis).map(|it| it.largest());
         Ok(RotaryCalibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -98,7 +97,7 @@ impl Machine {
                 .iter()
                 .filter_map(|it| it.scatter)
                 .reduce(Radians::max),
-            largest: largest.unwrap_or(Radians::ZERO),
+            content,
         })
     }
 

@@ -9,6 +9,7 @@ use compensator::volumetric::online::{MemoryError, RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Radians};
 
+use super::calibrate::Scatter;
 use crate::assemble::BeamDetectorError;
 use crate::engine::{Cause, Lack, PushError};
 
@@ -222,6 +223,9 @@ pub enum VolumetricFailure {
     /// Readings that do not tell the errors.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// Readings that are worse than they can be.
+    #[error("three axes: {0}")]
+    Scatter(Scatter),
     /// What detectors see is more than a correction is proven for.
     #[error(transparent)]
     Conditions(#[from] ConditionsError),
@@ -366,7 +370,7 @@ impl VolumetricFailure {
             | Self::Influence(_)
             | Self::NoPlan
             | Self::Roll(_) => 2,
-            Self::OutOfTolerance { .. } => 5,
+            Self::OutOfTolerance { .. } | Self::Scatter(_) => 5,
             Self::NoReference { .. }
             | Self::NoGeometry
             | Self::OtherGeometry { .. }

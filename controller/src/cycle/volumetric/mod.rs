@@ -29,7 +29,9 @@ mod thermometers;
 mod verify;
 mod zero;
 
-pub use calibrate::{VolumetricCalibrated, VolumetricEvaluated, WarmUp, volume_plan};
+pub use calibrate::{
+    Off, Scatter, VolumetricCalibrated, VolumetricEvaluated, WarmUp, WorstReading, volume_plan,
+};
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
 pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};

@@ -5,6 +5,7 @@
 //! `kind` and `summary`, and a way from [`CalibrationRecord`] to it that ends in
 //! [`CalibrationRecord::other_kind`]. In the file the keys of head and content stand side by side.
 
+mod agreement;
 mod linear;
 mod rotary;
 mod screw;
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{StoreError, short};
 
+pub use agreement::AgreementRecord;
 pub use linear::{LinearContent, NodeRecord};
 pub use rotary::{ReadingName, RotaryContent};
 pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};

@@ -82,10 +82,27 @@ impl RotaryContent {
         }
     }
 
+    /// The largest table error at the lines: the one figure that lists, screens and pages show. What
+    /// an interpolation makes of it between the lines is not measured, and not in it.
+    pub fn largest_error(&self) -> Radians {
+        largest(self.table_error_rad.iter())
+    }
+
+    /// The largest error of the plate's lines, likewise.
+    pub fn largest_plate_error(&self) -> Radians {
+        largest(self.plate_error_rad.iter().flatten())
+    }
+
+    /// The largest standard uncertainty of a table error, where it is known.
+    pub fn uncertainty_max(&self) -> Option<Radians> {
+        self.standard_uncertainty_rad
+            .as_ref()
+            .map(|it| largest(it.iter()))
+    }
+
     /// One line about it, for lists.
     pub(super) fn summary(&self) -> String {
-        let largest = self.table_error_rad.iter().map(|it| it.abs());
-        let largest = Radians(largest.fold(0.0, f64::max)).arcsec();
+        let largest = self.largest_error().arcsec();
         let (lines, placements) = (self.lines, self.offsets.len());
         format!("{lines} lines, {placements} placements, errors up to {largest:.3} arcsec")
     }
@@ -115,6 +132,10 @@ impl ReadingName {
             line: small(reading.line),
         }
     }
+}
+
+fn largest<'a>(radians: impl Iterator<Item = &'a f64>) -> Radians {
+    Radians(radians.fold(0.0, |most: f64, it| most.max(it.abs())))
 }
 
 fn small(number: usize) -> u32 {

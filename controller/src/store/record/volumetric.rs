@@ -14,7 +14,7 @@ use units::{Celsius, Metres, Quantity, Radians};
 
 use super::super::{StoreError, short};
 use super::warmth::{AXES, BendRecord, ExpansionRecord, UnknownRecord};
-use super::{CalibrationRecord, Content, IdentityRecord};
+use super::{AgreementRecord, CalibrationRecord, Content, IdentityRecord};
 
 /// How a function runs between its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,6 +27,26 @@ pub enum FunctionShape {
     MonotoneCubic,
     /// The cubic spline with continuous curvature.
     Spline,
+}
+
+impl From<Shape> for FunctionShape {
+    fn from(shape: Shape) -> Self {
+        match shape {
+            Shape::Linear => Self::Linear,
+            Shape::MonotoneCubic => Self::MonotoneCubic,
+            Shape::Spline => Self::Spline,
+        }
+    }
+}
+
+impl From<FunctionShape> for Shape {
+    fn from(shape: FunctionShape) -> Self {
+        match shape {
+            FunctionShape::Linear => Self::Linear,
+            FunctionShape::MonotoneCubic => Self::MonotoneCubic,
+            FunctionShape::Spline => Self::Spline,
+        }
+    }
 }
 
 /// A function of an axis's position: metres or radians at positions in metres.
@@ -55,11 +75,7 @@ impl FunctionRecord {
             .collect();
         Self {
             name: name.to_string(),
-            shape: match function.shape() {
-                Shape::Linear => FunctionShape::Linear,
-                Shape::MonotoneCubic => FunctionShape::MonotoneCubic,
-                Shape::Spline => FunctionShape::Spline,
-            },
+            shape: function.shape().into(),
             values_si: nodes.iter().map(|it| function.at(*it).value()).collect(),
             positions_m: nodes.iter().map(|it| it.value()).collect(),
             standard_uncertainties_si: u,
@@ -74,11 +90,7 @@ impl FunctionRecord {
         let nodes: Vec<_> = self.positions_m.iter().copied().map(Metres).collect();
         let quantities =
             |values: &[f64]| -> Vec<Q> { values.iter().copied().map(Q::from_value).collect() };
-        let shape = match self.shape {
-            FunctionShape::Linear => Shape::Linear,
-            FunctionShape::MonotoneCubic => Shape::MonotoneCubic,
-            FunctionShape::Spline => Shape::Spline,
-        };
+        let shape = self.shape.into();
         let function = Function::new(&nodes, &quantities(&self.values_si), shape);
         let function = function.and_then(|it| match &self.standard_uncertainties_si {
             Some(u) => it.with_uncertainties(&quantities(u)),
@@ -116,6 +128,9 @@ pub struct GeometryContent {
     /// What was not found of what there is.
     #[serde(default)]
     pub unknown: UnknownRecord,
+    /// How well the readings agree with all this; `None` in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<AgreementRecord>,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -156,6 +171,7 @@ impl GeometryContent {
             expansions: Vec::new(),
             drives: Vec::new(),
             unknown: UnknownRecord::default(),
+            agreement: None,
         }
     }
 

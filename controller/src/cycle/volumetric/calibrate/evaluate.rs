@@ -4,7 +4,7 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::function::Shape;
 use compensator::volumetric::identify::{
     Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, Observation, Plan, RunSetup,
-    SquarenessName, ThermalPlan,
+    Scattered, SquarenessName, ThermalPlan,
 };
 use compensator::volumetric::model::{AxisErrors, ErrorName};
 use units::{Celsius, Metres};
@@ -12,11 +12,11 @@ use units::{Celsius, Metres};
 use super::plan::axis_of;
 use crate::assemble::{beam_drift, bend_plans};
 use crate::config::{MachineConfig, VolumetricConfig};
-use crate::cycle::volumetric::{VolumetricCorrection, VolumetricFailure, VolumetricState};
+use crate::cycle::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
 use crate::failure::Failure;
 use crate::store::{
-    AXES, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent, IdentityRecord,
-    LineEntry, UnknownRecord, VolumePlanEntry, VolumeRead, error_name, point,
+    AXES, AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
+    IdentityRecord, LineEntry, UnknownRecord, VolumePlanEntry, VolumeRead, error_name, point,
 };
 
 /// Places between which the uncertainty of the tool is looked for, along each axis.
@@ -37,6 +37,8 @@ pub struct VolumetricEvaluated {
     pub readings: usize,
     /// The largest standard uncertainty of the tool in use, in the volume.
     pub u_max: Metres,
+    /// By how much the readings scatter, where that is more than they may.
+    pub scatter: Option<Scatter>,
     drives: Vec<IdentityRecord>,
     /// Errors that move nothing with the tools given: taken as zero.
     without_effect: Vec<ErrorName>,
@@ -56,7 +58,10 @@ impl VolumetricEvaluated {
         let axes = found.axis_errors(shape);
         let axes = axes.map_err(VolumetricFailure::from)?;
         let temperatures = references(read);
+        let scattered = scattered(&plan, &found, &observations);
+        let scatter = scattered.map(|it| Scatter::of(&it, entry, read, &observations));
         Ok(Self {
+            scatter,
             u_max: largest_u(entry, &found, &temperatures),
             found,
             axes,
@@ -66,6 +71,17 @@ impl VolumetricEvaluated {
             drives: entry.drives.clone(),
             without_effect: without_effect(&plan),
         })
+    }
+
+    /// How well the readings agree, as it is stored and shown.
+    pub fn agreement(&self) -> AgreementRecord {
+        AgreementRecord {
+            lines: self.lines,
+            readings: self.readings,
+            degrees_of_freedom: self.found.degrees_of_freedom,
+            scatter_ratio: self.found.birge_ratio,
+            tool_u_max_m: self.u_max.value(),
+        }
     }
 
     /// As it is stored, with what stays unknown of a machine of `config`.
@@ -80,21 +96,25 @@ impl VolumetricEvaluated {
             bends: found.bends.iter().map(BendRecord::of).collect(),
             expansions: found.expansions.iter().map(ExpansionRecord::of).collect(),
             drives: self.drives.clone(),
+            agreement: Some(self.agreement()),
             unknown: UnknownRecord::of(&unknown, &self.without_effect),
             ..GeometryContent::new(of.0, of.1, of.2)
         }
     }
 
-    /// Proves that the machine of `config` can be corrected by it: with what its detectors read
-    /// then, or by tables alone where that is not known.
+    /// Proves that the readings agree, and that the machine of `config` can be corrected by what was
+    /// found: with what its detectors read then, or by tables alone where that is not known.
     ///
     /// # Errors
-    /// When it cannot.
+    /// When they do not, or it cannot.
     pub fn check(
         &self,
         config: &MachineConfig,
         references: Option<&BeamReferencesContent>,
     ) -> Result<(), Failure> {
+        if let Some(scatter) = &self.scatter {
+            return Err(VolumetricFailure::Scatter(scatter.clone()).into());
+        }
         let own = config.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
         let mut state = VolumetricState {
             axes: self.axes.clone(),
@@ -116,6 +136,24 @@ impl VolumetricEvaluated {
         state.roll = references.roll("these references")?;
         VolumetricCorrection::new(config, state)?;
         Ok(())
+    }
+}
+
+/// What is wrong with readings that scatter too much. Errors that straight lines or monotone cubics
+/// between the nodes cannot draw are no fault of the readings: these are judged by the curve that
+/// bends most, and the errors found are as uncertain as the curve in use leaves them.
+fn scattered(plan: &Plan, found: &Identified, observations: &[Observation]) -> Option<Scattered> {
+    let seen = found.scattered(observations)?;
+    if plan.shape == Shape::Spline {
+        return Some(seen);
+    }
+    let smooth = Plan {
+        shape: Shape::Spline,
+        ..plan.clone()
+    };
+    match smooth.identify(observations) {
+        Ok(smooth) => smooth.scattered(observations),
+        Err(_) => Some(seen),
     }
 }
 

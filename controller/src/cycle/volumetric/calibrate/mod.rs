@@ -13,7 +13,8 @@
 //! first line that is not whole, as long as its references still hold (`resume`). What is evaluated
 //! is what was written down: the journal alone gives the same errors again.
 //!
-//! A result that cannot be applied is refused before it is stored.
+//! A result that cannot be applied, or whose readings scatter much more than was stated of them, is
+//! refused before it is stored (`scatter`).
 
 mod evaluate;
 mod known;
@@ -21,6 +22,7 @@ mod own;
 mod plan;
 mod readings;
 mod resume;
+mod scatter;
 
 use core::time::Duration;
 use std::path::{Path, PathBuf};
@@ -33,6 +35,7 @@ use units::{Metres, Radians};
 
 pub use evaluate::VolumetricEvaluated;
 pub use plan::volume_plan;
+pub use scatter::{Off, Scatter, WorstReading};
 
 use super::line::LineOperator;
 use super::reference::References;
@@ -45,8 +48,8 @@ use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
 use crate::store::{
-    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
-    SCHEMA_VERSION, Store, UnknownRecord, VolumeRead, VolumeReferencesEntry,
+    AgreementRecord, CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader,
+    RecordHead, SCHEMA_VERSION, Store, UnknownRecord, VolumeRead, VolumeReferencesEntry,
 };
 
 use known::Known;
@@ -77,6 +80,8 @@ pub struct VolumetricCalibrated {
     pub lines: usize,
     /// What was found.
     pub found: Identified,
+    /// How well the readings agree, as it was stored.
+    pub agreement: AgreementRecord,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
     /// What stays unknown: guides that bend by the configuration, by how much nobody knows, for no
@@ -111,7 +116,7 @@ impl Machine {
     ///
     /// # Errors
     /// When an axis is not zeroed, a line cannot be set up or read, the readings do not tell all
-    /// errors, the result cannot be applied, or anything stops the machine; when the journal is one
+    /// errors or scatter too much, the result cannot be applied, or anything stops the machine; when the journal is one
     /// of another run, or its references hold no more. What was in use before stays in use then.
     pub fn calibrate_volumetric(
         &mut self,
@@ -306,6 +311,7 @@ impl Machine {
         Ok(VolumetricCalibrated {
             id,
             references: references.id,
+            agreement: evaluated.agreement(),
             lines: evaluated.lines,
             found: evaluated.found,
             u_max: evaluated.u_max,

@@ -70,6 +70,7 @@ pub fn volume_plan(
             zero_m: metres(zero),
             nodes_m,
             functions: design.names().map(|it| it.to_string()).collect(),
+            shape: Some(shape.into()),
             lines: entries,
             drives,
             fixed_m: metres(point_of_mm(config.expansion_fixed_mm)),

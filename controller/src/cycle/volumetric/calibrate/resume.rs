@@ -39,7 +39,7 @@ pub(super) fn open(
     let read = match read.volume.plan {
         // Killed before its second line: nothing was read yet.
         None => begin(&mut journal, plan)?,
-        Some(ref before) if *before == plan => read.volume,
+        Some(ref before) if is_same(before, &plan) => read.volume,
         Some(before) => {
             let (what, expected, seen) = difference(&before, &plan);
             return Err(StoreError::NotResumable {
@@ -52,6 +52,16 @@ pub(super) fn open(
         }
     };
     Ok((journal, read))
+}
+
+/// A journal of an earlier program does not say how errors run between their nodes.
+fn is_same(before: &VolumePlanEntry, now: &VolumePlanEntry) -> bool {
+    let shape = before.shape.or(now.shape);
+    let before = VolumePlanEntry {
+        shape,
+        ..before.clone()
+    };
+    before == *now
 }
 
 fn begin(journal: &mut Journal, plan: VolumePlanEntry) -> Result<VolumeRead, StoreError> {

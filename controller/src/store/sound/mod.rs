@@ -1,0 +1,188 @@
+//! Whether what was loaded can be what it says it is: judged whole and once, where it enters, so that
+//! nothing behind has to expect a list of another length than its neighbour, a number that no machine
+//! makes, or a place that does not exist.
+//!
+//! A checksum says that nothing changed by accident; whoever edits a file makes it anew. Limits are
+//! wide: they are what no stage, instrument or building reaches, not what a good machine keeps.
+
+mod calibration;
+mod journal;
+mod volume;
+
+use core::fmt;
+use core::ops::RangeInclusive;
+
+pub(super) use calibration::record;
+pub(super) use journal::{entry, header};
+
+/// What cannot be so, where it stands, and what was expected there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Unsound {
+    pub(super) place: String,
+    pub(super) expected: String,
+    pub(super) seen: String,
+}
+
+pub(super) type Judged = Result<(), Unsound>;
+
+/// What numbers of a kind may be, and how a person calls that.
+pub(super) struct Limits {
+    range: RangeInclusive<f64>,
+    unit: &'static str,
+}
+
+const fn limits(low: f64, high: f64, unit: &'static str) -> Limits {
+    Limits {
+        range: low..=high,
+        unit,
+    }
+}
+
+/// Places along an axis, and what stands for one.
+pub(super) const PLACE_M: Limits = limits(-1e3, 1e3, "m");
+/// What a place is off by.
+pub(super) const ERROR_M: Limits = limits(-1.0, 1.0, "m");
+pub(super) const ERROR_U_M: Limits = limits(0.0, 1.0, "m");
+pub(super) const LENGTH_M: Limits = limits(f64::MIN_POSITIVE, 1e3, "m");
+pub(super) const ANGLE_RAD: Limits = limits(-10.0, 10.0, "rad");
+pub(super) const ANGLE_U_RAD: Limits = limits(0.0, 10.0, "rad");
+/// Turns are counted on.
+pub(super) const TURNS_RAD: Limits = limits(-1e6, 1e6, "rad");
+pub(super) const RESOLUTION: Limits = limits(f64::MIN_POSITIVE, 1.0, "m or rad a count");
+pub(super) const SLOPE: Limits = limits(-1.0, 1.0, "m/m");
+pub(super) const PER_KELVIN: Limits = limits(-1.0, 1.0, "a kelvin");
+pub(super) const PER_KELVIN_U: Limits = limits(0.0, 1.0, "a kelvin");
+/// From absolute zero to what melts any stage.
+pub(super) const CELSIUS: Limits = limits(-273.15, 1500.0, "°C");
+pub(super) const KELVIN_U: Limits = limits(0.0, 1e3, "K");
+pub(super) const PASCAL: Limits = limits(0.0, 1e7, "Pa");
+/// Sensors say a little less than nothing and a little more than all.
+pub(super) const HUMIDITY: Limits = limits(-0.5, 1.5, "of 1");
+pub(super) const VOLTS: Limits = limits(-1e4, 1e4, "V");
+/// Thirty years.
+pub(super) const SECONDS: Limits = limits(0.0, 1e9, "s");
+pub(super) const RATIO: Limits = limits(0.0, 1e9, "times");
+pub(super) const SPEED_RAD_PER_S: Limits = limits(f64::MIN_POSITIVE, 1e4, "rad/s");
+/// Plates have no more lines, and lists no more entries.
+pub(super) const COUNT_MAX: usize = 1_000_000;
+
+/// Nothing is expected that is not between `limits`.
+pub(super) fn number(place: impl fmt::Display, seen: f64, limits: &Limits) -> Judged {
+    // A NaN is in no range.
+    if limits.range.contains(&seen) {
+        return Ok(());
+    }
+    let (low, high) = (limits.range.start(), limits.range.end());
+    let expected = match *low == f64::MIN_POSITIVE {
+        true => format!("more than 0 and at most {high:e} {}", limits.unit),
+        false => format!("{low:e} to {high:e} {}", limits.unit),
+    };
+    Err(unsound(place, expected, format!("{seen:e}")))
+}
+
+pub(super) fn unsound(
+    place: impl fmt::Display,
+    expected: impl Into<String>,
+    seen: impl Into<String>,
+) -> Unsound {
+    Unsound {
+        place: place.to_string(),
+        expected: expected.into(),
+        seen: seen.into(),
+    }
+}
+
+pub(super) fn optional(place: &str, seen: Option<f64>, limits: &Limits) -> Judged {
+    seen.map_or(Ok(()), |it| number(place, it, limits))
+}
+
+pub(super) fn numbers(place: &str, seen: &[f64], limits: &Limits) -> Judged {
+    let each = seen.iter().enumerate();
+    each.map(|(at, it)| number(format_args!("{place}[{at}]"), *it, limits))
+        .collect()
+}
+
+pub(super) fn optionals(place: &str, seen: &[Option<f64>], limits: &Limits) -> Judged {
+    let known = seen.iter().enumerate();
+    let known = known.filter_map(|(at, it)| Some((at, (*it)?)));
+    known
+        .map(|(at, it)| number(format_args!("{place}[{at}]"), it, limits))
+        .collect()
+}
+
+/// A list that has as many entries as something else.
+pub(super) fn as_many(place: &str, seen: usize, expected: usize, of: &str) -> Judged {
+    is(
+        place,
+        seen == expected,
+        || format!("{expected} entries, one for each of {of}"),
+        || format!("{seen}"),
+    )
+}
+
+pub(super) fn counted(place: &str, seen: usize, range: RangeInclusive<usize>) -> Judged {
+    let expected = || format!("{} to {}", range.start(), range.end());
+    is(place, range.contains(&seen), expected, || seen.to_string())
+}
+
+/// That `holds`.
+pub(super) fn is(
+    place: impl fmt::Display,
+    holds: bool,
+    expected: impl FnOnce() -> String,
+    seen: impl FnOnce() -> String,
+) -> Judged {
+    match holds {
+        true => Ok(()),
+        false => Err(unsound(place, expected(), seen())),
+    }
+}
+
+/// One of these letters.
+pub(super) fn letter(place: &str, seen: char, among: &[char]) -> Judged {
+    let expected = || {
+        let each: Vec<String> = among.iter().map(|it| format!("`{it}`")).collect();
+        each.join(" or ")
+    };
+    is(place, among.contains(&seen), expected, || {
+        format!("`{}`", seen.escape_default())
+    })
+}
+
+/// The two ways to come to a place.
+pub(super) fn approach(place: &str, seen: char) -> Judged {
+    letter(place, seen, &['+', '-'])
+}
+
+/// What names a folder's file must not lead elsewhere.
+pub(super) fn file_name(place: &str, seen: &str) -> Judged {
+    let is_name = !seen.is_empty() && seen.len() <= 200 && seen != "." && seen != "..";
+    let is_plain = seen.chars().all(|it| it != '/' && !it.is_control());
+    let expected = || "a name without `/`, of 200 letters at most".to_owned();
+    is(place, is_name && is_plain, expected, || {
+        format!("`{}`", seen.escape_debug().take(80).collect::<String>())
+    })
+}
+
+/// Places closer than an atom's neighbours are one place, and no curve runs between them.
+const STEP_MIN_M: f64 = 1e-10;
+
+/// Places one behind the other, and not on each other.
+pub(super) fn increasing(place: &str, seen: &[f64]) -> Judged {
+    // A comparison with NaN is false.
+    let follows = |it: &[f64]| it[1] - it[0] >= STEP_MIN_M;
+    let back = seen.windows(2).position(|it| !follows(it));
+    back.map_or(Ok(()), |at| {
+        let expected = format!("more than {:e}, the one before", seen[at]);
+        let place = format_args!("{place}[{}]", at + 1);
+        Err(unsound(place, expected, format!("{:e}", seen[at + 1])))
+    })
+}
+
+/// What a model of its own says of it.
+pub(super) fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judged {
+    let expected = "what can be applied";
+    built
+        .map(|_| ())
+        .map_err(|it| unsound(place, expected, it.to_string()))
+}
