@@ -188,9 +188,9 @@ fn options(config: &MachineConfig, arguments: Arguments) -> Options {
         },
         control: arguments.control,
         outlive: arguments.outlive,
-        ..Options::default()
         interfaces: can.zip(arguments.can).into_iter().collect(),
         links,
+        ..Options::default()
     }
 }
 
