@@ -18,8 +18,8 @@ fn run(chain: &str, shape: Shape, seed: u64) -> (StandardDesign, Plan, Vec<Obser
 
 fn moved(observation: &mut Observation, by: f64) {
     match &mut observation.reading {
-        Reading::Length { deviation, .. } => *deviation = *deviation + Metres(by),
-        Reading::Angle { deviation, .. } => *deviation = *deviation + Radians(by),
+        Reading::Length { deviation, .. } => *deviation += Metres(by),
+        Reading::Angle { deviation, .. } => *deviation += Radians(by),
     }
 }
 

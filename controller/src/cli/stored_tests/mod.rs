@@ -10,7 +10,7 @@ mod mutation;
 use std::collections::BTreeMap;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
@@ -227,7 +227,7 @@ impl Tally {
 
 /// One calibration everywhere that it is shown: beside the one as it was written, in the list, alone,
 /// on the page of the run that it was made from.
-fn show_calibration(desk: &Desk, base: &str, id: &str, run: &PathBuf) -> Result<String, Failure> {
+fn show_calibration(desk: &Desk, base: &str, id: &str, run: &Path) -> Result<String, Failure> {
     let store = &desk.store;
     let list = cal::listed(store)?.0;
     let text = cal::shown(store, id)?.0;

@@ -97,17 +97,14 @@ pub(super) fn optional(place: &str, seen: Option<f64>, limits: &Limits) -> Judge
 }
 
 pub(super) fn numbers(place: &str, seen: &[f64], limits: &Limits) -> Judged {
-    let each = seen.iter().enumerate();
-    each.map(|(at, it)| number(format_args!("{place}[{at}]"), *it, limits))
-        .collect()
+    let mut each = seen.iter().enumerate();
+    each.try_for_each(|(at, it)| number(format_args!("{place}[{at}]"), *it, limits))
 }
 
 pub(super) fn optionals(place: &str, seen: &[Option<f64>], limits: &Limits) -> Judged {
     let known = seen.iter().enumerate();
-    let known = known.filter_map(|(at, it)| Some((at, (*it)?)));
-    known
-        .map(|(at, it)| number(format_args!("{place}[{at}]"), it, limits))
-        .collect()
+    let mut known = known.filter_map(|(at, it)| Some((at, (*it)?)));
+    known.try_for_each(|(at, it)| number(format_args!("{place}[{at}]"), it, limits))
 }
 
 /// A list that has as many entries as something else.
