@@ -201,13 +201,25 @@ fn a_calibration_of_another_stage_drive_scale_or_setup_is_refused_by_name() {
     check_foreign(|it| it.head.drive.serial = 77, &["the drive", "serial 77"]);
     check_foreign(
         |it| it.head.resolution_m = Some(2e-8),
-        &["encoder count", "0.00000002"],
+        &["encoder count", "`20 nm`"],
     );
     check_foreign(
         |it| it.head.config_hash = "0000".into(),
         &["configuration", "0000"],
     );
     check_foreign(|it| it.head.axis = "y".into(), &["the axis", "`y`"]);
+}
+
+/// The smallest one that is sound.
+fn a_rotary_table() -> RotaryContent {
+    RotaryContent {
+        lines: 2,
+        offsets: vec![0, 1],
+        table_error_rad: vec![0.0; 2],
+        plate_error_rad: vec![Some(0.0); 2],
+        noise_amplification: 1.0,
+        ..RotaryContent::default()
+    }
 }
 
 #[test]
@@ -224,7 +236,7 @@ fn a_file_of_a_newer_program_or_of_another_kind_is_refused_clearly() {
         "{failure}"
     );
     let mut shelf = Shelf::new();
-    shelf.activate(|record| record.content = Content::RotaryErrorTable(RotaryContent::default()));
+    shelf.activate(|record| record.content = Content::RotaryErrorTable(a_rotary_table()));
     let failure = shelf.load().unwrap_err();
     let other = matches!(failure, Failure::Store(StoreError::OtherKind { .. }));
     assert!(other, "{failure:?}");

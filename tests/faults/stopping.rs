@@ -120,8 +120,8 @@ fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
         }
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Alarm { .. } | Failure::Device { .. }),
-        words: &["x:"],
+        cause: |failure| matches!(failure, Failure::HeldUp { pause, .. } if *pause > WATCH_MASTER),
+        words: &["x:", "kept from its buses"],
         within: Duration::from_millis(2100),
         rest: WATCH_MASTER + STOPPING,
     };

@@ -38,7 +38,7 @@ pub fn calm(text: String) -> String {
     with_rare_heartbeats(&text)
 }
 
-/// Few nodes and short averages, for tests of what is done rather than of how well it is measured.
+/// Few readings and short averages, for tests of what is done rather than of how well it is measured.
 pub fn quick(text: String) -> String {
     let text = text.edit(
         "step_mm = 25.0\nsamples = 50",
@@ -46,7 +46,7 @@ pub fn quick(text: String) -> String {
     );
     let text = text.edit(
         "step_mm = 50.0\nsettle_ms = 100.0",
-        "step_mm = 100.0\nsettle_ms = 50.0",
+        "step_mm = 50.0\nsettle_ms = 50.0",
     );
     calm(text.edit("average_samples = 60", "average_samples = 20"))
 }

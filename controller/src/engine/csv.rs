@@ -154,8 +154,8 @@ impl Rows {
             0.0
         };
         let axes = self.positions.iter().map(ends).zip(point);
-        let squares = axes.map(|((begin, join), at)| (at - begin - share * join).powi(2));
-        squares.sum::<f64>().sqrt()
+        let off = axes.map(|((begin, join), at)| at - begin - share * join);
+        off.map(|it| it * it).sum::<f64>().sqrt()
     }
 }
 

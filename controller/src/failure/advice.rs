@@ -1,6 +1,7 @@
 //! Which key of the configuration would let a refused table pass, and whether that is wise.
 
 use compensator::error_table::{CompensationError, StandOff};
+use units::portable::{log10, powi};
 use units::Metres;
 
 /// What to do about a position that stands off its neighbours.
@@ -39,8 +40,8 @@ fn enough(length: Metres) -> String {
 /// Two digits, never less than `value`.
 fn rounded_up(value: f64) -> String {
     // A decade of ten thousandths and less is beyond what any key takes.
-    let digit = 10_f64.powi((value.max(1e-4).log10().floor() as i32) - 1);
-    let decimals = (-digit.log10().round()).max(0.0) as usize;
+    let digit = powi(10.0, log10(value.max(1e-4)).floor() as i32 - 1);
+    let decimals = (-log10(digit).round()).max(0.0) as usize;
     // A hair more, so that what is printed is never the limit itself.
     format!("{:.decimals$}", ((value * 1.001) / digit).ceil() * digit)
 }

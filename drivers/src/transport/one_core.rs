@@ -48,7 +48,7 @@ impl OneCore {
         self.rounds += 1;
         match self.met {
             // The clock is read seldom: that costs more than counting.
-            Some(since) if self.rounds % 64 == 0 && since.elapsed() > STAY => {
+            Some(since) if self.rounds.is_multiple_of(64) && since.elapsed() > STAY => {
                 self.met = None;
                 self.rounds = 0;
                 sched_setaffinity(OWN, &allowed).ok()?;

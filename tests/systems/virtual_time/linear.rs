@@ -1,6 +1,7 @@
 //! The linear stage: calibrate → zero → compensate → verify.
 
 use compensator::iso230::Figures;
+use tests::Edit;
 use tests::Bench;
 use truestage::cycle::{CalibrateOptions, Corrected, VerifyOptions};
 use truestage::{Failure, text};
@@ -62,11 +63,8 @@ fn twenty_stages_are_brought_within_two_micrometres_between_the_calibrated_posit
 /// is the encoder's, not the target's.
 #[test]
 fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
-    let calibrated_to_30 = |text: String| {
-        let changed = text.replacen("end_mm = 60.0\nstep_mm", "end_mm = 30.0\nstep_mm", 1);
-        assert_ne!(changed, text);
-        changed
-    };
+    let calibrated_to_30 =
+        |text: String| text.edit_first("end_mm = 60.0\nstep_mm", "end_mm = 30.0\nstep_mm");
     let mut bench = Bench::with(3, calibrated_to_30, |text| text);
     let store = bench.store.clone();
     let go = |machine: &mut truestage::Machine, mm: f64| {

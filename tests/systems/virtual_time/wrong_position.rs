@@ -138,6 +138,8 @@ struct Count {
     stages: u32,
     /// Good tables that were refused.
     refused: Vec<String>,
+    /// Stages that another guard stopped before there was a table: it has rates of its own.
+    stopped: Vec<String>,
     /// What each good table says would be noticed.
     noticed: Vec<Metres>,
     /// Wrong positions that were refused, of each error in half wavelengths.
@@ -163,7 +165,10 @@ impl Count {
         self.stages += 1;
         let mut bench = bench(seed, drawn);
         match calibrated(&mut bench) {
-            Err(failure) => self.refused.push(format!("seed {seed}: {failure}")),
+            Err(failure @ Failure::StandsOff { .. }) => {
+                self.refused.push(format!("seed {seed}: {failure}"));
+            }
+            Err(failure) => self.stopped.push(format!("seed {seed}: {failure}")),
             Ok(table) => self.spoil(&bench, &table, seed),
         }
     }
@@ -186,11 +191,12 @@ impl Count {
 
     fn tell(&mut self, title: &str) {
         println!(
-            "{title}: {} stages, {} refused",
+            "{title}: {} stages, {} refused, {} stopped by another guard",
             self.stages,
-            self.refused.len()
+            self.refused.len(),
+            self.stopped.len()
         );
-        self.refused.iter().for_each(|it| println!("  {it}"));
+        self.refused.iter().chain(&self.stopped).for_each(|it| println!("  {it}"));
         self.noticed.sort_by(|a, b| a.value().total_cmp(&b.value()));
         let at = |share: f64| {
             let place = (self.noticed.len() as f64 * share) as usize;
@@ -220,6 +226,7 @@ fn a_good_stage_is_not_refused_for_its_own_curve() {
     let mut count = Count::over([26, 35, 61].into_iter().chain(90_001..=90_030), false);
     count.tell("shipped stage");
     assert_eq!(count.refused, Vec::<String>::new());
+    assert_eq!(count.stopped, Vec::<String>::new());
 }
 
 #[test]
@@ -227,6 +234,7 @@ fn a_good_stage_of_any_size_noise_travel_and_step_is_not_refused() {
     let mut count = Count::over(70_001..=70_040, true);
     count.tell("drawn stages");
     assert_eq!(count.refused, Vec::<String>::new());
+    assert!(2 * count.stopped.len() <= count.stages as usize);
     assert_eq!(count.certain.0, count.certain.1);
 }
 
