@@ -1,8 +1,8 @@
 //! Which key of the configuration would let a refused table pass, and whether that is wise.
 
 use compensator::error_table::{CompensationError, StandOff};
-use units::portable::{log10, powi};
 use units::Metres;
+use units::portable::{log10, powi};
 
 /// What to do about a position that stands off its neighbours.
 pub(super) fn of_stand_off(axis: &str, refused: &StandOff) -> String {

@@ -1,8 +1,8 @@
 //! The linear stage: calibrate → zero → compensate → verify.
 
 use compensator::iso230::Figures;
-use tests::Edit;
 use tests::Bench;
+use tests::Edit;
 use truestage::cycle::{CalibrateOptions, Corrected, VerifyOptions};
 use truestage::{Failure, text};
 use units::{Metres, Time};

@@ -196,7 +196,10 @@ impl Count {
             self.refused.len(),
             self.stopped.len()
         );
-        self.refused.iter().chain(&self.stopped).for_each(|it| println!("  {it}"));
+        self.refused
+            .iter()
+            .chain(&self.stopped)
+            .for_each(|it| println!("  {it}"));
         self.noticed.sort_by(|a, b| a.value().total_cmp(&b.value()));
         let at = |share: f64| {
             let place = (self.noticed.len() as f64 * share) as usize;
