@@ -5,7 +5,7 @@
 //! both over a range and prints them.
 
 use compensator::error_table::{ErrorTable, Node};
-use tests::{Bench, random};
+use tests::{Bench, Edit, random};
 use truestage::assemble;
 use truestage::cycle::CalibrateOptions;
 use truestage::{Failure, Store};
@@ -90,7 +90,7 @@ impl Drawn {
 fn set(text: &str, from: &str, key: &str, value: impl std::fmt::Display) -> String {
     let line = format!("\n{from}");
     assert_eq!(text.matches(&line).count(), 1, "{from}");
-    text.replace(&line, &format!("\n{key} = {value}"))
+    text.edit(&line, &format!("\n{key} = {value}"))
 }
 
 /// The shipped stage, or a drawn one.
