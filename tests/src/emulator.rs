@@ -84,8 +84,15 @@ impl Setup {
     /// In real time on live buses, whatever they bear: the machine has no more patience with
     /// the computer than one of metal has.
     #[must_use]
-    pub const fn in_real_time(mut self) -> Self {
-        self.speed = Some(1.0);
+    pub const fn in_real_time(self) -> Self {
+        self.by_the_wall(1.0)
+    }
+
+    /// By the wall's clock on live buses, so many times as fast; the machine is as patient as one
+    /// that lives faster must be.
+    #[must_use]
+    pub const fn by_the_wall(mut self, speed: f64) -> Self {
+        self.speed = Some(speed);
         self
     }
 
