@@ -22,7 +22,7 @@ use units::{Metres, Time};
 use crate::assemble;
 use crate::bus_watch::BusWatch;
 use crate::camera;
-use crate::config::{AxisConfig, Loaded, MachineConfig};
+use crate::config::{AxisConfig, ConfigHash, Loaded, MachineConfig};
 use crate::cycle::platform::PlatformState;
 use crate::cycle::rotary::TableInUse;
 use crate::cycle::{Datum, RunPlan};
@@ -78,7 +78,7 @@ pub(crate) enum Supervision {
 /// A machine that is connected.
 pub struct Machine {
     pub(crate) config: MachineConfig,
-    pub(crate) config_hash: String,
+    pub(crate) config_hash: ConfigHash,
     pub(crate) patience: Patience,
     pub(crate) transport: Box<dyn Transport>,
     pub(crate) outbox: Outbox,
@@ -177,8 +177,8 @@ impl Machine {
         &self.config
     }
 
-    /// BLAKE3 of what a calibration depends on.
-    pub fn config_hash(&self) -> &str {
+    /// Of what a calibration depends on.
+    pub const fn config_hash(&self) -> &ConfigHash {
         &self.config_hash
     }
 

@@ -282,10 +282,11 @@ fn records_are_sound(bench: &Bench) {
     let store = &bench.store;
     if let Some(id) = store.active("x").expect("the pointer is whole").current {
         let record = store.load(&id).expect("the active calibration is whole");
-        match record
-            .head
-            .belongs_to(&id, &bench.machine.this_machine("x"))
-        {
+        match record.head.belongs_to(
+            &id,
+            &bench.machine.this_machine("x"),
+            bench.machine.config_hash(),
+        ) {
             // A drive that is gone has told nobody who it is.
             Ok(())
             | Err(StoreError::Foreign {

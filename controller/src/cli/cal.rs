@@ -246,10 +246,10 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let CalibrationRecord { head, .. } = record;
     let here = RecordHead {
         stage_serial: section.stage_serial.clone(),
-        config_hash: loaded.hash.clone(),
+        config_hash: loaded.hash.as_str().to_owned(),
         ..head.clone()
     };
-    head.belongs_to(&id, &here)?;
+    head.belongs_to(&id, &here, &loaded.hash)?;
     known_axis(&loaded, &head.axis)?;
     store.activate(&head.axis, &id)?;
     let text = format!("axis {}: {} is in use", head.axis, short(&id));

@@ -227,7 +227,7 @@ fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> R
         schema_version: SCHEMA_VERSION,
         machine: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
-        config_hash: loaded.hash.clone(),
+        config_hash: loaded.hash.as_str().to_owned(),
         axis: axis.to_owned(),
         drive: IdentityRecord::from(drive),
         resolution_m: None,

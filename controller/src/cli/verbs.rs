@@ -30,13 +30,13 @@ pub(super) fn check(path: &Path, output: Output) -> Ended {
         loaded.config.analog.len(),
         loaded.config.instrument.len(),
         loaded.config.camera.len(),
-        &loaded.hash[..12],
+        &loaded.hash.as_str()[..12],
     );
     let notes = text::table_notes(&loaded.config);
     let text = notes.iter().fold(text, |text, note| text + "\n" + note);
     output.result(
         &text,
-        &json!({"ok": true, "machine": machine.name, "hash": loaded.hash, "notes": notes}),
+        &json!({"ok": true, "machine": machine.name, "hash": loaded.hash.as_str(), "notes": notes}),
     )
 }
 

@@ -248,22 +248,23 @@ fn save(
 
 fn same_machine(path: &Path, journal: &ReadJournal, loaded: &Loaded) -> Result<(), Failure> {
     let (header, section) = (&journal.header, &loaded.config.machine);
-    let comparisons = [
-        ("stage", &header.stage_serial, &section.stage_serial),
-        ("configuration hash", &header.config_hash, &loaded.hash),
-    ];
-    for (what, expected, seen) in comparisons {
-        if expected != seen {
-            return Err(Failure::Usage {
-                what: format!(
-                    "{}: its {what} is `{expected}`, that of the machine `{seen}`",
-                    path.display()
-                ),
-                help: "give the configuration that the run was made with".into(),
-            });
-        }
-    }
-    Ok(())
+    let stage = (header.stage_serial == section.stage_serial)
+        .then_some(())
+        .ok_or(("stage", &*header.stage_serial, &*section.stage_serial));
+    let hash = loaded.hash.is(&header.config_hash).then_some(()).ok_or((
+        "configuration hash",
+        &*header.config_hash,
+        loaded.hash.as_str(),
+    ));
+    stage
+        .and(hash)
+        .map_err(|(what, expected, seen)| Failure::Usage {
+            what: format!(
+                "{}: its {what} is `{expected}`, that of the machine `{seen}`",
+                path.display()
+            ),
+            help: "give the configuration that the run was made with".into(),
+        })
 }
 
 fn stored_text(config: &Path, (geometry, references): &(String, Option<String>)) -> String {
@@ -295,7 +296,7 @@ mod tests {
     use super::*;
     use crate::cli::stored_tests::lines_of;
 
-    const JOURNAL: &str = include_str!("stored_tests/files/volumetric_calibrate.jsonl");
+    const JOURNAL: &str = include_str!("../../golden/volumetric_calibrate.jsonl");
     const MACHINE: &str = include_str!("../../../configs/machines/volumetric.toml");
     const HALF_WAVELENGTH_M: f64 = 0.316_4e-6;
     /// The first diagonal, counted from 0.
@@ -328,7 +329,7 @@ mod tests {
         fn journal(&self, name: &str, change: impl Fn(usize, &mut Value)) -> PathBuf {
             let hash = config::load(&self.config).unwrap().hash;
             let mut lines = lines_of(JOURNAL);
-            lines[0]["config_hash"] = hash.into();
+            lines[0]["config_hash"] = hash.as_str().into();
             let own = |it: &&mut Value| it["entry"] == "line_reading" && it["line"] == DIAGONAL;
             let diagonal = lines.iter_mut().filter(own).enumerate();
             diagonal.for_each(|(at, line)| change(at, line));

@@ -4,10 +4,10 @@ use core::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
+use super::dependence::ConfigHash;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
 use super::validate::{Finding, validate};
-use super::volumetric::{BeamDetectorConfig, VolumetricConfig};
 use crate::patience::Patience;
 
 /// A configuration that was read and judged sound.
@@ -15,8 +15,8 @@ use crate::patience::Patience;
 pub struct Loaded {
     /// What the file says.
     pub config: MachineConfig,
-    /// BLAKE3 of everything in it that a calibration depends on, in hexadecimal.
-    pub hash: String,
+    /// Of everything in it that a calibration depends on.
+    pub hash: ConfigHash,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
     /// own pauses do not shrink, so its time-outs must bear them.
@@ -52,7 +52,7 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     let findings = validate(&config);
     if findings.is_empty() {
         return Ok(Loaded {
-            hash: calibration_hash(&config),
+            hash: ConfigHash::of(&config),
             config,
             patience: Patience::NONE,
         });
@@ -63,99 +63,6 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
         .collect();
     findings.sort_by_key(|it| (it.line, it.column));
     Err(ConfigError::Invalid { findings })
-}
-
-/// What a calibration depends on: a change of any of it makes the calibration foreign.
-fn calibration_hash(config: &MachineConfig) -> String {
-    let axes: Vec<_> = config
-        .axis
-        .iter()
-        .map(|(name, axis)| {
-            let zero = axis.zero.as_ref();
-            let zero = zero.map(|zero| (&zero.analog, zero.level_below_peak_v));
-            let (device, resolution_nm) = (axis.device, axis.resolution_nm);
-            match (axis.can(), axis.serial()) {
-                (Some(can), _) => {
-                    let (node_id, identity) = (can.node_id, can.identity);
-                    format!("{name} {device:?} {node_id} {resolution_nm} {identity:?} {zero:?}")
-                }
-                (None, serial) => {
-                    let address = serial.map(|it| it.address);
-                    let amplifier = axis.amplifier.as_ref();
-                    format!("{name} {device:?} {address:?} {resolution_nm} {amplifier:?} {zero:?}")
-                }
-            }
-        })
-        .collect();
-    let mut text = format!("1 {} {}", config.machine.stage_serial, axes.join("\n"));
-    for (name, rotary) in &config.rotary {
-        let zero = rotary.zero.as_ref();
-        text.push_str(&format!(
-            "\nrotary {name} {:?} {} {} {} {:?} {:?}",
-            rotary.device,
-            rotary.node_id,
-            rotary.counts_per_turn,
-            rotary.reverse,
-            rotary.identity,
-            zero.map(|zero| (zero.index_direction, zero.index_deg)),
-        ));
-    }
-    for it in config.platform.iter().flat_map(|it| &it.actuator) {
-        // Points and directions turn what the camera sees into strokes; the index is their zero.
-        let place = (it.point_mm, it.direction, it.lead_mm, it.index_mm);
-        text += &format!("\n{} {place:?}", it.axis);
-    }
-    if let Some(volumetric) = &config.volumetric {
-        text += &volumetric_dependence(config, volumetric);
-    }
-    blake3::hash(text.as_bytes()).to_hex().to_string()
-}
-
-/// Tables and references of three axes hold for the same axes in the same order, the same zero, and
-/// detectors that are wired and read in the same way.
-fn volumetric_dependence(config: &MachineConfig, volumetric: &VolumetricConfig) -> String {
-    let detector = |it: &BeamDetectorConfig| {
-        let wired = (module(config, &it.analog), &it.channels, it.layout);
-        let read = (it.dark_mv, it.gain, it.um_per_one, &it.curve);
-        format!("{wired:?} {read:?}")
-    };
-    let mut text = format!(
-        "\nvolumetric {:?} {} {:?}",
-        volumetric.axes, volumetric.chain, volumetric.zero.index_mm
-    );
-    for beam in volumetric.beam.each() {
-        text += &match beam {
-            Some(it) => {
-                let drift = (it.drift, it.source_mm, it.end_mm, it.translation_share);
-                let end = it.end.as_ref().map(detector);
-                // Where it sits is in the tables that it told, and taken off what it says later.
-                let (slider, place_mm) = (detector(&it.slider), it.slider.place_mm);
-                format!("\nbeam {drift:?} {slider} {place_mm:?} {end:?}")
-            }
-            None => "\nno beam".into(),
-        };
-    }
-    if let Some(it) = &volumetric.roll {
-        let wired = (
-            it.axis,
-            module(config, &it.analog),
-            it.channels,
-            it.mm_per_v,
-        );
-        let optics = (it.height_mm, it.base_mm, it.inclination_deg);
-        text += &format!("\nroll {wired:?} {optics:?}");
-    }
-    for it in &volumetric.temperature {
-        let wired = (module(config, &it.analog), it.channel);
-        text += &format!("\ntemperature {wired:?}");
-    }
-    text
-}
-
-/// Which module a name stands for: where it is, and who it must be.
-fn module<'a>(config: &'a MachineConfig, name: &str) -> impl core::fmt::Debug + use<'a> {
-    let analog = config.analog.get(name);
-    analog.map(|it| (&it.bus, it.node_id, &it.identity))
 }
 
 fn structural(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
@@ -521,16 +428,6 @@ mod tests {
     }
 
     #[test]
-    fn a_calibration_depends_on_how_a_table_is_counted_and_on_nothing_of_its_speed() {
-        let hash = |text: &str| parse(text, "rotary.toml").unwrap().hash;
-        let usual = hash(ROTARY);
-        let faster = ROTARY.edit("speed_deg_per_s = 30.0", "speed_deg_per_s = 40.0");
-        assert_eq!(usual, hash(&faster));
-        let mirrored = ROTARY.edit("node_id = 1\n", "node_id = 1\nreverse = true\n");
-        assert_ne!(usual, hash(&mirrored));
-    }
-
-    #[test]
     fn a_calibration_run_without_limits_for_its_result_is_refused() {
         let end = LINEAR.find("[axis.x.compensation]").unwrap();
         let found = &findings(&LINEAR[..end])[0];
@@ -586,16 +483,6 @@ mod tests {
     }
 
     #[test]
-    fn the_hash_of_a_platform_follows_where_its_screws_push() {
-        const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
-        let hash = |text: &str| parse(text, "m").unwrap().hash;
-        let moved = UVW.edit_first("point_mm = [-80.0, 80.0]", "point_mm = [-80.0, 81.0]");
-        let slower = UVW.edit_first("settle_ms = 30", "settle_ms = 40");
-        assert_ne!(hash(UVW), hash(&moved));
-        assert_eq!(hash(UVW), hash(&slower));
-    }
-
-    #[test]
     fn a_platform_that_nothing_holds_or_reaches_is_refused_with_the_reason() {
         const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
         let refused = |from: &str, to: &str| {
@@ -619,14 +506,5 @@ mod tests {
         let text = LINEAR.edit_first("device = \"cia401\"", keys);
         let error = parse(&text, "m").unwrap_err().to_string();
         assert!(error.contains("a cia401 module has no such key"), "{error}");
-    }
-
-    #[test]
-    fn the_hash_follows_what_a_calibration_depends_on() {
-        let hash = |text: &str| parse(text, "m").unwrap().hash;
-        let same = LINEAR.edit("runs = 3", "runs = 4");
-        let other = LINEAR.edit("resolution_nm = 10.0", "resolution_nm = 20.0");
-        assert_eq!(hash(LINEAR), hash(&same));
-        assert_ne!(hash(LINEAR), hash(&other));
     }
 }

@@ -4,6 +4,7 @@
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
 mod camera;
+mod dependence;
 mod diagnostic;
 mod load;
 mod model;
@@ -13,6 +14,7 @@ mod validate;
 mod volumetric;
 
 pub use camera::{CameraConfig, CameraDevice};
+pub use dependence::ConfigHash;
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};
 pub use model::{

@@ -10,7 +10,7 @@ use units::Metres;
 use super::measure::{EarlierRuns, MeasureOptions, Measured, RunPlan};
 use super::utc_now;
 use crate::assemble;
-use crate::config::CalibrateConfig;
+use crate::config::{CalibrateConfig, ConfigHash};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::observer::Stage;
@@ -71,7 +71,8 @@ impl Machine {
         // Before the header, which says who measures.
         self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", axis, &plan, None);
-        let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
+        let (mut journal, earlier) =
+            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
         let measuring = MeasureOptions {
             stage: Stage::Calibrate,
             compensated: false,
@@ -107,7 +108,9 @@ impl Machine {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record.head.belongs_to(&id, &self.this_machine(axis))?;
+        record
+            .head
+            .belongs_to(&id, &self.this_machine(axis), &self.config_hash)?;
         let compensation = self.prepare(axis, record.linear(&id)?.table(&id)?)?;
         self.set_compensation(axis, Some(compensation))?;
         Ok(Some(id))
@@ -174,7 +177,7 @@ impl Machine {
             schema_version: SCHEMA_VERSION,
             machine: self.config.machine.name.clone(),
             stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
             axis: axis.to_owned(),
             drive: self.drive_record(axis),
             resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
@@ -222,7 +225,7 @@ impl Machine {
             verb: verb.to_owned(),
             machine: self.config.machine.name.clone(),
             stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
             axis: axis.to_owned(),
             drive: self.drive_record(axis),
             instrument: self.instrument_record(&plan.instrument),
@@ -253,6 +256,7 @@ pub(super) fn open_journal(
     store: &Store,
     header: &JournalHeader,
     resume: Option<&PathBuf>,
+    hash: &ConfigHash,
 ) -> Result<(Journal, EarlierRuns), Failure> {
     match resume {
         None => Ok((
@@ -260,7 +264,7 @@ pub(super) fn open_journal(
             EarlierRuns::default(),
         )),
         Some(path) => {
-            let (journal, read) = Journal::resume(path, header)?;
+            let (journal, read) = Journal::resume(path, header, hash)?;
             let earlier = EarlierRuns {
                 points: read.points,
                 closures: read.closures,

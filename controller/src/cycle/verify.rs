@@ -81,7 +81,8 @@ impl Machine {
         // Before the header, which says who measures.
         self.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
-        let (mut journal, earlier) = open_journal(store, &header, options.resume.as_ref())?;
+        let (mut journal, earlier) =
+            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
         let measuring = MeasureOptions {
             stage: Stage::Verify,
             compensated: options.compensated,

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::difference::{Difference, first_difference};
 use super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
 use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
@@ -17,6 +18,7 @@ use super::volume::{
     VolumeReferencesEntry,
 };
 use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound};
+use crate::config::ConfigHash;
 
 /// What a run is: written first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -189,13 +191,18 @@ impl Journal {
         Err(io_error("create a new journal in", folder)(taken))
     }
 
-    /// Continues the journal at `path` after its last whole line.
+    /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
+    /// that it is continued with.
     ///
     /// # Errors
     /// When it cannot be read or does not describe the same run as `header`.
-    pub fn resume(path: &Path, header: &JournalHeader) -> Result<(Self, ReadJournal), StoreError> {
+    pub fn resume(
+        path: &Path,
+        header: &JournalHeader,
+        hash: &ConfigHash,
+    ) -> Result<(Self, ReadJournal), StoreError> {
         let mut read = read_journal(path)?;
-        same_run(path, &read.header, header)?;
+        same_run(path, &read.header, header, hash)?;
         if read.complete {
             return Err(StoreError::AlreadyComplete {
                 path: path.to_owned(),
@@ -310,53 +317,50 @@ impl ReadJournal {
     }
 }
 
-fn same_run(path: &Path, old: &JournalHeader, new: &JournalHeader) -> Result<(), StoreError> {
+fn same_run(
+    path: &Path,
+    old: &JournalHeader,
+    new: &JournalHeader,
+    hash: &ConfigHash,
+) -> Result<(), StoreError> {
+    // An earlier program wrote the same configuration's hash in another way.
+    let recorded = if hash.is(&old.config_hash) {
+        &new.config_hash
+    } else {
+        &old.config_hash
+    };
+    let text = |a: &String, b: &String| first_difference(a, b);
     let comparisons = [
-        ("verb", old.verb.clone(), new.verb.clone()),
-        (
-            "stage serial",
-            old.stage_serial.clone(),
-            new.stage_serial.clone(),
-        ),
-        (
-            "configuration hash",
-            old.config_hash.clone(),
-            new.config_hash.clone(),
-        ),
-        ("axis", old.axis.clone(), new.axis.clone()),
-        (
-            "drive",
-            format!("{:?}", old.drive),
-            format!("{:?}", new.drive),
-        ),
+        ("verb", text(&old.verb, &new.verb)),
+        ("stage serial", text(&old.stage_serial, &new.stage_serial)),
+        ("configuration hash", text(recorded, &new.config_hash)),
+        ("axis", text(&old.axis, &new.axis)),
+        ("drive", first_difference(&old.drive, &new.drive)),
         (
             "calibration",
-            format!("{:?}", old.calibration),
-            format!("{:?}", new.calibration),
+            first_difference(&old.calibration, &new.calibration),
         ),
         (
             "instrument and its corrections",
-            format!("{:?}", old.instrument),
-            format!("{:?}", new.instrument),
+            first_difference(&old.instrument, &new.instrument),
         ),
-        ("number of runs", old.runs.to_string(), new.runs.to_string()),
-        (
-            "targets",
-            format!("{:?}", old.targets_m),
-            format!("{:?}", new.targets_m),
-        ),
+        ("number of runs", first_difference(&old.runs, &new.runs)),
+        ("targets", first_difference(&old.targets_m, &new.targets_m)),
     ];
-    for (what, expected, seen) in comparisons {
-        if expected != seen {
-            return Err(StoreError::NotResumable {
-                path: path.to_owned(),
-                what,
-                expected,
-                seen,
-            });
-        }
+    let different = comparisons
+        .into_iter()
+        .find_map(|(what, it)| Some((what, it?)));
+    different.map_or(Ok(()), |(what, it)| Err(not_resumable(path, what, it)))
+}
+
+/// The error for a journal whose run was another one than would be continued, with where they differ.
+pub(crate) fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
+    StoreError::NotResumable {
+        path: path.to_owned(),
+        what: it.in_what(what),
+        expected: it.expected,
+        seen: it.seen,
     }
-    Ok(())
 }
 
 /// Reads a journal up to its last whole line.
@@ -406,6 +410,13 @@ fn parse_line(line: &[u8]) -> Result<Entry, String> {
         return Err(format!("checksum {seen:08x}, the line says {expected:08x}"));
     }
     serde_json::from_str(json).map_err(|error| error.to_string())
+}
+
+/// Of a whole journal.
+#[cfg(test)]
+pub(super) fn entries(text: &str) -> impl Iterator<Item = Entry> {
+    let lines = text.as_bytes().split_inclusive(|byte| *byte == b'\n');
+    lines.map(|line| parse_line(line).expect("a whole line"))
 }
 
 fn take(
@@ -486,6 +497,10 @@ mod tests {
     use super::*;
     use crate::Edit;
 
+    fn hash() -> ConfigHash {
+        ConfigHash::only("h")
+    }
+
     fn header() -> JournalHeader {
         JournalHeader {
             schema_version: SCHEMA_VERSION,
@@ -546,7 +561,7 @@ mod tests {
         let mut header = header();
         header.targets_m = (0..=20).map(|at| f64::from(at * 3) * 1e-3).collect();
         let journal = Journal::create(folder.path(), &header).unwrap();
-        Journal::resume(journal.path(), &header).unwrap();
+        Journal::resume(journal.path(), &header, &hash()).unwrap();
     }
 
     fn write_points(journal: &mut Journal, run: u32) {
@@ -574,7 +589,7 @@ mod tests {
         let mut journal = Journal::create(folder.path(), &header()).unwrap();
         write_run(&mut journal, 1);
         write_points(&mut journal, 2);
-        let (_, read) = Journal::resume(journal.path(), &header()).unwrap();
+        let (_, read) = Journal::resume(journal.path(), &header(), &hash()).unwrap();
         assert!(read.points.iter().all(|point| point.run == 1));
         assert_eq!((read.points.len(), read.closures.len()), (4, 1));
     }
@@ -588,7 +603,7 @@ mod tests {
         let mut bytes = fs::read(&path).unwrap();
         bytes.extend_from_slice(b"1234abcd {\"entry\":\"poi");
         fs::write(&path, &bytes).unwrap();
-        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        let (mut journal, read) = Journal::resume(&path, &header(), &hash()).unwrap();
         assert!(read.torn);
         assert_eq!(read.points.len(), 4);
         write_run(&mut journal, 2);
@@ -607,10 +622,10 @@ mod tests {
         write_run(&mut journal, 1);
         journal.write(&point(2)).unwrap();
         let path = journal.path().to_owned();
-        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        let (mut journal, read) = Journal::resume(&path, &header(), &hash()).unwrap();
         assert_eq!(read.points.len(), 4);
         write_run(&mut journal, 2);
-        let (_, read) = Journal::resume(&path, &header()).unwrap();
+        let (_, read) = Journal::resume(&path, &header(), &hash()).unwrap();
         let runs: Vec<_> = read.points.iter().map(|point| point.run).collect();
         assert_eq!(runs, [1, 1, 1, 1, 2, 2, 2, 2]);
         assert_eq!(read_journal(&path).unwrap().points, read.points);
@@ -656,7 +671,7 @@ mod tests {
         journal.write(&Entry::Misplaced { offset: 73.0 }).unwrap();
         journal.write(&sweep(162.0)).unwrap();
         let path = journal.path().to_owned();
-        let (mut journal, read) = Journal::resume(&path, &header()).unwrap();
+        let (mut journal, read) = Journal::resume(&path, &header(), &hash()).unwrap();
         assert_eq!((read.sweeps.len(), read.placements.len()), (2, 1));
         journal.write(&sweep(73.0)).unwrap();
         journal.write(&placed(73.0)).unwrap();
@@ -673,7 +688,7 @@ mod tests {
         let path = journal.path().to_owned();
         let failure = || read_journal(&path).unwrap().failure;
         assert_eq!(failure().as_deref(), Some("the laser beam is blocked"));
-        Journal::resume(&path, &header()).unwrap();
+        Journal::resume(&path, &header(), &hash()).unwrap();
         assert_eq!(failure(), None);
     }
 
@@ -683,7 +698,7 @@ mod tests {
         let mut journal = Journal::create(folder.path(), &header()).unwrap();
         write_run(&mut journal, 1);
         journal.write(&Entry::Complete).unwrap();
-        let error = Journal::resume(journal.path(), &header()).unwrap_err();
+        let error = Journal::resume(journal.path(), &header(), &hash()).unwrap_err();
         assert!(error.to_string().contains("complete"), "{error}");
     }
 
@@ -711,11 +726,11 @@ mod tests {
         let journal = Journal::create(folder.path(), &header()).unwrap();
         let mut other = header();
         other.stage_serial = "B".into();
-        let error = Journal::resume(journal.path(), &other).unwrap_err();
+        let error = Journal::resume(journal.path(), &other, &hash()).unwrap_err();
         assert!(error.to_string().contains("stage serial"), "{error}");
         let mut other = header();
         other.instrument.air_corrected = true;
-        let error = Journal::resume(journal.path(), &other).unwrap_err();
+        let error = Journal::resume(journal.path(), &other, &hash()).unwrap_err();
         assert!(error.to_string().contains("instrument"), "{error}");
     }
 }

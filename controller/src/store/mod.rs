@@ -12,6 +12,9 @@
 
 mod atomic;
 mod calibration;
+mod difference;
+#[cfg(test)]
+mod golden_tests;
 mod journal;
 mod lease;
 mod plate;
@@ -23,6 +26,8 @@ mod volume;
 use std::path::{Path, PathBuf};
 
 pub use calibration::{ActivePointer, Store, short};
+pub(crate) use difference::first_difference;
+pub(crate) use journal::not_resumable;
 pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
@@ -219,7 +224,7 @@ pub enum StoreError {
         /// Which journal.
         path: PathBuf,
         /// What differs.
-        what: &'static str,
+        what: String,
         /// What the journal says.
         expected: String,
         /// What this run would be.

@@ -1,7 +1,7 @@
 //! Calibrations and journals that somebody edited and gave right checksums: whatever stands in them,
 //! they are shown or refused.
 //!
-//! `files` are those of demonstrations of each kind of machine; the many lines of three axes are thinned
+//! `controller/golden` has those of demonstrations of each kind of machine; the many lines of three axes are thinned
 //! so that each case is evaluated in milliseconds. A case is a seed: `MUTATIONS=20000 cargo test -p truestage --bin truestage mutated --
 //! --include-ignored` tries so many of each kind, and what fails names its seed.
 
@@ -40,7 +40,7 @@ struct Machine {
 
 macro_rules! file {
     ($name:literal) => {
-        include_str!(concat!("files/", $name))
+        include_str!(concat!("../../../golden/", $name))
     };
 }
 

@@ -379,7 +379,6 @@ fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
 
 #[cfg(test)]
 mod tests {
-    use crate::Edit;
     use crate::config::parse;
     use crate::config::validate::told;
 
@@ -565,25 +564,5 @@ mod tests {
             .find("[volumetric.compensation]")
             .expect("it comes next");
         check(&VOLUMETRIC[begin..end], "", "", "no section `feed`");
-    }
-
-    #[test]
-    fn the_hash_follows_how_detectors_are_wired_and_read() {
-        let hash = |from: &str, to: &str| {
-            parse(&VOLUMETRIC.edit_first(from, to), "m")
-                .expect("it is sound")
-                .hash
-        };
-        let usual = hash("", "");
-        assert_eq!(usual, hash("age_max_ms = 100.0", "age_max_ms = 90.0"));
-        assert_eq!(usual, hash("blend_s = 2.0", "blend_s = 3.0"));
-        assert_ne!(usual, hash("[-626.66, -626.66]", "[-626.66, 626.66]"));
-        assert_ne!(usual, hash("source_mm = -100.0", "source_mm = -90.0"));
-        assert_ne!(usual, hash("node_id = 11", "node_id = 15"));
-        assert_ne!(usual, hash("\"FXYZ\"", "\"XFYZ\""));
-        assert_ne!(
-            usual,
-            hash("inclination_deg = 45.0", "inclination_deg = 30.0")
-        );
     }
 }

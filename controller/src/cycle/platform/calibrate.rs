@@ -302,7 +302,9 @@ impl Machine {
             let id = store.active(&axis)?.current;
             if let Some(id) = &id {
                 let record = store.load(id)?;
-                record.head.belongs_to(id, &self.this_machine(&axis))?;
+                record
+                    .head
+                    .belongs_to(id, &self.this_machine(&axis), &self.config_hash)?;
                 let model = record.screw(id)?.model();
                 let compensation = self.prepare_screw(at, model)?;
                 let state = &mut self.platform_state_mut()?.screws[at];

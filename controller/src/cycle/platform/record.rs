@@ -42,7 +42,7 @@ impl Machine {
             verb: verb.to_owned(),
             machine: self.config.machine.name.clone(),
             stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
             axis: "platform".into(),
             drive: IdentityRecord::default(),
             instrument: self.camera_record()?,

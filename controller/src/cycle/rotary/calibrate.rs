@@ -10,12 +10,13 @@ use super::failure::RotaryFailure;
 use super::moves::TableInUse;
 use super::operator::Operator;
 use super::placement::{Placed, PlateRun};
+use crate::config::ConfigHash;
 use crate::cycle::{CalibrateOptions, note_failure, utc_now};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::store::{
     CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, PlatePlanEntry,
-    ReadJournal, RecordHead, RotaryContent, SCHEMA_VERSION, Store, StoreError,
+    ReadJournal, RecordHead, RotaryContent, SCHEMA_VERSION, Store, first_difference, not_resumable,
 };
 
 /// So many placements are needed before one can be told to be misplaced by the others.
@@ -68,7 +69,13 @@ impl Machine {
             .collect();
         let header = self.rotary_header("calibrate", axis, &run, None);
         let plan = run.plan(offsets.clone());
-        let (mut journal, kept) = open(store, &header, &plan, options.resume.as_ref())?;
+        let (mut journal, kept) = open(
+            store,
+            &header,
+            &plan,
+            options.resume.as_ref(),
+            &self.config_hash,
+        )?;
         let limit = config.amplification_limit;
         let evaluated = self
             .read_placements(axis, &run, &offsets, kept, &mut journal, operator)
@@ -216,6 +223,7 @@ fn open(
     header: &JournalHeader,
     plan: &PlatePlanEntry,
     resume: Option<&PathBuf>,
+    hash: &ConfigHash,
 ) -> Result<(Journal, Vec<Placed>), Failure> {
     let Some(path) = resume else {
         let mut journal = Journal::create(&store.runs(), header)?;
@@ -223,19 +231,14 @@ fn open(
         journal.flush_to_disk()?;
         return Ok((journal, Vec::new()));
     };
-    let (mut journal, read) = Journal::resume(path, header)?;
+    let (mut journal, read) = Journal::resume(path, header, hash)?;
     match &read.plate_plan {
         // Killed before its second line: nothing was read yet.
         None => journal.write(&Entry::PlatePlan(plan.clone()))?,
-        Some(before) if before == plan => {}
         Some(before) => {
-            return Err(StoreError::NotResumable {
-                path: path.clone(),
-                what: "how the plate is read",
-                expected: format!("{before:?}"),
-                seen: format!("{plan:?}"),
+            if let Some(it) = first_difference(before, plan) {
+                return Err(not_resumable(path, "how the plate is read", it).into());
             }
-            .into());
         }
     }
     Ok((journal, placed_of(&read, plan.passes)))

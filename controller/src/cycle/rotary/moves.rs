@@ -108,7 +108,9 @@ impl Machine {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record.head.belongs_to(&id, &self.this_machine(axis))?;
+        record
+            .head
+            .belongs_to(&id, &self.this_machine(axis), &self.config_hash)?;
         let compensation = self.prepare_table(axis, record.rotary(&id)?, &id)?;
         let in_use = TableInUse::new(&id, &record, compensation)?;
         self.remember_table(axis).calibration = Some(in_use);

@@ -9,7 +9,7 @@ use compensator::volumetric::online::{BeamReference, Memories};
 
 use super::{VolumetricFailure, VolumetricState};
 use crate::assemble::beam_drift;
-use crate::config::VolumetricConfig;
+use crate::config::{ConfigHash, VolumetricConfig};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::store::{
@@ -47,6 +47,7 @@ pub struct VolumetricRecords {
 struct Reader<'a> {
     store: &'a Store,
     here: RecordHead,
+    hash: &'a ConfigHash,
 }
 
 impl Reader<'_> {
@@ -60,7 +61,7 @@ impl Reader<'_> {
             axis: pointer.to_owned(),
             ..self.here.clone()
         };
-        record.head.belongs_to(&id, &here)?;
+        record.head.belongs_to(&id, &here, self.hash)?;
         Ok(Some((id, record)))
     }
 }
@@ -88,7 +89,11 @@ impl Machine {
     ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
         let config = self.volumetric_config()?;
         let here = self.this_volume(GEOMETRY)?;
-        let reader = Reader { store, here };
+        let reader = Reader {
+            store,
+            here,
+            hash: &self.config_hash,
+        };
         let Some((id, record)) = reader.active(GEOMETRY)? else {
             return Ok(None);
         };

@@ -16,6 +16,7 @@ use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
 
 use super::{StoreError, short};
+use crate::config::ConfigHash;
 
 pub use agreement::AgreementRecord;
 pub use linear::{LinearContent, NodeRecord};
@@ -138,11 +139,12 @@ impl CalibrationRecord {
 }
 
 impl RecordHead {
-    /// Whether the calibration `id` with this head belongs to `here`.
+    /// Whether the calibration `id` with this head belongs to `here`, a machine whose configuration
+    /// has `hash`.
     ///
     /// # Errors
     /// Naming the first thing that differs.
-    pub fn belongs_to(&self, id: &str, here: &Self) -> Result<(), StoreError> {
+    pub fn belongs_to(&self, id: &str, here: &Self, hash: &ConfigHash) -> Result<(), StoreError> {
         // A table measured elsewhere may not know the drive's serial number (0 in 0x1018:04).
         let serial_known = self.drive.serial != 0;
         let drive = |head: &Self| {
@@ -163,11 +165,6 @@ impl RecordHead {
             ("the axis", self.axis.clone(), here.axis.clone()),
             ("the drive", drive(self), drive(here)),
             ("one encoder count", self.resolution(), here.resolution()),
-            (
-                "the configuration's hash",
-                self.config_hash.clone(),
-                here.config_hash.clone(),
-            ),
         ];
         for (what, expected, seen) in comparisons {
             if expected != seen {
@@ -178,6 +175,14 @@ impl RecordHead {
                     seen,
                 });
             }
+        }
+        if !hash.is(&self.config_hash) {
+            return Err(StoreError::Foreign {
+                id: short(id),
+                what: "the configuration's hash",
+                expected: self.config_hash.clone(),
+                seen: hash.as_str().to_owned(),
+            });
         }
         Ok(())
     }

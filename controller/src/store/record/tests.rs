@@ -1,9 +1,14 @@
 use super::*;
+use crate::config::ConfigHash;
 use crate::store::{SCHEMA_VERSION, Store, write_new_or_replace};
 
 /// Written by the first program, before there were other kinds, and named by its hash then.
 const EARLIER: &str = include_str!("earlier_linear.json");
 const EARLIER_ID: &str = "9e34c78936a61aa45d4971e6a4bf2e81a7d2b24d48795819cae1e3a5ae244e9d";
+
+fn hash() -> ConfigHash {
+    ConfigHash::only("h")
+}
 
 pub(in crate::store) fn record(serial: &str) -> CalibrationRecord {
     let node = |position_m| NodeRecord {
@@ -188,19 +193,28 @@ fn a_key_that_is_unknown_or_missing_in_head_or_content_is_refused() {
 fn a_calibration_of_another_stage_or_drive_is_foreign() {
     let mine = record("A").head;
     let mut other = record("B").head;
-    assert!(mine.belongs_to("id", &mine).is_ok());
-    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    assert!(mine.belongs_to("id", &mine, &hash()).is_ok());
+    let error = mine
+        .belongs_to("id", &other, &hash())
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("serial number") && error.contains("`A`"),
         "{error}"
     );
     other = record("A").head;
     other.drive.serial = 8;
-    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    let error = mine
+        .belongs_to("id", &other, &hash())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("the drive"), "{error}");
     other = record("A").head;
     other.resolution_m = Some(2e-8);
-    let error = mine.belongs_to("id", &other).unwrap_err().to_string();
+    let error = mine
+        .belongs_to("id", &other, &hash())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("encoder count"), "{error}");
 }
 
@@ -209,9 +223,9 @@ fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_do
     let machine = record("A").head;
     let mut elsewhere = record("A").head;
     elsewhere.drive.serial = 0;
-    assert!(elsewhere.belongs_to("id", &machine).is_ok());
+    assert!(elsewhere.belongs_to("id", &machine, &hash()).is_ok());
     elsewhere.drive.vendor = 2;
-    assert!(elsewhere.belongs_to("id", &machine).is_err());
+    assert!(elsewhere.belongs_to("id", &machine, &hash()).is_err());
 }
 
 /// Three lines with table errors 2, −1, −1″ and plate errors 1, 0, −1″, placed at 0 and 1.

@@ -129,7 +129,7 @@ impl Machine {
         let drives = self.volume_drives(&config);
         let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
         let header = self.volume_header("calibrate", None)?;
-        let (mut journal, read) = resume::open(store, &header, plan, resume)?;
+        let (mut journal, read) = resume::open(store, &header, plan, resume, &self.config_hash)?;
         let made = self
             .calibration_session(config, lines, read, &mut journal, operator)
             .and_then(|mut session| {

@@ -13,14 +13,14 @@ use compensator::volumetric::Axis;
 use units::{Metres, Radians};
 
 use crate::assemble::{beam_drift, volume_axis};
-use crate::config::{BeamConfig, VolumetricCalibrateConfig, VolumetricConfig};
+use crate::config::{BeamConfig, ConfigHash, VolumetricCalibrateConfig, VolumetricConfig};
 use crate::cycle::volumetric::reference::warmth_tolerance_k;
 use crate::cycle::volumetric::{References, VolumetricFailure};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::store::{
     AXES, Entry, Journal, JournalHeader, Store, StoreError, VolumePlanEntry, VolumeRead,
-    VolumeReferencesEntry,
+    VolumeReferencesEntry, first_difference, not_resumable,
 };
 
 /// A new journal, or one that is continued after its last whole line.
@@ -29,39 +29,45 @@ pub(super) fn open(
     header: &JournalHeader,
     plan: VolumePlanEntry,
     resume: Option<&Path>,
+    hash: &ConfigHash,
 ) -> Result<(Journal, VolumeRead), Failure> {
     let Some(path) = resume else {
         let mut journal = Journal::create(&store.runs(), header)?;
         let read = begin(&mut journal, plan)?;
         return Ok((journal, read));
     };
-    let (mut journal, read) = Journal::resume(path, header)?;
+    let (mut journal, read) = Journal::resume(path, header, hash)?;
     let read = match read.volume.plan {
         // Killed before its second line: nothing was read yet.
         None => begin(&mut journal, plan)?,
-        Some(ref before) if is_same(before, &plan) => read.volume,
-        Some(before) => {
-            let (what, expected, seen) = difference(&before, &plan);
-            return Err(StoreError::NotResumable {
-                path: path.to_owned(),
-                what,
-                expected,
-                seen,
-            }
-            .into());
+        Some(ref before) => {
+            same_plan(path, before, &plan)?;
+            read.volume
         }
     };
     Ok((journal, read))
 }
 
-/// A journal of an earlier program does not say how errors run between their nodes.
-fn is_same(before: &VolumePlanEntry, now: &VolumePlanEntry) -> bool {
-    let shape = before.shape.or(now.shape);
-    let before = VolumePlanEntry {
-        shape,
+fn same_plan(
+    path: &Path,
+    before: &VolumePlanEntry,
+    now: &VolumePlanEntry,
+) -> Result<(), StoreError> {
+    // A journal of an earlier program does not say how errors run between their nodes.
+    let before = &VolumePlanEntry {
+        shape: before.shape.or(now.shape),
         ..before.clone()
     };
-    before == *now
+    // By far the most frequent one, and not to be found in a list of lines.
+    let warm = |it: &VolumePlanEntry| it.lines.iter().filter(|it| it.warm).count();
+    if let Some(it) = first_difference(&warm(before), &warm(now)) {
+        let what = "number of lines read warm (--warm-up-min)";
+        return Err(not_resumable(path, what, it));
+    }
+    let different = first_difference(before, now);
+    different.map_or(Ok(()), |it| {
+        Err(not_resumable(path, "how errors are found", it))
+    })
 }
 
 fn begin(journal: &mut Journal, plan: VolumePlanEntry) -> Result<VolumeRead, StoreError> {
@@ -71,28 +77,6 @@ fn begin(journal: &mut Journal, plan: VolumePlanEntry) -> Result<VolumeRead, Sto
         plan: Some(plan),
         ..VolumeRead::default()
     })
-}
-
-/// What a person needs to know of two plans that are not the same.
-fn difference(before: &VolumePlanEntry, now: &VolumePlanEntry) -> (&'static str, String, String) {
-    let warm = |it: &VolumePlanEntry| it.lines.iter().filter(|it| it.warm).count();
-    if before.drives != now.drives {
-        let text = |it: &VolumePlanEntry| format!("{:?}", it.drives);
-        return ("who the drives are", text(before), text(now));
-    }
-    if warm(before) != warm(now) {
-        let text = |it: &VolumePlanEntry| format!("{} lines", warm(it));
-        return ("what is read warm (--warm-up-min)", text(before), text(now));
-    }
-    let pair = before.lines.iter().zip(&now.lines).find(|(a, b)| a != b);
-    if let Some((before, now)) = pair {
-        return ("a line", format!("{before:?}"), format!("{now:?}"));
-    }
-    (
-        "how errors are found",
-        format!("{before:?}"),
-        format!("{now:?}"),
-    )
 }
 
 impl From<&VolumeReferencesEntry> for References {
