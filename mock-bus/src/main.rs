@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use drivers::wire::lockstep::{Reply, Request};
+use drivers::wire::lockstep::{Reply, Request, path_of};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
@@ -50,7 +50,7 @@ struct Arguments {
     /// `lockstep:PATH`: time passes only when neither the machine nor the programs that talk to
     /// it have anything left to do, so that a busy computer changes nothing. They agree over a
     /// socket at PATH: `truestage … --clock lockstep:PATH`.
-    #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "speed")]
+    #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "speed")]
     clock: Option<PathBuf>,
     /// With --clock: a program that is killed does not end the machine; the next one goes on.
     #[arg(long, requires = "clock")]
@@ -74,12 +74,6 @@ enum Command {
         #[arg(required = true, num_args = 1.., allow_hyphen_values = true)]
         words: Vec<String>,
     },
-}
-
-fn lockstep(text: &str) -> Result<PathBuf, String> {
-    let path = text.strip_prefix("lockstep:").filter(|it| !it.is_empty());
-    let path = path.ok_or("expected lockstep:PATH")?;
-    Ok(PathBuf::from(path))
 }
 
 fn port_and_path(text: &str) -> Result<(String, PathBuf), String> {

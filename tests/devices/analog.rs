@@ -11,11 +11,8 @@ use tests::{Desk, Emulator, Rig, Setup, rigs};
 use truestage::assemble;
 use units::Volts;
 
-/// How long a module may be silent: longer than a busy host pauses, and short enough to wait
-/// for.
-fn silence(rig: Rig) -> Duration {
-    Duration::from_secs_f64(1.5 * rig.speed())
-}
+/// How long a module may be silent.
+const SILENCE: Duration = Duration::from_millis(1500);
 
 fn cia401(rig: Rig) -> Desk<Cia401Analog> {
     let emulator = Emulator::new(rig, &Setup::new(22));
@@ -30,7 +27,7 @@ fn dcon(rig: Rig) -> Desk<Dcon> {
     let loaded = &emulator.loaded;
     let analog = &loaded.config.analog["hall"];
     let mut settings = assemble::dcon_settings(analog, loaded.patience);
-    settings.stale_after = silence(rig);
+    settings.stale_after = SILENCE;
     Desk::new(emulator, "adc", Dcon::new(settings))
 }
 
@@ -139,7 +136,7 @@ fn a_silent_dcon_module_is_an_alarm_and_no_old_value() {
             },
         );
         let since = desk.now();
-        desk.live(silence(desk.emulator.rig) * 2);
+        desk.live(SILENCE * 2);
         let stale = |alarm: &Alarm| matches!(alarm, Alarm::StaleSample { .. });
         assert!(desk.alarms.iter().any(stale), "{:?}", desk.alarms);
         let reading = desk.device.reading();

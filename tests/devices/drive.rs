@@ -12,16 +12,15 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
 type Drive = Desk<Cia402Drive>;
 
-/// How long, in the wall's seconds, the drive bears a master that is silent: longer than a busy
-/// host pauses, and short enough to wait for.
-const SILENCE_S: f64 = 1.5;
+/// How long the drive bears a master that is silent.
+const SILENCE: Duration = Duration::from_millis(1500);
 
 fn drive(rig: Rig) -> Drive {
     let emulator = Emulator::new(rig, &Setup::new(21));
     let loaded = &emulator.loaded;
     let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
     let mut settings = assemble::cia402_settings(axis, bus, loaded.patience);
-    settings.common.master_consumer_time = Duration::from_secs_f64(SILENCE_S * rig.speed());
+    settings.common.master_consumer_time = SILENCE;
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
 

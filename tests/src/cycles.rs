@@ -2,10 +2,10 @@
 
 use core::time::Duration;
 
-use truestage::Failure;
 use truestage::cycle::platform::Pose;
 use truestage::cycle::volumetric::WarmUp;
 use truestage::cycle::{CalibrateOptions, VerifyOptions, Way};
+use truestage::{Failure, Machine, Store};
 use units::{Metres, Radians};
 
 use crate::Edit;
@@ -104,36 +104,44 @@ fn few_placements(text: String) -> String {
     changed(text, &changes)
 }
 
-fn linear(mut bench: Bench) -> Result<Bench, Failure> {
+/// The machine is started, does `cycle` with its store, and is shut down.
+fn started(
+    mut bench: Bench,
+    cycle: impl FnOnce(&mut Machine, &Store) -> Result<(), Failure>,
+) -> Result<Bench, Failure> {
     let store = bench.store.clone();
-    let verify = |calibration: Option<String>| VerifyOptions {
-        compensated: calibration.is_some(),
-        calibration,
-        resume: None,
-    };
     bench.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)?;
-        machine.verify("x", &store, &verify(None))?;
-        let calibrated = machine.calibrate("x", &store, &CalibrateOptions::default())?;
-        machine.verify("x", &store, &verify(Some(calibrated.id)))?;
+        cycle(machine, &store)?;
         machine.shut_down()
     })?;
     Ok(bench)
 }
 
-fn part_of_linear(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
-    bench.machine.guarded(|machine| {
-        machine.start()?;
-        machine.zero("x", &store)?;
-        machine.calibrate("x", &store, &CalibrateOptions::default())?;
+fn linear(bench: Bench) -> Result<Bench, Failure> {
+    let verify = |calibration: Option<String>| VerifyOptions {
+        compensated: calibration.is_some(),
+        calibration,
+        resume: None,
+    };
+    started(bench, |machine, store| {
+        machine.zero("x", store)?;
+        machine.verify("x", store, &verify(None))?;
+        let calibrated = machine.calibrate("x", store, &CalibrateOptions::default())?;
+        machine.verify("x", store, &verify(Some(calibrated.id)))?;
+        Ok(())
+    })
+}
+
+fn part_of_linear(bench: Bench) -> Result<Bench, Failure> {
+    started(bench, |machine, store| {
+        machine.zero("x", store)?;
+        machine.calibrate("x", store, &CalibrateOptions::default())?;
         for mm in [12.5, 44.4, 31.0] {
             machine.move_to("x", Metres::from_mm(mm))?;
         }
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        Ok(())
+    })
 }
 
 fn somewhere() -> Pose {
@@ -144,32 +152,26 @@ fn somewhere() -> Pose {
     }
 }
 
-fn platform(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
-    bench.machine.guarded(|machine| {
-        machine.start()?;
-        machine.zero_platform(&store)?;
-        machine.verify_platform(&store, false)?;
+fn platform(bench: Bench) -> Result<Bench, Failure> {
+    started(bench, |machine, store| {
+        machine.zero_platform(store)?;
+        machine.verify_platform(store, false)?;
         machine.move_pose(Pose::default())?;
-        machine.calibrate_platform(&store)?;
-        machine.verify_platform(&store, true)?;
+        machine.calibrate_platform(store)?;
+        machine.verify_platform(store, true)?;
         machine.align_pose(somewhere())?;
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        Ok(())
+    })
 }
 
-fn part_of_platform(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
-    bench.machine.guarded(|machine| {
-        machine.start()?;
-        machine.zero_platform(&store)?;
-        machine.calibrate_platform(&store)?;
+fn part_of_platform(bench: Bench) -> Result<Bench, Failure> {
+    started(bench, |machine, store| {
+        machine.zero_platform(store)?;
+        machine.calibrate_platform(store)?;
         machine.move_pose(somewhere())?;
         machine.move_pose(Pose::default())?;
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        Ok(())
+    })
 }
 
 fn hand_of(bench: &Bench) -> Hand<'static> {
@@ -177,42 +179,33 @@ fn hand_of(bench: &Bench) -> Hand<'static> {
     Hand::new(move |lines| emulated.simulation_mut().turn_plate(lines))
 }
 
-fn rotary(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
+fn rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
-    bench.machine.guarded(|machine| {
-        machine.start()?;
+    started(bench, |machine, store| {
         machine.zero_rotary("c")?;
-        machine.calibrate_rotary("c", &store, &CalibrateOptions::default(), &mut hand)?;
-        machine.verify_rotary("c", &store, true, &mut hand)?;
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        machine.calibrate_rotary("c", store, &CalibrateOptions::default(), &mut hand)?;
+        machine.verify_rotary("c", store, true, &mut hand)?;
+        Ok(())
+    })
 }
 
-fn part_of_rotary(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
+fn part_of_rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
-    bench.machine.guarded(|machine| {
-        machine.start()?;
+    started(bench, |machine, store| {
         machine.zero_rotary("c")?;
-        machine.calibrate_rotary("c", &store, &CalibrateOptions::default(), &mut hand)?;
+        machine.calibrate_rotary("c", store, &CalibrateOptions::default(), &mut hand)?;
         machine.move_rotary("c", Radians::from_degrees(123.4), Way::Shortest)?;
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        Ok(())
+    })
 }
 
-fn volumetric(mut bench: Bench) -> Result<Bench, Failure> {
-    let store = bench.store.clone();
+fn volumetric(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = bench.emulated.clone();
-    bench.machine.guarded(|machine| {
-        machine.start()?;
+    started(bench, |machine, store| {
         machine.zero_volumetric()?;
-        machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
-        machine.shut_down()
-    })?;
-    Ok(bench)
+        machine.calibrate_volumetric(store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
+        Ok(())
+    })
 }
 
 /// Corrected by errors that are known: finding them takes hours.

@@ -64,18 +64,6 @@ pub enum Rig {
     Vcan,
 }
 
-impl Rig {
-    /// How much faster than real time machines live here: all that a busy host bears. User
-    /// Mode Linux has one core and system calls that cost microseconds.
-    pub fn speed(self) -> f64 {
-        match self {
-            Self::InProcess => 1.0,
-            Self::Vcan if !vcan_is_native() => 1.5,
-            Self::Pty | Self::Vcan => 5.0,
-        }
-    }
-}
-
 /// Whether `vcan` is this kernel's own: not that of a guest with one core.
 pub fn vcan_is_native() -> bool {
     std::env::var("VCAN_HOST").is_ok_and(|host| host == "native")

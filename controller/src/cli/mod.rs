@@ -28,6 +28,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use drivers::wire::lockstep::path_of;
 
 use kind::{Kind, by_kind};
 use output::Output;
@@ -117,7 +118,7 @@ struct MachineArgs {
     clock_speed: f64,
     /// `lockstep:PATH`: the clock of an emulated machine that waits for its controller (`mock-bus
     /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
-    #[arg(long, value_name = "CLOCK", value_parser = lockstep, conflicts_with = "clock_speed")]
+    #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "clock_speed")]
     clock: Option<PathBuf>,
     /// Who does what people are asked for: the hand of the emulated machine at this socket
     /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, who sits here.
@@ -142,12 +143,6 @@ impl MachineArgs {
         let hand = self.hand.as_deref().or(self.clock.as_deref());
         hand.filter(|hand| *hand != Path::new("ask"))
     }
-}
-
-fn lockstep(text: &str) -> Result<PathBuf, String> {
-    let path = text.strip_prefix("lockstep:").filter(|it| !it.is_empty());
-    let path = path.ok_or("expected lockstep:PATH")?;
-    Ok(PathBuf::from(path))
 }
 
 #[derive(Clone, Debug, Args)]

@@ -23,6 +23,7 @@
 //! state has changed. Entries stand in the order in which they happened.
 
 use core::fmt;
+use std::path::PathBuf;
 
 use units::Time;
 
@@ -32,6 +33,15 @@ use super::{LineControl, Port};
 pub const VERSION: u32 = 1;
 /// A line is never longer; a peer that sends more speaks something else.
 pub const LINE_MAX: usize = 1 << 20;
+
+/// Where the side channel of a clock is that a command line names as `lockstep:PATH`.
+///
+/// # Errors
+/// When it names something else.
+pub fn path_of(clock: &str) -> Result<PathBuf, &'static str> {
+    let path = clock.strip_prefix("lockstep:").filter(|it| !it.is_empty());
+    path.map(PathBuf::from).ok_or("expected lockstep:PATH")
+}
 
 /// Something that passed a port, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
