@@ -241,32 +241,38 @@ pub(super) enum Read {
 
 /// Reads what is there.
 pub(super) fn read(descriptor: &OwnedFd) -> Read {
-    read_up_to(descriptor, &mut [0; READ_MAX])
+    let mut buffer = [0; READ_MAX];
+    match read_into(descriptor, &mut buffer) {
+        None => Read::Gone,
+        Some(0) => Read::Nothing,
+        Some(count) => Read::Bytes(buffer[..count].to_vec()),
+    }
 }
 
 /// Waits until `count` bytes have come, which are known to be on their way; fewer when the
 /// device vanished or they do not come.
 pub(super) fn read_exactly(descriptor: &OwnedFd, count: usize) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(count);
-    let mut buffer = [0; READ_MAX];
-    while bytes.len() < count {
-        let wanted = (count - bytes.len()).min(READ_MAX);
-        match read_up_to(descriptor, &mut buffer[..wanted]) {
-            Read::Bytes(more) => bytes.extend(more),
-            Read::Nothing if awaited(descriptor.as_fd()) => {}
-            Read::Nothing | Read::Gone => break,
+    let mut bytes = vec![0; count];
+    let mut filled = 0;
+    while filled < count {
+        match read_into(descriptor, &mut bytes[filled..]) {
+            Some(0) if awaited(descriptor.as_fd()) => {}
+            Some(0) | None => break,
+            Some(more) => filled += more,
         }
     }
+    bytes.truncate(filled);
     bytes
 }
 
-fn read_up_to(descriptor: &OwnedFd, buffer: &mut [u8]) -> Read {
+/// How many bytes were there; `None` when the device vanished.
+fn read_into(descriptor: &OwnedFd, buffer: &mut [u8]) -> Option<usize> {
     match nix::unistd::read(descriptor, buffer) {
         // A pty whose other side was closed reads as 0 bytes or EIO.
-        Ok(0) => Read::Gone,
-        Ok(count) => Read::Bytes(buffer[..count].to_vec()),
-        Err(Errno::EAGAIN | Errno::EINTR) => Read::Nothing,
-        Err(_) => Read::Gone,
+        Ok(0) => None,
+        Ok(count) => Some(count),
+        Err(Errno::EAGAIN | Errno::EINTR) => Some(0),
+        Err(_) => None,
     }
 }
 

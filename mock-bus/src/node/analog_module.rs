@@ -193,6 +193,10 @@ impl<P: Profile> AnalogModule<P> {
 }
 
 impl<P: Profile + 'static> Node for AnalogModule<P> {
+    fn concerns(&self, payload: &Payload) -> bool {
+        matches!(payload, Payload::Frame(frame) if self.server.concerns(frame))
+    }
+
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
         if let Payload::Frame(frame) = payload {
             self.handle_frame(now, frame, plant);

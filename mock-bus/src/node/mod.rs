@@ -24,7 +24,14 @@ use crate::plant::Plant;
 ///
 /// It is [`Any`], so that a test can reach a device's own faults through the simulation.
 pub trait Node: Any {
-    /// Takes what was sent on the node's port; CAN nodes see every frame of their bus.
+    /// Whether what was sent on the node's port means anything to it; what does not changes nothing
+    /// about the node, and is not handed to it.
+    fn concerns(&self, _payload: &Payload) -> bool {
+        true
+    }
+
+    /// Takes what was sent on the node's port; CAN nodes see every frame of their bus that concerns
+    /// them.
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant);
 
     /// Lets time pass up to `now`; called at least at every [`Node::next_event`].

@@ -153,6 +153,11 @@ impl Endpoint {
         matches!(self.kind, Kind::Vcan(_))
     }
 
+    /// Whether it is an adapter's line: a stream of bytes in which pieces mean nothing.
+    pub(super) const fn is_adapter(&self) -> bool {
+        matches!(self.kind, Kind::Slcan(..))
+    }
+
     /// A participant has opened it, or has closed it.
     pub(super) fn attend(&mut self, is_there: bool) -> io::Result<()> {
         match &mut self.kind {
@@ -236,6 +241,7 @@ impl Endpoint {
     pub(super) fn send(&mut self, at: Time, event: Event) -> io::Result<Option<Passed>> {
         match event {
             Event::Link(Link::Gone) => {
+                self.flush()?;
                 self.unplug();
                 Ok(Some(Passed::Look))
             }

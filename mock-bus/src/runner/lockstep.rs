@@ -61,7 +61,10 @@ impl Lockstep {
     pub(super) fn run(mut self) -> io::Result<()> {
         while !self.do_jobs() {
             if self.is_everybody_idle() {
-                self.let_time_pass()?;
+                // Whoever goes on just now has nothing to say before somebody is waited for.
+                if self.let_time_pass()? && !self.has_anybody_unheard() {
+                    continue;
+                }
             } else if self.wait()? {
                 self.site.visitors.let_in()?;
             }
@@ -90,7 +93,13 @@ impl Lockstep {
         }) && anybody
     }
 
-    fn let_time_pass(&mut self) -> io::Result<()> {
+    fn has_anybody_unheard(&self) -> bool {
+        let mut peers = self.site.visitors.peers.iter();
+        peers.any(|peer| peer.has_unheard())
+    }
+
+    /// Whether somebody goes on.
+    fn let_time_pass(&mut self) -> io::Result<bool> {
         let is_awaited = self.take_in()?;
         self.refuse_strangers()?;
         if !is_awaited {
@@ -108,8 +117,14 @@ impl Lockstep {
             self.site.machine.advance_until_delivery(until.min(stride));
             self.hand_out()?;
         }
-        self.wake();
-        Ok(())
+        // All that was sent at this moment, in one piece.
+        self.flush()?;
+        Ok(self.wake())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let mut endpoints = self.site.endpoints.iter_mut();
+        endpoints.try_for_each(Endpoint::flush)
     }
 
     /// What everybody has sent reaches the machine. Whether somebody waits for an answer that
@@ -139,9 +154,8 @@ impl Lockstep {
         if answered.units > 0 {
             let passed = Passed::Units(answered.units);
             let port = entry.port;
-            self.site.visitors.peers[who]
-                .passed
-                .push(Entry { port, passed });
+            let joins = self.site.endpoints[place].is_adapter();
+            self.site.visitors.peers[who].pass(Entry { port, passed }, joins);
         }
         if self.site.endpoints[place].is_shared() {
             self.tell_others(Some(who), place, entry.passed);
@@ -151,11 +165,12 @@ impl Lockstep {
 
     /// Whoever has the port open hears it too, except who has sent it.
     fn tell_others(&mut self, sender: Option<usize>, place: usize, passed: Passed) {
+        let joins = self.site.endpoints[place].is_adapter();
         for (who, peer) in self.site.visitors.peers.iter_mut().enumerate() {
             if let Some(&port) = peer.ports.get(&place)
                 && Some(who) != sender
             {
-                peer.passed.push(Entry { port, passed });
+                peer.pass(Entry { port, passed }, joins);
             }
         }
     }
@@ -194,9 +209,10 @@ impl Lockstep {
         Ok(())
     }
 
-    /// Whoever has something to hear, or waited until now, goes on.
-    fn wake(&mut self) {
+    /// Whoever has something to hear, or waited until now, goes on; whether anybody does.
+    fn wake(&mut self) -> bool {
         let now = self.site.machine.now();
+        let mut any = false;
         for peer in &mut self.site.visitors.peers {
             let Doing::Idle { until, .. } = peer.doing else {
                 continue;
@@ -205,8 +221,10 @@ impl Lockstep {
                 let sent = core::mem::take(&mut peer.passed);
                 peer.set_working();
                 peer.say(&Reply::Go { now, sent });
+                any = true;
             }
         }
+        any
     }
 
     /// Until somebody says something; whether somebody new has come.
@@ -228,10 +246,7 @@ impl Lockstep {
             let mut bytes = [0; 64];
             let _ = self.site.waker.read(&mut bytes)?;
         }
-        self.site
-            .endpoints
-            .iter_mut()
-            .try_for_each(Endpoint::flush)?;
+        self.flush()?;
         Ok(has_come)
     }
 

@@ -17,7 +17,19 @@ const MACHINE: &str = r#"
     device = { kind = "dcon_module", checksum = false, boot_ms = 0.0 }
 "#;
 
-/// A machine with a serial line, and the folder of its side channel.
+const ON_CAN: &str = r#"
+    name = "test"
+    [[ports]]
+    kind = "can"
+    name = "can0"
+    bitrate_kbit_per_s = 1000
+    [[nodes]]
+    name = "adc"
+    port = "can0"
+    device = { kind = "cia401_analog", node_id = 2, boot_delay_ms = 50 }
+"#;
+
+/// A machine with one port, and the folder of its side channel.
 struct Bench {
     machine: Running,
     clock: PathBuf,
@@ -25,6 +37,10 @@ struct Bench {
 
 impl Bench {
     fn new(name: &str, change: impl FnOnce(&mut Options)) -> Self {
+        Self::of(MACHINE, name, change)
+    }
+
+    fn of(machine: &str, name: &str, change: impl FnOnce(&mut Options)) -> Self {
         let file = format!("truestage-{}-{name}", std::process::id());
         let clock = std::env::temp_dir().join(file);
         let mut options = Options {
@@ -32,7 +48,7 @@ impl Bench {
             ..Options::default()
         };
         change(&mut options);
-        let config = MachineConfig::parse(MACHINE).unwrap();
+        let config = MachineConfig::parse(machine).unwrap();
         let machine = spawn(&config, &options).unwrap();
         Self { machine, clock }
     }
@@ -96,6 +112,32 @@ fn an_answer_comes_at_its_own_time_whenever_it_is_asked_for() {
     line.read_exact(&mut answer).unwrap();
     assert_eq!(&answer, b"!014117\r");
     assert_eq!(client.ask("idle 1000000000"), "go 1000000000");
+    client.say("bye");
+    drop(bench);
+}
+
+#[test]
+fn what_an_adapter_says_at_one_moment_is_one_piece() {
+    let bench = Bench::of(ON_CAN, "piece", |_| {});
+    let mut client = bench.client();
+    assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
+    let mut line = File::options()
+        .read(true)
+        .write(true)
+        .open(bench.terminal())
+        .unwrap();
+    let attach = format!("attach 0 {}", bench.terminal());
+    assert_eq!(client.ask(&attach), "attached");
+    line.write_all(b"S8\rO\r").unwrap();
+    assert_eq!(client.ask("idle 1000000000 0:5"), "go 0 0:2");
+    line.write_all(b"t0800\r").unwrap();
+    // What the adapter says to a frame that it has taken waits for what the module says when it has
+    // booted.
+    let heard = client.ask("idle 1000000000 0:6");
+    assert!(heard.ends_with(" 0:10"), "{heard}");
+    let mut answers = [0; 12];
+    line.read_exact(&mut answers).unwrap();
+    assert_eq!(&answers, b"\r\rz\rt702100\r");
     client.say("bye");
     drop(bench);
 }

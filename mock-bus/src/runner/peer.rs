@@ -1,14 +1,17 @@
 //! A program at the other end of the side channel of a lockstep clock.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use drivers::wire::Port;
-use drivers::wire::lockstep::{Entry, LINE_MAX, Reply, Request};
+use drivers::wire::lockstep::{Entry, LINE_MAX, Passed, Reply, Request};
 use units::Time;
+
+const READ_MAX: usize = 4096;
 
 /// Whether it has something left to do.
 #[derive(Debug)]
@@ -25,7 +28,11 @@ pub(super) enum Doing {
 #[derive(Debug)]
 pub(super) struct Peer {
     stream: UnixStream,
+    /// What was read and is no whole line yet, or not taken.
     heard: Vec<u8>,
+    buffer: Box<[u8; READ_MAX]>,
+    /// What is said, in one piece.
+    line: String,
     pub(super) name: String,
     pid: u32,
     pub(super) doing: Doing,
@@ -54,6 +61,8 @@ impl Peer {
         Ok(Self {
             stream,
             heard: Vec::new(),
+            buffer: Box::new([0; READ_MAX]),
+            line: String::new(),
             name: "a program".to_owned(),
             pid: 0,
             doing: Doing::Nothing,
@@ -91,10 +100,9 @@ impl Peer {
         if let Some(heard) = self.next_line() {
             return heard;
         }
-        let mut buffer = [0; 4096];
-        match self.stream.read(&mut buffer) {
+        match self.stream.read(&mut self.buffer[..]) {
             Ok(0) => return Heard::Gone,
-            Ok(length) => self.heard.extend_from_slice(&buffer[..length]),
+            Ok(length) => self.heard.extend_from_slice(&self.buffer[..length]),
             Err(error) => match error.kind() {
                 io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => return Heard::Nothing,
                 _ => return Heard::Gone,
@@ -108,19 +116,42 @@ impl Peer {
             let endless = self.heard.len() > LINE_MAX;
             return endless.then(|| Heard::Nonsense("a line without an end".to_owned()));
         };
-        let line: Vec<u8> = self.heard.drain(..=end).collect();
-        let line = String::from_utf8_lossy(&line[..end]);
-        Some(match Request::parse(&line) {
+        let line = String::from_utf8_lossy(&self.heard[..end]);
+        let heard = match Request::parse(&line) {
             Ok(request) => Heard::Said(request),
             Err(error) => Heard::Nonsense(error.to_string()),
-        })
+        };
+        self.heard.drain(..=end);
+        Some(heard)
+    }
+
+    /// Whether something was read that nobody has taken yet.
+    pub(super) fn has_unheard(&self) -> bool {
+        !self.heard.is_empty()
+    }
+
+    /// Something has passed one of its ports; with `joins` it is one with what passed there just
+    /// before.
+    pub(super) fn pass(&mut self, entry: Entry, joins: bool) {
+        if joins
+            && let Passed::Units(more) = entry.passed
+            && let Some(last) = self.passed.last_mut()
+            && last.port == entry.port
+            && let Passed::Units(units) = &mut last.passed
+        {
+            *units += more;
+            return;
+        }
+        self.passed.push(entry);
     }
 
     /// Says something; one that does not listen any more is noticed when it is heard.
     pub(super) fn say(&mut self, reply: &Reply) {
-        let line = format!("{reply}\n");
+        self.line.clear();
+        // Writing to a text does not fail.
+        let _ = writeln!(self.line, "{reply}");
         // A line is short and its reader waits for it: the socket has room.
-        let _ = self.stream.write_all(line.as_bytes());
+        let _ = self.stream.write_all(self.line.as_bytes());
     }
 }
 

@@ -20,6 +20,8 @@ use nix::unistd::{read, ttyname, write};
 
 /// More unsent bytes than this are an overrun.
 const UNSENT_MAX: usize = 16 * 1024;
+/// So many are not kept for one piece with what follows.
+const PIECE_MAX: usize = 2 * 1024;
 
 pub(super) struct Pty {
     master: OwnedFd,
@@ -119,7 +121,9 @@ impl Pty {
         Ok(bytes)
     }
 
-    /// Sends now what fits, and the rest at the next [`Pty::flush`]; `false` when it is lost.
+    /// Sends now what fits, and the rest at the next [`Pty::flush`]; `false` when it is lost. For a
+    /// client that says itself when it waits, all waits for the flush: each piece wakes the kernel's
+    /// worker for terminals, which takes longer than the writing.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<bool> {
         self.look_who_is_there()?;
         let is_heard = self.is_attended || self.clients.is_any();
@@ -127,7 +131,9 @@ impl Pty {
         if taken {
             self.unsent.extend(bytes);
         }
-        self.flush()?;
+        if !self.is_attended || self.unsent.len() > PIECE_MAX {
+            self.flush()?;
+        }
         Ok(taken)
     }
 

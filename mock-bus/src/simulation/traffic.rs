@@ -50,6 +50,9 @@ impl Simulation {
             if slot.port != port || !slot.powered || sender == Sender::Node(place) {
                 continue;
             }
+            if !slot.node.concerns(payload) {
+                continue;
+            }
             slot.node.handle(self.now, payload, &mut self.plant);
             slot.next = slot.node.next_event();
             self.flush(place);

@@ -13,6 +13,7 @@ pub mod communication;
 pub mod dictionary;
 mod errors;
 mod heartbeat;
+mod listening;
 pub mod manners;
 mod nmt;
 mod outbox;
@@ -30,7 +31,7 @@ use std::time::Duration;
 use drivers::wire::can::CanFrame;
 use drivers::wire::canopen::emcy::EmergencyCode;
 use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtState, parse_heartbeat};
-use drivers::wire::canopen::sync::is_sync;
+use drivers::wire::canopen::sync::{SYNC_COB_ID, is_sync};
 use drivers::wire::canopen::{Function, NodeId, Object};
 use units::Time;
 
@@ -41,6 +42,7 @@ pub use manners::{Deliveries, Manners};
 
 use errors::Errors;
 use heartbeat::Consumer;
+use listening::Listening;
 use manners::Rudeness;
 use nmt::Phase;
 use outbox::Outbox;
@@ -82,6 +84,7 @@ pub struct CanopenServer {
     tpdos: Vec<Tpdo>,
     heartbeat_due: Time,
     consumers: Vec<Option<Consumer>>,
+    listening: Listening,
     errors: Errors,
     emergency_free: Time,
     outbox: Outbox,
@@ -117,6 +120,7 @@ impl CanopenServer {
             dictionary,
             heartbeat_due: Time::NEVER,
             consumers: Vec::new(),
+            listening: Listening::default(),
             errors: Errors::default(),
             emergency_free: Time::ZERO,
             outbox: Outbox::default(),
@@ -173,19 +177,24 @@ impl CanopenServer {
 
     /// Whether `frame` means anything to this node.
     pub fn concerns(&self, frame: &CanFrame) -> bool {
-        let Some(id) = frame.standard_id().filter(|_| !frame.is_remote()) else {
-            return false;
-        };
-        id == NMT_COB_ID
-            || is_sync(frame)
-            || id == self.node.cob_id(Function::SdoRequest)
-            || self.watches(id)
-            || self.rpdos.iter().any(|rpdo| rpdo.takes(frame))
+        let id = frame.standard_id().filter(|_| !frame.is_remote());
+        id.is_some_and(|id| self.listening.contains(id))
     }
 
-    fn watches(&self, id: u16) -> bool {
-        let mut watched = self.consumers.iter().flatten();
-        watched.any(|consumer| consumer.producer.cob_id(Function::ErrorControl) == id)
+    /// What it listens to depends on its RPDOs and on whom it watches: whatever changes these calls
+    /// this.
+    fn listen_anew(&mut self) {
+        let own = [
+            NMT_COB_ID,
+            SYNC_COB_ID,
+            self.node.cob_id(Function::SdoRequest),
+        ];
+        let watched = self.consumers.iter().flatten();
+        let watched = watched.map(|consumer| consumer.producer.cob_id(Function::ErrorControl));
+        let rpdos = self.rpdos.iter().filter_map(Rpdo::listens_to);
+        self.listening = Listening::default();
+        self.listening
+            .extend(own.into_iter().chain(watched).chain(rpdos));
     }
 
     /// Takes a frame from the bus.

@@ -54,6 +54,7 @@ impl CanopenServer {
         self.events.clear();
         self.heartbeat_due = Time::NEVER;
         self.consumers.clear();
+        self.listen_anew();
     }
 
     fn restart(&mut self, now: Time) {
@@ -147,6 +148,7 @@ impl CanopenServer {
         let entries = self.get(0x1016, 0) as u8;
         let entry = |sub| Consumer::from_entry(self.get(0x1016, sub) as u32);
         self.consumers = (1..=entries).map(entry).collect();
+        self.listen_anew();
     }
 
     pub(super) fn handle_heartbeat(&mut self, now: Time, producer: NodeId) {

@@ -233,9 +233,15 @@ impl Rpdo {
         }
     }
 
-    pub(super) fn takes(&self, frame: &CanFrame) -> bool {
+    /// The identifier of its frames, while it is in use.
+    pub(super) fn listens_to(&self) -> Option<u16> {
         let cob_id = self.parameters.cob_id;
-        cob_id.is_valid() && frame.standard_id() == Some(cob_id.cob_id())
+        cob_id.is_valid().then(|| cob_id.cob_id())
+    }
+
+    pub(super) fn takes(&self, frame: &CanFrame) -> bool {
+        let id = frame.standard_id();
+        id.is_some() && id == self.listens_to()
     }
 
     pub(super) fn receive(&mut self, now: Time, frame: CanFrame) -> Reception {

@@ -22,6 +22,7 @@ impl CanopenServer {
         for number in 0..self.tpdos.len() {
             self.tpdos[number] = Tpdo::read(&self.dictionary, number as u16, now);
         }
+        self.listen_anew();
     }
 
     /// A parameter of one PDO was written.
@@ -33,6 +34,7 @@ impl CanopenServer {
                     self.tpdos[place] = Tpdo::read(&self.dictionary, number, now);
                 } else {
                     self.rpdos[place] = Rpdo::read(&self.dictionary, number);
+                    self.listen_anew();
                 }
             }
             Area::Other => {}

@@ -128,6 +128,10 @@ impl Cia402DriveNode {
 }
 
 impl Node for Cia402DriveNode {
+    fn concerns(&self, payload: &Payload) -> bool {
+        matches!(payload, Payload::Frame(frame) if self.drive.server.concerns(frame))
+    }
+
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
         if let Payload::Frame(frame) = payload {
             let mut axis = self.axis(plant);

@@ -170,15 +170,24 @@ impl Beam {
         (1.0 + drift) * if self.trouble.bright { 2.0 } else { 1.0 }
     }
 
-    /// The voltage of one quadrant, without the noise of its channel.
-    pub(super) fn volts(
+    /// The voltages of the quadrants, without the noise of their channels, where the detector has
+    /// been looked at before at this moment.
+    pub(super) fn seen(&self, place: Place, now: Time) -> Option<[f64; 4]> {
+        let detector = match place {
+            Place::Slide => &self.slide,
+            Place::End => &self.end,
+        };
+        (detector.seen.at == now).then_some(detector.seen.volts)
+    }
+
+    /// Looks at a detector, the first time at this moment.
+    pub(super) fn look(
         &mut self,
         place: Place,
-        quadrant: usize,
         position_m: f64,
         motion: (&Motion, [usize; 2]),
         now: Time,
-    ) -> f64 {
+    ) -> [f64; 4] {
         let spot = self.spot_m(place, position_m, motion, now);
         let light_v = self.light(place, now) * self.config.sum_v;
         let share = self.distance_m(place, position_m) / self.distance_m(Place::End, 0.0);
@@ -187,13 +196,10 @@ impl Beam {
             Place::Slide => &mut self.slide,
             Place::End => &mut self.end,
         };
-        if detector.seen.at != now {
-            let volts = detector
-                .quadrants(spot, turbulence_m)
-                .map(|it| it * light_v);
-            detector.seen = Seen { at: now, volts };
-        }
-        detector.seen.volts[quadrant]
+        let volts = detector.quadrants(spot, turbulence_m);
+        let volts = volts.map(|it| it * light_v);
+        detector.seen = Seen { at: now, volts };
+        volts
     }
 }
 
@@ -236,6 +242,8 @@ impl Detector {
 fn erf(x: f64) -> f64 {
     const FAR: f64 = 4.0;
     const TERMS: i32 = 60;
+    /// A quarter of what the last bit of a number is worth at least, as a share of the number.
+    const NOTHING: f64 = f64::EPSILON / 8.0;
     if x.abs() > FAR {
         return x.signum();
     }
@@ -243,7 +251,12 @@ fn erf(x: f64) -> f64 {
     let mut sum = x;
     for n in 1..TERMS {
         power *= -x * x / f64::from(n);
-        sum += power / f64::from(2 * n + 1);
+        let term = power / f64::from(2 * n + 1);
+        sum += term;
+        // Terms that have become smaller than the one before stay so: no later one counts.
+        if f64::from(n) > x * x && term.abs() < sum.abs() * NOTHING {
+            break;
+        }
     }
     core::f64::consts::FRAC_2_SQRT_PI * sum
 }
@@ -284,7 +297,7 @@ mod tests {
 
     fn quadrants(beam: &mut Beam, place: Place, motion: &Motion) -> [f64; 4] {
         let now = Time::from_seconds(1.0);
-        [0, 1, 2, 3].map(|quadrant| beam.volts(place, quadrant, 0.2, (motion, ACROSS_X), now))
+        beam.look(place, 0.2, (motion, ACROSS_X), now)
     }
 
     fn ratios([a, b, c, d]: [f64; 4]) -> [f64; 2] {

@@ -22,6 +22,21 @@ pub(super) struct Chain {
     tool_offset: Vector,
 }
 
+/// How tool and workpiece stand at one moment, against the foot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stand {
+    tool: Transform,
+    workpiece: Transform,
+}
+
+impl Stand {
+    /// Where what is mounted on the tool is in the workpiece's frame, by its place with all axes
+    /// at 0.
+    pub(super) fn point(&self, offset_m: Vector) -> Vector {
+        self.workpiece.point_at(self.tool.place(offset_m))
+    }
+}
+
 impl Chain {
     pub(super) fn new(config: &VolumetricConfig, seed: u64) -> Self {
         let (before, after) = config.chain.split_once('F').unwrap_or(("", "XYZ"));
@@ -59,16 +74,11 @@ impl Chain {
 
     /// The tool point in the workpiece's frame.
     pub(super) fn tool_point(&self, scales_m: Vector, motions: &[Motion; 3]) -> Vector {
-        self.point(scales_m, motions, self.tool_offset)
+        self.stand(scales_m, motions).point(self.tool_offset)
     }
 
-    /// Likewise of what is mounted beside the tool, by its place with all axes at 0.
-    pub(super) fn point(
-        &self,
-        scales_m: Vector,
-        motions: &[Motion; 3],
-        offset_m: Vector,
-    ) -> Vector {
+    /// How tool and workpiece stand.
+    pub(super) fn stand(&self, scales_m: Vector, motions: &[Motion; 3]) -> Stand {
         let body = |axis: usize, way: f64| {
             let motion = &motions[axis];
             // What is off along the axis belongs to its coordinate, what is off sideways to
@@ -86,7 +96,9 @@ impl Chain {
                 carrier.carrying(&body(*axis, way))
             })
         };
-        let tool = outermost(&self.tool_side, 1.0).place(offset_m);
-        outermost(&self.workpiece_side, -1.0).point_at(tool)
+        Stand {
+            tool: outermost(&self.tool_side, 1.0),
+            workpiece: outermost(&self.workpiece_side, -1.0),
+        }
     }
 }

@@ -6,6 +6,7 @@
 //! three things: the scale grows, the guide bends to an arc along which the slide pitches, and
 //! the films under the slide grow and shift it without turning it.
 
+use core::cell::Cell;
 use core::f64::consts::{PI, TAU};
 
 use units::portable::{atan, sin};
@@ -33,8 +34,16 @@ pub(super) struct Motion {
 #[derive(Clone, Debug)]
 struct Curve {
     powers: [f64; 3],
-    waves: [(f64, f64); 3],
+    waves: [Wave; 3],
     size: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Wave {
+    amplitude: f64,
+    phase: f64,
+    /// Its sine at the start, where the function is 0.
+    at_start: f64,
 }
 
 impl Curve {
@@ -48,7 +57,12 @@ impl Curve {
         ];
         let waves = [1.0, 2.0, 3.0].map(|order: f64| {
             let amplitude = stream.between(0.3, 1.0) / (order * order);
-            (amplitude, stream.between(0.0, TAU))
+            let phase = stream.between(0.0, TAU);
+            Wave {
+                amplitude,
+                phase,
+                at_start: sin(phase),
+            }
         });
         let mut curve = Self {
             powers,
@@ -66,8 +80,8 @@ impl Curve {
     fn at(&self, u: f64) -> f64 {
         let [first, second, third] = self.powers;
         let bends = second * u * (u - 1.0) + third * u * (u - 0.5) * (u - 1.0);
-        let waves = (1..).zip(&self.waves).map(|(order, (amplitude, phase))| {
-            amplitude * (sin(PI * f64::from(order) * u + phase) - sin(*phase))
+        let waves = (1..).zip(&self.waves).map(|(order, wave)| {
+            wave.amplitude * (sin(PI * f64::from(order) * u + wave.phase) - wave.at_start)
         });
         self.size * (first * u + bends + waves.sum::<f64>())
     }
@@ -91,6 +105,9 @@ pub(super) struct Guide {
     travel_m: f64,
     shifts: [Curve; 3],
     turns: [Curve; 3],
+    /// Where the cold motions were asked for last, and what they were: a slide that stands is
+    /// asked again and again.
+    asked: Cell<(f64, Motion)>,
     growth: Growth,
     deliberate: Deliberate,
 }
@@ -127,6 +144,7 @@ impl Guide {
             travel_m: config.travel_mm[axis] * 1e-3,
             shifts: [0, 1, 2].map(|along| shift(along, &mut stream)),
             turns: [0, 1, 2].map(|about| turn(about, &mut stream)),
+            asked: Cell::new((f64::NAN, Motion::default())),
             growth: Growth::new(config, axis, &mut stream),
             deliberate: Deliberate::of(errors, axis),
         }
@@ -137,12 +155,23 @@ impl Guide {
         if self.axis == 2 { 1 } else { 2 }
     }
 
-    pub(super) fn motion(&self, position_m: f64, heat: &AxisHeat, now: Time) -> Motion {
-        let u = position_m / self.travel_m;
-        let mut motion = Motion {
+    /// At the share `u` of the travel.
+    fn cold_motion(&self, u: f64) -> Motion {
+        let (asked, known) = self.asked.get();
+        if asked == u {
+            return known;
+        }
+        let motion = Motion {
             shift: [0, 1, 2].map(|along| self.shifts[along].at(u)),
             turn: [0, 1, 2].map(|about| self.turns[about].at(u)),
         };
+        self.asked.set((u, motion));
+        motion
+    }
+
+    pub(super) fn motion(&self, position_m: f64, heat: &AxisHeat, now: Time) -> Motion {
+        let u = position_m / self.travel_m;
+        let mut motion = self.cold_motion(u);
         let growth = &self.growth;
         let warmer_k = heat.scale_c - REFERENCE_C;
         motion.shift[self.axis] += growth.expansion_per_k * warmer_k * position_m;

@@ -177,6 +177,11 @@ impl Laser {
         self.line = None;
     }
 
+    /// Whether a line is set up.
+    pub(super) const fn is_set_up(&self) -> bool {
+        self.line.is_some()
+    }
+
     /// What is seen now, `None` while no line is set up. `target` tells where a target of a tool
     /// offset is; `soon` the same a moment later, and how much later.
     pub(super) fn sighting(

@@ -39,7 +39,7 @@ pub use truth::{ErrorMotion, Point, VolumetricTruth};
 use super::machine::Actuator;
 use crate::random::Stream;
 use beam::{Beam, Place};
-use chain::Chain;
+use chain::{Chain, Stand};
 use config::VolumetricConfig;
 use guide::{Guide, Motion};
 use heat::Heat;
@@ -151,6 +151,11 @@ impl Volumetric {
         [0, 1, 2].map(|axis| self.motion(axis, scales_m[axis], now))
     }
 
+    fn stand(&self, scales_m: Vector, now: Time) -> Stand {
+        let motions = self.motions(scales_m, now);
+        self.chain.stand(scales_m, &motions)
+    }
+
     fn tool_point_m(&self, scales_m: Vector, now: Time) -> Vector {
         let motions = self.motions(scales_m, now);
         self.chain.tool_point(scales_m, &motions)
@@ -159,10 +164,9 @@ impl Volumetric {
     /// Sets the laser up along a line that begins where the machine stands.
     pub(super) fn set_up_line(&mut self, set_up: &LineSetUp, now: Time) {
         let scales_m = self.scales_m(now);
-        let motions = self.motions(scales_m, now);
-        let chain = &self.chain;
-        let target = |offset_m| chain.point(scales_m, &motions, offset_m);
-        self.laser.set_up(set_up, target, now);
+        let stand = self.stand(scales_m, now);
+        self.laser
+            .set_up(set_up, |offset_m| stand.point(offset_m), now);
     }
 
     pub(super) fn take_line_away(&mut self) {
@@ -171,13 +175,18 @@ impl Volumetric {
 
     /// What the laser looks at; `None` while no line is set up.
     pub(super) fn sighting(&self, now: Time) -> Option<Sighting> {
+        if !self.laser.is_set_up() {
+            return None;
+        }
         let here_m = self.scales_m(now);
         let speeds = [0, 1, 2].map(|axis| self.slides[axis].speed_m_per_s(now));
         let soon_m = rigid::add(here_m, rigid::times(speeds, SOON_S));
-        let [here, soon] = [here_m, soon_m].map(|scales_m| {
-            let motions = self.motions(scales_m, now);
-            move |offset_m| self.chain.point(scales_m, &motions, offset_m)
-        });
+        let here = self.stand(here_m, now);
+        let soon = match soon_m == here_m {
+            true => here,
+            false => self.stand(soon_m, now),
+        };
+        let [here, soon] = [here, soon].map(|stand| move |offset_m| stand.point(offset_m));
         self.laser.sighting(here, (soon, SOON_S), now)
     }
 
@@ -212,14 +221,18 @@ impl Volumetric {
 
     fn beam_volts(&mut self, terminal: usize, now: Time) -> f64 {
         let (axis, channel) = (terminal / PER_AXIS, terminal % PER_AXIS);
-        let scale_m = self.slides[axis].scale_m(now);
-        let motion = self.motion(axis, scale_m, now);
         let place = if channel < 4 {
             Place::Slide
         } else {
             Place::End
         };
+        let quadrant = channel % 4;
+        if let Some(volts) = self.beams[axis].seen(place, now) {
+            return volts[quadrant];
+        }
+        let scale_m = self.slides[axis].scale_m(now);
+        let motion = self.motion(axis, scale_m, now);
         let seen = (&motion, across(axis));
-        self.beams[axis].volts(place, channel % 4, scale_m, seen, now)
+        self.beams[axis].look(place, scale_m, seen, now)[quadrant]
     }
 }

@@ -74,8 +74,8 @@ impl<'a> VolumetricTruth<'a> {
     pub fn point_for(&self, tool_offset: Point, scales: Point) -> Point {
         let scales_m = values(scales);
         let motions = self.machine.motions(scales_m, self.now);
-        let chain = &self.machine.chain;
-        metres(chain.point(scales_m, &motions, values(tool_offset)))
+        let stand = self.machine.chain.stand(scales_m, &motions);
+        metres(stand.point(values(tool_offset)))
     }
 
     /// What the hand that set up the laser's line has left, while one is set up.
