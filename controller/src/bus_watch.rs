@@ -1,9 +1,12 @@
 //! What passes on the CAN buses that nobody of the configuration should say: a second master,
-//! and somebody who takes the bus for himself.
+//! another SDO client, and somebody who takes the bus for himself.
 //!
-//! A transport does not hear its own frames. A SYNC, an NMT command or a drive's set-point that
-//! is heard was sent by another master; two masters on one machine are never safe. Who occupies
-//! the bus is looked up only when something failed to come: a full bus alone hurts nobody.
+//! A transport does not hear its own frames. A SYNC, an NMT command, a drive's set-point or a write
+//! to a device that is heard was sent by another master; two masters on one machine are never safe.
+//! Who only reads from a device is told: its answers look like ours. Who occupies the bus is looked
+//! up only when something failed to come: a full bus alone hurts nobody.
+
+mod load;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -12,9 +15,12 @@ use drivers::device::{Alarm, DeviceError};
 use drivers::transport::{Arrival, Input, Payload, Port, SendError};
 use drivers::wire::can::CanFrame;
 use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
+use drivers::wire::canopen::sdo::SdoRequest;
 use drivers::wire::canopen::{Function, NodeId};
 use units::Time;
 
+use self::load::Load;
+use crate::assemble;
 use crate::config::{AxisConfig, MachineConfig};
 use crate::engine::EngineFailure;
 use crate::failure::Failure;
@@ -35,53 +41,19 @@ pub(crate) struct BusWatch {
 #[derive(Debug)]
 struct Bus {
     name: String,
-    bit: Duration,
-    window: Duration,
     /// Only a master sends these, and the master is here.
     masters_own: BTreeMap<u16, &'static str>,
-    before: Load,
-    now: Load,
+    /// Those of the configuration, by the identifier of what is asked of them.
+    servers: BTreeMap<u16, Server>,
+    load: Load,
 }
 
-/// Identifiers of standard frames.
-const IDENTIFIERS: usize = 0x800;
-
-/// One place for each identifier: counting asks for no memory, the cyclic engine counts too.
+/// A device that can be asked by SDO.
 #[derive(Debug)]
-struct Load {
-    since: Time,
-    busy: Box<[Duration; IDENTIFIERS]>,
-    /// The identifiers that were heard: few of all.
-    heard: Vec<u16>,
-}
-
-impl Default for Load {
-    fn default() -> Self {
-        Self {
-            since: Time::ZERO,
-            busy: Box::new([Duration::ZERO; IDENTIFIERS]),
-            heard: Vec::with_capacity(IDENTIFIERS),
-        }
-    }
-}
-
-impl Load {
-    fn begin(&mut self, since: Time) {
-        self.since = since;
-        for cob_id in self.heard.drain(..) {
-            self.busy[usize::from(cob_id)] = Duration::ZERO;
-        }
-    }
-
-    fn add(&mut self, cob_id: u16, span: Duration) {
-        let Some(busy) = self.busy.get_mut(usize::from(cob_id)) else {
-            return;
-        };
-        if *busy == Duration::ZERO {
-            self.heard.push(cob_id);
-        }
-        *busy += span;
-    }
+struct Server {
+    node: NodeId,
+    /// Whether it was told that somebody else asks it.
+    is_told: bool,
 }
 
 impl BusWatch {
@@ -90,11 +62,12 @@ impl BusWatch {
             let period = Duration::from_secs_f64(can.sync_period_ms * 1e-3);
             let bus = Bus {
                 name: name.clone(),
-                bit: Duration::from_secs(1) / can.bitrate_bit_per_s,
-                window: period * WINDOW_PERIODS,
                 masters_own: masters_own(config, name, can.master_node_id),
-                before: Load::default(),
-                now: Load::default(),
+                servers: servers(config, name),
+                load: Load::new(
+                    Duration::from_secs(1) / can.bitrate_bit_per_s,
+                    period * WINDOW_PERIODS,
+                ),
             };
             (ports[name], bus)
         });
@@ -103,27 +76,28 @@ impl BusWatch {
         }
     }
 
-    /// Takes what came in.
+    /// Takes what came in, and is looked at now. Returns what an operator should know of it.
     ///
     /// # Errors
     /// When it is something that only another master can have sent.
-    pub(crate) fn observe(&mut self, arrival: &Arrival) -> Result<(), Failure> {
-        let Input::Payload(Payload::Frame(frame)) = &arrival.input else {
-            return Ok(());
+    pub(crate) fn observe(
+        &mut self,
+        arrival: &Arrival,
+        now: Time,
+    ) -> Result<Option<String>, Failure> {
+        let Some(bus) = self.buses.get_mut(&arrival.port) else {
+            return Ok(None);
         };
-        let (Some(bus), Some(cob_id)) = (self.buses.get_mut(&arrival.port), frame.standard_id())
-        else {
-            return Ok(());
-        };
-        bus.count(arrival.at, cob_id, frame);
-        match bus.masters_own.get(&cob_id) {
-            // Noise on identifier 0 is no command.
-            Some(_) if cob_id == NMT_COB_ID && NmtCommand::parse(frame).is_err() => Ok(()),
-            Some(heard) => Err(Failure::SecondMaster {
-                port: bus.name.clone(),
-                heard,
-            }),
-            None => Ok(()),
+        match &arrival.input {
+            Input::Lost(frames) => {
+                bus.load.lose(arrival.at, now, *frames);
+                Ok(None)
+            }
+            Input::Payload(Payload::Frame(frame)) => {
+                bus.load.count(arrival.at, now, frame);
+                bus.judge(frame)
+            }
+            _ => Ok(None),
         }
     }
 
@@ -132,12 +106,13 @@ impl BusWatch {
         if !is_absence(&failure) {
             return failure;
         }
-        let loudest = self.buses.values().filter_map(|bus| bus.loudest(now));
-        match loudest.max_by(|a, b| a.2.total_cmp(&b.2)) {
-            Some((port, cob_id, share)) if share > SHARE_MAX => Failure::Babbling {
-                port,
-                cob_id,
-                percent: (share * 100.0).min(100.0),
+        let buses = self.buses.values();
+        let loudest = buses.filter_map(|bus| Some((bus, bus.load.loudest(now)?)));
+        match loudest.max_by(|(_, a), (_, b)| a.share.total_cmp(&b.share)) {
+            Some((bus, it)) if it.share > SHARE_MAX => Failure::Babbling {
+                port: bus.name.clone(),
+                id: it.id,
+                percent: (it.share * 100.0).min(100.0),
                 missing: Box::new(failure),
             },
             _ => failure,
@@ -146,39 +121,63 @@ impl BusWatch {
 }
 
 impl Bus {
-    fn count(&mut self, at: Time, cob_id: u16, frame: &CanFrame) {
-        if at.since(self.now.since) >= self.window {
-            core::mem::swap(&mut self.before, &mut self.now);
-            self.now.begin(at);
+    fn judge(&mut self, frame: &CanFrame) -> Result<Option<String>, Failure> {
+        let Some(cob_id) = frame.standard_id() else {
+            return Ok(None);
+        };
+        if let Some(&heard) = self.masters_own.get(&cob_id) {
+            // Noise on identifier 0 is no command.
+            if cob_id == NMT_COB_ID && NmtCommand::parse(frame).is_err() {
+                return Ok(None);
+            }
+            return Err(self.second_master(heard));
         }
-        // Between the shortest form and the longest, with every stuff bit there may be.
-        let bits = (47 + 8 * frame.data().len()) as u32;
-        self.now.add(cob_id, self.bit * bits);
+        let Some(server) = self.servers.get_mut(&cob_id) else {
+            return Ok(None);
+        };
+        match SdoRequest::parse(frame.data()) {
+            Ok(request) if writes(&request) => {
+                Err(self.second_master("an SDO request that writes to one of the devices"))
+            }
+            Ok(_) if !core::mem::replace(&mut server.is_told, true) => Ok(Some(format!(
+                "{}: an SDO request to {} was heard that this controller did not send: another \
+                 program asks this device, and either may take the answer for its own; let it wait \
+                 until this machine is at rest",
+                self.name, server.node
+            ))),
+            // Noise, or told already.
+            Ok(_) | Err(_) => Ok(None),
+        }
     }
 
-    /// Who took the largest share lately.
-    fn loudest(&self, now: Time) -> Option<(String, u16, f64)> {
-        let span = now.since(self.before.since).as_secs_f64();
-        if span > 3.0 * self.window.as_secs_f64() || span <= 0.0 {
-            return None;
+    fn second_master(&self, heard: &'static str) -> Failure {
+        Failure::SecondMaster {
+            port: self.name.clone(),
+            heard,
         }
-        // Since when the talker talks is not known: the shorter of both spans favours him.
-        let recent = now.since(self.now.since).as_secs_f64();
-        let share = |cob_id: u16| {
-            let of = |load: &Load| load.busy[usize::from(cob_id)];
-            let (late, all) = (of(&self.now), of(&self.now) + of(&self.before));
-            let late = if recent > 0.25 * self.window.as_secs_f64() {
-                late.as_secs_f64() / recent
-            } else {
-                0.0
-            };
-            late.max(all.as_secs_f64() / span)
-        };
-        let loudest = (0..IDENTIFIERS as u16)
-            .map(|cob_id| (cob_id, share(cob_id)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (loudest.1 > 0.0).then(|| (self.name.clone(), loudest.0, loudest.1))
     }
+}
+
+/// Whether a value of the device changes.
+const fn writes(request: &SdoRequest) -> bool {
+    matches!(
+        request,
+        SdoRequest::DownloadExpedited { .. }
+            | SdoRequest::DownloadInitiate { .. }
+            | SdoRequest::BlockDownloadInitiate { .. }
+    )
+}
+
+fn servers(config: &MachineConfig, bus: &str) -> BTreeMap<u16, Server> {
+    let nodes = assemble::expected_nodes(config, bus);
+    let nodes = nodes.keys().filter_map(|raw| NodeId::new(*raw));
+    nodes
+        .map(|node| {
+            let is_told = false;
+            let server = Server { node, is_told };
+            (node.cob_id(Function::SdoRequest), server)
+        })
+        .collect()
 }
 
 fn masters_own(config: &MachineConfig, bus: &str, master: u8) -> BTreeMap<u16, &'static str> {

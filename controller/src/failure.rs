@@ -10,6 +10,7 @@ use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
 use drivers::device::{Alarm, DeviceError};
 use drivers::transport::{LinkState, SendError};
+use drivers::wire::can::CanId;
 use units::Metres;
 
 use crate::config::ConfigError;
@@ -19,7 +20,7 @@ use crate::cycle::volumetric::{PathRefusal, VolumetricFailure};
 use crate::emulated::EmulatedError;
 use crate::engine::EngineFailure;
 use crate::store::StoreError;
-use crate::text::link_text;
+use crate::text::{identifier_text, link_text};
 
 /// Everything that ends a verb without its result.
 #[derive(Debug, thiserror::Error)]
@@ -77,14 +78,14 @@ pub enum Failure {
     },
     /// Somebody takes the bus for himself, and what should have come did not.
     #[error(
-        "{port}: identifier {cob_id:#05X} takes {percent:.0} % of the bus and leaves no room; \
-         find the device that sends it ({missing})"
+        "{port}: {} takes {percent:.0} % of the bus and leaves no room; find the device or program \
+         that sends it ({missing})", identifier_text(*id)
     )]
     Babbling {
         /// The port's name in the configuration.
         port: String,
         /// What is sent.
-        cob_id: u16,
+        id: CanId,
         /// Its share of the bus.
         percent: f64,
         /// What did not come or go.

@@ -4,6 +4,7 @@ use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
 use drivers::transport::LinkState;
+use drivers::wire::can::CanId;
 use units::Metres;
 
 use crate::assemble;
@@ -171,6 +172,14 @@ pub fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
 }
 
 /// What became of a bus or line.
+/// With all the digits that it can have, as it stands in a log of the bus.
+pub(crate) fn identifier_text(id: CanId) -> String {
+    match id {
+        CanId::Standard(raw) => format!("identifier {raw:#05X}"),
+        CanId::Extended(raw) => format!("29-bit identifier {raw:#010X}"),
+    }
+}
+
 pub(crate) fn link_text(state: LinkState) -> &'static str {
     match state {
         LinkState::Up => "came back; the machine must be started anew",

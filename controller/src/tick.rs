@@ -90,7 +90,10 @@ impl Machine {
         if self.supervision == Supervision::Stopping {
             return Ok(());
         }
-        self.bus_watch.observe(arrival)?;
+        let now = self.transport.now();
+        if let Some(told) = self.bus_watch.observe(arrival, now)? {
+            self.warn(told);
+        }
         match arrival.input {
             Input::Link(state @ (LinkState::Down | LinkState::Gone)) => Err(Failure::Link {
                 port: self.port_name(arrival.port),

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use drivers::device::Alarm;
 use drivers::transport::{LinkState, SendError};
+use drivers::wire::can::CanId;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
 
@@ -224,7 +225,15 @@ fn a_node_that_fills_the_bus_is_named_by_its_identifier() {
         cob_id: 0x010,
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Babbling { cob_id: 0x010, .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Babbling {
+                    id: CanId::Standard(0x010),
+                    ..
+                }
+            )
+        },
         words: &["can0", "0x010"],
         within: PERIOD * 4,
         rest: BY_ITSELF,

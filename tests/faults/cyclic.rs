@@ -3,6 +3,7 @@
 
 use drivers::device::Alarm;
 use drivers::transport::LinkState;
+use drivers::wire::can::CanId;
 use drivers::wire::canopen::emcy::EmergencyCode;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
@@ -260,7 +261,15 @@ fn a_talker_that_fills_the_bus_is_named() {
         cob_id: 0x010,
     };
     let wanted = Wanted {
-        cause: |it| matches!(it, Failure::Babbling { cob_id: 0x010, .. }),
+        cause: |it| {
+            matches!(
+                it,
+                Failure::Babbling {
+                    id: CanId::Standard(0x010),
+                    ..
+                }
+            )
+        },
         words: &["can0", "0x010"],
         within: PERIOD * 4,
         rest: BY_ITSELF,

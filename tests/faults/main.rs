@@ -11,6 +11,7 @@ mod cyclic_host;
 mod detectors;
 mod drive;
 mod files;
+mod foreign;
 mod hall;
 mod laser;
 mod limits;

@@ -18,7 +18,7 @@ use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
 
-use crate::witness::{Deed, Testimony, Witnessed};
+use crate::witness::{Deed, Slow, Testimony, Witnessed};
 
 /// From SYNC to SYNC in the shipped configuration.
 pub const PERIOD: Duration = Duration::from_millis(5);
@@ -68,6 +68,7 @@ pub struct Scene {
     stop: bool,
     stall: Option<Duration>,
     full: Option<u16>,
+    slow: Option<Slow>,
     held_up: Option<Duration>,
     killed: bool,
 }
@@ -144,6 +145,7 @@ impl Scene {
             stop: false,
             stall: None,
             full: None,
+            slow: None,
             held_up: None,
             killed: false,
         }
@@ -213,6 +215,12 @@ impl Scene {
     /// The controller's port has no more room for frames with this identifier.
     pub const fn full(mut self, cob_id: u16) -> Self {
         self.full = Some(cob_id);
+        self
+    }
+
+    /// The controller's computer takes frames more slowly than they come when the fault is due.
+    pub const fn slow(mut self, slow: Slow) -> Self {
+        self.slow = Some(slow);
         self
     }
 
@@ -321,6 +329,9 @@ impl Scene {
         }
         if let Some(cob_id) = self.full {
             seen.fill(due, cob_id);
+        }
+        if let Some(slow) = self.slow {
+            seen.slow_down(due, slow);
         }
         if self.stop {
             let request = bench.machine.stop_request();

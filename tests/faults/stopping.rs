@@ -133,6 +133,26 @@ fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
     );
 }
 
+/// Longer than process data may be missing, shorter than the drive's own watch.
+#[test]
+fn a_controller_that_was_stopped_for_a_fifth_of_a_second_says_that_it_was_held_up() {
+    const HELD_UP: Duration = Duration::from_millis(200);
+    let wanted = Wanted {
+        cause: |failure| matches!(failure, Failure::HeldUp { pause, .. } if *pause > HELD_UP / 2),
+        words: &["kept from its buses", "too busy for real time"],
+        within: HELD_UP + PERIOD * 4,
+        rest: HELD_UP + PERIOD * 4 + STOPPING,
+    };
+    for (phase, after_ms) in [
+        (Phase::Move, 60),
+        (Phase::Stand, 1000),
+        (Phase::Calibrate, 2500),
+    ] {
+        let scene = Scene::during(phase).after_ms(after_ms);
+        check(scene.held_up(HELD_UP, |_, _| {}), &wanted);
+    }
+}
+
 #[test]
 fn a_stop_request_while_the_drive_is_silent_ends_all_the_same() {
     let scene = Scene::during(Phase::Move)

@@ -2,11 +2,12 @@
 //! moment, and what is done to the machine at set moments behind the controller's back.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::transport::in_process::InProcess;
-use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+use drivers::transport::{Arrival, Input, Payload, Port, SendError, Transport};
 use drivers::wire::can::CanFrame;
 use truestage::emulated::Emulated;
 use units::Time;
@@ -26,6 +27,18 @@ pub struct Testimony {
     deeds: Vec<(Time, Deed)>,
     stall: Option<(Time, Duration)>,
     full: Option<(Time, u16)>,
+    /// The frames that a slow computer had no room for.
+    pub lost: u32,
+    slow: Option<(Time, Slow)>,
+}
+
+/// A computer that takes frames more slowly than they come.
+#[derive(Clone, Copy)]
+pub struct Slow {
+    /// What it needs for each.
+    pub cost: Duration,
+    /// How many wait for it at most; what else comes is lost.
+    pub room: usize,
 }
 
 impl Testimony {
@@ -44,6 +57,11 @@ impl Testimony {
         self.full = Some((at, cob_id));
     }
 
+    /// From `at` on the computer is slow.
+    pub const fn slow_down(&mut self, at: Time, slow: Slow) {
+        self.slow = Some((at, slow));
+    }
+
     /// Whether a stall that was ordered has come.
     pub const fn has_stalled(&self) -> bool {
         self.stall.is_none()
@@ -57,6 +75,8 @@ impl Testimony {
         assert!(left.is_empty(), "never done, due at {left:?}");
         let full = self.full.is_some();
         assert!(!full || self.refused > 0, "no frame met the full port");
+        let slow = self.slow.is_some();
+        assert!(!slow || self.lost > 0, "the slow computer lost no frame");
     }
 
     /// The longest time that the controller did not look, from `since` on.
@@ -98,12 +118,59 @@ impl Testimony {
 pub struct Witnessed {
     inner: InProcess<Emulated>,
     seen: Rc<RefCell<Testimony>>,
+    /// What waits for a slow computer, and how many frames were lost right before each.
+    waiting: VecDeque<(Arrival, u32)>,
+    /// The frames lost since the last one that found room.
+    lost: u32,
 }
 
 impl Witnessed {
     /// Looks over `inner`.
     pub const fn new(inner: InProcess<Emulated>, seen: Rc<RefCell<Testimony>>) -> Self {
-        Self { inner, seen }
+        Self {
+            inner,
+            seen,
+            waiting: VecDeque::new(),
+            lost: 0,
+        }
+    }
+
+    /// As a socket does: what comes waits, frames that find no room are lost, and the next one that
+    /// finds room says how many.
+    fn next_arrival(&mut self, until: Time) -> Option<Arrival> {
+        let now = self.inner.now();
+        let slow = self.seen.borrow().slow.filter(|(at, _)| now >= *at);
+        let Some((_, slow)) = slow else {
+            return self.inner.receive(until);
+        };
+        let taken = now + slow.cost;
+        self.inner.world().simulation_mut().advance(taken);
+        while let Some(arrival) = self.inner.receive(taken) {
+            let is_frame = matches!(arrival.input, Input::Payload(Payload::Frame(_)));
+            if is_frame && self.waiting.len() >= slow.room {
+                self.lost += 1;
+                self.seen.borrow_mut().lost += 1;
+            } else {
+                let lost = if is_frame {
+                    core::mem::take(&mut self.lost)
+                } else {
+                    0
+                };
+                self.waiting.push_back((arrival, lost));
+            }
+        }
+        match self.waiting.pop_front() {
+            None => self.inner.receive(until.max(taken)),
+            Some((arrival, 0)) => Some(arrival),
+            Some((arrival, lost)) => {
+                let told = Arrival {
+                    input: Input::Lost(lost),
+                    ..arrival.clone()
+                };
+                self.waiting.push_front((arrival, 0));
+                Some(told)
+            }
+        }
     }
 
     fn look(&self) {
@@ -174,7 +241,7 @@ impl Transport for Witnessed {
     fn receive(&mut self, until: Time) -> Option<Arrival> {
         loop {
             let stop = until.min(self.next_deed());
-            let arrival = self.inner.receive(stop);
+            let arrival = self.next_arrival(stop);
             self.look();
             self.do_what_is_due();
             if arrival.is_some() || stop >= until {

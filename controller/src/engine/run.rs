@@ -384,13 +384,13 @@ impl Machine {
         seats: &Seats,
         synced: Time,
     ) -> Result<(), Failure> {
-        let until = synced + engine.period.mul_f64(LISTEN_SHARE);
+        let listened = synced + engine.period.mul_f64(LISTEN_SHARE);
         loop {
             let complete = seats.drive[..seats.count]
                 .iter()
                 .all(|at| self.answer(*at, synced).is_some());
             // What else waits is taken too, so that nothing piles up.
-            let until = if complete { Time::ZERO } else { until };
+            let until = if complete { Time::ZERO } else { listened };
             let Some(arrival) = self.transport.receive(until) else {
                 return Ok(());
             };
@@ -403,6 +403,10 @@ impl Machine {
                 engine.timing.late_answers += u64::from(is_late);
             } else if !was_complete {
                 engine.timing.answers.note(arrival.at.since(synced));
+            }
+            // On a flooded bus something always waits.
+            if arrival.at > listened {
+                return Ok(());
             }
         }
     }
@@ -425,10 +429,15 @@ impl Machine {
     }
 
     fn not_sent(&mut self, source: SendError, what: &str) -> Failure {
-        // What has arrived meanwhile may say why: bus-off, for one.
+        // What has arrived meanwhile may say why: bus-off, for one. On a flooded bus something always
+        // waits.
+        let begun = self.now();
         while let Some(arrival) = self.transport.receive(Time::ZERO) {
             if let Err(failure) = self.take(&arrival) {
                 return failure;
+            }
+            if arrival.at > begun {
+                break;
             }
         }
         if let SendError::Unusable { port, state } = source {

@@ -4,11 +4,12 @@
 //! Probabilities are drawn from a stream of the fault's own: one fault never shifts another.
 
 use core::time::Duration;
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::NodeId;
+use drivers::wire::can::{CanFrame, CanId};
 use drivers::wire::canopen::emcy::{Emergency, EmergencyCode};
 use drivers::wire::canopen::nmt::{NmtState, emit_heartbeat};
+use drivers::wire::canopen::sdo::{Expedited, SdoRequest};
 use drivers::wire::canopen::sync::emit_sync;
+use drivers::wire::canopen::{Function, NodeId, Object};
 use serde::Deserialize;
 
 mod plan;
@@ -97,10 +98,19 @@ pub enum Fault {
     StopHeartbeat { node: String },
     /// A CANopen device's PDOs stop, its heartbeat goes on.
     StopPdos { node: String },
-    /// Somebody fills the bus with frames of this identifier.
-    Babble { port: String, cob_id: u16 },
+    /// Somebody fills the bus with frames of this identifier: of 29 bits when 11 do not hold it.
+    Babble { port: String, cob_id: u32 },
     /// A second master sends SYNC.
     ForeignSync { port: String, period_ms: f64 },
+    /// Another client asks the SDO server of a node: how it reads its position, or, with `writes`,
+    /// for another profile velocity.
+    ForeignSdo {
+        port: String,
+        node_id: u8,
+        #[serde(default)]
+        writes: bool,
+        period_ms: f64,
+    },
     /// A second device with this node identifier boots.
     DuplicateBootUp { port: String, node_id: u8 },
     /// An emergency message goes out in the name of this node identifier.
@@ -208,6 +218,7 @@ impl Fault {
             | Self::Delay { port, .. }
             | Self::Babble { port, .. }
             | Self::ForeignSync { port, .. }
+            | Self::ForeignSdo { port, .. }
             | Self::DuplicateBootUp { port, .. }
             | Self::Emergency { port, .. }
             | Self::ErrorPassive { port }
@@ -239,14 +250,21 @@ impl Fault {
     fn strangers_frame(&self) -> Option<(CanFrame, Option<Duration>)> {
         // Shorter than the shortest frame at 1 Mbit/s: the next one always waits.
         const FULL_LOAD: Duration = Duration::from_micros(50);
+        let every = |period_ms: f64| Some(Duration::from_secs_f64(period_ms.max(0.1) * 1e-3));
         match self {
             Self::Babble { cob_id, .. } => {
-                let frame = CanFrame::standard(cob_id & 0x7FF, &[0xBA; 8]);
-                Some((frame, Some(FULL_LOAD)))
+                Some((CanFrame::new(id_of(*cob_id), &[0xBA; 8])?, Some(FULL_LOAD)))
             }
-            Self::ForeignSync { period_ms, .. } => {
-                let period = Duration::from_secs_f64(period_ms.max(0.1) * 1e-3);
-                Some((emit_sync(None), Some(period)))
+            Self::ForeignSync { period_ms, .. } => Some((emit_sync(None), every(*period_ms))),
+            Self::ForeignSdo {
+                node_id,
+                writes,
+                period_ms,
+                ..
+            } => {
+                let cob_id = NodeId::new(*node_id)?.cob_id(Function::SdoRequest);
+                let frame = CanFrame::standard(cob_id, &foreign_request(*writes)?.emit());
+                Some((frame, every(*period_ms)))
             }
             Self::DuplicateBootUp { node_id, .. } => {
                 let node = NodeId::new(*node_id)?;
@@ -290,6 +308,22 @@ impl Fault {
                 | Self::Silence { .. }
         )
     }
+}
+
+/// An identifier of 11 bits where they hold it, else of 29.
+fn id_of(raw: u32) -> CanId {
+    let standard = u16::try_from(raw).ok().and_then(CanId::standard);
+    standard.unwrap_or(CanId::Extended(raw & CanId::EXTENDED_MAX))
+}
+
+/// What somebody else asks of a drive (CiA 402: 0x6064 position, 0x6081 profile velocity).
+fn foreign_request(writes: bool) -> Option<SdoRequest> {
+    let object = Object::new(if writes { 0x6081 } else { 0x6064 }, 0);
+    if !writes {
+        return Some(SdoRequest::UploadInitiate { object });
+    }
+    let data = Expedited::new(&1000_u32.to_le_bytes())?;
+    Some(SdoRequest::DownloadExpedited { object, data })
 }
 
 /// A fault that was injected, by its place in the plan.

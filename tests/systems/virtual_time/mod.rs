@@ -18,4 +18,5 @@ mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
 mod volumetric_resume;
+mod volumetric_scatter;
 mod wrong_position;
