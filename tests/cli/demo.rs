@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use serde_json::Value;
-use tests::Rig;
+use tests::{Edit, Rig, UVW, UVW_COPLEY};
+use truestage::{Store, config};
 
 use crate::programs::{live_rigs, truestage};
 
@@ -58,6 +59,39 @@ fn the_platform_shows_its_cycle() {
         "/as_left_after_power_cycle/largest_um",
     ];
     check("uvw", "/as_found/largest_um", left, 2.0);
+}
+
+/// Two machines are shown: what the second one stores is none of the first one's business.
+#[test]
+fn both_platforms_shown_in_one_folder_keep_their_calibrations() {
+    if !live_rigs().any(|rig| rig == Rig::Pty) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for machine in ["uvw", "uvw-copley"] {
+        let words = ["demo", "--machine", machine, "--data-dir", "."];
+        truestage(folder.path(), &words).with_code(0);
+    }
+    for shipped in [&UVW, &UVW_COPLEY] {
+        let here = format!("data_dir = {:?}", folder.path());
+        let text = shipped
+            .machine
+            .to_owned()
+            .edit("data_dir = \"machine-data\"", &here);
+        let machine = config::parse(&text, "machine.toml");
+        let machine = machine.unwrap_or_else(|error| panic!("{error}"));
+        let machine = machine.config.machine;
+        let store = Store::of(&machine);
+        for screw in ["u", "v", "w"] {
+            let active = store.active(screw).expect("it can be read").current;
+            let id = active.unwrap_or_else(|| panic!("{}: {screw} has none", machine.name));
+            let head = store.load(&id).expect("it is whole").head;
+            assert_eq!(
+                (head.machine, head.stage_serial),
+                (machine.name.clone(), machine.stage_serial.clone())
+            );
+        }
+    }
 }
 
 #[test]
