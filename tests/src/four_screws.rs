@@ -88,7 +88,7 @@ pub fn with_fourth_drive(text: String) -> String {
 /// The configuration of four screws whose axes follow a set-point every two milliseconds.
 pub fn four_cyclic_axes(text: String) -> String {
     let text = with_fourth_screw(text, Some(1.0));
-    let text = text.edit("sync_period_ms = 5.0", "sync_period_ms = 2.0");
+    let text = text.edit("sync_period_ms = 10.0", "sync_period_ms = 2.0");
     // These machines are zeroed in real time.
     let text = text.edit("search_speed_mm_per_s = 2.0", "search_speed_mm_per_s = 8.0");
     ["u", "v", "w", "r"].iter().fold(text, |text, axis| {

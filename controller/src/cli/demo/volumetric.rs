@@ -20,7 +20,8 @@ use crate::cli::volume::{calibrated_text, calibrated_value};
 
 /// How long the machine warms up between cold and warm lines.
 const WARM_UP: Duration = Duration::from_secs(2 * 3600);
-/// How long the day is, after that.
+/// When the line is read, hours after that: warmth settles as an exponential does.
+const HOURS: [u32; 5] = [0, 1, 2, 4, DAY_H];
 const DAY_H: u32 = 8;
 
 /// What the line showed at one hour, as ranges of the deviation along it.
@@ -108,7 +109,7 @@ fn day(
 ) -> Result<Vec<Hour>, Failure> {
     let morning = machine.now();
     let mut hours = Vec::new();
-    for hour in 0..=DAY_H {
+    for hour in HOURS {
         let until = morning + Duration::from_secs(u64::from(hour) * 3600);
         let pause = until.since(machine.now());
         if until > Time::ZERO && !pause.is_zero() {
