@@ -47,12 +47,12 @@ use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::transport::Port;
-use drivers::wire::canopen::NodeId;
 use units::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
     Scale, Volts,
 };
+use wire::Port;
+use wire::canopen::NodeId;
 
 use crate::config::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, HomeOffsetName, IdentityConfig,

@@ -12,12 +12,13 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use drivers::device::{Alarm, DeviceError};
-use drivers::transport::{Arrival, Input, Payload, Port, SendError};
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
-use drivers::wire::canopen::sdo::SdoRequest;
-use drivers::wire::canopen::{Function, NodeId};
+use drivers::transport::SendError;
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
+use wire::canopen::sdo::SdoRequest;
+use wire::canopen::{Function, NodeId};
+use wire::{Arrival, Input, Payload, Port};
 
 use self::load::Load;
 use crate::assemble;

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 
 use drivers::device::in_sight::{CameraFrame, InSight, InSightSettings};
 use drivers::device::{PoseInstrument, PoseReading};
-use drivers::transport::Port;
-use drivers::wire::in_sight::Cell;
 use units::{Metres, Radians};
+use wire::Port;
+use wire::in_sight::Cell;
 
 use crate::config::{CameraConfig, CameraDevice, MachineConfig};
 use crate::failure::Failure;

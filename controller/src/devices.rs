@@ -7,8 +7,8 @@ use drivers::device::{
     AnalogInput, Axis, Device, DisplacementInstrument, Identity, PoseInstrument, RotaryAxis,
     ServoDrive,
 };
-use drivers::transport::Port;
 use units::Time;
+use wire::Port;
 
 use crate::failure::Failure;
 use crate::machine::{Machine, Unit};

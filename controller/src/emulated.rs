@@ -9,14 +9,15 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+use drivers::transport::SendError;
 use drivers::transport::in_process::{InProcess, World};
-use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
 use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
 use mock_bus::plant::{LineOptics as EmulatedOptics, LineSetUp};
 use mock_bus::runner::{self, Options, RunError, Running};
 use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
 use tempfile::TempDir;
 use units::Time;
+use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::assemble;
 use crate::config::MachineConfig;

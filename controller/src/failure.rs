@@ -9,9 +9,10 @@ use std::path::PathBuf;
 use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
 use drivers::device::{Alarm, DeviceError};
-use drivers::transport::{LinkState, SendError};
-use drivers::wire::can::CanId;
+use drivers::transport::SendError;
 use units::Metres;
+use wire::LinkState;
+use wire::can::CanId;
 
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;

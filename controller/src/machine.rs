@@ -15,9 +15,10 @@ use drivers::device::{
     PoseInstrument, RotaryAxis,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::transport::{Port, Transport};
-use drivers::wire::cia402::PowerState;
+use drivers::transport::Transport;
 use units::{Metres, Time};
+use wire::Port;
+use wire::cia402::PowerState;
 
 use crate::assemble;
 use crate::bus_watch::BusWatch;

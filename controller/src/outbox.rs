@@ -7,8 +7,9 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use drivers::transport::{Payload, Port, SendError, Transport};
+use drivers::transport::{SendError, Transport};
 use units::Time;
+use wire::{Payload, Port};
 
 use crate::patience::Patience;
 
@@ -113,7 +114,7 @@ impl Outbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drivers::transport::Arrival;
+    use wire::Arrival;
 
     /// Takes `room` payloads, then is full; its clock is set by the test.
     struct Narrow {

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use drivers::transport::Port;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, LiveBuilder, OpenError, SerialSettings, SlcanSettings};
 use drivers::transport::lockstep::Participant;
+use wire::Port;
 
 use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};

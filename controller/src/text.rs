@@ -3,9 +3,9 @@
 use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
-use drivers::transport::LinkState;
-use drivers::wire::can::CanId;
 use units::Metres;
+use wire::LinkState;
+use wire::can::CanId;
 
 use crate::assemble;
 use crate::config::MachineConfig;

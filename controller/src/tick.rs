@@ -5,9 +5,10 @@
 //! by itself: every event comes through here.
 
 use drivers::device::{Alarm, LineUse};
-use drivers::transport::{Arrival, Input, LinkState, Payload, Port, SendError};
-use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
+use drivers::transport::SendError;
 use units::Time;
+use wire::can::{BusError, BusErrorClass, ControllerProblem};
+use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};

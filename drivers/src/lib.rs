@@ -1,6 +1,5 @@
-//! Drivers of precision stages: bytes, protocols, devices, transports.
+//! Drivers of precision stages: protocols, devices, transports. Bytes are the package `wire`'s.
 //!
-//! - [`wire`]: bytes to typed messages and back, one file per protocol part.
 //! - [`protocol`]: sans-io machines (SDO client, NMT, heartbeat, CiA 402 power machine).
 //! - [`device`]: what one device's objects or lines mean, behind domain traits.
 //! - [`transport`]: the only sockets, ports and threads.
@@ -8,4 +7,3 @@
 pub mod device;
 pub mod protocol;
 pub mod transport;
-pub mod wire;

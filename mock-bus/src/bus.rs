@@ -7,8 +7,8 @@
 //! Absent: acknowledge, error counters of the devices.
 
 use core::time::Duration;
-use drivers::wire::can::{CanFrame, CanId};
 use units::Time;
+use wire::can::{CanFrame, CanId};
 
 /// Who sent a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

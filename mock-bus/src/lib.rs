@@ -3,9 +3,9 @@
 //! - [`plant`]: the physical truth in SI units; knows no bus.
 //! - [`node`]: each emulated device's own protocol behaviour over that truth.
 //! - [`simulation`]: nodes, plant, bus latency and faults in one virtual time.
-//! - [`runner`]: the same in real time, on pseudo-terminals and SocketCAN interfaces.
+//! - `runner` (feature `live`): the same in real time, on pseudo-terminals and SocketCAN interfaces.
 //!
-//! Only the byte codecs (`drivers::wire`) are shared with the drivers, and no formula is
+//! Only the byte codecs (`wire`) are shared with the drivers, and no formula is
 //! shared with the compensator: an emulator that used either would mark its own homework.
 
 pub mod bus;
@@ -14,5 +14,6 @@ pub mod fault;
 pub mod node;
 pub mod plant;
 pub mod random;
+#[cfg(feature = "live")]
 pub mod runner;
 pub mod simulation;

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use drivers::wire::lockstep::{Reply, Request, path_of};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
 use nix::sys::signalfd::SignalFd;
+use wire::lockstep::{Reply, Request, path_of};
 
 use mock_bus::config::MachineConfig;
 use mock_bus::fault::FaultConfig;

@@ -8,13 +8,14 @@
 use std::time::Instant;
 
 use drivers::protocol::sdo_client::{Method, SdoClient, Timeouts};
+use drivers::transport::Transport;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::Live;
-use drivers::transport::{Input, Payload, Port, Transport};
-use drivers::wire::canopen::{NodeId, Object};
 use nix::unistd::{read, write};
 use socketcan::{CanFilter, CanSocket, Socket as _, SocketOptions as _};
 use units::Time;
+use wire::canopen::{NodeId, Object};
+use wire::{Input, Payload, Port};
 
 const PORT: Port = Port(0);
 const NODE: NodeId = NodeId::new(2).expect("1 to 127");

@@ -15,16 +15,17 @@ use std::os::fd::AsRawFd as _;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 
+use drivers::transport::Transport as _;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::Live;
 use drivers::transport::sync_thread::{Scheduling, SyncSink, SyncStatistics, SyncThread};
-use drivers::transport::{Port, Transport as _};
 use nix::errno::Errno;
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, clock_gettime};
 use serde_json::{Value, json};
 use socketcan::{CanFilter, CanSocket, Socket as _, SocketOptions as _};
+use wire::Port;
 
 const PORT: Port = Port(0);
 const SYNC: u32 = 0x80;

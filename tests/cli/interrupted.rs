@@ -4,13 +4,14 @@ use core::time::Duration;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use drivers::transport::Transport;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
 use drivers::transport::lockstep::Participant;
-use drivers::transport::{Input, Payload, Port, Transport};
 use nix::sys::signal::Signal;
 use tests::Rig;
 use truestage::store::{PointEntry, ReadJournal, read_journal};
+use wire::{Input, Payload, Port};
 
 use crate::programs::{Bench, Process, live_rigs};
 

@@ -5,7 +5,6 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use drivers::device::{Alarm, AmplifierTrouble, AxisCommand, DeviceError, DriveCommand};
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
@@ -13,6 +12,7 @@ use mock_bus::simulation::Simulation;
 use tests::{Emulator, Group, Rig, Setup, Stand, rigs};
 use truestage::observer::{Observer, Stage};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+use wire::cia402::PowerState;
 
 const NODE: &str = "amplifiers";
 const HERE_IS_ZERO: AxisCommand = AxisCommand::HomeHere {

@@ -4,11 +4,11 @@ use core::time::Duration;
 
 use drivers::device::cia402::Cia402Drive;
 use drivers::device::{Alarm, Axis, AxisCommand, Device, DeviceError, DriveCommand, ServoDrive};
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Desk, Emulator, Rig, Setup, rigs};
 use truestage::assemble;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
+use wire::cia402::PowerState;
 
 type Drive = Desk<Cia402Drive>;
 

@@ -4,10 +4,11 @@
 use std::time::Duration;
 
 use drivers::device::Alarm;
-use drivers::transport::{LinkState, SendError};
-use drivers::wire::can::CanId;
+use drivers::transport::SendError;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
+use wire::LinkState;
+use wire::can::CanId;
 
 use crate::scene::{PERIOD, Phase, STOPPING, Scene, WATCH_MASTER, Wanted, check, check_harmless};
 

@@ -2,12 +2,12 @@
 //! 10, 12 to 15, 22 to 24, 32, 50; those of the host are in `cyclic_host.rs`).
 
 use drivers::device::Alarm;
-use drivers::transport::LinkState;
-use drivers::wire::can::CanId;
-use drivers::wire::canopen::emcy::EmergencyCode;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
 use truestage::engine::EngineFailure;
+use wire::LinkState;
+use wire::can::CanId;
+use wire::canopen::emcy::EmergencyCode;
 
 use crate::scene::{HEARTBEAT, PERIOD, Phase, STOPPING, Scene, Wanted, check, check_harmless};
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::transport::in_process::InProcess;
-use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+use drivers::transport::{SendError, Transport};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, machine_config};
 use truestage::emulated::Emulated;
@@ -14,6 +14,7 @@ use truestage::engine::{Cause, Engine, EngineFailure, NoCorrection, State};
 use truestage::machine::StopRequest;
 use truestage::{Failure, Machine};
 use units::{Metres, Time};
+use wire::{Arrival, Payload, Port};
 
 use crate::scene::{cyclic, follow, shortened};
 use crate::witness::{Testimony, Witnessed};

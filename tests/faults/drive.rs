@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use drivers::device::Alarm;
-use drivers::wire::canopen::emcy::EmergencyCode;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
+use wire::canopen::emcy::EmergencyCode;
 
 use crate::scene::{HEARTBEAT, PERIOD, Phase, STOPPING, Scene, Wanted, check, check_harmless};
 

@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use drivers::device::{Alarm, DeviceError};
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::Fault;
 use mock_bus::node::cia402_drive::DriveQuirks;
 use truestage::Failure;
 use truestage::emulated::Emulated;
 use units::Metres;
+use wire::canopen::emcy::EmergencyCode;
+use wire::cia402::PowerState;
 
 use crate::scene::{PERIOD, Phase, STOPPING, Scene, Wanted, check, power_state, with_drive};
 

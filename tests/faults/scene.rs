@@ -5,7 +5,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::simulation::Simulation;
@@ -17,6 +16,7 @@ use truestage::observer::{Observer, Stage};
 use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
+use wire::cia402::PowerState;
 
 use crate::witness::{Deed, Slow, Testimony, Witnessed};
 

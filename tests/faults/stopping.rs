@@ -5,12 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::Fault;
 use mock_bus::simulation::Simulation;
 use tests::{Bench, Edit};
 use truestage::Failure;
 use units::{Metres, Time};
+use wire::cia402::PowerState;
 
 use crate::scene::{
     PERIOD, Phase, STOPPING, Scene, WATCH_MASTER, Wanted, check, check_harmless, power_state,

@@ -10,7 +10,6 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::device::Alarm;
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{FaultConfig, FaultId};
 use mock_bus::random::Stream;
 use tests::Bench;
@@ -18,6 +17,7 @@ use truestage::cycle::{CalibrateOptions, VerifyOptions};
 use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
+use wire::cia402::PowerState;
 
 use crate::scene::{power_state, shortened};
 use crate::witness::{Testimony, Witnessed};

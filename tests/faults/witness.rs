@@ -7,10 +7,11 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::transport::in_process::InProcess;
-use drivers::transport::{Arrival, Input, Payload, Port, SendError, Transport};
-use drivers::wire::can::CanFrame;
+use drivers::transport::{SendError, Transport};
 use truestage::emulated::Emulated;
 use units::Time;
+use wire::can::CanFrame;
+use wire::{Arrival, Input, Payload, Port};
 
 /// Something done to the machine.
 pub type Deed = Box<dyn FnOnce(&Emulated)>;

@@ -6,7 +6,6 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use drivers::transport::Port;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
 use serde_json::{Value, json};
@@ -17,6 +16,7 @@ use truestage::config::Loaded;
 use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::patience::Patience;
 use units::Metres;
+use wire::Port;
 
 use crate::peer::Peer;
 

@@ -1,15 +1,16 @@
 //! python-canopen's `LocalNode` is the server of our SDO client.
 
 use drivers::protocol::sdo_client::{Method, SdoClient, SdoFailure, Timeouts};
+use drivers::transport::Transport;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
-use drivers::transport::{Input, Payload, Port, Transport};
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::sdo::AbortCode;
-use drivers::wire::canopen::{NodeId, Object};
 use serde_json::json;
 use std::time::Duration;
 use tests::{INTERFACE, Rig, SlcanHub};
+use wire::can::CanFrame;
+use wire::canopen::sdo::AbortCode;
+use wire::canopen::{NodeId, Object};
+use wire::{Input, Payload, Port};
 
 use crate::peer::Peer;
 

@@ -3,10 +3,10 @@
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
 use drivers::transport::replay::Replay;
-use drivers::transport::{Payload, Port};
-use drivers::wire::can::CanFrame;
 use serde_json::{Value, json};
 use units::Time;
+use wire::can::CanFrame;
+use wire::{Payload, Port};
 
 use crate::peer::Peer;
 

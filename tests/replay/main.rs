@@ -6,12 +6,13 @@ use std::rc::Rc;
 
 use drivers::transport::record::Recorder;
 use drivers::transport::replay::{Replay, ReplayReport};
-use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+use drivers::transport::{SendError, Transport};
 use tests::{Bench, Edit, machine_config};
 use truestage::cycle::{Verified, VerifyOptions, Zeroed};
 use truestage::store::PointEntry;
 use truestage::{Failure, Machine, Store, assemble};
 use units::Time;
+use wire::{Arrival, Payload, Port};
 
 /// A verification of two points from both sides, twice.
 fn short(text: String) -> String {

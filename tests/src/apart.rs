@@ -4,10 +4,11 @@ use core::time::Duration;
 use std::cell::Cell;
 use std::rc::Rc;
 
-use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+use drivers::transport::{SendError, Transport};
 use truestage::engine::{Cause, Engine};
 use truestage::{Failure, Machine};
 use units::Time;
+use wire::{Arrival, Payload, Port};
 
 use crate::stream::Writer;
 

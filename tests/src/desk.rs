@@ -6,10 +6,11 @@ use drivers::device::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, LatchCommand, PositionLatch,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::transport::{Payload, Port, Transport};
-use drivers::wire::canopen::NodeId;
+use drivers::transport::Transport;
 use truestage::assemble;
 use units::{Coordinate, Time};
+use wire::canopen::NodeId;
+use wire::{Payload, Port};
 
 use crate::emulator::Emulator;
 

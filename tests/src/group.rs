@@ -4,11 +4,12 @@ use core::time::Duration;
 
 use drivers::device::{Alarm, Axis, AxisCommand, AxisReading, DeviceError, LineUse};
 use drivers::protocol::heartbeat::HeartbeatProducer;
-use drivers::transport::{Payload, Port, Transport};
-use drivers::wire::canopen::NodeId;
+use drivers::transport::Transport;
 use truestage::assemble;
 use truestage::config::AxisDevice;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
+use wire::canopen::NodeId;
+use wire::{Payload, Port};
 
 use crate::emulator::Emulator;
 
@@ -172,7 +173,7 @@ impl Group {
         let arrival = self.transport.receive(deadline);
         let now = arrival.as_ref().map_or_else(|| self.now(), |it| it.at);
         if let Some(arrival) = arrival {
-            use drivers::transport::Input;
+            use wire::Input;
             if let Input::Payload(Payload::Bytes(bytes)) = &arrival.input {
                 let text = String::from_utf8_lossy(bytes).into_owned();
                 self.heard.push((arrival.at, text));

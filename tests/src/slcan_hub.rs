@@ -1,7 +1,7 @@
 //! A CAN bus of two SLCAN adapters on pseudo-terminals, for two programs that both expect to
 //! be the host of one: what one transmits, the other receives.
 //!
-//! Source: Lawicel AB, CAN232 manual version 3, by way of [`drivers::wire::slcan`]. The bus has
+//! Source: Lawicel AB, CAN232 manual version 3, by way of [`wire::slcan`]. The bus has
 //! no time and no arbitration. What a host does not read in time is lost, as in a real adapter.
 
 use std::fs::File;
@@ -10,13 +10,13 @@ use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::slcan::{Command, LineBuffer, Reply, StatusFlags};
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
+use wire::can::CanFrame;
+use wire::slcan::{Command, LineBuffer, Reply, StatusFlags};
 
 /// Two adapters on one bus, until it is dropped.
 pub struct SlcanHub {

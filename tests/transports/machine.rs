@@ -4,10 +4,11 @@ use core::time::Duration;
 use std::cell::Cell;
 use std::rc::Rc;
 
-use drivers::transport::{Arrival, LinkState, Payload, Port, SendError, Transport};
+use drivers::transport::{SendError, Transport};
 use tests::{Interface, Rig, Setup, Stand};
 use truestage::Failure;
 use units::{Metres, Time};
+use wire::{Arrival, LinkState, Payload, Port};
 
 /// Does something when its clock has reached a moment.
 struct Meddling {

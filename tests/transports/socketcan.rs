@@ -5,10 +5,11 @@ use core::time::Duration;
 use ::socketcan::{CanErrorFrame, CanSocket, Socket};
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, OpenError};
-use drivers::transport::{Arrival, Input, LinkState, SendError, Transport};
-use drivers::wire::can::{BusErrorClass, CanFrame, CanId};
-use drivers::wire::{Payload, Port};
+use drivers::transport::{SendError, Transport};
 use tests::{Interface, run};
+use wire::can::{BusErrorClass, CanFrame, CanId};
+use wire::{Arrival, Input, LinkState};
+use wire::{Payload, Port};
 
 const HOST: Port = Port(0);
 const LONG: Duration = Duration::from_secs(20);

@@ -3,8 +3,8 @@
 use core::time::Duration;
 
 use drivers::device::copley::{CopleySettings, CopleyTimeouts};
-use drivers::wire::copley::Address;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+use wire::copley::Address;
 
 use super::{CHECKED, millis, reference_limit};
 use crate::config::{AxisConfig, SerialLine};

@@ -10,8 +10,8 @@ use drivers::device::RotaryAxis;
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, Edge, LatchSettings, PositionRange, Turn,
 };
-use drivers::transport::Port;
 use units::{Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale};
+use wire::Port;
 
 use super::{CHECKED, home_offset, millis, node_settings, option_codes, patient_drive};
 use crate::config::{

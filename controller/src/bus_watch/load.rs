@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use drivers::wire::can::{CanFrame, CanId};
 use units::Time;
+use wire::can::{CanFrame, CanId};
 
 /// The number of 11-bit identifiers.
 const STANDARD: usize = 0x800;

@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use drivers::wire::lockstep::path_of;
+use wire::lockstep::path_of;
 
 use kind::{Kind, by_kind};
 use output::Output;

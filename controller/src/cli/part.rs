@@ -291,9 +291,10 @@ pub(super) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
 mod tests {
     use core::time::Duration;
 
-    use drivers::transport::{Arrival, Payload, Port, SendError, Transport};
+    use drivers::transport::{SendError, Transport};
     use truestage::config;
     use units::Time;
+    use wire::{Arrival, Payload, Port};
 
     use super::*;
 

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use drivers::wire::cia402::PowerState;
 use serde_json::{Value, json};
 use truestage::cycle::{CalibrateOptions, VerifyOptions};
 use truestage::ports::Use;
 use truestage::store::Store;
 use truestage::{Failure, Machine, config, json as to_json, text};
 use units::{Metres, Short};
+use wire::cia402::PowerState;
 
 use super::moved;
 use super::output::{Ended, Output};

@@ -8,10 +8,10 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use drivers::device::Identity;
-use drivers::transport::{Arrival, Input, Payload, Port};
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::sdo::{SdoRequest, SdoResponse};
-use drivers::wire::canopen::{Function, NodeId, Object};
+use wire::can::CanFrame;
+use wire::canopen::sdo::{SdoRequest, SdoResponse};
+use wire::canopen::{Function, NodeId, Object};
+use wire::{Arrival, Input, Payload, Port};
 
 use crate::assemble;
 use crate::config::IdentityConfig;

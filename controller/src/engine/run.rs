@@ -14,11 +14,12 @@
 use core::time::Duration;
 
 use drivers::device::DriveCommand;
+use drivers::transport::SendError;
 use drivers::transport::real_time::RealTime;
-use drivers::transport::{Payload, Port, SendError};
-use drivers::wire::canopen::sync::emit_sync;
-use drivers::wire::cia402::PowerState;
 use units::{Metres, Time};
+use wire::canopen::sync::emit_sync;
+use wire::cia402::PowerState;
+use wire::{Payload, Port};
 
 use super::account::Trouble;
 use super::pace::Pace;

@@ -3,13 +3,13 @@
 use core::fmt;
 use core::time::Duration;
 use units::LengthOrAngle;
+use wire::canopen::NodeId;
+use wire::canopen::emcy::Emergency;
+use wire::canopen::nmt::NmtState;
+use wire::cia402::PowerState;
+use wire::copley::Faults;
 
 use super::DeviceName;
-use crate::wire::canopen::NodeId;
-use crate::wire::canopen::emcy::Emergency;
-use crate::wire::canopen::nmt::NmtState;
-use crate::wire::cia402::PowerState;
-use crate::wire::copley::Faults;
 
 /// Something that must stop the machine, or at least be told.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

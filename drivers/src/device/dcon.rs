@@ -1,6 +1,6 @@
 //! Analog input modules of the ADAM-4000 and I-7000 families ("DCON" ASCII).
 //!
-//! Source: Advantech ADAM-4000 series manual, chapter 4; the lines are [`crate::wire::dcon`]'s.
+//! Source: Advantech ADAM-4000 series manual, chapter 4; the lines are [`wire::dcon`]'s.
 //!
 //! Answers carry no number that says which question they answer. But a module answers in the
 //! order it was asked, and the answers to `#AA` (`>…`) and to `$AAM` (`!AA…`) look different.
@@ -15,16 +15,14 @@ mod range;
 use core::time::Duration;
 use std::collections::VecDeque;
 use units::{Time, Volts};
+use wire::Payload;
+use wire::dcon::{CHANNEL_CHARACTERS, CR, Command, Configuration, frame, parse_text, unframe};
+use wire::{Input, LinkState};
 
 pub use self::range::InputRange;
 use self::range::parse_channels;
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{Alarm, AnalogInput, AnalogReading, Device, DeviceError, DeviceName, Identity, Seen};
-use crate::transport::{Input, LinkState};
-use crate::wire::Payload;
-use crate::wire::dcon::{
-    CHANNEL_CHARACTERS, CR, Command, Configuration, frame, parse_text, unframe,
-};
 
 const NAME: DeviceName = DeviceName::Serial("analog module");
 /// `>`, eight channels, checksum; room for a module with sixteen.

@@ -4,13 +4,13 @@ use core::fmt;
 use core::time::Duration;
 
 use units::{LengthOrAngle, Short};
+use wire::canopen::nmt::NmtState;
+use wire::canopen::sdo::AbortCode;
+use wire::canopen::{NodeId, Object};
+use wire::cia402::PowerState;
+use wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
 
 use super::Alarm;
-use crate::wire::canopen::nmt::NmtState;
-use crate::wire::canopen::sdo::AbortCode;
-use crate::wire::canopen::{NodeId, Object};
-use crate::wire::cia402::PowerState;
-use crate::wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
 
 /// Why a command of a device failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -113,7 +113,7 @@ pub enum DeviceError {
     Refused {
         device: DeviceName,
         step: &'static str,
-        status: crate::wire::in_sight::Status,
+        status: wire::in_sight::Status,
     },
     /// Too few good pictures.
     #[error(

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::wire::can::CanFrame;
+use wire::can::CanFrame;
 
 pub(super) const NODE: u16 = 5;
 

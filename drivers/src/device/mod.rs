@@ -24,15 +24,14 @@ use core::time::Duration;
 use units::{
     Approach, Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
 };
+use wire::Input;
+use wire::Payload;
+use wire::cia402::PowerState;
 
 pub use alarm::{Alarm, AmplifierTrouble};
 pub use error::{DeviceError, DeviceName, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use shared_line::{LineUse, Urgency};
-
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::cia402::PowerState;
 
 /// The sans-io face that every device shows to the loop that drives it.
 pub trait Device {

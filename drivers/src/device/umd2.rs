@@ -1,7 +1,7 @@
 //! The µMD2 laser interferometer: a stream of samples over a serial line.
 //!
 //! Source: J. Beck and S. M. Goldwasser, µMD2 manual v1.41 and InterferometerGUI; the line
-//! format is [`crate::wire::umd2`]'s. Displacement = (distance − phase/256) · λ/2 / n, where
+//! format is [`wire::umd2`]'s. Displacement = (distance − phase/256) · λ/2 / n, where
 //! n is the optics factor (1 plane mirror single pass, 2 double pass, 4 …).
 //!
 //! The instrument counts fringes; once it has missed some, its number means nothing. Hence
@@ -20,6 +20,9 @@ mod weather;
 use core::time::Duration;
 use std::collections::VecDeque;
 use units::{Metres, Time};
+use wire::Payload;
+use wire::umd2::{Line, LowSpeed, Sample};
+use wire::{Input, LinkState};
 
 use self::average::{Averaging, RunningAverage};
 use self::health::fault_of;
@@ -31,9 +34,6 @@ use super::{
     Alarm, Device, DeviceError, DeviceName, DisplacementInstrument, DisplacementReading,
     Environment, Identity, Seen,
 };
-use crate::transport::{Input, LinkState};
-use crate::wire::Payload;
-use crate::wire::umd2::{Line, LowSpeed, Sample};
 
 const NAME: DeviceName = DeviceName::Serial("interferometer");
 /// Sixteen fields of at most 20 characters.

@@ -8,7 +8,7 @@
 
 use core::time::Duration;
 
-use crate::wire::can::worst_case_bits;
+use wire::can::worst_case_bits;
 
 /// What is on one bus.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,10 +2,9 @@
 
 use core::time::Duration;
 use units::Time;
-
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::NodeId;
-use crate::wire::canopen::nmt::{NmtState, emit_heartbeat, parse_heartbeat};
+use wire::can::CanFrame;
+use wire::canopen::NodeId;
+use wire::canopen::nmt::{NmtState, emit_heartbeat, parse_heartbeat};
 
 /// What a node's error control messages tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,8 @@
 //! an EDS may lie about what can be mapped, and a drive about what it took.
 
 use super::script::Step;
-use crate::wire::canopen::pdo::{MappedObject, PdoCobId, Transmission};
-use crate::wire::canopen::{NodeId, Object};
+use wire::canopen::pdo::{MappedObject, PdoCobId, Transmission};
+use wire::canopen::{NodeId, Object};
 
 /// Whether the node sends or receives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -7,8 +7,7 @@
 
 use core::time::Duration;
 use units::Time;
-
-use crate::wire::cia402::{Controlword, PowerState, Statusword};
+use wire::cia402::{Controlword, PowerState, Statusword};
 
 /// Where the drive shall go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

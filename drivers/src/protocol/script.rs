@@ -7,10 +7,10 @@
 use std::collections::VecDeque;
 
 use units::Time;
+use wire::canopen::Object;
+use wire::canopen::sdo::AbortCode;
 
 use super::sdo_client::{Method, SdoClient, SdoFailure};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::sdo::AbortCode;
 
 /// An integer of 1 to 8 bytes, as an object holds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -333,8 +333,8 @@ fn compare(expected: Value, mask: u64, data: &[u8]) -> Result<(), ScriptCause> {
 mod tests {
     use super::*;
     use crate::protocol::sdo_client::Timeouts;
-    use crate::wire::can::CanFrame;
-    use crate::wire::canopen::NodeId;
+    use wire::can::CanFrame;
+    use wire::canopen::NodeId;
 
     const OBJECT: Object = Object::new(0x6067, 0);
 

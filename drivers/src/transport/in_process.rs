@@ -1,13 +1,15 @@
 //! A world in this process, in virtual time: no wall clock, the same result every run.
 
 use core::time::Duration;
-use nix::errno::Errno;
 use units::Time;
+use wire::canopen::sync::emit_sync;
+use wire::{Arrival, Payload, Port};
 
-use super::live::system;
 use super::sync_grid::SyncGrid;
-use super::{Arrival, Payload, Port, SendError, Transport};
-use crate::wire::canopen::sync::emit_sync;
+use super::{SendError, Transport};
+
+/// What Linux says of a period that is none.
+const EINVAL: i32 = 22;
 
 /// What is at the other end of the ports: emulated devices and their machine.
 pub trait World {
@@ -129,7 +131,10 @@ impl<W: World> Transport for InProcess<W> {
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
         if period.is_some_and(|period| period.is_zero()) {
-            return Err(system(port, Errno::EINVAL));
+            return Err(SendError::System {
+                port,
+                errno: EINVAL,
+            });
         }
         self.syncs.set(self.now, port, period);
         Ok(())
@@ -139,8 +144,8 @@ impl<W: World> Transport for InProcess<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::Input;
-    use crate::wire::can::CanFrame;
+    use wire::Input;
+    use wire::can::CanFrame;
 
     /// Answers each frame after 300 µs and writes down what it got.
     #[derive(Default)]

@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use units::Time;
+use wire::{Arrival, Input, Payload, Port};
 
 use self::in_lockstep::InLockstep;
 pub use self::opening::{LiveBuilder, OpenError};
@@ -26,7 +27,7 @@ use super::clock::Clock;
 pub use super::serial::{Parity, SerialSettings, StopBits};
 pub use super::slcan::{SlcanFailure, SlcanSettings};
 use super::sync_thread::{SyncSink, SyncStatistics, SyncThread, monotonic};
-use super::{Arrival, Input, Payload, Port, SendError, Transport};
+use super::{SendError, Transport};
 
 /// Until the clock has been read, a wait is no longer than this, or half of what is left.
 const COARSE_WAIT: Duration = Duration::from_millis(1);

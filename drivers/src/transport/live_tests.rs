@@ -8,12 +8,12 @@ use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::path::PathBuf;
 use std::thread::JoinHandle;
+use wire::LineControl;
+use wire::LinkState;
+use wire::can::{BusError, BusErrorClass, CanFrame, ControllerProblem};
+use wire::slcan::{BusState, Command, LineBuffer, Reply, StatusFlags};
 
 use super::*;
-use crate::transport::LinkState;
-use crate::wire::LineControl;
-use crate::wire::can::{BusError, BusErrorClass, CanFrame, ControllerProblem};
-use crate::wire::slcan::{BusState, Command, LineBuffer, Reply, StatusFlags};
 
 const PORT: Port = Port(1);
 /// Only a failure waits this long.
@@ -359,7 +359,7 @@ fn check_refused(refused: Command, step: &'static str) {
 #[test]
 fn a_refused_step_of_the_start_is_named() {
     check_refused(Command::Open, "O");
-    let bitrate = crate::wire::slcan::BitrateCode::new(1_000_000).unwrap();
+    let bitrate = wire::slcan::BitrateCode::new(1_000_000).unwrap();
     check_refused(Command::Bitrate(bitrate), "S");
 }
 
@@ -518,7 +518,7 @@ fn syncs_and_frames_never_mix_within_a_line() {
     let mut live = live.unwrap();
     live.set_sync(PORT, Some(Duration::from_micros(500)))
         .unwrap();
-    let sync = Command::Transmit(crate::wire::canopen::sync::emit_sync(None));
+    let sync = Command::Transmit(wire::canopen::sync::emit_sync(None));
     let mut syncs = 0;
     let mut sent = 0;
     while syncs < 20 {

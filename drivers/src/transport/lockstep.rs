@@ -2,7 +2,7 @@
 //!
 //! Source: conservative co-simulation (K. M. Chandy, J. Misra, "Distributed Simulation",
 //! 1979): nobody's time passes before it is certain that nothing earlier can reach him. The
-//! lines are those of [`crate::wire::lockstep`].
+//! lines are those of [`wire::lockstep`].
 //!
 //! When the emulator ends, nobody tells the time any more: the clock then goes on by the
 //! wall's, so that every deadline still comes, and the ports show what became of them.
@@ -16,9 +16,8 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use units::Time;
-
-use super::Port;
-use crate::wire::lockstep::{Entry, LINE_MAX, Reply, Request, Unintelligible, VERSION};
+use wire::Port;
+use wire::lockstep::{Entry, LINE_MAX, Reply, Request, Unintelligible, VERSION};
 
 /// Why the shared clock cannot be used.
 #[derive(Debug, thiserror::Error)]

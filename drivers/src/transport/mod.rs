@@ -4,62 +4,37 @@
 //! same: live ports (SocketCAN, SLCAN, serial lines), an in-process world in virtual time,
 //! and the replay of a recording.
 
-pub mod clock;
 pub mod in_process;
-pub mod live;
-pub mod lockstep;
-mod one_core;
-mod os;
-pub mod real_time;
 pub mod record;
 pub mod replay;
-mod serial;
-mod slcan;
-mod socketcan;
-mod stamps;
 mod sync_grid;
+
+#[cfg(feature = "live")]
+pub mod clock;
+#[cfg(feature = "live")]
+pub mod live;
+#[cfg(feature = "live")]
+pub mod lockstep;
+#[cfg(feature = "live")]
+mod one_core;
+#[cfg(feature = "live")]
+mod os;
+#[cfg(feature = "live")]
+pub mod real_time;
+#[cfg(feature = "live")]
+mod serial;
+#[cfg(feature = "live")]
+mod slcan;
+#[cfg(feature = "live")]
+mod socketcan;
+#[cfg(feature = "live")]
+mod stamps;
+#[cfg(feature = "live")]
 pub mod sync_thread;
 
 use core::time::Duration;
 use units::Time;
-
-use crate::wire::can::BusError;
-pub use crate::wire::{Payload, Port};
-
-/// What came in on a port.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Input {
-    /// A frame or bytes.
-    Payload(Payload),
-    /// The CAN controller reported an error frame.
-    BusError(BusError),
-    /// The receive queue overflowed; this many frames were lost since the last report.
-    Lost(u32),
-    /// The port changed its state.
-    Link(LinkState),
-}
-
-/// Whether a port can be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum LinkState {
-    /// Usable (again).
-    Up,
-    /// The interface was set down (ENETDOWN); the same socket works when it comes up.
-    Down,
-    /// The interface or device vanished (ENODEV, EIO); it must be opened anew.
-    Gone,
-}
-
-/// One thing that came in.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Arrival {
-    /// Where.
-    pub port: Port,
-    /// When, by the transport's clock (kernel receive time where the port has it).
-    pub at: Time,
-    /// What.
-    pub input: Input,
-}
+use wire::{Arrival, LinkState, Payload, Port};
 
 /// Why something could not be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

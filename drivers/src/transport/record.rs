@@ -23,10 +23,11 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 use std::io;
 use units::Time;
+use wire::LineControl;
+use wire::candump::{Content, Direction, Record};
+use wire::{Arrival, Input, LinkState, Payload, Port};
 
-use super::{Arrival, Input, LinkState, Payload, Port, SendError, Transport};
-use crate::wire::LineControl;
-use crate::wire::candump::{Content, Direction, Record};
+use super::{SendError, Transport};
 
 /// The first line of a recording.
 pub(super) const HEADER: &str = "# truestage recording 1";
@@ -234,7 +235,7 @@ fn hex(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::transport::replay::Replay;
-    use crate::wire::can::{BusError, CanFrame};
+    use wire::can::{BusError, CanFrame};
 
     const LOG: &str = "\
 # truestage recording 1

@@ -8,11 +8,12 @@ use core::fmt;
 use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 use units::Time;
+use wire::LineControl;
+use wire::candump::{Content, Direction, Record};
+use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use super::record::rounded;
-use super::{Arrival, Input, LinkState, Payload, Port, SendError, Transport};
-use crate::wire::LineControl;
-use crate::wire::candump::{Content, Direction, Record};
+use super::{SendError, Transport};
 
 /// How many recorded sendings a single one may leave out and still be recognised.
 const LOOK_AHEAD: usize = 32;
@@ -345,7 +346,7 @@ fn unhex(text: &str) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::can::CanFrame;
+    use wire::can::CanFrame;
 
     const LOG: &str = "\
 (0000000010.000000) vcan0 705#00

@@ -10,12 +10,13 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::Arc;
 use tokio_serial::SerialPort as _;
 use units::Time;
+use wire::LineControl;
+use wire::{Input, LinkState, Payload, Port};
 
+use super::SendError;
 use super::clock::Clock;
 use super::live::{LivePort, awaited, system};
 use super::os;
-use super::{Input, LinkState, Payload, Port, SendError};
-use crate::wire::LineControl;
 
 const READ_MAX: usize = 4_096;
 /// What may wait for a slow line before a send is refused.

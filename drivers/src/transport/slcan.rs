@@ -1,6 +1,6 @@
 //! A CAN adapter that speaks SLCAN (Lawicel's ASCII protocol) over a serial line or pty.
 //!
-//! Source: see [`crate::wire::slcan`]. The adapter is stopped, set up and opened step by
+//! Source: see [`wire::slcan`]. The adapter is stopped, set up and opened step by
 //! step, without blocking the other ports. It answers each command in order, so that a BEL
 //! is known to belong to a transmission; that frame did not go out, which is reported as a
 //! transmit overflow. Its status flags are read now and then: they show lost frames and an
@@ -16,17 +16,18 @@ use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::Arc;
 use units::Time;
+use wire::slcan::{BitrateCode, Command, LineBuffer, Reply, StatusFlags};
+use wire::{Input, LinkState, Payload, Port};
 
 use self::lines::{Asked, SharedLines};
 use self::start::Step;
 pub use self::start::{SlcanFailure, SlcanSettings};
+use super::SendError;
 use super::clock::Clock;
 use super::live::{LivePort, OpenError, system};
 use super::serial::{self, BackOff, Read};
 use super::stamps::AdapterStamps;
 use super::sync_thread::SyncSink;
-use super::{Input, LinkState, Payload, Port, SendError};
-use crate::wire::slcan::{BitrateCode, Command, LineBuffer, Reply, StatusFlags};
 
 /// After something was heard, an adapter that does not know `V` gets no longer than this.
 const VERSION_WAIT: Duration = Duration::from_millis(200);

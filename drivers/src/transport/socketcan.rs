@@ -16,15 +16,16 @@ use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use units::Time;
+use wire::can::{BusError, CanFrame, CanId};
+use wire::canopen::sync::emit_sync;
+use wire::{Input, LinkState, Payload, Port};
 
+use super::SendError;
 use super::clock::Clock;
 use super::live::{LivePort, OpenError, awaited, system};
 use super::serial::BackOff;
 use super::stamps::KernelStamps;
 use super::sync_thread::SyncSink;
-use super::{Input, LinkState, Payload, Port, SendError};
-use crate::wire::can::{BusError, CanFrame, CanId};
-use crate::wire::canopen::sync::emit_sync;
 
 /// `struct can_frame`: identifier with flags, length, 3 bytes of padding, 8 of data.
 const FRAME_BYTES: usize = 16;
@@ -401,7 +402,7 @@ mod tests {
         let Some(Input::BusError(error)) = parse(&bytes) else {
             panic!("no bus error")
         };
-        assert_eq!(error.class, crate::wire::can::BusErrorClass::BUS_OFF);
+        assert_eq!(error.class, wire::can::BusErrorClass::BUS_OFF);
     }
 
     #[test]

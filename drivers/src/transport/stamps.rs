@@ -9,9 +9,9 @@ use core::time::Duration;
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, clock_gettime};
 use units::Time;
+use wire::slcan::TIMESTAMP_PERIOD_MS;
 
 use super::clock::Clock;
-use crate::wire::slcan::TIMESTAMP_PERIOD_MS;
 
 /// The offset of the two clocks is measured anew after this; a step of the wall clock by
 /// more (NTP slews what is less than 128 ms) shows in the stamp itself.

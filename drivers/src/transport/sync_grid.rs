@@ -4,8 +4,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use units::Time;
-
-use super::Port;
+use wire::Port;
 
 #[derive(Clone, Copy, Debug)]
 struct Producer {

@@ -4,13 +4,13 @@
 //! Probabilities are drawn from a stream of the fault's own: one fault never shifts another.
 
 use core::time::Duration;
-use drivers::wire::can::{CanFrame, CanId};
-use drivers::wire::canopen::emcy::{Emergency, EmergencyCode};
-use drivers::wire::canopen::nmt::{NmtState, emit_heartbeat};
-use drivers::wire::canopen::sdo::{Expedited, SdoRequest};
-use drivers::wire::canopen::sync::emit_sync;
-use drivers::wire::canopen::{Function, NodeId, Object};
 use serde::Deserialize;
+use wire::can::{CanFrame, CanId};
+use wire::canopen::emcy::{Emergency, EmergencyCode};
+use wire::canopen::nmt::{NmtState, emit_heartbeat};
+use wire::canopen::sdo::{Expedited, SdoRequest};
+use wire::canopen::sync::emit_sync;
+use wire::canopen::{Function, NodeId, Object};
 
 mod plan;
 

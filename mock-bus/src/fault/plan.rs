@@ -1,8 +1,8 @@
 //! When which fault is there, and what it does to frames and bytes.
 
 use core::time::Duration;
-use drivers::wire::can::CanFrame;
 use units::Time;
+use wire::can::CanFrame;
 
 use super::{Fault, FaultConfig, FaultId};
 use crate::random::Stream;

@@ -6,11 +6,11 @@
 
 use std::time::Duration;
 
-use drivers::wire::Payload;
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::nmt::NmtState;
-use drivers::wire::canopen::{Function, NodeId, Object};
 use units::Time;
+use wire::Payload;
+use wire::can::CanFrame;
+use wire::canopen::nmt::NmtState;
+use wire::canopen::{Function, NodeId, Object};
 
 use super::Node;
 use super::canopen_server::dictionary::Dictionary;

@@ -13,9 +13,9 @@
 //! | 0x6401 | reading = (raw + 0x6431) · 0x6432, an i16 that saturates; raw is left-justified |
 //! | 0x6424, 0x6425, 0x6426 | upper limit, lower limit, delta of the event, in 0x6401's unit |
 
-use drivers::wire::canopen::pdo::MappedObject;
-use drivers::wire::canopen::{Function, NodeId, Object};
 use serde::{Deserialize, Serialize};
+use wire::canopen::pdo::MappedObject;
+use wire::canopen::{Function, NodeId, Object};
 
 use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
@@ -211,8 +211,8 @@ fn description(config: &Cia401AnalogConfig, node: NodeId) -> Description {
 
 #[cfg(test)]
 mod tests {
-    use drivers::wire::can::CanFrame;
     use units::Time;
+    use wire::can::CanFrame;
 
     use super::super::Node;
     use super::*;

@@ -17,10 +17,10 @@
 //! | 0x7130 | process value = (measured · 0x6126 + 0x6127) in 0x6131's unit with 0x6132's digits |
 //! | 0x6150 | what is wrong with it; a value that is not valid reads −32768 |
 
-use drivers::wire::canopen::pdo::MappedObject;
-use drivers::wire::canopen::{Function, NodeId, Object};
-use drivers::wire::cia404::{self, InputStatus, PhysicalUnit, SensorType, Unit};
 use serde::{Deserialize, Serialize};
+use wire::canopen::pdo::MappedObject;
+use wire::canopen::{Function, NodeId, Object};
+use wire::cia404::{self, InputStatus, PhysicalUnit, SensorType, Unit};
 
 use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Bounds, Dictionary, Entry, Kind, Mapping};
@@ -276,12 +276,12 @@ fn description(config: &Cia404AnalogConfig, node: NodeId) -> Description {
 mod tests {
     use core::time::Duration;
 
-    use drivers::wire::can::CanFrame;
     use units::Time;
+    use wire::can::CanFrame;
 
     use super::super::Node;
     use super::*;
-    use drivers::wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse};
+    use wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse};
 
     #[derive(Default)]
     struct Bench {

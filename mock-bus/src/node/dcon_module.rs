@@ -8,9 +8,9 @@
 use core::time::Duration;
 use serde::Deserialize;
 use std::collections::VecDeque;
+use wire::Payload;
+use wire::dcon::{CR, Command, format_volts, frame, unframe};
 
-use drivers::wire::Payload;
-use drivers::wire::dcon::{CR, Command, format_volts, frame, unframe};
 use units::Time;
 
 use super::Node;
@@ -217,7 +217,7 @@ impl Node for DconModuleNode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drivers::wire::dcon::parse_volts;
+    use wire::dcon::parse_volts;
 
     fn module(checksum: bool) -> (DconModuleNode, Plant) {
         let config = DconModuleConfig {

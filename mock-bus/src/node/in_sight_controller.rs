@@ -1,6 +1,6 @@
 //! An In-Sight vision system in Native Mode over the plant's cameras.
 //!
-//! Sources: those of [`drivers::wire::in_sight`]. It does one thing after the other: what is
+//! Sources: those of [`wire::in_sight`]. It does one thing after the other: what is
 //! said while it takes and judges a picture waits in its input buffer, and what does not fit
 //! into that is lost. Its job looks for all marks, works out the pose that takes them from
 //! where they were taught to where they are (the rigid motion of least squares: S. Umeyama,
@@ -12,11 +12,11 @@
 use core::time::Duration;
 use serde::{Deserialize, Deserializer, de::Error};
 use std::collections::VecDeque;
-
-use drivers::wire::Payload;
-use drivers::wire::in_sight::{
+use wire::Payload;
+use wire::in_sight::{
     ACQUIRE, CELL_ERROR, COUNT_MAX, Cell, Command, Inspection, Status, TERMINATOR,
 };
+
 use units::Time;
 use units::portable::{atan2, sin_cos};
 

@@ -15,8 +15,8 @@ pub mod umd2_interferometer;
 
 use core::any::Any;
 
-use drivers::wire::Payload;
 use units::Time;
+use wire::Payload;
 
 use crate::plant::Plant;
 

@@ -1,6 +1,6 @@
 //! A µMD2 laser interferometer: it streams one line for each sample, whoever listens.
 //!
-//! Source: J. Beck and S. M. Goldwasser, µMD2 manual v1.41 (see `drivers::wire::umd2` for the
+//! Source: J. Beck and S. M. Goldwasser, µMD2 manual v1.41 (see `wire::umd2` for the
 //! format). Displacement is counted from where the counter was reset: at power-on. A lost
 //! beam stops the count, and what moved meanwhile is lost for ever; so does a reflector that
 //! moves too fast. Samples leave in small batches, as a USB device hands them over.
@@ -10,9 +10,9 @@
 use core::time::Duration;
 use serde::Deserialize;
 use std::collections::VecDeque;
+use wire::Payload;
+use wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, LowSpeed, PHASE_STEPS, Sample};
 
-use drivers::wire::Payload;
-use drivers::wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, LowSpeed, PHASE_STEPS, Sample};
 use units::Time;
 
 use super::Node;
@@ -227,7 +227,7 @@ impl Node for Umd2InterferometerNode {
 mod tests {
     use super::*;
     use crate::plant::Servo;
-    use drivers::wire::umd2::{Line, VACUUM_WAVELENGTH_M};
+    use wire::umd2::{Line, VACUUM_WAVELENGTH_M};
 
     struct Rig {
         node: Umd2InterferometerNode,

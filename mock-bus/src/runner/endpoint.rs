@@ -4,10 +4,10 @@ use std::io;
 use std::os::fd::BorrowedFd;
 use std::path::{Path, PathBuf};
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::lockstep::Passed;
-use drivers::wire::{LineControl, Payload, Port};
 use units::Time;
+use wire::can::CanFrame;
+use wire::lockstep::Passed;
+use wire::{LineControl, Payload, Port};
 
 use super::pty::Pty;
 use super::slcan_adapter::{Action, SlcanAdapter};

@@ -5,7 +5,7 @@
 //! Once all of them wait, exactly that is taken in, in the order of the participants, and the
 //! machine lives to the first moment that one of them waits for, or at which something
 //! reaches one. Frames and bytes pass the kernel; nothing is guessed at, and how busy the
-//! computer is changes nothing. The lines are those of [`drivers::wire::lockstep`].
+//! computer is changes nothing. The lines are those of [`wire::lockstep`].
 //!
 //! Nobody there: time stands still until somebody comes. Somebody who ends without taking
 //! leave (unless that was asked for), hangs, or computes without end is named, and the
@@ -16,13 +16,13 @@ use std::io::{self, Read};
 use std::os::fd::AsFd;
 use std::sync::mpsc::TryRecvError;
 
-use drivers::wire::Port;
-use drivers::wire::lockstep::{Entry, Passed, Reply, Request, VERSION};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
 use nix::unistd::Pid;
 use units::Time;
+use wire::Port;
+use wire::lockstep::{Entry, Passed, Reply, Request, VERSION};
 
 use super::endpoint::Endpoint;
 use super::peer::{Doing, Heard};

@@ -7,9 +7,9 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use drivers::wire::Port;
-use drivers::wire::lockstep::{Entry, LINE_MAX, Passed, Reply, Request};
 use units::Time;
+use wire::Port;
+use wire::lockstep::{Entry, LINE_MAX, Passed, Reply, Request};
 
 const READ_MAX: usize = 4096;
 

@@ -7,11 +7,11 @@
 //!
 //! Absent: acceptance filters (`M`, `m`), polling (`A`, `P`, `X`), `s` bit timing.
 
-use drivers::wire::can::{BusError, BusErrorClass, CanFrame, CanId, ControllerProblem};
-use drivers::wire::slcan::{
+use units::Time;
+use wire::can::{BusError, BusErrorClass, CanFrame, CanId, ControllerProblem};
+use wire::slcan::{
     BitrateCode, BusState, CR, Command, LineBuffer, Reply, StatusFlags, TIMESTAMP_PERIOD_MS,
 };
-use units::Time;
 
 const VERSION: [u8; 4] = *b"1013";
 const SERIAL: [u8; 4] = *b"TS01";

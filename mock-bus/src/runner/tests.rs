@@ -81,10 +81,7 @@ fn an_interferometer_streams_to_its_terminal() {
         read_until(&mut laser, b'\n').unwrap();
     }
     let line = read_until(&mut laser, b'\n').unwrap();
-    assert!(
-        drivers::wire::umd2::Line::parse(line.trim_end()).is_ok(),
-        "{line}"
-    );
+    assert!(wire::umd2::Line::parse(line.trim_end()).is_ok(), "{line}");
 }
 
 #[test]
@@ -120,9 +117,7 @@ fn an_adapter_that_is_pulled_out_hangs_up_and_comes_back_at_its_link() {
     let id = machine.inject(FaultConfig::permanent(gone)).unwrap();
     assert_eq!(read_until(&mut adc, b'\r'), None);
     machine.end_fault(id).unwrap();
-    while machine
-        .with(|machine| machine.link(drivers::wire::Port(2)))
-        .unwrap()
+    while machine.with(|machine| machine.link(wire::Port(2))).unwrap()
         != Some(crate::simulation::Link::Up)
     {}
     // The link is there as soon as the loop has handed the change out: before the next job.

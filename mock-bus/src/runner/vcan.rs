@@ -8,8 +8,8 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
 use super::pty::await_readable;
-use drivers::wire::can::{BusError, CanFrame, CanId};
 use socketcan::{CanErrorFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, StandardId};
+use wire::can::{BusError, CanFrame, CanId};
 
 /// How often to look whether a deleted interface is back.
 const LOOK_EVERY: Duration = Duration::from_millis(50);

@@ -5,8 +5,8 @@ use std::os::fd::AsFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 
-use drivers::wire::lockstep::{Reply, Request};
 use nix::poll::{PollFd, PollFlags};
+use wire::lockstep::{Reply, Request};
 
 use super::hand::Hands;
 use super::peer::{Heard, Peer};

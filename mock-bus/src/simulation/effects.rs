@@ -1,7 +1,7 @@
 //! What a fault that lasts does to the machine when it begins, and what its end undoes.
 
-use drivers::wire::can::{BusError, BusErrorClass, ControllerProblem};
 use units::{Celsius, Metres, Pascals, Radians, RelativeHumidity};
+use wire::can::{BusError, BusErrorClass, ControllerProblem};
 
 use super::{Event, Link, Simulation};
 use crate::bus::Sender;

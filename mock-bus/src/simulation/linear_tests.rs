@@ -4,7 +4,7 @@ use super::*;
 use crate::fault::Fault;
 use crate::plant::HallDrift;
 use core::time::Duration;
-use drivers::wire::can::CanFrame;
+use wire::can::CanFrame;
 
 const CAN: Port = Port(0);
 

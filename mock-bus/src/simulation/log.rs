@@ -1,7 +1,7 @@
 //! Everything that passed the machine's ports: always as a number, on demand as text.
 
-use drivers::wire::{Payload, Port};
 use units::Time;
+use wire::{Payload, Port};
 
 use super::{Delivery, Event};
 use crate::random::{FNV_START, fnv1a_bytes};

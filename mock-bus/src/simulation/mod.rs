@@ -24,9 +24,9 @@ use core::any::Any;
 use core::cell::Cell;
 use std::collections::VecDeque;
 
-use drivers::wire::can::BusError;
-use drivers::wire::{Payload, Port};
 use units::Time;
+use wire::can::BusError;
+use wire::{Payload, Port};
 
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};

@@ -6,9 +6,9 @@ use crate::node::in_sight_controller::InSightControllerNode;
 use crate::plant::HallDrift;
 use crate::plant::PlatformTruth;
 use core::time::Duration;
-use drivers::wire::can::CanFrame;
-use drivers::wire::in_sight::Inspection;
 use units::Metres;
+use wire::can::CanFrame;
+use wire::in_sight::Inspection;
 
 const CAN: Port = Port(0);
 const VISION: Port = Port(1);

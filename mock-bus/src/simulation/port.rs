@@ -3,9 +3,9 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::{LineControl, Payload, Port};
 use units::Time;
+use wire::can::CanFrame;
+use wire::{LineControl, Payload, Port};
 
 use super::{DeliverError, Link};
 use crate::bus::{CanBus, Sender};

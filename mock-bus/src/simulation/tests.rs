@@ -2,7 +2,7 @@ use super::*;
 use crate::fault::Fault;
 use crate::plant::HallDrift;
 use core::time::Duration;
-use drivers::wire::can::{BusErrorClass, CanFrame};
+use wire::can::{BusErrorClass, CanFrame};
 
 const MACHINE: &str = r#"
     name = "test"

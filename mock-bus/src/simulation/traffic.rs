@@ -2,9 +2,9 @@
 
 use core::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::{Payload, Port};
 use units::Time;
+use wire::can::CanFrame;
+use wire::{Payload, Port};
 
 use super::port::Medium;
 use super::{Delivery, Event, Link, Simulation};

@@ -9,9 +9,9 @@ use crate::plant::{LineOptics, LineSetUp};
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::umd2::{Line, Sample};
 use units::Metres;
+use wire::can::CanFrame;
+use wire::umd2::{Line, Sample};
 
 const CAN: Port = Port(0);
 const LASER: Port = Port(1);

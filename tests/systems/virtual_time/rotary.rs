@@ -5,7 +5,6 @@ use core::time::Duration;
 use std::cell::Cell;
 use std::rc::Rc;
 
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
@@ -18,6 +17,7 @@ use truestage::observer::{Observer, Stage};
 use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine};
 use units::Radians;
+use wire::cia402::PowerState;
 
 const AXIS: &str = "c";
 /// What the issue asks for, at the lines and between them.

@@ -5,7 +5,6 @@ use core::time::Duration;
 use compensator::volumetric::identify::Reading;
 use compensator::volumetric::{Axis, Point};
 use drivers::device::Alarm;
-use drivers::wire::cia402::PowerState;
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::plant::LineTruth;
@@ -16,6 +15,7 @@ use truestage::cycle::volumetric::{
 };
 use truestage::emulated::Emulated;
 use units::{Metres, Radians};
+use wire::cia402::PowerState;
 
 const TOOL: Point = Point::from_mm(0.0, 0.0, -100.0);
 const ORIGIN: Point = Point::from_mm(0.0, 0.0, 0.0);

@@ -1,6 +1,6 @@
 //! Whether an image controller's section makes sense.
 
-use drivers::wire::in_sight::Cell;
+use wire::in_sight::Cell;
 
 use super::judge::{Finding, Judge};
 use crate::config::{CameraConfig, MachineConfig};

@@ -3,7 +3,7 @@
 use crate::device::DeviceError;
 use crate::protocol::script::{ScriptCause, ScriptFailure};
 use crate::protocol::sdo_client::SdoFailure;
-use crate::wire::canopen::NodeId;
+use wire::canopen::NodeId;
 
 pub(super) fn device_error(node: NodeId, failure: ScriptFailure) -> DeviceError {
     let step = failure.text;

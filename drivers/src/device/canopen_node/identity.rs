@@ -3,7 +3,7 @@
 use super::settings::NodeSettings;
 use crate::device::{DeviceError, Identity};
 use crate::protocol::script::{Script, Step};
-use crate::wire::canopen::Object;
+use wire::canopen::Object;
 
 pub(super) const DEVICE_TYPE: Object = Object::new(0x1000, 0);
 const NAME: Object = Object::new(0x1008, 0);

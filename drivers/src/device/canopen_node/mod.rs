@@ -14,6 +14,12 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::Time;
+use wire::Input;
+use wire::Payload;
+use wire::can::CanFrame;
+use wire::canopen::emcy::Emergency;
+use wire::canopen::nmt::{NmtCommand, NmtState, consumer_heartbeat_entry};
+use wire::canopen::{Function, NodeId, Object};
 
 pub use settings::{ExpectedIdentity, NodeSettings, NodeTimeouts};
 
@@ -21,12 +27,6 @@ use super::{Alarm, DeviceError, DeviceName, Identity, Seen};
 use crate::protocol::heartbeat::HeartbeatConsumer;
 use crate::protocol::script::{Script, ScriptCause, ScriptFailure, Step};
 use crate::protocol::sdo_client::{SdoClient, SdoFailure};
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::emcy::Emergency;
-use crate::wire::canopen::nmt::{NmtCommand, NmtState, consumer_heartbeat_entry};
-use crate::wire::canopen::{Function, NodeId, Object};
 
 /// How often NMT start, which nobody confirms, is sent before the node counts as deaf.
 const START_COMMANDS_MAX: u8 = 3;

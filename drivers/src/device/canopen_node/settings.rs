@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use crate::protocol::sdo_client::{Retry, Timeouts as SdoTimeouts};
-use crate::wire::canopen::NodeId;
+use wire::canopen::NodeId;
 
 /// What the configuration says about a device; `None` accepts anything.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 //! boots while the other goes on: a boot-up message, and yet process data at the next SYNC,
 //! which no device that was reset sends before it is started.
 
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::sdo::SdoResponse;
-use crate::wire::canopen::{Function, NodeId};
+use wire::can::CanFrame;
+use wire::canopen::sdo::SdoResponse;
+use wire::canopen::{Function, NodeId};
 
 const IDENTITY: u16 = 0x1018;
 

@@ -1,12 +1,12 @@
 //! What a node says unasked: heartbeats, boot-ups, emergencies.
 
 use units::Time;
+use wire::canopen::emcy::Emergency;
+use wire::canopen::nmt::NmtState;
 
 use super::{CanopenNode, NodeEvent, Phase};
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::heartbeat::HeartbeatEvent;
-use crate::wire::canopen::emcy::Emergency;
-use crate::wire::canopen::nmt::NmtState;
 
 impl CanopenNode {
     pub(super) fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {

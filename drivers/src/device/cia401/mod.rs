@@ -12,15 +12,15 @@ mod tests;
 use std::collections::VecDeque;
 
 use units::{Time, Volts};
+use wire::Input;
+use wire::Payload;
+use wire::canopen::Object;
+use wire::canopen::pdo::{MappedObject, Transmission, extract};
 
 use super::canopen_node::{CanopenNode, NodeEvent, NodeSettings};
 use super::{Alarm, AnalogInput, AnalogReading, Device, DeviceError, Identity};
 use crate::protocol::pdo_setup::{Pdo, PdoDirection};
 use crate::protocol::script::Step;
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::canopen::Object;
-use crate::wire::canopen::pdo::{MappedObject, Transmission, extract};
 
 /// The profile number in 0x1000.
 const PROFILE: u16 = 401;

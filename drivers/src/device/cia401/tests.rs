@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 use units::{Time, Volts};
+use wire::can::CanFrame;
+use wire::canopen::NodeId;
 
 use super::*;
 use crate::device::fake_node::FakeNode;
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::NodeId;
 
 struct Rig {
     module: Cia401Analog,

@@ -1,11 +1,11 @@
 //! What a drive and its axis are told, and what they read.
 
 use units::{Coordinate, Time};
+use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::homing::HomingPlace;
 use super::{Activity, Cia402Drive};
 use crate::device::{Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, ServoDrive};
-use crate::wire::cia402::{OperationMode, PowerState, Statusword};
 
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn refuse_out_of_service(&mut self) {

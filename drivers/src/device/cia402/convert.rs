@@ -1,10 +1,10 @@
 //! SI quantities to the drive's integers; what does not fit is an error, never clamped.
 
 use units::{Coordinate, Quantity};
+use wire::canopen::Object;
 
 use super::settings::Cia402Settings;
 use crate::device::DeviceError;
-use crate::wire::canopen::Object;
 
 /// `value` and `limit` in SI units, `unit` what a person reads them in.
 pub(super) fn out_of_range<Q: Coordinate>(

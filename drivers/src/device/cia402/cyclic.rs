@@ -17,6 +17,8 @@
 use core::time::Duration;
 
 use units::{Coordinate, Time};
+use wire::canopen::Object;
+use wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 
 use super::convert::{out_of_range, position_counts};
 use super::image::Sample;
@@ -24,8 +26,6 @@ use super::start::{MODE, TARGET_POSITION};
 use super::{Activity, Cia402Drive};
 use crate::device::{Alarm, DeviceError, Seen};
 use crate::protocol::script::Step;
-use crate::wire::canopen::Object;
-use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 
 const PERIOD_VALUE: Object = Object::new(0x60C2, 1);
 const PERIOD_INDEX: Object = Object::new(0x60C2, 2);

@@ -2,12 +2,12 @@
 
 use core::time::Duration;
 use units::Metres;
+use wire::canopen::sdo::AbortCode;
 
 use super::cyclic::{interpolation_period, period_from};
 use super::tests::{Rig, SYNC_MS, move_to, settings};
 use super::*;
 use crate::device::{Axis, DriveCommand};
-use crate::wire::canopen::sdo::AbortCode;
 
 const ENTER: DriveCommand = DriveCommand::EnterCyclic {
     period: Duration::from_millis(SYNC_MS),

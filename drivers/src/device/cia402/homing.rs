@@ -3,6 +3,7 @@
 
 use core::time::Duration;
 use units::{Approach, Coordinate, Time};
+use wire::cia402::{Controlword, HomingStatus, OperationMode};
 
 use super::convert::{counts_i32, position_counts};
 use super::modulo::apart;
@@ -11,7 +12,6 @@ use super::start::{HOME_OFFSET, MODE, homing_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::script::Step;
-use crate::wire::cia402::{Controlword, HomingStatus, OperationMode};
 
 /// So many samples after the start, "done" and "error" may still be those of the homing before.
 const STALE_SAMPLES: u8 = 5;

@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 use units::{Counts, Time};
+use wire::canopen::pdo::extract;
+use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::modulo::Modulo;
 use super::start::{MODE_DISPLAY, POSITION_ACTUAL, STATUSWORD};
-use crate::wire::canopen::pdo::extract;
-use crate::wire::cia402::{OperationMode, PowerState, Statusword};
 
 /// Bytes of TPDO 1: statusword, position, mode.
 pub(super) const SAMPLE_BYTES: usize = 7;

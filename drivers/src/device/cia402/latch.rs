@@ -19,6 +19,8 @@
 use std::collections::VecDeque;
 
 use units::{Coordinate, Counts, Quantity, Time};
+use wire::canopen::Object;
+use wire::canopen::pdo::{MappedObject, extract};
 
 use super::convert::out_of_range;
 use super::settings::{Cia402Settings, Edge, LatchSettings};
@@ -27,8 +29,6 @@ use crate::device::{
     Alarm, DeviceError, LatchCommand, Latched, PositionLatch, Repeat, SYNCS_PER_EDGE,
 };
 use crate::protocol::script::{Script, Step};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::pdo::{MappedObject, extract};
 
 const FUNCTION: Object = Object::new(0x60B8, 0);
 const STATUS: MappedObject = MappedObject::new(0x60B9, 0, 16);

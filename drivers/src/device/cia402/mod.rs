@@ -40,6 +40,11 @@ mod tests;
 use std::collections::VecDeque;
 
 use units::{Coordinate, Metres, Quantity, Time};
+use wire::Input;
+use wire::Payload;
+use wire::can::CanFrame;
+use wire::canopen::Function;
+use wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 
 pub use cyclic::{interpolation_period, period_from};
 pub use settings::{
@@ -50,11 +55,6 @@ pub use settings::{
 use super::canopen_node::{CanopenNode, NodeEvent};
 use super::{Alarm, Device, DeviceError, Identity, Seen};
 use crate::protocol::script::Script;
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::Function;
-use crate::wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 use cyclic::ModeChange;
 use homing::Homing;
 use image::{Image, Sample};

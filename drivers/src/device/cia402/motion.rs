@@ -7,13 +7,13 @@
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
+use wire::cia402::{Controlword, OperationMode, Statusword};
 
 use super::convert::{acceleration_counts, out_of_range, position_counts, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::script::Step;
-use crate::wire::cia402::{Controlword, OperationMode, Statusword};
 
 /// "Target reached" must be seen so often in a row.
 const REACHED_SAMPLES: u8 = 2;

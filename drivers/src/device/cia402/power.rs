@@ -1,13 +1,13 @@
 //! Enable, disable, quick stop and fault reset of a drive.
 
 use units::{Coordinate, Time};
+use wire::cia402::{Controlword, PowerState};
 
 use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::power_state::{Goal, PowerFailure, PowerSequence, PowerStep};
 use crate::protocol::script::Step;
-use crate::wire::cia402::{Controlword, PowerState};
 
 /// A change of the power state under way.
 #[derive(Debug)]

@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared, Time};
+use wire::canopen::NodeId;
 
 use super::*;
 use crate::device::canopen_node::NodeSettings;
@@ -9,7 +10,6 @@ use crate::device::fake_node::FakeNode;
 use crate::device::{
     Axis, AxisCommand, DriveCommand, LatchCommand, Latched, PositionLatch, Repeat, ServoDrive,
 };
-use crate::wire::canopen::NodeId;
 
 const SYNC_MS: u64 = 2;
 /// 0.01 degrees.

@@ -2,6 +2,9 @@
 
 use core::time::Duration;
 use units::Coordinate;
+use wire::canopen::Object;
+use wire::canopen::pdo::{MappedObject, Transmission};
+use wire::cia402::OperationMode;
 
 use super::convert::{acceleration_counts, counts_i32, distance_counts, velocity_counts};
 use super::latch;
@@ -10,9 +13,6 @@ use crate::device::DeviceError;
 use crate::device::canopen_node::millis;
 use crate::protocol::pdo_setup::{Pdo, PdoDirection, PdoTooLong};
 use crate::protocol::script::{Script, Step};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::pdo::{MappedObject, Transmission};
-use crate::wire::cia402::OperationMode;
 
 pub(super) const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 pub(super) const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);

@@ -1,6 +1,8 @@
 //! What a drive says of itself, and what of it is an alarm.
 
 use units::{Coordinate, Time};
+use wire::can::CanFrame;
+use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::image::{Judgement, SAMPLE_BYTES, Sample};
 use super::modulo::apart;
@@ -8,8 +10,6 @@ use super::start::POSITION_ACTUAL;
 use super::{Activity, Cia402Drive};
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::script::{Script, Step};
-use crate::wire::can::CanFrame;
-use crate::wire::cia402::{OperationMode, PowerState, Statusword};
 
 const COMPARING: &str = "comparing process data with the object it carries";
 

@@ -2,14 +2,14 @@
 
 use core::time::Duration;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale, Time};
+use wire::canopen::sdo::AbortCode;
+use wire::canopen::{NodeId, Object};
 
 use super::homing::HomingPlace;
 use super::*;
 use crate::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use crate::device::fake_node::FakeNode;
 use crate::device::{Axis, AxisCommand, DriveCommand, ServoDrive};
-use crate::wire::canopen::sdo::AbortCode;
-use crate::wire::canopen::{NodeId, Object};
 
 pub(super) const SYNC_MS: u64 = 2;
 const COUNT: Metres = Metres(10e-9);
@@ -1049,7 +1049,7 @@ fn leaving_operational_is_an_alarm() {
         matches!(
             alarm,
             Alarm::UnexpectedNmtState {
-                state: crate::wire::canopen::nmt::NmtState::Stopped,
+                state: wire::canopen::nmt::NmtState::Stopped,
                 ..
             }
         )

@@ -19,6 +19,11 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::{Celsius, Time, Volts};
+use wire::Input;
+use wire::Payload;
+use wire::canopen::Object;
+use wire::canopen::pdo::{MappedObject, Transmission, extract};
+use wire::cia404::{self, PhysicalUnit, SensorType};
 
 use super::canopen_node::{CanopenNode, NodeEvent, NodeSettings};
 use super::{
@@ -27,11 +32,6 @@ use super::{
 };
 use crate::protocol::pdo_setup::{Pdo, PdoDirection};
 use crate::protocol::script::Step;
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::canopen::Object;
-use crate::wire::canopen::pdo::{MappedObject, Transmission, extract};
-use crate::wire::cia404::{self, PhysicalUnit, SensorType};
 
 /// The most inputs of one module.
 pub const INPUTS_MAX: usize = 8;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::device::fake_node::FakeNode;
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::NodeId;
+use wire::can::CanFrame;
+use wire::canopen::NodeId;
 
 struct Rig {
     module: Cia404Analog,

@@ -1,10 +1,10 @@
 //! SI quantities to the amplifier's integers; what does not fit is an error, never clamped.
 
 use units::{Coordinate, Counts, Quantity};
+use wire::copley::Parameter;
 
 use super::settings::CopleySettings;
 use crate::device::{DeviceError, DeviceName};
-use crate::wire::copley::Parameter;
 
 /// `value` and `limit` in SI units, `unit` what a person reads them in.
 pub(super) fn out_of_range<Q: Coordinate>(

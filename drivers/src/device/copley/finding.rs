@@ -10,10 +10,10 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::Time;
+use wire::copley::{Address, BAUD_AT_RESET, Bank, Command, Parameter, Reply, Request};
+use wire::{LineControl, Payload};
 
 use super::settings::CopleyTimeouts;
-use crate::wire::copley::{Address, BAUD_AT_RESET, Bank, Command, Parameter, Reply, Request};
-use crate::wire::{LineControl, Payload};
 
 /// Longer than any byte at 9600 bit/s.
 const BREAK: Duration = Duration::from_millis(20);

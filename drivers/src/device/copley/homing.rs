@@ -7,12 +7,12 @@
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
+use wire::copley::{EventStatus, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
 use super::convert::{acceleration, amplifier_counts, speed};
 use super::script::Step;
 use super::{Activity, CopleyAxis, read};
 use crate::device::{DeviceError, Seen, Urgency};
-use crate::wire::copley::{EventStatus, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
 const PREPARING: &str = "setting the homing parameters";
 const STARTING: &str = "starting the homing";

@@ -4,8 +4,7 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::{Counts, Time};
-
-use crate::wire::copley::{EventStatus, Parameter, TrajectoryStatus};
+use wire::copley::{EventStatus, Parameter, TrajectoryStatus};
 
 /// An axis stands when so many looks in a row lie within the tolerance.
 const STANDING_LOOKS: u8 = 3;

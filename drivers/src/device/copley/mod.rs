@@ -1,7 +1,7 @@
 //! A servo amplifier by Copley Controls on its ASCII interface over a serial line.
 //!
 //! Source: Copley Controls, ASCII Programmer's Guide, 16-01196 rev. 01; the lines are
-//! [`crate::wire::copley`]'s. Start, power, profile position, homing, halt, quick stop and
+//! [`wire::copley`]'s. Start, power, profile position, homing, halt, quick stop and
 //! supervision of one axis.
 //!
 //! Up to some four amplifiers share a line. Each has a driver of its own, which takes its turn
@@ -39,6 +39,10 @@ mod tests;
 use std::collections::VecDeque;
 
 use units::{Coordinate, Counts, Metres, Quantity, Time};
+use wire::Payload;
+use wire::cia402::PowerState;
+use wire::copley::{BAUD_AT_RESET, Bank, EventStatus, Parameter};
+use wire::{Input, LinkState};
 
 pub use settings::{CopleySettings, CopleyTimeouts};
 
@@ -46,10 +50,6 @@ use super::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DeviceName, DriveCommand, Identity,
     LineUse, Seen, ServoDrive,
 };
-use crate::transport::{Input, LinkState};
-use crate::wire::Payload;
-use crate::wire::cia402::PowerState;
-use crate::wire::copley::{BAUD_AT_RESET, Bank, EventStatus, Parameter};
 use homing::{Homing, HomingPlace};
 use image::{Image, Look};
 use link::Link;

@@ -6,12 +6,12 @@
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
+use wire::copley::{EventStatus, Parameter, Trajectory, TrajectoryStatus};
 
 use super::convert::{acceleration, amplifier_counts, out_of_range, speed};
 use super::script::Step;
 use super::{Activity, CopleyAxis, read};
 use crate::device::{DeviceError, Urgency};
-use crate::wire::copley::{EventStatus, Parameter, Trajectory, TrajectoryStatus};
 
 const LOADING: &str = "loading the move";
 const STARTING: &str = "starting the move";

@@ -1,12 +1,12 @@
 //! Enable, disable, quick stop and fault reset.
 
 use units::{Coordinate, Time};
+use wire::cia402::PowerState;
+use wire::copley::{DesiredState, EventStatus, Faults, Parameter};
 
 use super::script::Step;
 use super::{Activity, CopleyAxis, read};
 use crate::device::{DeviceError, Urgency};
-use crate::wire::cia402::PowerState;
-use crate::wire::copley::{DesiredState, EventStatus, Faults, Parameter};
 
 /// Any of these, and the motor is not under control.
 const OFF: EventStatus = EventStatus::NOT_ENABLED_BY_INPUT

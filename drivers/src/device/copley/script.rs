@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use units::Time;
+use wire::copley::{Bank, Command, Parameter, Trajectory};
 
 use crate::device::Urgency;
-use crate::wire::copley::{Bank, Command, Parameter, Trajectory};
 
 /// What an exchange must be answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,6 +136,6 @@ impl Script {
 
     pub(super) fn number(&self, parameter: Parameter) -> Option<i64> {
         let value = self.values.get(&parameter)?.clone();
-        crate::wire::copley::Reply::Value(value).number()
+        wire::copley::Reply::Value(value).number()
     }
 }

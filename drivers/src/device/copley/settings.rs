@@ -3,8 +3,7 @@
 use core::time::Duration;
 
 use units::{Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
-
-use crate::wire::copley::Address;
+use wire::copley::Address;
 
 /// Everything the driver must know about one amplifier.
 #[derive(Clone, Debug, PartialEq)]

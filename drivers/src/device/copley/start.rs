@@ -1,12 +1,12 @@
 //! The start: find it, ask who it is, set it up, look at it.
 
 use units::{Coordinate, Counts, Time};
+use wire::copley::{Bank, DesiredState, EventStatus, Parameter};
 
 use super::convert::{acceleration, length};
 use super::{Activity, CopleyAxis, read};
 use crate::device::copley::script::{Script, Step};
 use crate::device::{DeviceError, Identity, Urgency};
-use crate::wire::copley::{Bank, DesiredState, EventStatus, Parameter};
 
 const ASKING: &str = "asking who it is";
 

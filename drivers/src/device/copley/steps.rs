@@ -2,12 +2,12 @@
 
 use core::time::Duration;
 use units::{Coordinate, Time};
+use wire::copley::{Command, Parameter, Reply, Request};
 
 use super::link::LinkEvent;
 use super::script::{Script, Step, Wanted};
 use super::{Activity, CopleyAxis, Purpose};
 use crate::device::{DeviceError, LineUse, Seen, Urgency};
-use crate::wire::copley::{Command, Parameter, Reply, Request};
 
 /// How often a step whose answer was lost is asked again, where that changes nothing.
 const RETRIES: u32 = 2;

@@ -2,12 +2,12 @@
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
+use wire::copley::{Bank, Command, EventStatus, Faults, Parameter, Reply, TrajectoryStatus};
 
 use super::image::Judgement;
 use super::start::Starting;
 use super::{Activity, CopleyAxis, Purpose};
 use crate::device::{Alarm, AmplifierTrouble, Urgency};
-use crate::wire::copley::{Bank, Command, EventStatus, Faults, Parameter, Reply, TrajectoryStatus};
 
 /// How often the amplifier is asked how long it has been on.
 const UPTIME_PERIOD: Duration = Duration::from_secs(1);

@@ -1,8 +1,7 @@
 //! Input ranges, and the channels of an answer.
 
 use units::Volts;
-
-use crate::wire::dcon::{CHANNEL_CHARACTERS, DconError, parse_volts};
+use wire::dcon::{CHANNEL_CHARACTERS, DconError, parse_volts};
 
 /// The input range of a module (ADAM-4000 manual, input range codes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

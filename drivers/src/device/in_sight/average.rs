@@ -1,10 +1,10 @@
 //! One pose from several pictures.
 
 use units::{Metres, Radians, Time};
+use wire::in_sight::Inspection;
 
 use super::settings::InSightSettings;
 use crate::device::{DeviceError, DeviceName, PoseReading};
-use crate::wire::in_sight::Inspection;
 
 /// A pose under way.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! An image controller: a Cognex In-Sight vision system in Native Mode.
 //!
-//! Sources: those of [`crate::wire::in_sight`]. A pose is asked for by `SW8` (take a picture,
+//! Sources: those of [`wire::in_sight`]. A pose is asked for by `SW8` (take a picture,
 //! judge it, answer when done) and read with `GV` from the one cell in which the job puts its
 //! whole [`Inspection`].
 //!
@@ -19,15 +19,15 @@ mod settings;
 
 use std::collections::VecDeque;
 use units::Time;
+use wire::Input;
+use wire::Payload;
+use wire::in_sight::{COUNT_MAX, Command, Inspection, Status, TERMINATOR};
 
 use self::average::Measurement;
 use self::question::Question;
 pub use self::settings::{CameraFrame, InSightSettings};
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{Alarm, Device, DeviceError, DeviceName, Identity, PoseInstrument, PoseReading, Seen};
-use crate::transport::Input;
-use crate::wire::Payload;
-use crate::wire::in_sight::{COUNT_MAX, Command, Inspection, Status, TERMINATOR};
 
 const NAME: DeviceName = DeviceName::Serial("image controller");
 /// A cell of text has at most 255 characters.

@@ -1,6 +1,6 @@
 //! What an image controller is asked, and how its silence or refusal is told.
 
-use crate::wire::in_sight::{ACQUIRE, Cell, Command};
+use wire::in_sight::{ACQUIRE, Cell, Command};
 
 /// What is being asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

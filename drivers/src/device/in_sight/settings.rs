@@ -3,8 +3,7 @@
 use core::time::Duration;
 use units::portable::sin_cos;
 use units::{Metres, Radians};
-
-use crate::wire::in_sight::Cell;
+use wire::in_sight::Cell;
 
 /// How the controller's axes lie against the machine's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,10 +1,10 @@
 //! What the image controller's driver must and must not make of its answers.
 
 use super::*;
-use crate::wire::in_sight::Cell;
 use core::time::Duration;
 use proptest::prelude::*;
 use units::{Metres, Radians};
+use wire::in_sight::Cell;
 
 const INFO: [&str; 6] = [
     "1",

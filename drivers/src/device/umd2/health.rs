@@ -1,7 +1,7 @@
 //! Whether a sample's count means anything.
 
 use crate::device::Alarm;
-use crate::wire::umd2::Sample;
+use wire::umd2::Sample;
 
 /// The measurement frequency is next to nothing below this part of the reference.
 const SLOW_BEAT: u32 = 32;

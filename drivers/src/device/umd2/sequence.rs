@@ -1,6 +1,6 @@
 //! Whether samples follow one another.
 
-use crate::wire::umd2::Sample;
+use wire::umd2::Sample;
 
 /// How a sample stands to those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,7 +79,7 @@ impl Sequence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::umd2::LowSpeed;
+    use wire::umd2::LowSpeed;
 
     fn sample(sequence: u32) -> Sample {
         Sample {

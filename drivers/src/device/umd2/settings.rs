@@ -2,8 +2,7 @@
 
 use core::time::Duration;
 use units::Metres;
-
-use crate::wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, VACUUM_WAVELENGTH_M};
+use wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, VACUUM_WAVELENGTH_M};
 
 /// Which way the displacement counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

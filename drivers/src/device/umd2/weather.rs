@@ -2,9 +2,9 @@
 
 use core::time::Duration;
 use units::{Celsius, Pascals, RelativeHumidity, Time};
+use wire::umd2::LowSpeed;
 
 use super::super::Environment;
-use crate::wire::umd2::LowSpeed;
 
 /// The newest values and when they came. Temperature 1 is the air's, 2 the material's.
 #[derive(Clone, Copy, Debug)]

@@ -2,8 +2,8 @@
 
 use super::Method;
 use super::transfer::{Oddity, Verdict};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::sdo::{
+use wire::canopen::Object;
+use wire::canopen::sdo::{
     AbortCode, BLOCK_SIZE_MAX, BlockSegment, Expedited, SEGMENT_BYTES, SdoRequest, SdoResponse,
     Segment, block_crc,
 };

@@ -38,12 +38,11 @@ use std::collections::VecDeque;
 
 use transfer::{Oddity, Transfer, Verdict};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
+use wire::canopen::{Function, NodeId, Object};
 
 pub use types::{Busy, Counters, Method, Retry, SdoFailure, Timeouts};
-
-use crate::wire::can::CanFrame;
-use crate::wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
-use crate::wire::canopen::{Function, NodeId, Object};
 
 /// The longest value that is read; a server that announces or sends more is cut off.
 pub const TRANSFER_BYTES_MAX: usize = 1 << 20;

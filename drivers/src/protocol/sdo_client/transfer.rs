@@ -5,8 +5,8 @@ use core::time::Duration;
 use super::download::Download;
 use super::upload::Upload;
 use super::{Direction, Job, Timeouts};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
+use wire::canopen::Object;
+use wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
 
 /// Why a payload was ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

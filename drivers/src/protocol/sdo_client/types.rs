@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use crate::wire::canopen::Object;
-use crate::wire::canopen::sdo::AbortCode;
+use wire::canopen::Object;
+use wire::canopen::sdo::AbortCode;
 
 /// How long each thing is waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use super::transfer::{Oddity, Verdict};
 use super::{Method, TRANSFER_BYTES_MAX};
-use crate::wire::canopen::Object;
-use crate::wire::canopen::sdo::{
+use wire::canopen::Object;
+use wire::canopen::sdo::{
     AbortCode, BLOCK_SIZE_MAX, BlockSegment, SEGMENT_BYTES, SdoRequest, SdoResponse, Segment,
     block_crc,
 };

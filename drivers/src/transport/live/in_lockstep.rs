@@ -12,13 +12,14 @@ use std::sync::Arc;
 
 use nix::poll::{PollFd, PollFlags, ppoll};
 use units::Time;
+use wire::lockstep::{Entry, Passed};
+use wire::{Payload, Port};
 
 use super::super::lockstep::{LockstepError, Participant};
 use super::super::one_core::OneCore;
 use super::super::sync_grid::SyncGrid;
 use super::super::{Arrival, SendError};
-use super::{Clock, Live, Payload, Port, WAITED_MAX};
-use crate::wire::lockstep::{Entry, Passed};
+use super::{Clock, Live, WAITED_MAX};
 
 /// A port that asks to be looked at more often at one moment is wrong; time goes on then.
 const LOOKS_MAX: usize = 1_000;

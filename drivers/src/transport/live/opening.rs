@@ -4,13 +4,14 @@ use std::path::Path;
 
 use nix::poll::{PollFd, ppoll};
 use nix::sys::time::TimeSpec;
+use wire::Port;
 
 use super::super::clock::Clock;
 use super::super::lockstep::LockstepError;
 use super::super::serial::{SerialError, SerialLine, SerialSettings};
 use super::super::slcan::{SlcanFailure, SlcanPort, SlcanSettings};
 use super::super::socketcan::{self, CanPort};
-use super::{Live, LivePort, Port, Slot, WAIT_MAX, WAITED_MAX, interest};
+use super::{Live, LivePort, Slot, WAIT_MAX, WAITED_MAX, interest};
 
 /// Why a port could not be opened.
 #[derive(Debug, thiserror::Error)]

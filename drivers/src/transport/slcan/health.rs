@@ -1,8 +1,8 @@
 //! What an adapter says about itself and the bus, in the terms of SocketCAN's error frames.
 
-use super::super::Input;
-use crate::wire::can::{BusError, BusErrorClass, ControllerProblem};
-use crate::wire::slcan::{BusState, StatusFlags};
+use wire::Input;
+use wire::can::{BusError, BusErrorClass, ControllerProblem};
+use wire::slcan::{BusState, StatusFlags};
 
 /// The adapter refused a frame: it did not go out.
 pub(super) const fn transmit_overflow() -> Input {

@@ -4,12 +4,12 @@ use nix::errno::Errno;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use units::Time;
+use wire::canopen::sync::emit_sync;
+use wire::slcan::Command;
 
 use super::super::clock::Clock;
 use super::super::serial::Outbox;
 use super::super::sync_thread::SyncSink;
-use crate::wire::canopen::sync::emit_sync;
-use crate::wire::slcan::Command;
 
 /// Lines that wait for a slow adapter: some twenty frames, as a CAN interface's queue.
 const PENDING_MAX: usize = 512;

@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 
 use super::super::serial::SerialSettings;
-use crate::wire::slcan::{BitrateCode, Command};
+use wire::slcan::{BitrateCode, Command};
 
 /// How an SLCAN adapter is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]

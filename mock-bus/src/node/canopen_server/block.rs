@@ -1,7 +1,7 @@
 //! Block transfers of the SDO server (CiA 301, 7.2.4.3.9 to 7.2.4.3.16).
 
-use drivers::wire::canopen::Object;
-use drivers::wire::canopen::sdo::{
+use wire::canopen::Object;
+use wire::canopen::sdo::{
     AbortCode, BLOCK_SIZE_MAX, BlockSegment, SEGMENT_BYTES, SdoRequest, SdoResponse, block_crc,
 };
 

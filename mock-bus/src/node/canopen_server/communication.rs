@@ -1,8 +1,8 @@
 //! The communication profile area 0x1000-0x1FFF of an emulated node (CiA 301, 7.5.2).
 
-use drivers::wire::canopen::pdo::MappedObject;
-use drivers::wire::canopen::{Function, NodeId};
 use serde::{Deserialize, Serialize};
+use wire::canopen::pdo::MappedObject;
+use wire::canopen::{Function, NodeId};
 
 use super::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
 use super::errors::HISTORY;

@@ -3,8 +3,8 @@
 //! Every entry has three values: the factory's, the one it takes at power-on (what "save" in
 //! 0x1010 stored), and the present one.
 
-use drivers::wire::canopen::Object;
-use drivers::wire::canopen::sdo::AbortCode;
+use wire::canopen::Object;
+use wire::canopen::sdo::AbortCode;
 
 /// The data type of an entry (CiA 301, 7.4.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

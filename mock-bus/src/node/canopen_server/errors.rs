@@ -1,6 +1,6 @@
 //! The error register, the error history and emergency messages (CiA 301, 7.2.7, 7.5.2.2-4).
 
-use drivers::wire::canopen::emcy::{Emergency, EmergencyCode};
+use wire::canopen::emcy::{Emergency, EmergencyCode};
 
 /// The most errors 0x1003 remembers.
 pub(super) const HISTORY: usize = 8;

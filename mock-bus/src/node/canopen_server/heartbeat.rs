@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drivers::wire::canopen::NodeId;
 use units::Time;
+use wire::canopen::NodeId;
 
 /// One producer that this node watches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

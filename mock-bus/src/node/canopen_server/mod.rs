@@ -28,12 +28,12 @@ mod tests;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::canopen::nmt::{NMT_COB_ID, NmtState, parse_heartbeat};
-use drivers::wire::canopen::sync::{SYNC_COB_ID, is_sync};
-use drivers::wire::canopen::{Function, NodeId, Object};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::nmt::{NMT_COB_ID, NmtState, parse_heartbeat};
+use wire::canopen::sync::{SYNC_COB_ID, is_sync};
+use wire::canopen::{Function, NodeId, Object};
 
 pub use communication::{Description, Identity, PdoDefault};
 pub use dictionary::Dictionary;

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::NodeId;
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::canopen::nmt::{NmtCommand, NmtState, emit_heartbeat};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::NodeId;
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::nmt::{NmtCommand, NmtState, emit_heartbeat};
 
 use super::errors::{Errors, register};
 use super::heartbeat::Consumer;

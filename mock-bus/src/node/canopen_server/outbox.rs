@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use drivers::wire::can::CanFrame;
 use units::Time;
+use wire::can::CanFrame;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outbox {

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::pdo::{self, MappedObject, PdoCobId, Transmission};
-use drivers::wire::canopen::{Object, pdo::extract};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::pdo::{self, MappedObject, PdoCobId, Transmission};
+use wire::canopen::{Object, pdo::extract};
 
 use super::dictionary::Dictionary;
 use super::rules::{is_dummy, mapping_index, parameters_index};

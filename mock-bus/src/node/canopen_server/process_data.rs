@@ -1,10 +1,10 @@
 //! PDO traffic of the node (CiA 301, 7.2.2 and 7.2.5).
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::Object;
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::canopen::sync::is_sync;
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::Object;
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::sync::is_sync;
 
 use super::errors::register;
 use super::pdo::{Reception, Rpdo, Tpdo};

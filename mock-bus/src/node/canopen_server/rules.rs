@@ -1,8 +1,8 @@
 //! Which writes to the communication area are allowed when (CiA 301, 7.5.2.35-38, 7.5.2.19).
 
-use drivers::wire::canopen::Object;
-use drivers::wire::canopen::pdo::{MappedObject, PdoCobId};
-use drivers::wire::canopen::sdo::AbortCode;
+use wire::canopen::Object;
+use wire::canopen::pdo::{MappedObject, PdoCobId};
+use wire::canopen::sdo::AbortCode;
 
 use super::communication::{LOAD, MAPPED_MAX, SAVE};
 use super::dictionary::{Dictionary, Value};

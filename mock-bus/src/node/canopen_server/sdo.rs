@@ -5,11 +5,11 @@
 
 use std::time::Duration;
 
-use drivers::wire::canopen::Object;
-use drivers::wire::canopen::sdo::{
+use units::Time;
+use wire::canopen::Object;
+use wire::canopen::sdo::{
     AbortCode, BlockSegment, Expedited, SEGMENT_BYTES, SdoRequest, SdoResponse, Segment,
 };
-use units::Time;
 
 use super::block::{BlockDownload, BlockUpload};
 

@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse, Segment};
-use drivers::wire::canopen::{Function, Object};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse, Segment};
+use wire::canopen::{Function, Object};
 
 use super::dictionary::Dictionary;
 use super::manners::Rudeness;

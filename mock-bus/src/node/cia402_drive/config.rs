@@ -1,7 +1,7 @@
 //! What a configuration file says about an emulated drive.
 
-use drivers::wire::canopen::NodeId;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use wire::canopen::NodeId;
 
 use crate::node::canopen_server::{Identity, Manners};
 

@@ -12,10 +12,10 @@
 
 use std::time::Duration;
 
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::cia402::Controlword;
 use units::Time;
 use units::portable::powi;
+use wire::canopen::emcy::EmergencyCode;
+use wire::cia402::Controlword;
 
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};

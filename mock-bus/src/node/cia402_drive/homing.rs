@@ -6,8 +6,8 @@
 //! index pulse, the first pulse behind that edge is. The encoder latches the count of the pulse,
 //! so its place does not depend on the speed.
 
-use drivers::wire::cia402::{Controlword, HomingStatus};
 use units::Time;
+use wire::cia402::{Controlword, HomingStatus};
 
 use super::Drive;
 use super::mechanism::Mechanism;

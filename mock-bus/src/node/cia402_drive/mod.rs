@@ -32,13 +32,13 @@ mod transitions;
 
 use std::time::Duration;
 
-use drivers::wire::Payload;
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::NodeId;
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::canopen::nmt::NmtState;
-use drivers::wire::cia402::{Controlword, HomingStatus, PowerState};
 use units::Time;
+use wire::Payload;
+use wire::can::CanFrame;
+use wire::canopen::NodeId;
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::nmt::NmtState;
+use wire::cia402::{Controlword, HomingStatus, PowerState};
 
 pub(in crate::node) use config::checked_node_id;
 pub use config::{Cia402DriveConfig, DriveQuirks, RotaryDriveConfig, TouchProbeConfig};

@@ -1,8 +1,8 @@
 //! The drive's object dictionary (CiA 402-2) and its default PDOs.
 
-use drivers::wire::canopen::pdo::MappedObject;
-use drivers::wire::canopen::{Function, NodeId};
 use units::portable::log10;
+use wire::canopen::pdo::MappedObject;
+use wire::canopen::{Function, NodeId};
 
 use super::config::Cia402DriveConfig;
 use crate::node::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};

@@ -1,7 +1,7 @@
 //! Profile position mode: the set-point handshake and its buffer of one (CiA 402-2, 10.1).
 
-use drivers::wire::cia402::Controlword;
 use units::Time;
+use wire::cia402::Controlword;
 
 use super::Drive;
 use super::mechanism::Mechanism;

@@ -1,6 +1,6 @@
 //! The power state machine (CiA 402-2 / IEC 61800-7-201, figure "state machine"): pure.
 
-use drivers::wire::cia402::{Controlword, PowerState};
+use wire::cia402::{Controlword, PowerState};
 
 /// The drive's states; on the wire they are [`PowerState`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drivers::wire::cia402::{HomingStatus, Statusword};
 use units::Time;
+use wire::cia402::{HomingStatus, Statusword};
 
 use super::mechanism::Mechanism;
 use super::motion::Activity;
@@ -96,7 +96,7 @@ impl Drive {
 
     /// The same of a drive that owns up to it.
     fn is_at_target(&self, now: Time) -> bool {
-        use drivers::wire::cia402::Controlword;
+        use wire::cia402::Controlword;
         if self.controlword.contains(Controlword::HALT) {
             return self.profile.is_done(now);
         }

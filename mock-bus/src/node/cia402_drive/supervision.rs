@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use drivers::wire::canopen::emcy::EmergencyCode;
 use units::Time;
+use wire::canopen::emcy::EmergencyCode;
 
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drivers::wire::cia402::Controlword;
 use units::Time;
+use wire::cia402::Controlword;
 
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};

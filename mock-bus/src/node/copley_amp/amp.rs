@@ -3,10 +3,10 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use drivers::wire::copley::{
+use units::Time;
+use wire::copley::{
     BAUD_AT_RESET, Command, DesiredState, Faults, Parameter, Reply, TrajectoryStatus,
 };
-use units::Time;
 
 use super::config::CopleyAmpConfig;
 use super::parameters;

@@ -1,7 +1,7 @@
 //! The amplifier looks after itself, and says how it is.
 
-use drivers::wire::copley::{EventStatus, Faults, Parameter, TrajectoryStatus};
 use units::Time;
+use wire::copley::{EventStatus, Faults, Parameter, TrajectoryStatus};
 
 use super::amp::{Amp, Stage, milliseconds};
 use crate::plant::Plant;

@@ -25,11 +25,11 @@ mod trajectory;
 use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 
-use drivers::wire::copley::{
+use units::Time;
+use wire::copley::{
     Address, BAUD_AT_RESET, CR, Command, ErrorCode, Faults, LINE_MAX, Reply, Request,
 };
-use drivers::wire::{LineControl, Payload};
-use units::Time;
+use wire::{LineControl, Payload};
 
 pub use config::{AmpQuirks, CopleyAmpConfig, CopleyAmpsConfig, LineQuirks};
 

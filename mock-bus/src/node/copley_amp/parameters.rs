@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use drivers::wire::copley::{
-    BAUD_AT_RESET, Bank, DesiredState, ErrorCode, Faults, HomingMethod, Parameter,
-};
 use units::Time;
+use wire::copley::{BAUD_AT_RESET, Bank, DesiredState, ErrorCode, Faults, HomingMethod, Parameter};
 
 use super::amp::Amp;
 use super::config::CopleyAmpConfig;

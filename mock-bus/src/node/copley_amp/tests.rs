@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plant::config::PlantConfig;
-use drivers::wire::copley::EventStatus;
+use wire::copley::EventStatus;
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -1,7 +1,7 @@
 //! The trajectory generator: moves, aborts, homing.
 
-use drivers::wire::copley::{ErrorCode, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 use units::Time;
+use wire::copley::{ErrorCode, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
 use super::amp::{Amp, Stage};
 use crate::node::profile::{MotionLimits, Profile};

@@ -1,11 +1,11 @@
 //! What follows a reply that did not come.
 
 use units::Time;
+use wire::Payload;
+use wire::copley::{Address, Bank, Command, ErrorCode, Parameter, Reply, Request};
 
 use super::{Link, NOISE_MAX, State, Then};
 use crate::device::Urgency;
-use crate::wire::Payload;
-use crate::wire::copley::{Address, Bank, Command, ErrorCode, Parameter, Reply, Request};
 
 impl Link {
     /// A stop is next: clean-up waits until it has gone.

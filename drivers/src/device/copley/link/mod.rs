@@ -16,13 +16,13 @@ use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::Time;
+use wire::Payload;
+use wire::copley::{Address, CR, Command, ErrorCode, LINE_MAX, Reply, Request};
 
 use super::finding::{Finding, Found, span};
 use super::settings::CopleyTimeouts;
 use crate::device::serial_line::{AssembledLine, LineAssembler};
 use crate::device::{LineUse, Urgency};
-use crate::wire::Payload;
-use crate::wire::copley::{Address, CR, Command, ErrorCode, LINE_MAX, Reply, Request};
 
 /// Replies are reckoned with so many bytes.
 const REPLY_BYTES: usize = 24;

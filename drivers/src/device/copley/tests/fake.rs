@@ -5,12 +5,11 @@ use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};
 
 use units::Time;
-
-use crate::wire::copley::{
+use wire::copley::{
     BAUD_AT_RESET, Bank, CR, Command, DesiredState, ErrorCode, EventStatus, HomingMethod,
     Parameter, Reply, Request, Trajectory, TrajectoryStatus,
 };
-use crate::wire::{LineControl, Payload};
+use wire::{LineControl, Payload};
 
 const REPLY: Duration = Duration::from_millis(2);
 /// Every move takes as long.

@@ -6,11 +6,11 @@ use core::time::Duration;
 
 use proptest::prelude::*;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
+use wire::LineControl;
+use wire::copley::{Address, CR, Faults};
 
 use super::*;
 use crate::device::AmplifierTrouble;
-use crate::wire::LineControl;
-use crate::wire::copley::{Address, CR, Faults};
 use fake::{Fake, Spoil};
 
 const MS: Duration = Duration::from_millis(1);

@@ -1,6 +1,6 @@
 //! Block SDO, with lost segments.
 
-use drivers::wire::canopen::sdo::block_crc;
+use wire::canopen::sdo::block_crc;
 
 use super::{Bench, LOG};
 

@@ -1,8 +1,8 @@
 //! NMT, heartbeat and emergencies.
 
-use drivers::wire::canopen::NodeId;
-use drivers::wire::canopen::emcy::EmergencyCode;
-use drivers::wire::canopen::nmt::NmtState;
+use wire::canopen::NodeId;
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::nmt::NmtState;
 
 use super::{Bench, Manners, ServerEvent};
 use crate::node::canopen_server::register;

@@ -8,13 +8,13 @@ mod transfers;
 
 use std::time::Duration;
 
-use drivers::wire::can::{CanFrame, CanId};
-use drivers::wire::canopen::pdo::MappedObject;
 use units::Time;
+use wire::can::{CanFrame, CanId};
+use wire::canopen::pdo::MappedObject;
 
 use super::dictionary::{Access, Bounds, Entry, Kind, Mapping};
 use super::{CanopenServer, Description, Dictionary, Identity, Manners, PdoDefault, ServerEvent};
-use drivers::wire::canopen::NodeId;
+use wire::canopen::NodeId;
 
 pub(super) const LOG: usize = 300;
 

@@ -1,6 +1,6 @@
 //! PDOs: the order of remapping, transmission types, short frames.
 
-use drivers::wire::canopen::Object;
+use wire::canopen::Object;
 
 use super::{Bench, ServerEvent};
 

@@ -1,6 +1,6 @@
 //! Following error, safe torque off, lost master, internal errors.
 
-use drivers::wire::canopen::emcy::EmergencyCode;
+use wire::canopen::emcy::EmergencyCode;
 
 use super::Bench;
 use crate::plant::Servo;

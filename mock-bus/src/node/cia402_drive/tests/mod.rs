@@ -11,10 +11,10 @@ mod states;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use drivers::wire::can::CanFrame;
-use drivers::wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse};
-use drivers::wire::canopen::{NodeId, Object};
 use units::Time;
+use wire::can::CanFrame;
+use wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse};
+use wire::canopen::{NodeId, Object};
 
 use super::mechanism::Mechanism;
 use super::{Cia402DriveConfig, Drive};
@@ -253,7 +253,7 @@ impl Bench {
 
     pub(super) fn watch_master(&mut self) {
         let master = NodeId::new(127).unwrap();
-        let entry = drivers::wire::canopen::nmt::consumer_heartbeat_entry(master, 150);
+        let entry = wire::canopen::nmt::consumer_heartbeat_entry(master, 150);
         self.try_write(0x1016, 1, &entry.to_le_bytes()).unwrap();
         let _ = self.send(0x77F, &[5]);
     }

@@ -2,7 +2,7 @@
 
 use super::{AbortCode, Bench};
 use crate::node::cia402_drive::{Cia402DriveConfig, objects};
-use drivers::wire::canopen::NodeId;
+use wire::canopen::NodeId;
 
 #[test]
 fn the_mode_display_lags_behind_the_mode() {

@@ -1,6 +1,6 @@
 //! A rotary axis: positions that wrap, homing on the index pulse, the touch probe.
 
-use drivers::wire::canopen::sdo::AbortCode;
+use wire::canopen::sdo::AbortCode;
 
 use super::Bench;
 use crate::node::cia402_drive::{Cia402DriveConfig, RotaryDriveConfig, TouchProbeConfig};

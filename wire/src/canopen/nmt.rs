@@ -1,7 +1,7 @@
 //! Network management: node control, boot-up and heartbeat (CiA 301, 7.2.8 and 7.3.5).
 
 use super::{Function, NodeId, WireError};
-use crate::wire::can::CanFrame;
+use crate::can::CanFrame;
 use core::fmt;
 
 /// The identifier of NMT node control, the highest priority on the bus.

@@ -1,6 +1,6 @@
 //! The SYNC object (CiA 301, 7.2.5).
 
-use crate::wire::can::CanFrame;
+use crate::can::CanFrame;
 
 /// The default identifier of SYNC (0x1005).
 pub const SYNC_COB_ID: u16 = 0x080;

@@ -1,7 +1,7 @@
 //! Emergency messages (CiA 301, 7.2.7; drive codes: CiA 402-2).
 
 use super::{Function, NodeId, WireError};
-use crate::wire::can::CanFrame;
+use crate::can::CanFrame;
 use core::fmt;
 
 /// A 16-bit emergency error code.
