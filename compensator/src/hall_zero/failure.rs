@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use units::{Metres, Volts};
 
-use super::{Sample, SensorFault};
+use super::{Sample, Sensor, SensorFault};
 
 /// The steps of the patent, and the way to the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,24 +33,6 @@ impl fmt::Display for Step {
             Self::RightFlank => "step 3 (G2, right flank)",
             Self::Centre => "step 4 (P0, centre)",
             Self::Check => "step 5 (check of P0)",
-        })
-    }
-}
-
-/// The two sensors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sensor {
-    /// Sensor 1 over N-S-N: even.
-    Peak,
-    /// Sensor 2 over S-N: odd.
-    Slope,
-}
-
-impl fmt::Display for Sensor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Peak => "peak sensor",
-            Self::Slope => "slope sensor",
         })
     }
 }

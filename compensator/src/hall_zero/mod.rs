@@ -31,16 +31,18 @@ mod failure;
 mod profile;
 mod refine;
 mod search;
+mod sensor;
 mod settings;
 
 pub use crate::measurement::{HallPoint, HallSeries};
 pub use diagnose::{SensorFault, diagnose};
-pub use failure::{Reason, SearchFailure, Sensor, Step};
+pub use failure::{Reason, SearchFailure, Step};
 pub use refine::{
     Flank, Level, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
     single_threshold_zero,
 };
 pub use search::{Held, Outcome, Progress, Sample, Search};
+pub use sensor::Sensor;
 pub use settings::{Settings, SettingsError};
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use nalgebra::{DMatrix, DVector};
+use units::Approach;
 
 use super::super::rig::{Noise, Screw, UM, dense, every, row, with_lead};
 use super::*;

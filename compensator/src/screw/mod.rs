@@ -34,11 +34,14 @@
 
 mod compensation;
 mod engagement;
+mod error;
 mod fit;
 mod limits;
 mod observe;
+mod options;
 mod outliers;
 pub mod patent;
+mod problem;
 
 use core::f64::consts::TAU;
 
@@ -49,9 +52,12 @@ use crate::uncertainty::propagate;
 
 pub use compensation::{Correction, OutOfRange, Rule, ScrewCompensation};
 pub use engagement::{Engagement, ScrewMemory};
-pub use fit::{FitError, FitOptions, Fitted, HarmonicTest, LackOfFit, fit};
+pub use error::FitError;
+pub use fit::{Fitted, fit};
 pub use limits::{LimitName, Limits, ScrewError};
+pub use options::FitOptions;
 pub use outliers::StrokeOutlier;
+pub use problem::{HarmonicTest, LackOfFit};
 
 /// Offset, slope and lost motion come before the harmonics' sines and cosines.
 const BASE: usize = 3;

@@ -1,7 +1,7 @@
 //! What can be seen in data, before anything is solved: each term must differ from all
 //! combinations of those before it.
 
-use super::fit::FitError;
+use super::error::FitError;
 use super::{BASE, design_row};
 use crate::measurement::Stroke;
 use units::portable::hypot;

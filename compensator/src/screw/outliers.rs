@@ -14,7 +14,9 @@ use std::collections::BTreeMap;
 
 use units::{Approach, Metres};
 
-use super::fit::{FitError, FitOptions, Problem, SCATTER_FLOOR_M};
+use super::error::FitError;
+use super::options::FitOptions;
+use super::problem::{Problem, SCATTER_FLOOR_M};
 use super::{BASE, design_row};
 use crate::measurement::Stroke;
 use crate::uncertainty::{median, propagate, robust_sigma};

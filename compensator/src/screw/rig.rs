@@ -2,7 +2,7 @@
 
 use units::{Approach, Metres};
 
-use super::fit::FitOptions;
+use super::FitOptions;
 use crate::measurement::Stroke;
 
 pub(super) const UM: f64 = 1e-6;

@@ -8,9 +8,9 @@ use wire::canopen::nmt::NmtState;
 use wire::canopen::sdo::AbortCode;
 use wire::canopen::{NodeId, Object};
 use wire::cia402::PowerState;
-use wire::copley::{Address, ErrorCode, EventStatus, Faults, Parameter};
+use wire::copley::{ErrorCode, EventStatus, Faults, Parameter};
 
-use super::Alarm;
+use super::{Alarm, DeviceName};
 
 /// Why a command of a device failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -206,27 +206,6 @@ pub enum DeviceError {
 
 fn of_parameter(parameter: Option<Parameter>) -> String {
     parameter.map_or_else(String::new, |parameter| format!(", parameter {parameter}"))
-}
-
-/// Which device speaks: a node on the bus or a serial device by its kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum DeviceName {
-    /// On CAN.
-    Node(NodeId),
-    /// On a serial line.
-    Serial(&'static str),
-    /// One of several amplifiers behind a serial line.
-    Amplifier(Address),
-}
-
-impl fmt::Display for DeviceName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Node(node) => node.fmt(f),
-            Self::Serial(kind) => f.write_str(kind),
-            Self::Amplifier(address) => write!(f, "amplifier {address}"),
-        }
-    }
 }
 
 /// What was last seen when something awaited did not come.

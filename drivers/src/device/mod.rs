@@ -15,6 +15,7 @@ mod error;
 mod fake_node;
 pub mod in_sight;
 mod latch;
+mod name;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;
@@ -29,8 +30,9 @@ use wire::Payload;
 use wire::cia402::PowerState;
 
 pub use alarm::{Alarm, AmplifierTrouble};
-pub use error::{DeviceError, DeviceName, Seen};
+pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
+pub use name::DeviceName;
 pub use shared_line::{LineUse, Urgency};
 
 /// The sans-io face that every device shows to the loop that drives it.

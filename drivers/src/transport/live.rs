@@ -16,17 +16,17 @@ use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use std::collections::BTreeMap;
-use std::os::fd::BorrowedFd;
-use std::sync::Arc;
 use units::Time;
 use wire::{Arrival, Input, Payload, Port};
 
 use self::in_lockstep::InLockstep;
-pub use self::opening::{LiveBuilder, OpenError};
+pub use self::opening::LiveBuilder;
 use super::clock::Clock;
+use super::live_port::{LivePort, system};
+pub use super::open_error::OpenError;
 pub use super::serial::{Parity, SerialSettings, StopBits};
 pub use super::slcan::{SlcanFailure, SlcanSettings};
-use super::sync_thread::{SyncSink, SyncStatistics, SyncThread, monotonic};
+use super::sync_thread::{SyncStatistics, SyncThread, monotonic};
 use super::{SendError, Transport};
 
 /// Until the clock has been read, a wait is no longer than this, or half of what is left.
@@ -36,70 +36,11 @@ const WAITED_MAX: usize = 16;
 /// The longest single wait, so that a deadline of "never" needs no special case.
 const WAIT_MAX: Duration = Duration::from_secs(3_600);
 
-/// One port that this thread reads.
-pub(super) trait LivePort: Send {
-    /// What to wait on; `None` while the port is gone.
-    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
-
-    /// Whether to wait for room to write, too.
-    fn wants_write(&self) -> bool {
-        false
-    }
-
-    /// When to be polled even if nothing is readable.
-    fn next_event(&self) -> Time;
-
-    /// The next input, without waiting. `ready`: the descriptor can be read (or written).
-    /// It is `known` or a little later; who needs it better reads the clock.
-    fn poll(&mut self, known: Time, ready: bool) -> Option<(Time, Input)>;
-
-    /// Sends without waiting.
-    fn send(&mut self, payload: &Payload) -> Result<(), SendError>;
-
-    /// How its start went, once that has ended.
-    fn start_result(&self) -> Option<Result<(), SlcanFailure>> {
-        Some(Ok(()))
-    }
-
-    /// Goes on with its start; what comes in is kept.
-    fn progress(&mut self, _now: Time, _ready: bool) {}
-
-    /// How many frames or bytes it has sent so far.
-    fn units_sent(&self) -> u64;
-
-    /// Writes what waits for a slow line.
-    fn flush(&mut self) {}
-
-    /// Reads so many frames or bytes, which are known to be on their way; they came at `now`.
-    fn take_in(&mut self, now: Time, units: usize);
-
-    /// Where a SYNC thread may send; `None` for a serial line.
-    fn sync_sink(&self) -> Option<Arc<dyn SyncSink>> {
-        None
-    }
-
-    /// Counters for a person who looks for trouble.
-    fn counters(&self) -> Vec<(&'static str, u64)>;
-}
-
 fn interest(port: &dyn LivePort) -> PollFlags {
     if port.wants_write() {
         PollFlags::POLLIN | PollFlags::POLLOUT
     } else {
         PollFlags::POLLIN
-    }
-}
-
-/// Waits for what is known to be on its way; `false` when it does not come.
-pub(super) fn awaited(descriptor: BorrowedFd<'_>) -> bool {
-    /// The kernel hands on what was written within microseconds, on a busy computer too.
-    const LIMIT: TimeSpec = TimeSpec::new(10, 0);
-    let mut descriptors = [PollFd::new(descriptor, PollFlags::POLLIN)];
-    loop {
-        match ppoll(&mut descriptors, Some(LIMIT), None) {
-            Err(Errno::EINTR) => {}
-            result => return result.is_ok_and(|count| count > 0),
-        }
     }
 }
 
@@ -300,17 +241,6 @@ impl Transport for Live {
             }
         }
         Ok(())
-    }
-}
-
-/// The operating system's refusal as a [`SendError`].
-pub(super) const fn system(port: Port, errno: Errno) -> SendError {
-    match errno {
-        Errno::ENOBUFS | Errno::EAGAIN => SendError::QueueFull { port },
-        _ => SendError::System {
-            port,
-            errno: errno as i32,
-        },
     }
 }
 

@@ -14,9 +14,13 @@ pub mod clock;
 #[cfg(feature = "live")]
 pub mod live;
 #[cfg(feature = "live")]
+mod live_port;
+#[cfg(feature = "live")]
 pub mod lockstep;
 #[cfg(feature = "live")]
 mod one_core;
+#[cfg(feature = "live")]
+mod open_error;
 #[cfg(feature = "live")]
 mod os;
 #[cfg(feature = "live")]

@@ -15,7 +15,7 @@ use wire::{Input, LinkState, Payload, Port};
 
 use super::SendError;
 use super::clock::Clock;
-use super::live::{LivePort, awaited, system};
+use super::live_port::{LivePort, awaited, system};
 use super::os;
 
 const READ_MAX: usize = 4_096;

@@ -6,6 +6,7 @@
 //! transmit overflow. Its status flags are read now and then: they show lost frames and an
 //! ailing bus, and their absence shows a dead adapter.
 
+mod failure;
 mod health;
 mod lines;
 mod start;
@@ -19,12 +20,14 @@ use units::Time;
 use wire::slcan::{BitrateCode, Command, LineBuffer, Reply, StatusFlags};
 use wire::{Input, LinkState, Payload, Port};
 
+pub use self::failure::SlcanFailure;
 use self::lines::{Asked, SharedLines};
+pub use self::start::SlcanSettings;
 use self::start::Step;
-pub use self::start::{SlcanFailure, SlcanSettings};
 use super::SendError;
 use super::clock::Clock;
-use super::live::{LivePort, OpenError, system};
+use super::live_port::{LivePort, system};
+use super::open_error::OpenError;
 use super::serial::{self, BackOff, Read};
 use super::stamps::AdapterStamps;
 use super::sync_thread::SyncSink;

@@ -22,7 +22,8 @@ use wire::{Input, LinkState, Payload, Port};
 
 use super::SendError;
 use super::clock::Clock;
-use super::live::{LivePort, OpenError, awaited, system};
+use super::live_port::{LivePort, awaited, system};
+use super::open_error::OpenError;
 use super::serial::BackOff;
 use super::stamps::KernelStamps;
 use super::sync_thread::SyncSink;

@@ -7,7 +7,7 @@ use super::Servo;
 use super::encoder::Encoder;
 use super::index_mark::IndexMark;
 use super::limit_switch::LimitSwitch;
-use super::machine::IndexPulse;
+use super::pulse::IndexPulse;
 use super::servo::{Mass, Stroke};
 
 /// Metres of a linear one, radians of a rotary one.

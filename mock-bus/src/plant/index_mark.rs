@@ -3,7 +3,7 @@
 use crate::random::Stream;
 
 use super::encoder::Encoder;
-use super::machine::IndexPulse;
+use super::pulse::IndexPulse;
 
 /// One of the marks is where the scale has its zero.
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@
 //! deterministic: the same seed and the same commands at the same times give the same bits,
 //! however often [`Plant::advance`] is called in between.
 
+mod actuator;
 mod analog;
 pub mod camera;
 pub mod config;
@@ -16,6 +17,7 @@ mod instrument;
 mod limit_switch;
 mod machine;
 pub mod platform;
+mod pulse;
 mod servo;
 mod stage;
 pub mod table;
@@ -32,19 +34,20 @@ pub use analog::InputFault;
 pub use camera::{Mark, Target};
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes};
-pub use machine::{IndexPulse, ProbeEdge};
 pub use platform::{PlatformTruth, Pose};
+pub use pulse::{IndexPulse, ProbeEdge};
 pub use table::TableTruth;
 pub use thermal::Environment;
 pub use truth::Truth;
 pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 
+use actuator::Actuator;
 use analog::Input;
 use camera::Camera;
 use config::PlantConfig;
 use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
-use machine::{Actuator, Machine};
+use machine::Machine;
 use thermal::Climate;
 use volumetric::{BeamTrouble, Signal, TERMINALS};
 

@@ -6,12 +6,12 @@ use crate::random::Stream;
 use units::Time;
 
 use super::Servo;
+use super::actuator::Actuator;
 use super::config::StageConfig;
 use super::deviation::{Field, Path};
 use super::drive_train::DriveTrain;
 use super::encoder::Encoder;
 use super::limit_switch::LimitSwitch;
-use super::machine::Actuator;
 use super::servo::Mass;
 
 /// Scales are true at this temperature (ISO 1).

@@ -7,6 +7,7 @@
 
 mod band;
 mod outcome;
+mod sample;
 mod watch;
 
 use units::{Metres, Time, Volts};
@@ -15,7 +16,8 @@ use super::{
     HallPoint, Reason, SearchFailure, Sensor, SensorFault, Settings, SettingsError, Step, diagnose,
 };
 use band::{Band, Hold};
-pub use outcome::{Held, Outcome, Progress, Sample};
+pub use outcome::{Outcome, Progress};
+pub use sample::{Held, Sample};
 use watch::{MotionWatch, Watch};
 
 #[derive(Clone, Debug)]

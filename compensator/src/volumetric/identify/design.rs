@@ -3,12 +3,13 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use units::Metres;
 
+use super::effect::{Effect, lever, seen, u_of};
 use super::thermal::ThermalPlan;
 use super::{Axis, FunctionPlan, IdentifyError, Observation, Plan, Reading, Unknown};
 use crate::volumetric::Point;
 use crate::volumetric::function::{Pieces, Shape};
 use crate::volumetric::model::{ErrorName, Squareness};
-use crate::volumetric::point::{V3, cross};
+use crate::volumetric::point::cross;
 
 /// A target that rounding puts this far beyond the last node is at it.
 const AT_THE_END_M: f64 = 1e-9;
@@ -164,40 +165,6 @@ impl Design {
     }
 }
 
-/// What one unit of an error does to the tool.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effect {
-    /// A rotation.
-    pub(super) turn: V3,
-    /// A displacement, that by the rotation included.
-    pub(super) moved: V3,
-}
-
-impl Effect {
-    const fn displaced(moved: V3) -> Self {
-        Self {
-            turn: [0.0; 3],
-            moved,
-        }
-    }
-}
-
-/// What a reading sees of an effect.
-pub(super) fn seen(reading: Reading, effect: &Effect) -> f64 {
-    match reading {
-        Reading::Length { along, .. } => dot(along, effect.moved),
-        Reading::Angle { about, .. } => effect.turn[about.index()],
-    }
-}
-
-/// The standard uncertainty of a reading, in its SI unit.
-pub(super) fn u_of(reading: Reading) -> f64 {
-    match reading {
-        Reading::Length { u, .. } => u.value(),
-        Reading::Angle { u, .. } => u.value(),
-    }
-}
-
 /// What each parameter of functions, squarenesses and warmth contributes, as `seen` sees it;
 /// `above`: how far each thermometer is above its reference.
 pub(super) fn error_row(
@@ -235,14 +202,6 @@ pub(super) fn error_row(
     let warmth = ThermalPlan::effects(plan, at, above, |axis| lever(plan, axis, at, tool));
     row.extend(warmth.iter().map(&seen));
     row
-}
-
-pub(super) fn lever(plan: &Plan, axis: Axis, at: Point, tool: Point) -> V3 {
-    plan.chain.lever(axis, at, tool).array()
-}
-
-fn dot(a: V3, b: V3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn axis_of(name: ErrorName) -> Axis {

@@ -37,6 +37,8 @@
 
 mod design;
 mod diagonals;
+mod effect;
+mod heat;
 mod observe;
 mod scatter;
 mod solve;

@@ -17,7 +17,7 @@
 //! is where to look first.
 
 use super::Observation;
-use super::design::u_of;
+use super::effect::u_of;
 use super::solve::Identified;
 use crate::uncertainty::reduced_chi_square_limit;
 

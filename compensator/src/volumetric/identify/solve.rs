@@ -3,7 +3,8 @@
 use units::{Celsius, Metres, Radians};
 
 use super::design::{Block, Design, error_row};
-use super::thermal::{IdentifiedBend, IdentifiedExpansion, add_heat};
+use super::heat::add_heat;
+use super::thermal::{IdentifiedBend, IdentifiedExpansion};
 use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
 use crate::least_squares::{self, Fit};
 use crate::volumetric::function::{Function, FunctionError, Shape};

@@ -7,16 +7,15 @@
 //!
 //! | symbol | name here |
 //! |---|---|
-//! | ∂β/∂T, of the coefficients by one thermometer's reading in one run | [`add_heat`] |
+//! | ∂β/∂T, of the coefficients by one thermometer's reading in one run | [`add_heat`](super::heat::add_heat) |
 //!
 //! The zeros of runs take up whatever grows without depending on a position. An angle's zero takes
 //! up the chord's tilt: that the arc begins and ends on its chord is the plan's assumption.
 
 use units::{Celsius, Metres};
 
-use super::design::{Design, Effect, error_row, lever, seen, u_of};
+use super::effect::{Effect, lever, seen};
 use super::{IdentifyError, Observation, Plan, Unknown};
-use crate::least_squares::Fit;
 use crate::volumetric::model::{Arc, ErrorName, ThermalBend, ThermalChannel};
 use crate::volumetric::point::{V3, cross};
 use crate::volumetric::{Axis, Point};
@@ -345,49 +344,4 @@ pub(super) fn check_apart(plan: &Plan, observations: &[Observation]) -> Result<(
         }
     }
     Ok(())
-}
-
-/// Adds to the covariance of the first `count` parameters what thermometers that were off in one
-/// run, each by itself, make of them. `fit` has the parameters found, `covariance` is by row.
-pub(super) fn add_heat(
-    plan: &Plan,
-    design: &Design,
-    observations: &[Observation],
-    fit: &Fit,
-    covariance: &mut [f64],
-) {
-    let count = design.errors();
-    let all = design.columns();
-    let first = count - plan.thermal.count();
-    let u = plan.thermal.u;
-    for run in 0..plan.runs.len() {
-        for thermometer in 0..plan.thermal.references.len() {
-            let mut above = vec![0.0; plan.thermal.references.len()];
-            above[thermometer] = u;
-            // A's transpose times what the readings would then seem to be off.
-            let mut pull = vec![0.0; all];
-            let own = observations.iter().enumerate();
-            for (index, it) in own.filter(|(_, it)| it.run == run) {
-                let per_kelvin =
-                    error_row(plan, &design.blocks, it.at, it.tool, &above, |effect| {
-                        seen(it.reading, effect)
-                    });
-                let terms = per_kelvin[first..].iter().zip(&fit.coefficients[first..]);
-                let off: f64 = terms.map(|(a, b)| a * b).sum();
-                let row = &design.rows[index * all..(index + 1) * all];
-                for (sum, part) in pull.iter_mut().zip(row) {
-                    *sum += part * off / u_of(it.reading);
-                }
-            }
-            let moved: Vec<f64> = (0..count)
-                .map(|at| {
-                    let cofactor = &fit.cofactor[at * all..(at + 1) * all];
-                    cofactor.iter().zip(&pull).map(|(a, b)| a * b).sum()
-                })
-                .collect();
-            for (at, sum) in covariance.iter_mut().enumerate() {
-                *sum += moved[at / count] * moved[at % count];
-            }
-        }
-    }
 }

@@ -40,10 +40,9 @@ mod reference;
 mod roll;
 mod stuck;
 mod temperature;
+mod trouble;
 
-pub use beam::{
-    BeamDetector, BeamDetectorSettings, Layout, RatioCurve, Sample, SettingsError, Trouble,
-};
+pub use beam::{BeamDetector, BeamDetectorSettings, Layout, RatioCurve, Sample, SettingsError};
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
 pub use lever::DetectorLever;
@@ -54,6 +53,7 @@ pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
 pub use stuck::StuckWatch;
 pub use temperature::{TemperatureChannel, TemperatureSettings};
+pub use trouble::Trouble;
 
 use units::Metres;
 

@@ -1,7 +1,7 @@
 //! Writing: expedited and segmented (CiA 301, 7.2.4.3.3 and .4), block (7.2.4.3.9 to .12).
 
 use super::Method;
-use super::transfer::{Oddity, Verdict};
+use super::verdict::{Oddity, Verdict};
 use wire::canopen::Object;
 use wire::canopen::sdo::{
     AbortCode, BLOCK_SIZE_MAX, BlockSegment, Expedited, SEGMENT_BYTES, SdoRequest, SdoResponse,

@@ -28,6 +28,7 @@ mod download;
 mod transfer;
 mod types;
 mod upload;
+mod verdict;
 
 #[cfg(test)]
 mod property_tests;
@@ -36,8 +37,9 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use transfer::{Oddity, Transfer, Verdict};
+use transfer::Transfer;
 use units::Time;
+use verdict::{Oddity, Verdict};
 use wire::can::CanFrame;
 use wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse};
 use wire::canopen::{Function, NodeId, Object};

@@ -1,6 +1,6 @@
 //! Reading: expedited and segmented (CiA 301, 7.2.4.3.5 and .6), block (7.2.4.3.13 to .15).
 
-use super::transfer::{Oddity, Verdict};
+use super::verdict::{Oddity, Verdict};
 use super::{Method, TRANSFER_BYTES_MAX};
 use wire::canopen::Object;
 use wire::canopen::sdo::{

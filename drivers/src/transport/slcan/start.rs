@@ -1,6 +1,5 @@
-//! Bringing an adapter to work: its settings, the steps, and what can go wrong.
+//! Bringing an adapter to work: its settings and the steps.
 
-use core::fmt;
 use core::time::Duration;
 
 use super::super::serial::SerialSettings;
@@ -34,39 +33,6 @@ impl SlcanSettings {
             status_interval: Some(Duration::from_millis(500)),
             answer_timeout: Duration::from_secs(2),
             answers: true,
-        }
-    }
-}
-
-/// Why an adapter could not be brought to work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SlcanFailure {
-    /// It answered nothing.
-    Silent {
-        /// To which step.
-        step: &'static str,
-        /// For how long (wall time).
-        waited: Duration,
-    },
-    /// It refused a step.
-    Refused {
-        /// Which.
-        step: &'static str,
-    },
-    /// Its device vanished meanwhile.
-    Gone,
-}
-
-impl fmt::Display for SlcanFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Silent { step, waited } => write!(
-                f,
-                "did not answer to `{step}` within {waited:?}; is it an SLCAN adapter (or are two \
-                 serial ports swapped?), is its baud rate right?"
-            ),
-            Self::Refused { step } => write!(f, "refused `{step}`; unplug it and try again"),
-            Self::Gone => f.write_str("vanished while it was set up"),
         }
     }
 }

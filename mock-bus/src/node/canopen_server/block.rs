@@ -5,7 +5,7 @@ use wire::canopen::sdo::{
     AbortCode, BLOCK_SIZE_MAX, BlockSegment, SEGMENT_BYTES, SdoRequest, SdoResponse, block_crc,
 };
 
-use super::sdo::{Objects, Refusal, Reply, size_error};
+use super::exchange::{Objects, Refusal, Reply, size_error};
 
 /// The server sends.
 #[derive(Clone, Debug)]

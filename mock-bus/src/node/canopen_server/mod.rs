@@ -12,6 +12,7 @@ mod block;
 pub mod communication;
 pub mod dictionary;
 mod errors;
+mod exchange;
 mod heartbeat;
 mod listening;
 pub mod manners;

@@ -9,9 +9,9 @@ use wire::canopen::sdo::{AbortCode, SdoRequest, SdoResponse, Segment};
 use wire::canopen::{Function, Object};
 
 use super::dictionary::Dictionary;
+use super::exchange::{Objects, Reply};
 use super::manners::Rudeness;
 use super::rules::{self, Area};
-use super::sdo::{Objects, Reply};
 use super::{CanopenServer, ServerEvent};
 
 /// The dictionary as the SDO server sees it, with the rules of the communication area.

@@ -10,37 +10,13 @@ use units::Time;
 use wire::cia402::{Controlword, HomingStatus};
 
 use super::Drive;
+use super::homing_run::{HomingRun, Step};
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};
 use crate::node::profile::{MotionLimits, Profile};
 
 /// Farther than any axis, in counts.
 const FAR: f64 = 1e12;
-
-/// A run towards a limit switch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct HomingRun {
-    /// −1 for the negative switch (1, 17), +1 for the positive one (2, 18).
-    direction: f64,
-    /// Whether an index pulse is the home.
-    to_index: bool,
-    step: Step,
-    started_at: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    /// Until the switch is pressed.
-    Seek,
-    /// Slowing down on the switch.
-    Stop,
-    /// Until it is released: that is home, or where the index pulse is searched.
-    BackOff,
-    /// Until the next index pulse after this one (by number): that is home.
-    Index { after: u64 },
-    /// Slowing down behind it.
-    Settle,
-}
 
 impl Drive {
     /// A new controlword in operation enabled: bit 4 starts and, falling, interrupts.

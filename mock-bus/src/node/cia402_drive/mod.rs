@@ -17,6 +17,7 @@
 mod config;
 mod cyclic;
 mod homing;
+mod homing_run;
 mod mechanism;
 mod motion;
 mod objects;

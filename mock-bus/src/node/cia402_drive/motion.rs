@@ -2,7 +2,7 @@
 
 use units::Time;
 
-use super::homing::HomingRun;
+use super::homing_run::HomingRun;
 use super::mechanism::Mechanism;
 use super::power::Power;
 use super::{Drive, PROFILE_POSITION};
@@ -103,7 +103,7 @@ impl Drive {
         let here = self.actual(m) as f64;
         self.profile = Profile::resting(here);
         self.activity = Activity::Standing;
-        self.positioning = super::Positioning::at(here);
+        self.positioning.begin_at(here);
         self.servo_on = true;
         self.enabled_at = here;
         self.in_window_since = None;
@@ -163,7 +163,7 @@ impl Drive {
         self.offset += counts;
         self.enabled_at += counts as f64;
         self.profile = self.profile.clone().shifted(counts as f64);
-        self.positioning = super::Positioning::at(self.profile.end_position());
+        self.positioning.begin_at(self.profile.end_position());
     }
 
     /// The nearest position inside the soft limits 0x607D. They count from the machine's zero,

@@ -40,6 +40,11 @@ impl Positioning {
         }
     }
 
+    /// Begins anew with nothing to do at `position`.
+    pub(super) fn begin_at(&mut self, position: f64) {
+        *self = Self::at(position);
+    }
+
     /// Forgets what was to be done.
     pub(super) fn abandon(&mut self) {
         *self = Self::at(self.last_target);

@@ -1,5 +1,8 @@
 //! One amplifier: its memory, its power, and what it does with a command.
 
+mod parameters;
+mod trajectory;
+
 use core::time::Duration;
 use std::collections::BTreeMap;
 
@@ -8,9 +11,8 @@ use wire::copley::{
     BAUD_AT_RESET, Command, DesiredState, Faults, Parameter, Reply, TrajectoryStatus,
 };
 
+use self::trajectory::Motion;
 use super::config::CopleyAmpConfig;
-use super::parameters;
-use super::trajectory::Motion;
 use crate::node::profile::{MotionState, Profile};
 use crate::plant::{Plant, Servo};
 

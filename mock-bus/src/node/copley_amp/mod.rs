@@ -17,10 +17,8 @@
 mod amp;
 mod config;
 mod health;
-mod parameters;
 #[cfg(test)]
 mod tests;
-mod trajectory;
 
 use core::time::Duration;
 use std::collections::{BTreeMap, VecDeque};

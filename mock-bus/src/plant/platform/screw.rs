@@ -10,12 +10,12 @@ use crate::random::Stream;
 use units::Time;
 
 use crate::plant::Servo;
+use crate::plant::actuator::Actuator;
 use crate::plant::deviation::StopError;
 use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
 use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::machine::Actuator;
 use crate::plant::servo::Mass;
 
 use super::config::ScrewConfig;

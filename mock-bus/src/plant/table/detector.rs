@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use units::{Radians, Time};
 
-use crate::plant::machine::ProbeEdge;
+use crate::plant::pulse::ProbeEdge;
 use crate::random::Stream;
 
 use super::config::DetectorConfig;

@@ -31,10 +31,11 @@ use units::{Radians, Time};
 pub use truth::TableTruth;
 
 use crate::plant::Servo;
+use crate::plant::actuator::Actuator;
 use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
-use crate::plant::machine::{Actuator, ProbeEdge};
+use crate::plant::pulse::ProbeEdge;
 use crate::plant::servo::{GRID_NS, Mass};
 use crate::random::Stream;
 use config::TableConfig;

@@ -2,7 +2,7 @@
 
 use units::{Radians, Time};
 
-use crate::plant::machine::Actuator;
+use crate::plant::actuator::Actuator;
 
 use super::Table;
 

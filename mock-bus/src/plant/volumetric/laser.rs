@@ -30,7 +30,7 @@ use units::{Metres, Radians, Time};
 
 use super::config::LaserConfig;
 use super::rigid::{Vector, add, minus, times};
-use super::truth::Point;
+use super::truth::{LineTruth, Point};
 use crate::random::Stream;
 
 /// The optics before the laser's head.
@@ -59,15 +59,6 @@ pub struct LineSetUp {
     pub along: [f64; 3],
     /// The target's place from the machine's zero, with all axes at 0: as the tool point's.
     pub tool_offset: Point,
-}
-
-/// What the hand that set a line up has left.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineTruth {
-    /// The beam against the line.
-    pub misalignment: Radians,
-    /// The straightedge against the line, in the direction across that is measured.
-    pub slope: Radians,
 }
 
 /// What the interferometer looks at.

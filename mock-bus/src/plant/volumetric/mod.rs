@@ -33,10 +33,10 @@ use units::Time;
 
 pub(crate) use beam::BeamTrouble;
 pub(super) use laser::Sighting;
-pub use laser::{LineOptics, LineSetUp, LineTruth};
-pub use truth::{ErrorMotion, Point, VolumetricTruth};
+pub use laser::{LineOptics, LineSetUp};
+pub use truth::{ErrorMotion, LineTruth, Point, VolumetricTruth};
 
-use super::machine::Actuator;
+use super::actuator::Actuator;
 use crate::random::Stream;
 use beam::{Beam, Place};
 use chain::{Chain, Stand};

@@ -3,11 +3,11 @@
 use units::Time;
 
 use super::config::VolumetricConfig;
+use crate::plant::actuator::Actuator;
 use crate::plant::drive_train::DriveTrain;
 use crate::plant::encoder::Encoder;
 use crate::plant::index_mark::IndexMark;
 use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::machine::Actuator;
 use crate::plant::servo::Mass;
 use crate::random::Stream;
 

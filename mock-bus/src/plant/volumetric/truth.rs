@@ -2,8 +2,17 @@
 
 use units::{Celsius, Metres, Radians, Time};
 
+use super::Volumetric;
 use super::rigid::Vector;
-use super::{LineTruth, Volumetric};
+
+/// What the hand that set a line up has left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineTruth {
+    /// The beam against the line.
+    pub misalignment: Radians,
+    /// The straightedge against the line, in the direction across that is measured.
+    pub slope: Radians,
+}
 
 /// A place, or a displacement: x, y, z.
 pub type Point = [Metres; 3];

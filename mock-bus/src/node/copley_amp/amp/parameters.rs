@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use units::Time;
 use wire::copley::{BAUD_AT_RESET, Bank, DesiredState, ErrorCode, Faults, HomingMethod, Parameter};
 
-use super::amp::Amp;
-use super::config::CopleyAmpConfig;
+use super::super::config::CopleyAmpConfig;
+use super::Amp;
 use crate::plant::Plant;
 
 /// Parameters 0xca and the like hold 32 bits with a sign.

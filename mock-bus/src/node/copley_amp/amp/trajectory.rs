@@ -3,7 +3,7 @@
 use units::Time;
 use wire::copley::{ErrorCode, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
-use super::amp::{Amp, Stage};
+use super::{Amp, Stage};
 use crate::node::profile::{MotionLimits, Profile};
 use crate::plant::Plant;
 
@@ -12,7 +12,7 @@ const FAR: f64 = 1e12;
 
 /// Why the demand is what it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Motion {
+pub(in crate::node::copley_amp) enum Motion {
     Standing,
     Move,
     /// It slows down, for an abort, a limit or a failed homing.
@@ -22,7 +22,7 @@ pub(super) enum Motion {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum HomingStep {
+pub(in crate::node::copley_amp) enum HomingStep {
     /// Until the switch is pressed.
     Seek { to_index: bool },
     /// Slowing down on the switch.
