@@ -58,8 +58,8 @@ use crate::config::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, HomeOffsetName, IdentityConfig,
     InstrumentConfig, InstrumentDevice, MachineConfig, OptionCodesConfig, ZeroConfig,
 };
-use crate::machine::Unit;
 use crate::patience::Patience;
+use crate::unit::Unit;
 
 /// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
 const CO2_UMOL_PER_MOL: f64 = 450.0;

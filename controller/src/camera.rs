@@ -1,18 +1,17 @@
-//! Image controllers of a machine: from the configuration to a driver, and to a pose.
+//! Image controllers of a machine: from the configuration to a driver.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
 
+use drivers::device::PoseInstrument;
 use drivers::device::in_sight::{CameraFrame, InSight, InSightSettings};
-use drivers::device::{PoseInstrument, PoseReading};
 use units::{Metres, Radians};
 use wire::Port;
 use wire::in_sight::Cell;
 
 use crate::config::{CameraConfig, CameraDevice, MachineConfig};
-use crate::failure::Failure;
-use crate::machine::{Machine, Unit};
 use crate::patience::Patience;
+use crate::unit::Unit;
 
 pub(crate) fn cameras(
     config: &MachineConfig,
@@ -62,58 +61,7 @@ pub fn in_sight_settings(camera: &CameraConfig, patience: Patience) -> InSightSe
     }
 }
 
-fn inspection_timeout(camera: &CameraConfig) -> Duration {
+/// How long one picture may take.
+pub(crate) fn inspection_timeout(camera: &CameraConfig) -> Duration {
     Duration::from_secs_f64(camera.inspection_timeout_ms * 1e-3)
-}
-
-impl Machine {
-    /// The names of the image controllers.
-    pub fn camera_names(&self) -> Vec<String> {
-        self.cameras.iter().map(|unit| unit.name.clone()).collect()
-    }
-
-    /// Where image controller `camera` sees the machine's platform now, from `exposures`
-    /// pictures. It is started when it has not been. The machine should stand: nothing here
-    /// waits for that.
-    ///
-    /// # Errors
-    /// When there is no such camera, it cannot be started, or not enough of its pictures are
-    /// good.
-    pub fn look(&mut self, camera: &str, exposures: u32) -> Result<PoseReading, Failure> {
-        let place = self.camera_index(camera)?;
-        self.use_camera(camera)?;
-        let now = self.now();
-        self.cameras[place].device.begin_pose(now, exposures);
-        // The driver ends by itself; this is the last resort, in a number that a clock can bear.
-        let config = &self.config.camera[camera];
-        let pictures = exposures
-            .saturating_add(config.rejects_max)
-            .clamp(1, 10_000);
-        let limit = 4 * inspection_timeout(config) + Duration::from_secs(10);
-        let at = self.camera_device(place);
-        let outcome = self.await_outcome(at, "pose", limit * pictures);
-        self.instrument_in_use = None;
-        outcome?;
-        let pose = self.cameras[place].device.pose();
-        Ok(pose.expect("a pose that ended well can be read"))
-    }
-
-    /// Starts a camera, unless it runs already, and counts its alarms from now on.
-    fn use_camera(&mut self, name: &str) -> Result<(), Failure> {
-        let at = self.camera_device(self.camera_index(name)?);
-        self.use_device(at, name)
-    }
-
-    fn camera_index(&self, name: &str) -> Result<usize, Failure> {
-        let place = self.cameras.iter().position(|unit| unit.name == name);
-        place.ok_or_else(|| Failure::NoSuchCamera {
-            camera: name.to_owned(),
-            known: self.camera_names().join(", "),
-        })
-    }
-
-    /// The number, among all devices, of camera number `at`.
-    fn camera_device(&self, at: usize) -> usize {
-        self.device_count() - self.cameras.len() + at
-    }
 }

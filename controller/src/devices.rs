@@ -11,7 +11,8 @@ use units::Time;
 use wire::Port;
 
 use crate::failure::Failure;
-use crate::machine::{Machine, Unit};
+use crate::machine::Machine;
+use crate::unit::Unit;
 
 /// Any device, with its port.
 pub(crate) struct UnitMut<'a> {

@@ -4,6 +4,8 @@
 //! This module is the only one of the package that knows `mock-bus` (the layout test checks
 //! it): nothing of the emulator's truth can reach a procedure.
 
+mod error;
+
 use std::cell::{Ref, RefCell, RefMut};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -11,7 +13,7 @@ use std::rc::Rc;
 
 use drivers::transport::SendError;
 use drivers::transport::in_process::{InProcess, World};
-use mock_bus::config::{ConfigError, MachineConfig as EmulatedConfig};
+use mock_bus::config::MachineConfig as EmulatedConfig;
 use mock_bus::plant::{LineOptics as EmulatedOptics, LineSetUp};
 use mock_bus::runner::{self, Options, RunError, Running};
 use mock_bus::simulation::{DeliverError, Event, Link, Simulation};
@@ -27,6 +29,7 @@ use crate::failure::Failure;
 use crate::ports::{self, Endpoint, Overrides};
 use compensator::volumetric::{Axis, Point};
 
+pub use error::EmulatedError;
 pub use mock_bus::plant::{DriftLimits, HallDrift};
 
 /// The text of a machine file with the shipped heartbeats made rare: hours without SYNC cost little in
@@ -42,25 +45,6 @@ pub fn with_rare_heartbeats(text: &str) -> String {
             "heartbeat_consumer_ms = 7000",
         )
         .edit("watch_master_ms = 500", "watch_master_ms = 7000")
-}
-
-/// Why an emulated machine cannot be brought up.
-#[derive(Debug, thiserror::Error)]
-pub enum EmulatedError {
-    /// Its description is wrong.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// It has no port of a name that the machine's configuration uses.
-    #[error("the emulated machine has no bus or line `{name}`; it has {known}")]
-    NoPort {
-        /// What the configuration names.
-        name: String,
-        /// What there is.
-        known: String,
-    },
-    /// Pseudo-terminals or threads cannot be had, or the machine's thread has ended.
-    #[error(transparent)]
-    Run(#[from] RunError),
 }
 
 /// A simulated machine in virtual time, shared by a transport and whoever injects faults,

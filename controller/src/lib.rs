@@ -40,6 +40,7 @@ pub mod engine;
 pub mod failure;
 mod host_watch;
 pub mod json;
+mod looking;
 pub mod machine;
 pub mod observer;
 mod outbox;
@@ -51,6 +52,7 @@ mod stopping;
 pub mod store;
 pub mod text;
 mod tick;
+mod unit;
 mod waiting;
 
 pub use edit::Edit;

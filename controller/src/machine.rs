@@ -33,13 +33,7 @@ use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
 use crate::patience::Patience;
 pub use crate::stop_request::StopRequest;
-
-/// A device with its name and its port.
-pub(crate) struct Unit<D: ?Sized> {
-    pub(crate) name: String,
-    pub(crate) port: Port,
-    pub(crate) device: Box<D>,
-}
+use crate::unit::Unit;
 
 /// What is known about an axis beyond what its drive says.
 #[derive(Default)]

@@ -1,14 +1,16 @@
 //! What a person reads on a terminal.
 
+mod bus;
+
 use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
 use units::Metres;
-use wire::LinkState;
-use wire::can::CanId;
 
 use crate::assemble;
 use crate::config::MachineConfig;
+
+pub(crate) use bus::{identifier_text, link_text};
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
 pub(crate) type Row = (&'static str, &'static str, fn(&Figures) -> Metres);
@@ -169,26 +171,6 @@ pub fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
         terms.push(term(&name, harmonic.amplitude().um(), um(u), "µm"));
     }
     terms
-}
-
-/// What became of a bus or line.
-/// With all the digits that it can have, as it stands in a log of the bus.
-pub(crate) fn identifier_text(id: CanId) -> String {
-    match id {
-        CanId::Standard(raw) => format!("identifier {raw:#05X}"),
-        CanId::Extended(raw) => format!("29-bit identifier {raw:#010X}"),
-    }
-}
-
-pub(crate) fn link_text(state: LinkState) -> &'static str {
-    match state {
-        LinkState::Up => "came back; the machine must be started anew",
-        LinkState::Down => {
-            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
-             set it up and start again"
-        }
-        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
-    }
 }
 
 #[cfg(test)]

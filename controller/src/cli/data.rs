@@ -1,7 +1,5 @@
 //! `truestage fit` and `truestage iso230`: the mathematics on data measured elsewhere.
 
-use core::f64::consts::TAU;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
@@ -9,18 +7,13 @@ use compensator::error_table::{self, FitOptions, Fitted};
 use compensator::hall_zero::fit_hall;
 use compensator::iso230;
 use compensator::measurement::{HallSeries, LinearSeries};
-use drivers::device::Identity;
 use serde_json::json;
 use truestage::config::MachineConfig;
-use truestage::cycle::utc_now;
-use truestage::cycle::volumetric::VolumetricFailure;
-use truestage::store::{
-    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, LinearContent,
-    RecordHead, SCHEMA_VERSION, Store, short,
-};
+use truestage::store::{CalibrationRecord, Content, LinearContent, Store, short};
 use truestage::{Failure, assemble, config, json as to_json, text};
 use units::Metres;
 
+use super::data_file::{head_of, read};
 use super::output::{Ended, Output};
 use super::{rotary, screw, volume_fit};
 
@@ -49,13 +42,6 @@ pub(super) enum FitCommand {
     /// The errors of three axes, from the journal of a calibration or from columns
     /// line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u.
     Volumetric(volume_fit::VolumetricArgs),
-}
-
-pub(super) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|source| Failure::File {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 pub(super) fn iso230(path: &Path, output: Output) -> Ended {
@@ -167,83 +153,6 @@ fn linear_axis(path: &Path, config: &MachineConfig, axis: Option<&str>) -> Resul
                     .into(),
             )
         }
-    }
-}
-
-/// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be
-/// asked here, so its identity is what the configuration expects; with a serial number there it is
-/// checked like any other, without one any drive of that product will do.
-pub(super) fn head_of(
-    loaded: &config::Loaded,
-    axis: &str,
-    data: &Path,
-) -> Result<RecordHead, Failure> {
-    let axes = &loaded.config.axis;
-    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
-    Ok(RecordHead {
-        resolution_m: Some(it.resolution_nm * 1e-9),
-        ..head(loaded, axis, &it.configured_identity(), data)
-    })
-}
-
-/// The same of the rotary `axis`.
-pub(super) fn rotary_head_of(
-    loaded: &config::Loaded,
-    axis: &str,
-    data: &Path,
-) -> Result<RecordHead, Failure> {
-    let axes = &loaded.config.rotary;
-    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
-    Ok(RecordHead {
-        resolution_rad: Some(TAU / f64::from(it.counts_per_turn)),
-        ..head(loaded, axis, &it.identity.configured(), data)
-    })
-}
-
-/// The same of three axes, whose record is called `pointer`.
-pub(super) fn volume_head_of(
-    loaded: &config::Loaded,
-    pointer: &str,
-    data: &Path,
-) -> Result<RecordHead, Failure> {
-    let volumetric = loaded.config.volumetric.as_ref();
-    let [first, ..] = &volumetric.ok_or(VolumetricFailure::None)?.axes;
-    Ok(RecordHead {
-        axis: pointer.to_owned(),
-        ..head_of(loaded, first, data)?
-    })
-}
-
-fn no_such_axis<T>(axis: &str, axes: &BTreeMap<String, T>) -> Failure {
-    Failure::NoSuchAxis {
-        axis: axis.to_owned(),
-        known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
-    }
-}
-
-fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> RecordHead {
-    let section = &loaded.config.machine;
-    RecordHead {
-        schema_version: SCHEMA_VERSION,
-        machine: section.name.clone(),
-        stage_serial: section.stage_serial.clone(),
-        config_hash: loaded.hash.as_str().to_owned(),
-        axis: axis.to_owned(),
-        drive: IdentityRecord::from(drive),
-        resolution_m: None,
-        resolution_rad: None,
-        created: utc_now(),
-        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
-        source: data
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        instrument: InstrumentRecord {
-            name: "measured elsewhere".into(),
-            ..Default::default()
-        },
-        environment: EnvironmentRecord::default(),
     }
 }
 

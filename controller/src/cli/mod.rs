@@ -2,6 +2,7 @@
 
 mod cal;
 mod data;
+mod data_file;
 mod demo;
 mod kind;
 mod moved;

@@ -12,7 +12,7 @@ use truestage::store::{MemoryName, short};
 use truestage::{Failure, Machine, Store};
 use units::Metres;
 
-use super::data::read;
+use super::data_file::read;
 use super::output::{Ended, Output};
 use super::session::Session;
 use super::volume::{with_zeroed_volume, zeroed_volume};

@@ -15,7 +15,7 @@ use truestage::store::{CalibrationRecord, Content, RotaryContent, Store, short};
 use truestage::{Failure, assemble, config};
 use units::Radians;
 
-use super::data::{read, rotary_head_of};
+use super::data_file::{read, rotary_head_of};
 use super::output::{Ended, Output};
 
 /// Harmonics that a plan prints; `--json` has them all.

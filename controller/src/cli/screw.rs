@@ -15,7 +15,7 @@ use truestage::text::ScrewTerm;
 use truestage::{Failure, config, text};
 use units::{Metres, Short};
 
-use super::data::{head_of, read};
+use super::data_file::{head_of, read};
 use super::output::{Ended, Output};
 
 /// What `truestage fit screw` is told.

@@ -20,7 +20,7 @@ use truestage::store::{
 };
 use units::Radians;
 
-use super::data::{read, volume_head_of};
+use super::data_file::{read, volume_head_of};
 use super::output::{Ended, Output};
 use super::volume::{add_unknown, found_value, unknown_text, warmth_text};
 use super::volumetric::shown;

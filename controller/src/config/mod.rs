@@ -6,6 +6,7 @@
 mod camera;
 mod dependence;
 mod diagnostic;
+mod drive;
 mod load;
 mod model;
 mod platform;
@@ -16,13 +17,13 @@ mod volumetric;
 pub use camera::{CameraConfig, CameraDevice};
 pub use dependence::ConfigHash;
 pub use diagnostic::{ConfigError, Diagnostic};
+pub use drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
 pub use load::{Loaded, load, parse};
 pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
-    CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, HomeOffsetName,
-    IdentityConfig, InstrumentConfig, InstrumentDevice, InterpolationName, MachineConfig,
-    MachineSection, OpticsConfig, OptionCodesConfig, SerialAxis, SerialLine, VerifyConfig,
-    ZeroConfig,
+    CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, InstrumentConfig,
+    InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OpticsConfig, SerialAxis,
+    SerialLine, VerifyConfig, ZeroConfig,
 };
 pub use platform::{
     ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use compensator::rotary::{self, Criterion, Design, PlanError};
 use serde::Deserialize;
 
-use super::model::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
+use super::drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
 
 /// The kinds of drive of a rotary axis: those with a touch probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

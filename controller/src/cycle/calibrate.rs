@@ -7,7 +7,8 @@ use std::path::PathBuf;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
-use super::measure::{EarlierRuns, MeasureOptions, Measured, RunPlan};
+use super::measure::{EarlierRuns, MeasureOptions, Measured};
+use super::run_plan::RunPlan;
 use super::utc_now;
 use crate::assemble;
 use crate::config::{CalibrateConfig, ConfigHash};

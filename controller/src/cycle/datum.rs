@@ -7,20 +7,12 @@ use drivers::device::{DisplacementReading, Environment};
 use units::Metres;
 
 use super::cross_check::is_shaken;
-use super::measure::RunPlan;
+use super::datum_in_use::Datum;
+use super::run_plan::RunPlan;
 use super::travel::Correction;
 use crate::assemble;
 use crate::failure::Failure;
 use crate::machine::Machine;
-
-/// What readings are counted from.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Datum {
-    /// How lengths are corrected since.
-    length: LengthCorrection,
-    /// What the instrument still read there, averaged: it makes a single sample its zero.
-    offset: Metres,
-}
 
 /// What is shaken at the datum would shift everything: it is read again, so often at most …
 const ATTEMPTS: u32 = 10;

@@ -5,10 +5,12 @@
 mod calibrate;
 mod cross_check;
 mod datum;
+mod datum_in_use;
 mod measure;
 mod moved;
 pub mod platform;
 pub mod rotary;
+mod run_plan;
 mod scan;
 pub(crate) mod sweep;
 mod travel;
@@ -18,8 +20,9 @@ pub mod volumetric;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
-pub use measure::{MeasureOptions, Measured, RunPlan};
+pub use measure::{MeasureOptions, Measured};
 pub use moved::{Corrected, Moved};
+pub use run_plan::RunPlan;
 pub use scan::Found;
 pub use sweep::{Sweep, SweepOptions};
 pub use turn::Way;
@@ -27,7 +30,7 @@ pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;
 
 pub(crate) use calibrate::note_failure;
-pub(crate) use datum::Datum;
+pub(crate) use datum_in_use::Datum;
 pub use measure::series_of;
 
 /// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.

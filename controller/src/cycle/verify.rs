@@ -8,7 +8,8 @@ use compensator::iso230::{self, Figures};
 use units::Metres;
 
 use super::calibrate::{missing, note_failure, open_journal};
-use super::measure::{MeasureOptions, Measured, RunPlan};
+use super::measure::{MeasureOptions, Measured};
+use super::run_plan::RunPlan;
 use crate::config::VerifyConfig;
 use crate::failure::Failure;
 use crate::machine::Machine;

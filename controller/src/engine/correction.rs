@@ -11,7 +11,7 @@ use core::time::Duration;
 use compensator::apply::{Alarm, SlewedCorrection};
 use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
 
-use super::account::Cause;
+use super::cause::Cause;
 use super::{AXES_MAX, Lack, PerAxis};
 
 /// Analog channels that a correction sees at most.

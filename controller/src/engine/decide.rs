@@ -9,10 +9,12 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer};
 use units::{Metres, Time};
 
-use super::account::{Cause, Command, Counts, Heard, Live, State, Trouble};
+use super::account::{Command, Counts, Heard, Live, State, Trouble};
+use super::cause::Cause;
 use super::correction::{Applied, Correction, Observed};
 use super::judge::Differences;
-use super::motion::{Moment, Motion};
+use super::moment::Moment;
+use super::motion::Motion;
 use super::path::Item;
 use super::{AXES_MAX, AxisLimits, PerAxis};
 use crate::patience::Patience;

@@ -4,7 +4,8 @@ use core::time::Duration;
 
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
-use super::motion::{Moment, Motion};
+use super::moment::Moment;
+use super::motion::Motion;
 use super::{AXES_MAX, AxisLimits, PerAxis};
 
 /// Differences may exceed a limit by this share: positions are rounded.

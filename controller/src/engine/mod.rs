@@ -17,6 +17,7 @@
 //! loop did lately. All of it passes through rings without locks. Linear axes only.
 
 mod account;
+mod cause;
 mod correction;
 mod csv;
 mod decide;
@@ -27,6 +28,7 @@ mod hear;
 mod histogram;
 mod judge;
 mod lack;
+mod moment;
 mod motion;
 mod pace;
 mod path;
@@ -39,7 +41,8 @@ use core::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
-pub use account::{Cause, Counts, Live, State};
+pub use account::{Counts, Live, State};
+pub use cause::Cause;
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
     THERMOMETERS_MAX, ThermometerSample, Validity,
@@ -49,7 +52,8 @@ pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use judge::{PathError, PathFault};
 pub use lack::{Lack, Source};
-pub use motion::{Moment, Motion, MotionError};
+pub use moment::Moment;
+pub use motion::{Motion, MotionError};
 pub use pace::Timing;
 pub use path::{PathWriter, PushError};
 pub use tables::TableCorrection;

@@ -11,40 +11,11 @@
 
 use core::time::Duration;
 
-use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
+use units::Metres;
 
+use super::moment::Moment;
 use super::planner::{Leg, Planner, Refusal};
 use super::{AXES_MAX, AxisLimits, PerAxis};
-
-/// What the axes do at one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
-    /// Where they are.
-    pub position: PerAxis<Metres>,
-    /// How fast they go.
-    pub speed: PerAxis<MetresPerSecond>,
-    /// How their speed changes.
-    pub acceleration: PerAxis<MetresPerSecondSquared>,
-}
-
-impl Moment {
-    /// At rest.
-    pub fn at_rest(position: PerAxis<Metres>) -> Self {
-        Self {
-            position,
-            ..Self::default()
-        }
-    }
-
-    fn is_rest(&self) -> bool {
-        let Self {
-            position: _,
-            speed,
-            acceleration,
-        } = self;
-        *speed == PerAxis::default() && *acceleration == PerAxis::default()
-    }
-}
 
 /// Why there is no such motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -196,6 +167,7 @@ mod tests {
 
     use super::*;
     use units::MetresPerSecondCubed;
+    use units::{MetresPerSecond, MetresPerSecondSquared};
 
     const AXES: usize = 3;
 

@@ -15,7 +15,7 @@ use rsruckig::prelude::{
 use units::portable::{power_of_two_below, powi};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
-use super::motion::Moment;
+use super::moment::Moment;
 use super::{AXES_MAX, AxisLimits, PerAxis};
 
 /// What the planner said when it found no way.

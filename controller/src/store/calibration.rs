@@ -268,11 +268,6 @@ fn list_folder(folder: &Path) -> Result<Vec<String>, StoreError> {
     Ok(names)
 }
 
-/// A calibration's name, short enough to read.
-pub fn short(id: &str) -> String {
-    id.chars().take(12).collect()
-}
-
 fn parse_versioned<T: for<'de> Deserialize<'de>>(
     path: &Path,
     bytes: &[u8],

@@ -17,6 +17,7 @@ mod difference;
 mod golden_tests;
 mod journal;
 mod lease;
+mod name;
 mod plate;
 mod pose;
 mod record;
@@ -25,13 +26,14 @@ mod volume;
 
 use std::path::{Path, PathBuf};
 
-pub use calibration::{ActivePointer, Store, short};
+pub use calibration::{ActivePointer, Store};
 pub(crate) use difference::first_difference;
 pub(crate) use journal::not_resumable;
 pub use journal::{
     ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
 };
 pub use lease::Lease;
+pub use name::short;
 pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{

@@ -7,7 +7,8 @@
 
 use core::fmt::{Debug, Formatter, Result};
 
-use super::super::model::{AxisConfig, AxisDevice, IdentityConfig, MachineConfig};
+use super::super::drive::IdentityConfig;
+use super::super::model::{AxisConfig, AxisDevice, MachineConfig};
 use super::super::rotary::{DirectionName, RotaryConfig};
 use super::super::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, CurvePointConfig, LayoutName, RollConfig,

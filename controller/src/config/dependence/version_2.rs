@@ -4,7 +4,8 @@
 //! for, so that writing a default out changes nothing. A key that a later program adds gets a line
 //! only where it says something else than what machines did before there was that key.
 
-use super::super::model::{AnalogConfig, AxisConfig, AxisDevice, IdentityConfig, MachineConfig};
+use super::super::drive::IdentityConfig;
+use super::super::model::{AnalogConfig, AxisConfig, AxisDevice, MachineConfig};
 use super::super::platform::ActuatorConfig;
 use super::super::rotary::{DirectionName, RotaryConfig, RotaryDevice};
 use super::super::volumetric::{

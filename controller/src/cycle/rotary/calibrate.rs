@@ -7,7 +7,7 @@ use units::Radians;
 
 use super::estimate::{evaluate, series};
 use super::failure::RotaryFailure;
-use super::moves::TableInUse;
+use super::in_use::TableInUse;
 use super::operator::Operator;
 use super::placement::{Placed, PlateRun};
 use crate::config::ConfigHash;

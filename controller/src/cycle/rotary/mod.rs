@@ -14,6 +14,7 @@
 mod calibrate;
 mod estimate;
 mod failure;
+mod in_use;
 mod moves;
 mod operator;
 mod placement;
@@ -26,4 +27,4 @@ pub use moves::RotaryMoved;
 pub use operator::{Operator, PlateMove, PlateTask};
 pub use verify::{RotaryFigures, RotaryVerified};
 
-pub(crate) use moves::TableInUse;
+pub(crate) use in_use::TableInUse;

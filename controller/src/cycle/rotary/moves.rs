@@ -4,37 +4,13 @@ use compensator::rotary::PeriodicCompensation;
 use units::Radians;
 
 use super::failure::RotaryFailure;
+use super::in_use::TableInUse;
 use crate::assemble;
 use crate::cycle::Way;
 use crate::cycle::calibrate::missing;
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::store::{CalibrationRecord, RotaryContent, Store, StoreError};
-
-/// A calibration in use.
-#[derive(Clone, Debug)]
-pub(crate) struct TableInUse {
-    pub(super) id: String,
-    /// The plate it was made with.
-    pub(super) plate: String,
-    pub(super) content: RotaryContent,
-    pub(super) compensation: PeriodicCompensation,
-}
-
-impl TableInUse {
-    pub(super) fn new(
-        id: &str,
-        record: &CalibrationRecord,
-        compensation: PeriodicCompensation,
-    ) -> Result<Self, StoreError> {
-        Ok(Self {
-            id: id.to_owned(),
-            plate: record.head.instrument.name.clone(),
-            content: record.rotary(id)?.clone(),
-            compensation,
-        })
-    }
-}
+use crate::store::{RotaryContent, Store};
 
 /// A move of a rotary axis that was made. Angles count on over the turns.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,7 +18,7 @@ use core::f64::consts::TAU;
 use units::Radians;
 
 use super::failure::RotaryFailure;
-use super::moves::TableInUse;
+use super::in_use::TableInUse;
 use super::operator::Operator;
 use super::placement::{Placed, PlateRun};
 use crate::cycle::calibrate::missing;

@@ -48,22 +48,6 @@ impl Mover {
     }
 }
 
-/// Why a path is not begun.
-#[derive(Debug, thiserror::Error)]
-pub enum PathRefusal {
-    /// The axes cannot follow it: soft limits, speed, acceleration or jerk.
-    #[error(transparent)]
-    Point(#[from] PushError),
-    /// It leaves the volume that is calibrated.
-    #[error("at {at_s:.4} s: {source}")]
-    Volume {
-        /// When it does, in seconds from the path's beginning.
-        at_s: f64,
-        /// Where it is then, and what is calibrated.
-        source: Box<VolumetricFailure>,
-    },
-}
-
 fn per_axis(point: Point) -> [Metres; 3] {
     Axis::ALL.map(|axis| point.along(axis))
 }

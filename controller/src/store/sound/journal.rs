@@ -8,8 +8,8 @@ use super::super::pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 use super::calibration::environment;
 use super::{
     ANGLE_RAD, ANGLE_U_RAD, COUNT_MAX, ERROR_M, ERROR_U_M, Judged, LENGTH_M, PLACE_M, SECONDS,
-    SPEED_RAD_PER_S, TURNS_RAD, VOLTS, approach, as_many, counted, is, number, numbers, optional,
-    optionals, unsound, volume,
+    SPEED_RAD_PER_S, TURNS_RAD, VOLTS, approach, as_many, counted, is, number, numbers, once,
+    optional, optionals, unsound, volume,
 };
 
 /// Passes over a plate, and runs, at most.
@@ -45,12 +45,6 @@ pub(in crate::store) fn entry(read: &ReadJournal, entry: &Entry) -> Judged {
         Entry::VolumeCheck(it) => volume::check(&read.volume, it),
         Entry::Header(_) | Entry::Resumed { .. } | Entry::Failed { .. } | Entry::Complete => Ok(()),
     }
-}
-
-/// What is said once is not said otherwise later.
-pub(super) fn once(place: &str, is_new: bool) -> Judged {
-    let expected = || "one such line in a journal".to_owned();
-    is(place, is_new, expected, || "another one".to_owned())
 }
 
 fn run(read: &ReadJournal, seen: u32) -> Judged {

@@ -183,3 +183,9 @@ pub(super) fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judg
         .map(|_| ())
         .map_err(|it| unsound(place, expected, it.to_string()))
 }
+
+/// What is said once is not said otherwise later.
+fn once(place: &str, is_new: bool) -> Judged {
+    let expected = || "one such line in a journal".to_owned();
+    is(place, is_new, expected, || "another one".to_owned())
+}

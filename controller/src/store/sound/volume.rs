@@ -8,10 +8,9 @@ use super::super::volume::{
     VolumeRead, VolumeReferencesEntry,
 };
 use super::calibration::references as beams;
-use super::journal::once;
 use super::{
     ANGLE_RAD, CELSIUS, ERROR_M, ERROR_U_M, Judged, KELVIN_U, LENGTH_M, PLACE_M, SECONDS, as_many,
-    counted, increasing, is, letter, model, number, numbers, optional, unsound,
+    counted, increasing, is, letter, model, number, numbers, once, optional, unsound,
 };
 
 /// Lines, nodes of an axis, places of a line, thermometers, at most.

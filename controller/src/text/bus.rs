@@ -1,0 +1,24 @@
+//! Buses and what passes on them, for a person.
+
+use wire::LinkState;
+use wire::can::CanId;
+
+/// With all the digits that it can have, as it stands in a log of the bus.
+pub(crate) fn identifier_text(id: CanId) -> String {
+    match id {
+        CanId::Standard(raw) => format!("identifier {raw:#05X}"),
+        CanId::Extended(raw) => format!("29-bit identifier {raw:#010X}"),
+    }
+}
+
+/// What became of a bus or line.
+pub(crate) fn link_text(state: LinkState) -> &'static str {
+    match state {
+        LinkState::Up => "came back; the machine must be started anew",
+        LinkState::Down => {
+            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
+             set it up and start again"
+        }
+        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
+    }
+}
