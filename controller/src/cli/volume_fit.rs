@@ -248,23 +248,23 @@ fn save(
 
 fn same_machine(path: &Path, journal: &ReadJournal, loaded: &Loaded) -> Result<(), Failure> {
     let (header, section) = (&journal.header, &loaded.config.machine);
-    let stage = (header.stage_serial == section.stage_serial)
-        .then_some(())
-        .ok_or(("stage", &*header.stage_serial, &*section.stage_serial));
-    let hash = loaded.hash.is(&header.config_hash).then_some(()).ok_or((
-        "configuration hash",
-        &*header.config_hash,
-        loaded.hash.as_str(),
-    ));
-    stage
-        .and(hash)
-        .map_err(|(what, expected, seen)| Failure::Usage {
-            what: format!(
-                "{}: its {what} is `{expected}`, that of the machine `{seen}`",
-                path.display()
-            ),
-            help: "give the configuration that the run was made with".into(),
-        })
+    let hash = loaded.hash.beside(&header.config_hash);
+    let comparisons = [
+        ("stage", &*header.stage_serial, &*section.stage_serial),
+        ("configuration hash", &header.config_hash, hash),
+    ];
+    for (what, expected, seen) in comparisons {
+        if expected != seen {
+            return Err(Failure::Usage {
+                what: format!(
+                    "{}: its {what} is `{expected}`, that of the machine `{seen}`",
+                    path.display()
+                ),
+                help: "give the configuration that the run was made with".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 fn stored_text(config: &Path, (geometry, references): &(String, Option<String>)) -> String {

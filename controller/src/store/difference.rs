@@ -25,7 +25,10 @@ impl Difference {
 }
 
 /// The first difference of what `expected` and `seen` look like in a file, if there is one.
-pub(crate) fn first_difference<T: Serialize>(expected: &T, seen: &T) -> Option<Difference> {
+pub(crate) fn first_difference<T: Serialize + ?Sized>(
+    expected: &T,
+    seen: &T,
+) -> Option<Difference> {
     let value = |it: &T| serde_json::to_value(it).expect("plain data always serialises");
     below("", &value(expected), &value(seen))
 }

@@ -54,7 +54,7 @@ impl Golden {
         parse(self.machine, "m").unwrap()
     }
 
-    /// The same machine with another drive, module or screw: foreign to everything it wrote.
+    /// A stage with another serial number: everything is foreign to it.
     fn other(&self) -> Loaded {
         let serial = "stage_serial = \"";
         let other = format!("{serial}another ");

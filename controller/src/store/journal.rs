@@ -323,17 +323,12 @@ fn same_run(
     new: &JournalHeader,
     hash: &ConfigHash,
 ) -> Result<(), StoreError> {
-    // An earlier program wrote the same configuration's hash in another way.
-    let recorded = if hash.is(&old.config_hash) {
-        &new.config_hash
-    } else {
-        &old.config_hash
-    };
-    let text = |a: &String, b: &String| first_difference(a, b);
+    let text = |a: &str, b: &str| first_difference(a, b);
+    let config_hash = hash.beside(&old.config_hash);
     let comparisons = [
         ("verb", text(&old.verb, &new.verb)),
         ("stage serial", text(&old.stage_serial, &new.stage_serial)),
-        ("configuration hash", text(recorded, &new.config_hash)),
+        ("configuration hash", text(&old.config_hash, config_hash)),
         ("axis", text(&old.axis, &new.axis)),
         ("drive", first_difference(&old.drive, &new.drive)),
         (

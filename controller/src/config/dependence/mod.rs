@@ -40,6 +40,16 @@ impl ConfigHash {
         self.current == recorded || self.earlier.iter().any(|it| it == recorded)
     }
 
+    /// What to show and compare beside `recorded`: the same where both were made with the same values,
+    /// else today's.
+    pub fn beside<'a>(&'a self, recorded: &'a str) -> &'a str {
+        if self.is(recorded) {
+            recorded
+        } else {
+            &self.current
+        }
+    }
+
     /// One that only `text` agrees with.
     #[cfg(test)]
     pub(crate) fn only(text: &str) -> Self {
