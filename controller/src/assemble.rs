@@ -7,6 +7,7 @@ mod cia404;
 mod copley;
 mod cyclic;
 mod line;
+mod parts;
 mod patience;
 mod rotary;
 mod table;
@@ -18,8 +19,8 @@ use std::collections::BTreeMap;
 pub use cia404::cia404_settings;
 pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
-pub(crate) use cyclic::cyclic_settings;
 pub(crate) use line::{angular_separation, line_corrections};
+pub(crate) use parts::parts;
 pub(crate) use patience::patient_search;
 use patience::{patient_drive, patient_node, patient_pdos};
 pub(crate) use rotary::{index_limit, rotaries};
@@ -46,7 +47,7 @@ use drivers::device::copley::CopleyAxis;
 use drivers::device::dcon::{Dcon, DconSettings, InputRange};
 use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
 use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
-use drivers::protocol::heartbeat::HeartbeatProducer;
+use machine::{Patience, Unit};
 use units::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
     Scale, Volts,
@@ -58,8 +59,6 @@ use crate::config::{
     AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, HomeOffsetName, IdentityConfig,
     InstrumentConfig, InstrumentDevice, MachineConfig, OptionCodesConfig, ZeroConfig,
 };
-use crate::patience::Patience;
-use crate::unit::Unit;
 
 /// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
 const CO2_UMOL_PER_MOL: f64 = 450.0;
@@ -164,47 +163,6 @@ pub(crate) fn instruments(
         .collect()
 }
 
-pub(crate) fn heartbeats(
-    config: &MachineConfig,
-    ports: &BTreeMap<String, Port>,
-) -> Vec<(Port, HeartbeatProducer)> {
-    config
-        .can
-        .iter()
-        .map(|(name, bus)| {
-            let period = Duration::from_millis(bus.master_heartbeat_ms.into());
-            (
-                ports[name],
-                HeartbeatProducer::new(node_id(bus.master_node_id), period),
-            )
-        })
-        .collect()
-}
-
-/// The nodes that the configuration has on CAN bus `name`: who they are and must be.
-pub(crate) fn expected_nodes(
-    config: &MachineConfig,
-    bus: &str,
-) -> BTreeMap<u8, (String, IdentityConfig)> {
-    let axes = config
-        .axis
-        .iter()
-        .filter_map(|(name, axis)| Some((name, axis.can()?)))
-        .filter(|(_, axis)| axis.bus == bus)
-        .map(|(name, axis)| (axis.node_id, (name.clone(), axis.identity.clone())));
-    let analogs = config
-        .analog
-        .iter()
-        .filter(|(_, analog)| analog.bus.as_deref() == Some(bus))
-        .filter_map(|(name, it)| Some((it.node_id?, (name.clone(), it.identity.clone()?))));
-    let rotaries = config
-        .rotary
-        .iter()
-        .filter(|(_, rotary)| rotary.bus == bus)
-        .map(|(name, rotary)| (rotary.node_id, (name.clone(), rotary.identity.clone())));
-    axes.chain(rotaries).chain(analogs).collect()
-}
-
 fn node_id(raw: u8) -> NodeId {
     NodeId::new(raw).expect(CHECKED)
 }
@@ -224,13 +182,7 @@ fn node_settings(
     let (producer, consumer, watch_master) = heartbeat_ms;
     let usual = NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period);
     NodeSettings {
-        expected: ExpectedIdentity {
-            device_type: Some(identity.device_type),
-            vendor: Some(identity.vendor_id),
-            product: Some(identity.product_code),
-            revision: identity.revision,
-            serial: identity.serial_number,
-        },
+        expected: expected_identity(identity),
         heartbeat_period: millis(producer),
         consumer_time: patience.of(millis(consumer)),
         // 0x1016 has 16 bits of milliseconds.
@@ -238,6 +190,16 @@ fn node_settings(
         missed_pdos_max: patient_pdos(&usual, millis(consumer), patience),
         timeouts: patient_node(usual.timeouts, patience),
         ..usual
+    }
+}
+
+fn expected_identity(identity: &IdentityConfig) -> ExpectedIdentity {
+    ExpectedIdentity {
+        device_type: Some(identity.device_type),
+        vendor: Some(identity.vendor_id),
+        product: Some(identity.product_code),
+        revision: identity.revision,
+        serial: identity.serial_number,
     }
 }
 

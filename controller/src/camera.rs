@@ -10,8 +10,8 @@ use wire::Port;
 use wire::in_sight::Cell;
 
 use crate::config::{CameraConfig, CameraDevice, MachineConfig};
-use crate::patience::Patience;
-use crate::unit::Unit;
+use machine::Patience;
+use machine::Unit;
 
 pub(crate) fn cameras(
     config: &MachineConfig,

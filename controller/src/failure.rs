@@ -3,29 +3,26 @@
 mod advice;
 mod exit_code;
 
-use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
-use drivers::device::{Alarm, DeviceError};
-use drivers::transport::SendError;
+use machine::{EngineFailure, Layered};
 use units::Metres;
-use wire::LinkState;
-use wire::can::CanId;
 
 use crate::config::ConfigError;
 use crate::cycle::platform::PlatformFailure;
 use crate::cycle::rotary::RotaryFailure;
 use crate::cycle::volumetric::{PathRefusal, VolumetricFailure};
 use crate::emulated::EmulatedError;
-use crate::engine::EngineFailure;
 use crate::store::StoreError;
-use crate::text::{identifier_text, link_text};
 
 /// Everything that ends a verb without its result.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
+    /// The machine refused, or stopped.
+    #[error(transparent)]
+    Machine(#[from] machine::Failure),
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -35,131 +32,12 @@ pub enum Failure {
     /// A rotary table did not do what it was asked.
     #[error(transparent)]
     Table(#[from] RotaryFailure),
-    /// The cyclic engine refused, or stopped every drive at once.
-    #[error(transparent)]
-    Engine(#[from] EngineFailure),
     /// Three axes cannot be zeroed or corrected together.
     #[error(transparent)]
     Volumetric(#[from] VolumetricFailure),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
-    /// A payload could not be sent; control words are never dropped silently.
-    #[error("sending to {device}: {source}")]
-    Send {
-        /// The device it was for.
-        device: String,
-        /// Why not.
-        source: SendError,
-    },
-    /// A bus or serial line cannot be used any more.
-    #[error("{port}: {}", link_text(*state))]
-    Link {
-        /// The port's name in the configuration.
-        port: String,
-        /// What became of it.
-        state: LinkState,
-    },
-    /// Our CAN controller left the bus.
-    #[error("{port}: bus-off; check cable, termination and bit rate, then start again")]
-    BusOff {
-        /// The port's name in the configuration.
-        port: String,
-    },
-    /// Another master is on the bus.
-    #[error(
-        "{port}: {heard} was heard that this controller did not send: another master is on the \
-         bus; disconnect it, then start again"
-    )]
-    SecondMaster {
-        /// The port's name in the configuration.
-        port: String,
-        /// What only a master sends.
-        heard: &'static str,
-    },
-    /// Somebody takes the bus for himself, and what should have come did not.
-    #[error(
-        "{port}: {} takes {percent:.0} % of the bus and leaves no room; find the device or program \
-         that sends it ({missing})", identifier_text(*id)
-    )]
-    Babbling {
-        /// The port's name in the configuration.
-        port: String,
-        /// What is sent.
-        id: CanId,
-        /// Its share of the bus.
-        percent: f64,
-        /// What did not come or go.
-        missing: Box<Failure>,
-    },
-    /// Something went wrong shortly after the program was kept from its buses.
-    #[error(
-        "{failure}. This program was kept from its buses for {:.3} s, until {:.3} s before, which may be \
-         the whole cause: the computer is too busy for real time. Give it SCHED_FIFO (`ulimit -r`) or \
-         less to do; an emulated machine can wait for it (--clock lockstep:PATH)",
-        pause.as_secs_f64(), ago.as_secs_f64()
-    )]
-    HeldUp {
-        /// For how long, by the machine's clock.
-        pause: Duration,
-        /// How long before.
-        ago: Duration,
-        /// What went wrong.
-        failure: Box<Self>,
-    },
-    /// A device raised an alarm.
-    #[error("{device}: {alarm}")]
-    Alarm {
-        /// The device's name in the configuration.
-        device: String,
-        /// What it said.
-        alarm: Alarm,
-    },
-    /// A command of a device failed.
-    #[error("{device}: {source}")]
-    Device {
-        /// The device's name in the configuration.
-        device: String,
-        /// Why.
-        source: DeviceError,
-    },
-    /// A command did not end in time.
-    #[error("{device}: {step} not done within {}", units::ShortSpan(*waited))]
-    Overdue {
-        /// The device's name in the configuration.
-        device: String,
-        /// What was asked.
-        step: &'static str,
-        /// How long we waited.
-        waited: Duration,
-    },
-    /// A move would leave the soft limits; nothing moved.
-    #[error(
-        "axis {axis}: {:.6} mm is outside the soft limits {:.3} to {:.3} mm; nothing was moved",
-        target.mm(), min.mm(), max.mm()
-    )]
-    SoftLimit {
-        /// Which axis.
-        axis: String,
-        /// Where it should have gone.
-        target: Metres,
-        /// The lower limit.
-        min: Metres,
-        /// The upper limit.
-        max: Metres,
-    },
-    /// The verb needs a zeroed axis.
-    #[error("axis {axis}: not zeroed since power-on; run `truestage zero` first")]
-    NotZeroed {
-        /// Which axis.
-        axis: String,
-    },
-    /// The machine was stopped, or was never started: nobody would heed its alarms.
-    #[error("{device}: not moved, the machine was stopped; start it again (`Machine::start`)")]
-    NotStarted {
-        /// The drive.
-        device: String,
-    },
     /// The verb needs something the configuration does not have.
     #[error("axis {axis}: the configuration has no section `{section}` for it")]
     NotConfigured {
@@ -167,14 +45,6 @@ pub enum Failure {
         axis: String,
         /// The missing section.
         section: &'static str,
-    },
-    /// There is no such axis.
-    #[error("there is no axis `{axis}`; known: {known}")]
-    NoSuchAxis {
-        /// What was asked for.
-        axis: String,
-        /// What there is.
-        known: String,
     },
     /// A turn over a plate saw none of its lines.
     #[error(
@@ -186,14 +56,6 @@ pub enum Failure {
         axis: String,
         /// How many there should be.
         lines: u32,
-    },
-    /// There is no such image controller.
-    #[error("there is no camera `{camera}`; known: {known}")]
-    NoSuchCamera {
-        /// What was asked for.
-        camera: String,
-        /// What there is.
-        known: String,
     },
     /// The Hall search failed.
     #[error("axis {axis}: {source}")]
@@ -428,15 +290,6 @@ pub enum Failure {
         /// What is allowed.
         limit: Metres,
     },
-    /// Somebody asked to stop (Ctrl-C).
-    #[error("stopped on request")]
-    Interrupted,
-    /// Another program asked to stop (SIGTERM), or the terminal is gone (SIGHUP).
-    #[error("stopped on request (signal {signal})")]
-    Terminated {
-        /// Its number.
-        signal: u8,
-    },
     /// A run that was stopped on request, and can be continued.
     #[error(
         "{source}; what was measured is kept in {}: the same command with --resume continues it",
@@ -474,4 +327,19 @@ fn in_use_text(in_use: Option<&str>) -> String {
         || "the axis has no calibration now".into(),
         |id| format!("calibration {id}, used before, is in use again"),
     )
+}
+
+impl From<EngineFailure> for Failure {
+    fn from(failure: EngineFailure) -> Self {
+        Self::Machine(failure.into())
+    }
+}
+
+impl Layered for Failure {
+    fn map_machine(self, explain: impl FnOnce(machine::Failure) -> machine::Failure) -> Self {
+        match self {
+            Self::Machine(failure) => Self::Machine(explain(failure)),
+            other => other,
+        }
+    }
 }

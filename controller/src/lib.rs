@@ -29,33 +29,23 @@
 
 pub mod assemble;
 pub mod bus_plan;
-mod bus_watch;
 pub mod camera;
 pub mod config;
+mod connected;
 pub mod cycle;
-mod devices;
 mod edit;
 pub mod emulated;
-pub mod engine;
 pub mod failure;
-mod host_watch;
 pub mod json;
-mod looking;
-pub mod machine;
-pub mod observer;
-mod outbox;
-pub mod patience;
 pub mod ports;
 pub mod report;
-mod stop_request;
-mod stopping;
 pub mod store;
 pub mod text;
-mod tick;
-mod unit;
-mod waiting;
 
+pub use connected::Machine;
 pub use edit::Edit;
 pub use failure::Failure;
-pub use machine::{Machine, StopRequest};
+pub use machine::{
+    Desk, Engine, EngineFailure, Observer, Patience, Silent, Stage, StopRequest, engine,
+};
 pub use store::Store;

@@ -12,7 +12,7 @@ use wire::Port;
 use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
-use crate::patience::Patience;
+use machine::Patience;
 
 /// Where a bus or a line is really found.
 #[derive(Clone, Debug, PartialEq, Eq)]

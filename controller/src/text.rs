@@ -1,7 +1,5 @@
 //! What a person reads on a terminal.
 
-mod bus;
-
 use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
@@ -9,8 +7,6 @@ use units::Metres;
 
 use crate::assemble;
 use crate::config::MachineConfig;
-
-pub(crate) use bus::{identifier_text, link_text};
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
 pub(crate) type Row = (&'static str, &'static str, fn(&Figures) -> Metres);

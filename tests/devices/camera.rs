@@ -4,11 +4,11 @@ use core::time::Duration;
 
 use drivers::device::in_sight::InSight;
 use drivers::device::{Device, DeviceError, PoseInstrument, PoseReading};
+use machine::Failure;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::in_sight_controller::InSightControllerNode;
 use mock_bus::plant::Pose;
 use tests::{Desk, Emulator, Rig, Setup, on_every_rig, rigs};
-use truestage::Failure;
 use truestage::camera::in_sight_settings;
 
 type Eye = Desk<InSight>;
@@ -304,7 +304,7 @@ fn a_machine_looks_through_its_camera() {
         assert_eq!(failure.exit_code(), 4, "{failure}");
         assert!(failure.to_string().contains("no target"), "{failure}");
         let failure = stand.machine.look("ear", 1).expect_err("it is no camera");
-        assert!(matches!(failure, Failure::NoSuchCamera { .. }), "{failure}");
+        assert!(matches!(failure, Failure::NoSuchDevice { .. }), "{failure}");
         Ok(())
     });
 }

@@ -77,10 +77,10 @@ fn a_single_corrupted_position_is_not_believed() {
         played.was_delivered();
         match &played.result {
             Ok(()) => {}
-            Err(Failure::Alarm {
+            Err(Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::DriveState { .. } | Alarm::FollowingError { .. },
                 ..
-            }) => {
+            })) => {
                 played.is_safe(PERIOD * 2 + STOPPING);
             }
             Err(failure) => panic!("seed {seed}: {failure}"),
@@ -98,12 +98,12 @@ fn positions_that_jump_again_and_again_stop_the_machine() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::PositionJump { .. }
                         | Alarm::DriveState { .. }
                         | Alarm::FollowingError { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:"],
@@ -132,7 +132,7 @@ fn error_passive_is_a_warning_and_no_stop() {
 fn bus_off_ends_everything_and_the_drive_stops_by_itself() {
     let fault = Fault::BusOff { port: CAN.into() };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::BusOff { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::BusOff { .. })),
         words: &["can0", "bus-off"],
         within: PERIOD,
         rest: BY_ITSELF,
@@ -147,10 +147,10 @@ fn an_interface_that_is_set_down_is_named_and_the_drive_stops_by_itself() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Link {
+                Failure::Machine(machine::Failure::Link {
                     state: LinkState::Down,
                     ..
-                }
+                })
             )
         },
         words: &["can0", "ENETDOWN"],
@@ -167,10 +167,10 @@ fn an_adapter_that_is_pulled_out_is_named_and_the_drive_stops_by_itself() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Link {
+                Failure::Machine(machine::Failure::Link {
                     state: LinkState::Gone,
                     ..
-                }
+                })
             )
         },
         words: &["can0", "ENODEV"],
@@ -187,7 +187,7 @@ fn an_adapter_that_comes_back_after_a_moment_is_not_simply_used_again() {
         Duration::from_millis(20),
     );
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Link { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Link { .. })),
         words: &["can0"],
         within: PERIOD,
         rest: PERIOD + STOPPING + Duration::from_millis(100),
@@ -205,10 +205,10 @@ fn a_transmit_queue_that_is_full_is_named_and_drops_nothing_silently() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Send {
+                Failure::Machine(machine::Failure::Send {
                     source: SendError::QueueFull { .. },
                     ..
-                }
+                })
             )
         },
         words: &["transmit queue full", "txqueuelen"],
@@ -229,10 +229,10 @@ fn a_node_that_fills_the_bus_is_named_by_its_identifier() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Babbling {
+                Failure::Machine(machine::Failure::Babbling {
                     id: CanId::Standard(0x010),
                     ..
-                }
+                })
             )
         },
         words: &["can0", "0x010"],
@@ -258,7 +258,12 @@ fn a_second_master_is_refused_before_anything_moves() {
         period_ms: 10.0,
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::SecondMaster { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::SecondMaster { .. })
+            )
+        },
         words: &["can0", "SYNC", "another master"],
         within: Duration::from_millis(20),
         rest: Duration::ZERO,
@@ -273,7 +278,12 @@ fn a_second_master_that_appears_stops_the_motion() {
         period_ms: 10.0,
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::SecondMaster { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::SecondMaster { .. })
+            )
+        },
         words: &["can0", "SYNC", "another master"],
         within: PERIOD,
         rest: PERIOD + STOPPING,
@@ -291,10 +301,10 @@ fn two_devices_of_one_node_number_are_told_apart_from_a_reset() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::DuplicateNode { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "node 1", "second device"],

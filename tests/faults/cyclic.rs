@@ -89,10 +89,10 @@ fn a_second_node_with_the_drives_number_stops_it() {
     let cause = |it: &Failure| {
         matches!(
             it,
-            Failure::Alarm {
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::DuplicateNode { .. } | Alarm::UnexpectedBootUp { .. },
                 ..
-            }
+            })
         )
     };
     let scene = following().inject(FaultConfig::times(fault, 1));
@@ -106,7 +106,10 @@ fn a_drive_that_shows_one_position_for_ever_is_away_from_its_set_points() {
     let cause = |it: &Failure| {
         matches!(
             it,
-            Failure::Engine(EngineFailure::Deviates { .. }) | Failure::Alarm { .. }
+            Failure::Machine(
+                machine::Failure::Engine(EngineFailure::Deviates { .. })
+                    | machine::Failure::Alarm { .. }
+            )
         )
     };
     // 1 mm and the last four set-points at 80 mm/s and more.
@@ -118,7 +121,10 @@ fn a_limit_switch_that_is_pressed_on_the_way_stops_the_drive() {
     let cause = |it: &Failure| {
         matches!(
             it,
-            Failure::Engine(EngineFailure::Deviates { .. }) | Failure::Alarm { .. }
+            Failure::Machine(
+                machine::Failure::Engine(EngineFailure::Deviates { .. })
+                    | machine::Failure::Alarm { .. }
+            )
         )
     };
     let pressed = |positive| Fault::LimitSwitch {
@@ -135,11 +141,13 @@ fn samples_that_stay_away_stop_the_drive_within_four_periods() {
     let missing = |failure: &Failure| {
         matches!(
             failure,
-            Failure::Engine(EngineFailure::Missing { .. })
-                | Failure::Alarm {
-                    alarm: Alarm::PdoLost { .. },
-                    ..
-                }
+            Failure::Machine(
+                machine::Failure::Engine(EngineFailure::Missing { .. })
+                    | machine::Failure::Alarm {
+                        alarm: Alarm::PdoLost { .. },
+                        ..
+                    }
+            )
         )
     };
     for fault in [
@@ -158,10 +166,10 @@ fn a_heartbeat_that_stops_while_samples_go_on_stops_the_drive() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::HeartbeatLost { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "no heartbeat"],
@@ -177,13 +185,16 @@ fn positions_that_jump_again_and_again_stop_the_drive() {
     let cause = |failure: &Failure| {
         matches!(
             failure,
-            Failure::Alarm {
-                alarm: Alarm::PositionJump { .. }
-                    | Alarm::DriveState { .. }
-                    | Alarm::FollowingError { .. },
-                ..
-            } | Failure::Engine(EngineFailure::Deviates { .. } | EngineFailure::NotCyclic { .. })
-                | Failure::Device { .. }
+            Failure::Machine(
+                machine::Failure::Alarm {
+                    alarm: Alarm::PositionJump { .. }
+                        | Alarm::DriveState { .. }
+                        | Alarm::FollowingError { .. },
+                    ..
+                } | machine::Failure::Engine(
+                    EngineFailure::Deviates { .. } | EngineFailure::NotCyclic { .. }
+                ) | machine::Failure::Device { .. }
+            )
         )
     };
     for seed in 1..=6 {
@@ -203,7 +214,7 @@ fn bus_off_and_a_bus_that_goes_away_are_named_within_a_period() {
         rest: BY_ITSELF,
     };
     let off = by_itself(
-        |it| matches!(it, Failure::BusOff { .. }),
+        |it| matches!(it, Failure::Machine(machine::Failure::BusOff { .. })),
         &["can0", "bus-off"],
     );
     check(following().fault(Fault::BusOff { port: CAN.into() }), &off);
@@ -211,10 +222,10 @@ fn bus_off_and_a_bus_that_goes_away_are_named_within_a_period() {
         |it| {
             matches!(
                 it,
-                Failure::Link {
+                Failure::Machine(machine::Failure::Link {
                     state: LinkState::Down,
                     ..
-                }
+                })
             )
         },
         &["can0"],
@@ -227,10 +238,10 @@ fn bus_off_and_a_bus_that_goes_away_are_named_within_a_period() {
         |it| {
             matches!(
                 it,
-                Failure::Link {
+                Failure::Machine(machine::Failure::Link {
                     state: LinkState::Gone,
                     ..
-                }
+                })
             )
         },
         &["can0"],
@@ -247,7 +258,8 @@ fn a_second_masters_sync_stops_the_drive() {
         port: CAN.into(),
         period_ms: 7.0,
     };
-    let cause = |it: &Failure| matches!(it, Failure::SecondMaster { .. });
+    let cause =
+        |it: &Failure| matches!(it, Failure::Machine(machine::Failure::SecondMaster { .. }));
     check(
         following().fault(fault),
         &wanted(cause, &["can0", "another master"], 3),
@@ -264,10 +276,10 @@ fn a_talker_that_fills_the_bus_is_named() {
         cause: |it| {
             matches!(
                 it,
-                Failure::Babbling {
+                Failure::Machine(machine::Failure::Babbling {
                     id: CanId::Standard(0x010),
                     ..
-                }
+                })
             )
         },
         words: &["can0", "0x010"],
@@ -291,10 +303,10 @@ fn an_emergency_stops_the_drive_within_two_periods() {
     let cause = |it: &Failure| {
         matches!(
             it,
-            Failure::Alarm {
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::Emergency { emergency, .. },
                 ..
-            } if emergency.code == EmergencyCode(0x4310)
+            }) if emergency.code == EmergencyCode(0x4310)
         )
     };
     check(following().inject(fault), &wanted(cause, &["x:"], 2));
@@ -305,13 +317,15 @@ fn a_blocked_axis_and_a_drive_without_torque_are_never_driven_on() {
     let cause = |it: &Failure| {
         matches!(
             it,
-            Failure::Engine(EngineFailure::Deviates { .. })
-                | Failure::Alarm {
-                    alarm: Alarm::FollowingError { .. }
-                        | Alarm::DriveState { .. }
-                        | Alarm::Emergency { .. },
-                    ..
-                }
+            Failure::Machine(
+                machine::Failure::Engine(EngineFailure::Deviates { .. })
+                    | machine::Failure::Alarm {
+                        alarm: Alarm::FollowingError { .. }
+                            | Alarm::DriveState { .. }
+                            | Alarm::Emergency { .. },
+                        ..
+                    }
+            )
         )
     };
     check(
@@ -337,7 +351,10 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
         cause: |it| {
             matches!(
                 it,
-                Failure::Engine(EngineFailure::Missing { .. }) | Failure::Alarm { .. }
+                Failure::Machine(
+                    machine::Failure::Engine(EngineFailure::Missing { .. })
+                        | machine::Failure::Alarm { .. }
+                )
             )
         },
         words: &["x:"],
@@ -350,7 +367,10 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
     machine.start().unwrap();
     let refused = machine.move_to("x", units::Metres::ZERO);
     assert!(
-        matches!(refused, Err(Failure::NotZeroed { .. })),
+        matches!(
+            refused,
+            Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
+        ),
         "{refused:?}"
     );
 }
@@ -359,7 +379,10 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
 fn a_stop_that_is_asked_for_is_a_controlled_one() {
     let played = following().stop_request().play();
     assert!(
-        matches!(played.result, Err(Failure::Interrupted)),
+        matches!(
+            played.result,
+            Err(Failure::Machine(machine::Failure::Interrupted))
+        ),
         "{:?}",
         played.result
     );

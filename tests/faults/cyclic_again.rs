@@ -9,9 +9,9 @@ use drivers::transport::in_process::InProcess;
 use drivers::transport::{SendError, Transport};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, machine_config};
+use truestage::StopRequest;
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, EngineFailure, NoCorrection, State};
-use truestage::machine::StopRequest;
 use truestage::{Failure, Machine};
 use units::{Metres, Time};
 use wire::{Arrival, Payload, Port};
@@ -60,7 +60,7 @@ fn orders_and_points_of_a_motion_that_failed_are_never_driven_later() {
     desk.path.finish().unwrap();
     let refused = machine.follow(&mut engine);
     assert!(
-        matches!(refused, Err(Failure::NotZeroed { .. })),
+        matches!(refused, Err(machine::Failure::NotZeroed { .. })),
         "{refused:?}"
     );
     machine.zero("x", &bench.store).unwrap();
@@ -89,18 +89,30 @@ fn after_a_quick_stop_nothing_moves_until_the_machine_is_started_again() {
     let id = bench.emulated.simulation_mut().inject(emergency).unwrap();
     let machine = &mut bench.machine;
     let stopped = follow(machine);
-    assert!(matches!(stopped, Err(Failure::Alarm { .. })), "{stopped:?}");
+    assert!(
+        matches!(
+            stopped,
+            Err(Failure::Machine(machine::Failure::Alarm { .. }))
+        ),
+        "{stopped:?}"
+    );
     assert_eq!(bench.emulated.simulation().fault_deliveries(id), 1);
     let refused = |outcome: Result<(), Failure>| {
         let failure = outcome.unwrap_err();
-        assert!(matches!(failure, Failure::NotStarted { .. }), "{failure}");
+        assert!(
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::NotStarted { .. })
+            ),
+            "{failure}"
+        );
         assert!(failure.to_string().contains("start it again"), "{failure}");
         assert_eq!(failure.exit_code(), 3);
     };
     refused(follow(machine).map(drop));
     refused(machine.move_to("x", Metres::from_mm(10.0)).map(drop));
     refused(machine.zero("x", &bench.store).map(drop));
-    refused(machine.enable("x"));
+    refused(machine.enable("x").map_err(Failure::from));
     machine.start().unwrap();
     machine.zero("x", &bench.store).unwrap();
     assert_eq!(follow(machine).unwrap(), Cause::PathDone);
@@ -126,7 +138,10 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     seen.borrow_mut()
         .plan(soon, Box::new(move |_| request.stop()));
     let moved = machine.move_to("x", Metres::from_mm(62.0));
-    assert!(matches!(moved, Err(Failure::Interrupted)), "{moved:?}");
+    assert!(
+        matches!(moved, Err(Failure::Machine(machine::Failure::Interrupted))),
+        "{moved:?}"
+    );
     machine.share_stop_request(&StopRequest::default());
     let coasting = FaultConfig::lasting(Fault::SafeTorqueOff, Duration::from_millis(500));
     let id = bench.emulated.simulation_mut().inject(coasting).unwrap();
@@ -134,7 +149,10 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     let rested = machine.now() + Duration::from_secs(1);
     let mut told = 0;
     while let Err(failure) = machine.run_until(rested) {
-        assert!(matches!(failure, Failure::Alarm { .. }), "{failure}");
+        assert!(
+            matches!(failure, machine::Failure::Alarm { .. }),
+            "{failure}"
+        );
         told += 1;
     }
     assert!(told > 0);
@@ -142,7 +160,9 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     let outside = here(&bench);
     assert!(outside > Metres::from_mm(63.4), "{outside}");
     let failure = follow(&mut bench.machine).unwrap_err();
-    let Failure::Engine(EngineFailure::Outside { at, max, .. }) = &failure else {
+    let Failure::Machine(machine::Failure::Engine(EngineFailure::Outside { at, max, .. })) =
+        &failure
+    else {
         panic!("{failure}")
     };
     assert!((*at - outside).abs() < Metres::from_um(10.0) && *max == Metres::from_mm(63.0));

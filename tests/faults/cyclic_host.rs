@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use tests::{Bench, Edit};
 use truestage::Failure;
+use truestage::StopRequest;
 use truestage::engine::{Cause, EngineFailure};
-use truestage::machine::StopRequest;
 use units::Metres;
 
 use crate::scene::{PERIOD, Phase, STOPPING, Scene, Wanted, check, cyclic, follow, shortened};
@@ -60,7 +60,12 @@ fn a_computer_that_is_held_up_for_long_is_named_as_the_cause() {
         let span = Duration::from_millis(ms);
         let scene = following().stall(span);
         let wanted = Wanted {
-            cause: |it| matches!(it, Failure::Engine(EngineFailure::HeldUp { .. })),
+            cause: |it| {
+                matches!(
+                    it,
+                    Failure::Machine(machine::Failure::Engine(EngineFailure::HeldUp { .. }))
+                )
+            },
             words: &["the computer was held up", "x:"],
             within: span + PERIOD * 4,
             // By itself, long before.
@@ -74,7 +79,12 @@ fn a_computer_that_is_held_up_for_long_is_named_as_the_cause() {
 #[test]
 fn set_points_that_the_port_does_not_take_stop_the_drive() {
     let wanted = Wanted {
-        cause: |it| matches!(it, Failure::Engine(EngineFailure::NotSent { .. })),
+        cause: |it| {
+            matches!(
+                it,
+                Failure::Machine(machine::Failure::Engine(EngineFailure::NotSent { .. }))
+            )
+        },
         words: &["x:", "txqueuelen", "before their SYNC"],
         within: PERIOD * 2,
         rest: PERIOD * 4 + STOPPING,
@@ -87,7 +97,10 @@ fn set_points_that_the_port_does_not_take_stop_the_drive() {
 #[test]
 fn a_drive_whose_controller_is_killed_stops_by_itself() {
     let played = following().killed().play();
-    assert!(matches!(played.result, Err(Failure::Interrupted)));
+    assert!(matches!(
+        played.result,
+        Err(Failure::Machine(machine::Failure::Interrupted))
+    ));
     let last = played.seen().sent.last().map(|(at, _)| *at).unwrap();
     assert!(last <= played.due);
     // Two and a half periods without SYNC, then its own quick stop.
@@ -111,7 +124,10 @@ fn under_way(target: Metres) -> Bench {
     seen.borrow_mut()
         .plan(soon, Box::new(move |_| request.stop()));
     let moved = machine.move_to("x", target);
-    assert!(matches!(moved, Err(Failure::Interrupted)), "{moved:?}");
+    assert!(
+        matches!(moved, Err(Failure::Machine(machine::Failure::Interrupted))),
+        "{moved:?}"
+    );
     machine.share_stop_request(&StopRequest::default());
     bench
 }
@@ -133,7 +149,7 @@ fn an_axis_that_never_rests_is_named_and_nothing_is_begun() {
     let mut bench = under_way(Metres::from_mm(60.0));
     let failure = follow(&mut bench.machine).unwrap_err();
     let EngineFailure::NotAtRest { axis, waited } = (match &failure {
-        Failure::Engine(failure) => failure.clone(),
+        Failure::Machine(machine::Failure::Engine(failure)) => failure.clone(),
         other => panic!("{other}"),
     }) else {
         panic!("{failure}")

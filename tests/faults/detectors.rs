@@ -18,8 +18,8 @@ use truestage::engine::{
     Cause, Channel, Corrected, Correction, Engine, Live, Observed, Source, ThermometerSample,
     Validity,
 };
-use truestage::observer::{Observer, Stage};
 use truestage::{Failure, assemble};
+use truestage::{Observer, Stage};
 use units::{Celsius, Metres, Quantity, Radians};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -432,7 +432,7 @@ fn a_module_that_falls_silent_is_an_alarm_whatever_its_detectors_do() {
     let failure = failure.map(drop).unwrap_err();
     assert!(bench.emulated.simulation().fault_deliveries(id) > 0);
     assert!(
-        matches!(&failure, Failure::Alarm { device, .. } if device == "beams_x"),
+        matches!(&failure, Failure::Machine(machine::Failure::Alarm { device, .. }) if device == "beams_x"),
         "{failure}"
     );
 }

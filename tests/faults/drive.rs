@@ -23,10 +23,10 @@ macro_rules! alarm {
         |failure: &Failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: $pattern,
                     ..
-                }
+                })
             )
         }
     };
@@ -111,7 +111,10 @@ fn a_drive_that_resets_while_it_moves_is_not_zeroed_any_more() {
     assert!(!played.bench.machine.is_zeroed("x"));
     let refused = played.bench.machine.move_to("x", units::Metres::ZERO);
     assert!(
-        matches!(refused, Err(Failure::NotZeroed { .. })),
+        matches!(
+            refused,
+            Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
+        ),
         "{refused:?}"
     );
 }
@@ -142,14 +145,14 @@ fn a_blocked_axis_is_named_as_such() {
         .fault(Fault::BlockedAxis { axis: 0 });
     let wanted = Wanted {
         cause: |failure| match failure {
-            Failure::Alarm {
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::FollowingError { .. },
                 ..
-            } => true,
-            Failure::Alarm {
+            }) => true,
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::Emergency { emergency, .. },
                 ..
-            } => emergency.code == EmergencyCode::FOLLOWING_ERROR,
+            }) => emergency.code == EmergencyCode::FOLLOWING_ERROR,
             _ => false,
         },
         words: &["x:", "following error"],
@@ -166,14 +169,14 @@ fn torque_that_is_switched_off_while_the_axis_moves_stops_it_for_good() {
         .fault(Fault::SafeTorqueOff);
     let wanted = Wanted {
         cause: |failure| match failure {
-            Failure::Alarm {
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::Emergency { emergency, .. },
                 ..
-            } => emergency.code == EmergencyCode::SAFE_TORQUE_OFF,
-            Failure::Alarm {
+            }) => emergency.code == EmergencyCode::SAFE_TORQUE_OFF,
+            Failure::Machine(machine::Failure::Alarm {
                 alarm: Alarm::DriveState { .. },
                 ..
-            } => true,
+            }) => true,
             _ => false,
         },
         words: &["x:", "torque"],

@@ -278,7 +278,10 @@ fn a_killed_run_goes_on_where_it_stopped() {
         .machine
         .guarded(|machine| run(machine, None))
         .unwrap_err();
-    assert!(matches!(failure, Failure::Interrupted), "{failure:?}");
+    assert!(
+        matches!(failure, Failure::Machine(machine::Failure::Interrupted)),
+        "{failure:?}"
+    );
     let journal = store.newest_run("calibrate", "x").unwrap().unwrap();
     let before = truestage::store::read_journal(&journal).unwrap();
     assert_eq!((before.points.len(), before.complete), (30, false));
@@ -306,9 +309,9 @@ struct StopAt {
     stop: truestage::StopRequest,
 }
 
-impl truestage::observer::Observer for StopAt {
-    fn progress(&mut self, stage: truestage::observer::Stage, _: &str, done: u64, _: u64) {
-        if stage == truestage::observer::Stage::Calibrate && done == self.left {
+impl truestage::Observer for StopAt {
+    fn progress(&mut self, stage: truestage::Stage, _: &str, done: u64, _: u64) {
+        if stage == truestage::Stage::Calibrate && done == self.left {
             self.stop.stop();
         }
     }

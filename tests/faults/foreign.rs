@@ -28,7 +28,7 @@ fn babble(cob_id: u32) -> Fault {
 
 fn check_named(scene: Scene, words: &[&str]) {
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Babbling { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Babbling { .. })),
         words,
         within: Duration::from_secs(1),
         rest: Duration::from_millis(1500),
@@ -92,7 +92,12 @@ fn somebody_else_who_reads_from_a_drive_is_told_once_and_stops_nothing() {
 #[test]
 fn somebody_else_who_writes_to_a_drive_is_another_master() {
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::SecondMaster { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::SecondMaster { .. })
+            )
+        },
         words: &[CAN, "SDO", "another master"],
         within: PERIOD,
         rest: PERIOD + STOPPING,

@@ -21,7 +21,10 @@ fn check_named(fault: Fault, words: &[&str]) {
     assert!(!machine.is_zeroed("x"));
     let refused = machine.move_to("x", units::Metres::ZERO);
     assert!(
-        matches!(refused, Err(Failure::NotZeroed { .. })),
+        matches!(
+            refused,
+            Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
+        ),
         "{refused:?}"
     );
 }
@@ -73,7 +76,7 @@ fn an_analog_module_that_falls_silent_ends_the_search() {
         node: "hall_adc".into(),
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Alarm { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Alarm { .. })),
         words: &["hall:", "no sample"],
         within: Duration::from_millis(40),
         rest: Duration::from_millis(140),

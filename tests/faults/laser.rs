@@ -51,10 +51,10 @@ fn a_beam_that_is_interrupted_stops_the_run_and_no_point_is_made_up() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::BeamLost,
                     ..
-                }
+                })
             )
         },
         words: &["laser:", "beam lost"],
@@ -73,10 +73,10 @@ fn a_beam_that_is_too_weak_is_named_and_no_point_is_made_up() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::BeamWeak { .. },
                     ..
-                }
+                })
             )
         },
         words: &["laser:", "beam too weak"],
@@ -92,10 +92,10 @@ fn the_stream_that_ends_stops_the_run() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::StreamSilent { .. },
                     ..
-                }
+                })
             )
         },
         words: &["laser:", "no sample"],
@@ -107,7 +107,7 @@ fn the_stream_that_ends_stops_the_run() {
     };
     check_nothing_recorded(&check(measuring().fault(mute), &wanted));
     let unplugged = Wanted {
-        cause: |failure| matches!(failure, Failure::Link { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Link { .. })),
         words: &["laser:", "ENODEV"],
         within: Duration::from_millis(5),
         rest: Duration::from_millis(5) + STOPPING,
@@ -124,10 +124,10 @@ fn an_interferometer_that_restarts_has_no_datum_any_more() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::CountRestarted | Alarm::StreamSilent { .. },
                     ..
-                }
+                })
             )
         },
         words: &["laser:"],

@@ -42,7 +42,7 @@ fn a_target_beyond_the_soft_limits_moves_nothing() {
     for target_mm in [63.001, -3.001, 1e6, -1e6, f64::NAN, f64::INFINITY] {
         let refused = bench.machine.move_to("x", Metres::from_mm(target_mm));
         match refused {
-            Err(failure @ Failure::SoftLimit { .. }) => {
+            Err(failure @ Failure::Machine(machine::Failure::SoftLimit { .. })) => {
                 assert!(
                     failure.to_string().contains("nothing was moved"),
                     "{failure}"
@@ -69,7 +69,10 @@ fn an_axis_that_is_not_zeroed_moves_nothing() {
     let before = bench.true_position();
     let refused = bench.machine.move_to("x", Metres::from_mm(1.0));
     assert!(
-        matches!(refused, Err(Failure::NotZeroed { .. })),
+        matches!(
+            refused,
+            Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
+        ),
         "{refused:?}"
     );
     assert_eq!(bench.true_position(), before);

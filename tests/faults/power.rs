@@ -30,10 +30,10 @@ fn a_statusword_that_never_changes_is_named_with_the_state_it_stays_in() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: DeviceError::Timeout { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "ready to switch on", "switch on disabled"],
@@ -56,10 +56,10 @@ fn a_statusword_that_sticks_in_a_move_ends_it_in_bounded_time() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: DeviceError::Timeout { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "target reached"],
@@ -78,10 +78,10 @@ fn a_drive_that_refuses_to_enable_is_named_with_its_state() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: DeviceError::Timeout { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "operation enabled", "switched on"],
@@ -102,10 +102,10 @@ fn a_target_that_is_never_reached_ends_the_move_in_bounded_time() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: DeviceError::Timeout { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "target reached", "60.0"],
@@ -135,10 +135,10 @@ fn a_fault_that_does_not_go_is_reset_once_and_no_more() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::Emergency { .. } | Alarm::DriveState { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:"],
@@ -182,10 +182,10 @@ fn wrong_direction(scene: Scene, farthest: Duration) {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::WrongDirection { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:", "wrong direction"],
@@ -215,10 +215,12 @@ fn torque_that_is_off_is_told_when_enabling_is_tried() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
-                    alarm: Alarm::Emergency { .. },
-                    ..
-                } | Failure::Device { .. }
+                Failure::Machine(
+                    machine::Failure::Alarm {
+                        alarm: Alarm::Emergency { .. },
+                        ..
+                    } | machine::Failure::Device { .. }
+                )
             )
         },
         words: &["x:"],
@@ -239,10 +241,10 @@ fn a_limit_switch_that_is_hit_ends_the_move() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::Emergency { .. },
                     ..
-                }
+                })
             )
         },
         words: &["x:"],

@@ -12,9 +12,9 @@ use tests::{Bench, Edit};
 use truestage::cycle::{CalibrateOptions, Calibrated, VerifyOptions};
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, NoCorrection};
-use truestage::observer::{Observer, Stage};
 use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
+use truestage::{Observer, Stage};
 use units::{Metres, Time};
 use wire::cia402::PowerState;
 
@@ -122,7 +122,7 @@ pub fn follow(machine: &mut Machine) -> Result<Cause, Failure> {
     })?;
     match cause {
         Cause::PathDone | Cause::Overrun { .. } => Ok(cause),
-        Cause::Asked => Err(Failure::Interrupted),
+        Cause::Asked => Err(Failure::Machine(machine::Failure::Interrupted)),
         other => panic!("{other}\n{}", engine.timing()),
     }
 }
@@ -286,7 +286,7 @@ impl Scene {
         });
         let result = result.unwrap_or_else(|panic| {
             if panic.is::<Killed>() {
-                return Err(Failure::Interrupted);
+                return Err(Failure::Machine(machine::Failure::Interrupted));
             }
             resume_unwind(panic)
         });

@@ -67,10 +67,10 @@ fn a_line_that_falls_silent_stops_the_run() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Alarm {
+                Failure::Machine(machine::Failure::Alarm {
                     alarm: Alarm::StreamSilent { .. },
                     ..
-                }
+                })
             )
         },
         words: &["laser:", "no sample"],
@@ -89,7 +89,7 @@ fn a_line_that_falls_silent_stops_the_run() {
 #[test]
 fn a_line_without_an_interferometer_is_refused_before_anything_is_measured() {
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Device { .. }),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Device { .. })),
         words: &["interferometer", "good samples in a row", "0 samples"],
         within: Duration::from_secs(5),
         rest: Duration::from_secs(5),
@@ -150,7 +150,12 @@ fn a_serial_module_on_a_disturbed_line_gives_a_true_zero_or_none() {
 #[test]
 fn a_serial_module_that_falls_silent_or_answers_late_ends_the_search() {
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Alarm { .. } | Failure::Device { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::Alarm { .. } | machine::Failure::Device { .. })
+            )
+        },
         words: &["adam:"],
         within: Duration::from_secs(2),
         rest: Duration::from_secs(2) + STOPPING,

@@ -17,10 +17,10 @@ macro_rules! device {
         |failure: &Failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: $pattern,
                     ..
-                }
+                })
             )
         }
     };
@@ -111,10 +111,10 @@ fn a_mapping_that_is_confirmed_and_not_done_is_refused() {
         |failure| {
             matches!(
                 failure,
-                Failure::Device {
+                Failure::Machine(machine::Failure::Device {
                     source: DeviceError::ReadBack { .. } | DeviceError::SdoAbort { .. },
                     ..
-                }
+                })
             )
         },
         &["x:", "node 1", "1A00"],

@@ -20,7 +20,7 @@ use crate::witness::{Testimony, Witnessed};
 #[test]
 fn a_stop_request_stops_every_phase_in_a_controlled_way() {
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Interrupted),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Interrupted)),
         words: &["stopped on request"],
         within: PERIOD * 2,
         rest: PERIOD * 2 + STOPPING,
@@ -120,7 +120,7 @@ fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
         }
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::HeldUp { pause, .. } if *pause > WATCH_MASTER),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::HeldUp { pause, .. }) if *pause > WATCH_MASTER),
         words: &["x:", "kept from its buses"],
         within: Duration::from_millis(2100),
         rest: WATCH_MASTER + STOPPING,
@@ -138,7 +138,7 @@ fn a_controller_held_up_too_long_finds_the_drive_stopped_and_replays_nothing() {
 fn a_controller_that_was_stopped_for_a_fifth_of_a_second_says_that_it_was_held_up() {
     const HELD_UP: Duration = Duration::from_millis(200);
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::HeldUp { pause, .. } if *pause > HELD_UP / 2),
+        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::HeldUp { pause, .. }) if *pause > HELD_UP / 2),
         words: &["kept from its buses", "too busy for real time"],
         within: HELD_UP + PERIOD * 4,
         rest: HELD_UP + PERIOD * 4 + STOPPING,
@@ -162,7 +162,12 @@ fn a_stop_request_while_the_drive_is_silent_ends_all_the_same() {
         })
         .stop_request();
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Interrupted | Failure::Link { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::Interrupted | machine::Failure::Link { .. })
+            )
+        },
         words: &[],
         within: PERIOD,
         rest: WATCH_MASTER + STOPPING,

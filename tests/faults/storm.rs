@@ -37,18 +37,24 @@ type Causes = fn(&Failure) -> bool;
 fn drive_or_bus(failure: &Failure) -> bool {
     matches!(
         failure,
-        Failure::Alarm { .. }
-            | Failure::Device { .. }
-            | Failure::Overdue { .. }
-            | Failure::Babbling { .. }
-            | Failure::Send { .. }
+        Failure::Machine(
+            machine::Failure::Alarm { .. }
+                | machine::Failure::Device { .. }
+                | machine::Failure::Overdue { .. }
+                | machine::Failure::Babbling { .. }
+                | machine::Failure::Send { .. }
+        )
     )
 }
 
 fn link(failure: &Failure) -> bool {
     matches!(
         failure,
-        Failure::Link { .. } | Failure::BusOff { .. } | Failure::Send { .. }
+        Failure::Machine(
+            machine::Failure::Link { .. }
+                | machine::Failure::BusOff { .. }
+                | machine::Failure::Send { .. }
+        )
     )
 }
 
@@ -62,16 +68,19 @@ fn sensors(failure: &Failure) -> bool {
 fn optics(failure: &Failure) -> bool {
     matches!(
         failure,
-        Failure::Alarm {
-            alarm: Alarm::BeamLost
-                | Alarm::BeamWeak { .. }
-                | Alarm::SamplesLost { .. }
-                | Alarm::SlewError
-                | Alarm::StreamSilent { .. }
-                | Alarm::CountRestarted
-                | Alarm::Garbage { .. },
-            ..
-        } | Failure::FringeJump { .. }
+        Failure::Machine(
+            machine::Failure::Alarm {
+                alarm: Alarm::BeamLost
+                    | Alarm::BeamWeak { .. }
+                    | Alarm::SamplesLost { .. }
+                    | Alarm::SlewError
+                    | Alarm::StreamSilent { .. }
+                    | Alarm::CountRestarted
+                    | Alarm::Garbage { .. },
+                ..
+            } | machine::Failure::Device { .. }
+                | machine::Failure::Overdue { .. }
+        ) | Failure::FringeJump { .. }
             | Failure::ScaleMismatch { .. }
             | Failure::Closure { .. }
             | Failure::Fit { .. }
@@ -79,8 +88,6 @@ fn optics(failure: &Failure) -> bool {
             | Failure::Correction { .. }
             | Failure::MadeWorse { .. }
             | Failure::Compensation { .. }
-            | Failure::Device { .. }
-            | Failure::Overdue { .. }
     )
 }
 
@@ -90,11 +97,19 @@ fn nothing(_: &Failure) -> bool {
 
 /// A frame whose bits are wrong may say anything that the device could say, to the search too.
 fn anything_said(failure: &Failure) -> bool {
-    drive_or_bus(failure) || sensors(failure) || matches!(failure, Failure::SecondMaster { .. })
+    drive_or_bus(failure)
+        || sensors(failure)
+        || matches!(
+            failure,
+            Failure::Machine(machine::Failure::SecondMaster { .. })
+        )
 }
 
 fn second_master(failure: &Failure) -> bool {
-    matches!(failure, Failure::SecondMaster { .. })
+    matches!(
+        failure,
+        Failure::Machine(machine::Failure::SecondMaster { .. })
+    )
 }
 
 fn link_or_optics(failure: &Failure) -> bool {

@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 use tests::stream::{self, Watch, Writer, circle};
 use tests::{Edit, INTERFACE, Rig, SlcanHub, VOLUMETRIC, left_out, not_run, shipped_config};
 use truestage::Machine;
+use truestage::Patience;
 use truestage::config::Loaded;
 use truestage::engine::{Cause, Engine, NoCorrection};
-use truestage::patience::Patience;
 use units::Metres;
 use wire::Port;
 

@@ -201,6 +201,9 @@ fn a_recording_whose_drive_falls_silent_ends_with_the_reason() {
     let store = Store::new(folder.path(), &loaded.config.machine.name);
     let result = machine.guarded(|machine| procedure(machine, &store).map(drop));
     let failure = result.unwrap_err();
-    assert!(matches!(failure, Failure::Alarm { .. }), "{failure}");
+    assert!(
+        matches!(failure, Failure::Machine(machine::Failure::Alarm { .. })),
+        "{failure}"
+    );
     assert_eq!(failure.exit_code(), 4);
 }

@@ -60,7 +60,7 @@ impl Operator for Hand<'_> {
         self.asked.push(task.clone());
         let ask = self.asked.len();
         if self.leaves_after.is_some_and(|asks| ask > asks) {
-            return Err(Failure::Interrupted);
+            return Err(Failure::Machine(machine::Failure::Interrupted));
         }
         let slips = self.mistakes.iter().filter(|it| it.0 == ask).map(|it| it.1);
         (self.turn)(task.offset - self.lies_at + slips.sum::<f64>());

@@ -81,7 +81,7 @@ impl Stand {
     /// Whatever stops it.
     pub fn live(&mut self, span: Duration) -> Result<(), Failure> {
         let until = self.machine.now() + span;
-        self.machine.run_until(until)
+        Ok(self.machine.run_until(until)?)
     }
 
     /// The machine is shut down, its mains goes off and on while the Hall sensors drift, and

@@ -195,7 +195,7 @@ fn follow_alone(
         }
     });
     writer.serve();
-    (outcome, writer)
+    (outcome.map_err(Failure::from), writer)
 }
 
 fn follow_together(
@@ -225,7 +225,10 @@ fn follow_together(
             }
         });
         drop(wake);
-        (outcome, thread.join().expect("the writer ends"))
+        (
+            outcome.map_err(Failure::from),
+            thread.join().expect("the writer ends"),
+        )
     })
 }
 
@@ -281,11 +284,13 @@ pub fn check_lives(lives: &[Live], period: Duration, bounds: Bounds) {
 pub const fn is_lateness(failure: &Failure) -> bool {
     matches!(
         failure,
-        Failure::Engine(_)
-            | Failure::Alarm { .. }
-            | Failure::Device { .. }
-            | Failure::Overdue { .. }
-            | Failure::HeldUp { .. }
+        Failure::Machine(
+            machine::Failure::Engine(_)
+                | machine::Failure::Alarm { .. }
+                | machine::Failure::Device { .. }
+                | machine::Failure::Overdue { .. }
+                | machine::Failure::HeldUp { .. }
+        )
     )
 }
 

@@ -9,7 +9,6 @@ use compensator::volumetric::model::{AxisErrors, Squareness};
 use compensator::volumetric::online::StateMap;
 use compensator::volumetric::{Axis, Point};
 use mock_bus::plant::VolumetricTruth;
-use truestage::Failure;
 use truestage::cycle::volumetric::{
     GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
 };
@@ -152,7 +151,7 @@ pub fn largest_range(errors: &[Off]) -> Metres {
 /// # Panics
 /// When it failed.
 #[track_caller]
-pub fn good<R>(result: Result<R, Failure>) -> R {
+pub fn good<R, F: std::fmt::Display>(result: Result<R, F>) -> R {
     result.unwrap_or_else(|failure| panic!("{failure}"))
 }
 

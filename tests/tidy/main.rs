@@ -14,9 +14,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("wire", &["units"]),
     ("drivers", &["units", "wire"]),
     ("mock-bus", &["units", "wire"]),
+    ("machine", &["units", "wire", "drivers", "compensator"]),
     (
         "truestage",
-        &["units", "wire", "drivers", "compensator", "mock-bus"],
+        &[
+            "units",
+            "wire",
+            "drivers",
+            "compensator",
+            "machine",
+            "mock-bus",
+        ],
     ),
     (
         "tests",
@@ -25,6 +33,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "wire",
             "drivers",
             "compensator",
+            "machine",
             "mock-bus",
             "truestage",
         ],
@@ -51,6 +60,7 @@ const PACKAGES: &[&str] = &[
     "drivers",
     "compensator",
     "mock-bus",
+    "machine",
     "controller",
 ];
 

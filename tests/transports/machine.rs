@@ -77,7 +77,7 @@ fn check(name: &'static str, what: fn(&Interface), wanted: LinkState) {
     at.set(machine.now() + Duration::from_secs(2));
     let failure = machine.move_to("x", Metres::from_mm(40.0)).unwrap_err();
     assert_eq!(at.get(), Time::NEVER, "{failure}");
-    let Failure::Link { port, state } = &failure else {
+    let Failure::Machine(machine::Failure::Link { port, state }) = &failure else {
         panic!("{failure}")
     };
     assert_eq!((port.as_str(), *state), ("can0", wanted));

@@ -5,7 +5,7 @@ use units::portable::powi;
 
 use super::{CHECKED, node_settings};
 use crate::config::{AnalogConfig, CanBus};
-use crate::patience::Patience;
+use machine::Patience;
 
 /// What 16 bits reach in volts when a count is a millivolt.
 const REACH_V: f64 = 32.767;

@@ -8,7 +8,7 @@ use wire::copley::Address;
 
 use super::{CHECKED, millis, reference_limit};
 use crate::config::{AxisConfig, SerialLine};
-use crate::patience::Patience;
+use machine::Patience;
 
 /// A Copley amplifier, as its driver is told; the configuration has been checked.
 ///

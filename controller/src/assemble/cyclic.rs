@@ -3,7 +3,7 @@
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
 use crate::config::{AxisConfig, CyclicConfig};
-use crate::engine::{AxisLimits, CorrectionLimits};
+use machine::engine::{AxisLimits, CorrectionLimits};
 
 /// The share of a drive's speed that is left to catch up what a SYNC that came early left short.
 const CATCHING_UP: f64 = 0.02;

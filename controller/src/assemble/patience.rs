@@ -9,7 +9,7 @@ use drivers::device::cia402::Cia402Timeouts;
 use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use units::Metres;
 
-use crate::patience::Patience;
+use machine::Patience;
 
 /// Where the clock is faster than the wall's, a pause of the host silences process data and
 /// heartbeats alike, so they are waited for alike.

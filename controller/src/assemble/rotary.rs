@@ -19,8 +19,8 @@ use crate::config::{
     PositionRangeName, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
 };
 use crate::failure::Failure;
-use crate::patience::Patience;
-use crate::unit::Unit;
+use machine::Patience;
+use machine::Unit;
 
 pub(crate) fn rotaries(
     config: &MachineConfig,

@@ -266,10 +266,10 @@ fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     if known.contains(&axis) || volume.any(|it| it == axis) {
         return Ok(());
     }
-    Err(Failure::NoSuchAxis {
+    Err(Failure::Machine(machine::Failure::NoSuchAxis {
         axis: axis.to_owned(),
         known: known.join(", "),
-    })
+    }))
 }
 
 /// What `--axis` calls all screws of a platform.

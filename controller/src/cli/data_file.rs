@@ -64,10 +64,10 @@ pub(super) fn volume_head_of(
 }
 
 fn no_such_axis<T>(axis: &str, axes: &BTreeMap<String, T>) -> Failure {
-    Failure::NoSuchAxis {
+    Failure::Machine(machine::Failure::NoSuchAxis {
         axis: axis.to_owned(),
         known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
-    }
+    })
 }
 
 fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> RecordHead {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use truestage::observer::{Observer, Stage};
+use truestage::{Observer, Stage};
 
 /// One bar for the procedure that runs.
 pub(super) struct Bars {

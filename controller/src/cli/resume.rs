@@ -51,7 +51,10 @@ pub(super) fn resumable<R>(
 ) -> Result<R, Failure> {
     let before = store.newest_run(verb, axis)?;
     run().map_err(|failure| {
-        let is_asked = matches!(failure, Failure::Interrupted | Failure::Terminated { .. });
+        let is_asked = matches!(
+            failure,
+            Failure::Machine(machine::Failure::Interrupted | machine::Failure::Terminated { .. })
+        );
         let begun = || {
             store
                 .newest_run(verb, axis)
@@ -95,7 +98,11 @@ mod tests {
     #[test]
     fn a_run_that_somebody_stops_says_how_it_goes_on() {
         let (_folder, store) = store();
-        let said = stopped(&store, true, Failure::Interrupted);
+        let said = stopped(
+            &store,
+            true,
+            Failure::Machine(machine::Failure::Interrupted),
+        );
         assert!(said.contains("20200102-calibrate-x-00.jsonl"), "{said}");
         assert!(said.contains("--resume"), "{said}");
     }
@@ -103,7 +110,11 @@ mod tests {
     #[test]
     fn where_nothing_was_begun_or_something_failed_nothing_is_promised() {
         let (_folder, store) = self::store();
-        let said = stopped(&store, false, Failure::Interrupted);
+        let said = stopped(
+            &store,
+            false,
+            Failure::Machine(machine::Failure::Interrupted),
+        );
         assert!(!said.contains("--resume"), "{said}");
         let said = stopped(&store, true, Failure::ScanMismatch { wrong: 1 });
         assert!(!said.contains("--resume"), "{said}");
@@ -113,7 +124,11 @@ mod tests {
     fn a_run_that_was_continued_is_continued_again() {
         let (_folder, store) = store();
         let journal = store.runs().join("20200101-calibrate-x-00.jsonl");
-        let run = || Err::<(), _>(Failure::Terminated { signal: 15 });
+        let run = || {
+            Err::<(), _>(Failure::Machine(machine::Failure::Terminated {
+                signal: 15,
+            }))
+        };
         let failed = resumable(&store, "calibrate", "x", Some(&journal), run).unwrap_err();
         assert_eq!(failed.exit_code(), 143);
         assert!(failed.to_string().contains("20200101"), "{failed}");

@@ -125,10 +125,10 @@ pub(super) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
 pub(super) fn choose_axis(names: Vec<String>, args: &AxisArgs) -> Result<String, Failure> {
     match (&args.axis, names.as_slice()) {
         (Some(axis), known) if known.contains(axis) => Ok(axis.clone()),
-        (Some(axis), known) => Err(Failure::NoSuchAxis {
+        (Some(axis), known) => Err(Failure::Machine(machine::Failure::NoSuchAxis {
             axis: axis.clone(),
             known: known.join(", "),
-        }),
+        })),
         (None, [only]) => Ok(only.clone()),
         (None, _) => Err(Failure::Usage {
             what: "the machine has several axes".into(),

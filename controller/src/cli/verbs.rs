@@ -270,12 +270,12 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
             )
         };
         if !(*target >= min && *target <= max) {
-            return Err(Failure::SoftLimit {
+            return Err(Failure::Machine(machine::Failure::SoftLimit {
                 axis: axis.clone(),
                 target: *target,
                 min,
                 max,
-            });
+            }));
         }
     }
     let store = session.store.clone();

@@ -324,7 +324,10 @@ pub(super) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         let (axis, place) = parse_target(text)?;
         let known = "x, y, z".to_owned();
         let at = ["x", "y", "z"].iter().position(|it| *it == axis);
-        let at = at.ok_or(Failure::NoSuchAxis { axis, known })?;
+        let at = at.ok_or(Failure::Machine(machine::Failure::NoSuchAxis {
+            axis,
+            known,
+        }))?;
         target[at] = Some(place);
     }
     if target.iter().all(Option::is_none) {

@@ -8,7 +8,7 @@ use super::dependence::ConfigHash;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
 use super::validate::{Finding, validate};
-use crate::patience::Patience;
+use machine::Patience;
 
 /// A configuration that was read and judged sound.
 #[derive(Clone, Debug)]

@@ -12,13 +12,13 @@ use super::run_plan::RunPlan;
 use super::utc_now;
 use crate::assemble;
 use crate::config::{CalibrateConfig, ConfigHash};
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{
     CalibrationRecord, Content, Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord,
     Journal, JournalHeader, LinearContent, RecordHead, SCHEMA_VERSION, Store,
 };
+use machine::Stage;
 
 /// How a calibration is made.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -192,9 +192,7 @@ impl Machine {
     }
 
     pub(crate) fn drive_record(&self, axis: &str) -> IdentityRecord {
-        let drive = self.drive_index(axis).ok();
-        let identity = drive.and_then(|at| self.drive(at).identity());
-        identity
+        self.identity(axis)
             .as_ref()
             .map(IdentityRecord::from)
             .unwrap_or_default()
@@ -202,10 +200,9 @@ impl Machine {
 
     pub(in crate::cycle) fn instrument_record(&self, name: &str) -> InstrumentRecord {
         let config = &self.config.instrument[name];
-        let unit = &self.instruments[self.instrument_index(name)];
         InstrumentRecord {
             name: name.to_owned(),
-            identity: unit.device.identity().unwrap_or_default().name,
+            identity: self.identity(name).unwrap_or_default().name,
             air_corrected: config.correct_air,
             material_corrected: config.correct_material,
             dead_path_corrected: config.correct_dead_path,

@@ -11,8 +11,8 @@ use super::datum_in_use::Datum;
 use super::run_plan::RunPlan;
 use super::travel::Correction;
 use crate::assemble;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// What is shaken at the datum would shift everything: it is read again, so often at most …
 const ATTEMPTS: u32 = 10;
@@ -37,8 +37,8 @@ impl Machine {
         self.use_instrument(&plan.instrument)?;
         self.go_to_datum(axis, &plan)?;
         let reading = self.read_displacement(axis, &plan)?;
-        let environment = self.instrument_environment(&plan.instrument);
-        self.instrument_in_use = None;
+        let environment = self.instrument_environment(&plan.instrument)?;
+        self.leave_instrument();
         self.correct(&plan, &reading, &environment, &datum)
     }
 
@@ -46,11 +46,9 @@ impl Machine {
     pub(super) fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<Datum, Failure> {
         self.go_to_datum(axis, plan)?;
         self.stand_still(axis, plan.settle)?;
-        let now = self.now();
-        let at = self.instrument_index(&plan.instrument);
-        self.instruments[at].device.set_datum(now);
+        self.set_instrument_datum(&plan.instrument)?;
         let offset = self.read_calm(axis, plan)?.vacuum;
-        let environment = self.instrument_environment(&plan.instrument);
+        let environment = self.instrument_environment(&plan.instrument)?;
         let config = &self.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(assemble::correction_settings(config), &environment)
@@ -91,25 +89,12 @@ impl Machine {
         plan: &RunPlan,
     ) -> Result<DisplacementReading, Failure> {
         self.stand_still(axis, plan.settle)?;
-        let at = self.instrument_index(&plan.instrument);
-        let now = self.now();
-        self.instruments[at]
-            .device
-            .begin_average(now, plan.average_samples);
-        let rate = self.config.instrument[&plan.instrument].sample_rate_hz;
-        // Four times the nominal time: the stream comes in batches over USB.
-        let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(plan.average_samples) / rate);
-        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        Ok(self.instruments[at]
-            .device
-            .average()
-            .expect("an average that ended well is there"))
+        let rate_hz = self.config.instrument[&plan.instrument].sample_rate_hz;
+        Ok(self.average(&plan.instrument, plan.average_samples, rate_hz)?)
     }
 
-    pub(crate) fn instrument_environment(&self, instrument: &str) -> Environment {
-        self.instruments[self.instrument_index(instrument)]
-            .device
-            .environment()
+    pub(crate) fn instrument_environment(&self, instrument: &str) -> Result<Environment, Failure> {
+        Ok(self.instrument(instrument)?.environment())
     }
 
     /// A reading as a displacement from the datum.

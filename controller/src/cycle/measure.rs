@@ -12,10 +12,10 @@ use super::datum_in_use::Datum;
 use super::run_plan::RunPlan;
 use super::travel::Correction;
 use crate::assemble;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{ClosureEntry, Entry, EnvironmentRecord, Journal, PointEntry};
+use machine::Stage;
 
 /// How a series is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -170,7 +170,7 @@ impl Machine {
         }
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
-        self.instrument_in_use = None;
+        self.leave_instrument();
         let environment = mean_environment(&runs.points);
         Ok(Measured {
             closure: largest(&runs.closures),
@@ -230,7 +230,7 @@ impl Machine {
         session.journal.write(&Entry::Point(point))?;
         session.counter.done += 1;
         let Counter { stage, done, total } = session.counter;
-        self.observer.progress(stage, axis, done, total);
+        self.core.observer().progress(stage, axis, done, total);
         Ok(point)
     }
 
@@ -288,7 +288,7 @@ impl Machine {
     /// The environment, as long as its sensors can be believed.
     fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
         let instrument = &session.plan.instrument;
-        let environment = self.instrument_environment(instrument);
+        let environment = self.instrument_environment(instrument)?;
         let reading = assemble::correction_environment(&environment);
         match session.watch.observe(self.now(), reading) {
             Ok(()) => Ok(environment),

@@ -1,6 +1,6 @@
 //! The cycle: calibrate → zero → compensate → verify, as procedures on a [`Machine`].
 //!
-//! [`Machine`]: crate::machine::Machine
+//! [`Machine`]: crate::connected::Machine
 
 mod calibrate;
 mod cross_check;
@@ -11,8 +11,8 @@ mod moved;
 pub mod platform;
 pub mod rotary;
 mod run_plan;
-mod scan;
 pub(crate) mod sweep;
+mod table_correction;
 mod travel;
 mod turn;
 mod verify;
@@ -20,10 +20,10 @@ pub mod volumetric;
 mod zero;
 
 pub use calibrate::{CalibrateOptions, Calibrated};
+pub use machine::Found;
 pub use measure::{MeasureOptions, Measured};
 pub use moved::{Corrected, Moved};
 pub use run_plan::RunPlan;
-pub use scan::Found;
 pub use sweep::{Sweep, SweepOptions};
 pub use turn::Way;
 pub use verify::{Verified, VerifyOptions};

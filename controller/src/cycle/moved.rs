@@ -3,8 +3,8 @@
 use compensator::error_table::{Compensation, EndPolicy};
 use units::Metres;
 
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// What corrected a move.
 #[derive(Clone, Copy, Debug, PartialEq)]

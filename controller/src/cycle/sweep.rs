@@ -14,8 +14,8 @@ use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use super::turn::Way;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// Of the nominal spacing of lines, what is left between the nearest two of them.
 const SPACING_SHARE: f64 = 0.75;
@@ -87,14 +87,7 @@ impl Machine {
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
         let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
-        let at = self.rotary_index(axis)?;
-        let device = &self.rotaries[at].device;
-        device
-            .check_latch_speed(spacing, speed)
-            .map_err(|source| Failure::Device {
-                device: axis.to_owned(),
-                source,
-            })?;
+        self.check_latch_speed(axis, spacing, speed)?;
         let start = self.turn_to(axis, Radians(-sign * run_up), Way::Shortest)?;
         self.rest(axis)?;
         let repeat = Repeat::Continuous;
@@ -115,16 +108,10 @@ impl Machine {
         Ok(assign(&latched, first, options))
     }
 
-    fn take_latched(&mut self, axis: &str) -> Result<Vec<Latched<Radians>>, Failure> {
-        let at = self.rotary_index(axis)?;
-        let device = &mut self.rotaries[at].device;
-        Ok(core::iter::from_fn(|| device.poll_latched()).collect())
-    }
-
     /// Waits until the rotary axis has stood without a break, by samples that were taken since:
     /// the host's clock alone would count old ones.
     pub(super) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
-        let limit = self.patience.of(REST_LIMIT);
+        let limit = self.patience().of(REST_LIMIT);
         let start = self.now();
         let mut first = None;
         loop {
@@ -140,11 +127,11 @@ impl Machine {
             }
             let now = self.now();
             if now.since(start) > limit {
-                return Err(Failure::Overdue {
+                return Err(Failure::Machine(machine::Failure::Overdue {
                     device: axis.to_owned(),
                     step: "standing still",
                     waited: limit,
-                });
+                }));
             }
             self.tick(now + REST)?;
         }

@@ -1,17 +1,11 @@
 //! Moves: limits before anything moves, compensation, and the direction of approach.
 
-use core::time::Duration;
-
 use compensator::apply::ApproachTracker;
 use compensator::error_table::{Compensation, OutOfRange};
-use drivers::device::{AxisCommand, DriveCommand};
-use units::{Approach, Metres, MetresPerSecond, MetresPerSecondSquared};
+use units::{Approach, Metres};
 
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
-
-/// The longest an axis may take to come to rest after its drive has called the target reached.
-const SETTLING_LIMIT: Duration = Duration::from_secs(2);
 
 /// Whether a move is corrected by the active calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,35 +17,6 @@ pub(crate) enum Correction {
 }
 
 impl Machine {
-    /// Switches `axis`, linear or rotary, on.
-    ///
-    /// # Errors
-    /// When the drive refuses or does not answer in time.
-    pub fn enable(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
-        self.control(at, DriveCommand::Enable, "enable", Duration::from_secs(5))
-    }
-
-    /// Switches `axis`, linear or rotary, off.
-    ///
-    /// # Errors
-    /// When the drive refuses or does not answer in time.
-    pub fn disable(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
-        let limit = Duration::from_secs(5);
-        self.control(at, DriveCommand::Disable, "disable", limit)
-    }
-
-    /// Acknowledges a fault of `axis`, linear or rotary, once.
-    ///
-    /// # Errors
-    /// When the fault does not go: its cause is still there.
-    pub fn reset_fault(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
-        let limit = Duration::from_secs(5);
-        self.control(at, DriveCommand::ResetFault, "fault reset", limit)
-    }
-
     /// Moves the point of `axis` to `target` (machine coordinates), compensated when a
     /// calibration is in use, and returns the set-point the drive was sent.
     ///
@@ -74,13 +39,9 @@ impl Machine {
         let (Correction::On, Some(compensation)) = (correction, compensation) else {
             return Ok(target);
         };
-        let tracker = &self
-            .memory
-            .get(axis)
-            .expect("every axis has its memory")
-            .approach;
+        let tracker = self.approach(axis)?;
         let here = self.reading(axis)?.map(|reading| reading.position);
-        set_point_of(compensation, tracker, here, target).map_err(|source| {
+        set_point_of(compensation, &tracker, here, target).map_err(|source| {
             Failure::OutOfCalibration {
                 axis: axis.to_owned(),
                 source,
@@ -98,86 +59,14 @@ impl Machine {
         self.check_soft_limits(axis, target)?;
         let set_point = self.set_point(axis, target, correction)?;
         self.check_soft_limits(axis, set_point)?;
+        let own_speed = self.axis_settings(axis)?.speed;
         let speed = match (correction, self.compensation(axis)) {
             // So fast that the correction changes no faster than its limit.
-            (Correction::On, Some(table)) => self.travel_speed(axis)?.min(table.speed_max()),
-            _ => self.travel_speed(axis)?,
+            (Correction::On, Some(table)) => own_speed.min(table.speed_max()),
+            _ => own_speed,
         };
         self.profile_move(axis, set_point, speed)?;
         Ok(set_point)
-    }
-
-    pub(crate) fn check_soft_limits(&self, axis: &str, target: Metres) -> Result<(), Failure> {
-        let (min, max) = self.soft_limits(axis)?;
-        // Written so that NaN is refused too.
-        if target >= min && target <= max {
-            return Ok(());
-        }
-        Err(Failure::SoftLimit {
-            axis: axis.to_owned(),
-            target,
-            min,
-            max,
-        })
-    }
-
-    pub(crate) fn travel_speed(&self, axis: &str) -> Result<MetresPerSecond, Failure> {
-        Ok(MetresPerSecond(
-            self.axis_config(axis)?.speed_mm_per_s * 1e-3,
-        ))
-    }
-
-    pub(crate) fn acceleration(&self, axis: &str) -> Result<MetresPerSecondSquared, Failure> {
-        Ok(MetresPerSecondSquared(
-            self.axis_config(axis)?.acceleration_mm_per_s2 * 1e-3,
-        ))
-    }
-
-    /// Waits until `axis` has stood still for `span` without a break.
-    pub(crate) fn stand_still(&mut self, axis: &str, span: Duration) -> Result<(), Failure> {
-        let limit = self.patience.of(SETTLING_LIMIT) + span;
-        let start = self.now();
-        let mut since = start;
-        while self.now().since(since) < span {
-            if self.now().since(start) > limit {
-                let device = axis.to_owned();
-                return Err(Failure::Overdue {
-                    device,
-                    step: "standing still",
-                    waited: limit,
-                });
-            }
-            self.tick(since + span)?;
-            if !self.reading(axis)?.is_some_and(|reading| reading.standing) {
-                since = self.now();
-            }
-        }
-        Ok(())
-    }
-
-    /// One profile position move in drive coordinates, awaited.
-    pub(crate) fn profile_move(
-        &mut self,
-        axis: &str,
-        target: Metres,
-        speed: MetresPerSecond,
-    ) -> Result<(), Failure> {
-        let acceleration = self.acceleration(axis)?;
-        let limit = Duration::from_secs_f64(self.axis_config(axis)?.move_timeout_s);
-        let command = AxisCommand::MoveTo {
-            target,
-            speed,
-            acceleration,
-        };
-        let result = self.command(axis, command, "move", limit);
-        let approach = &mut self.remember(axis).approach;
-        if result.is_ok() {
-            approach.update(target);
-        } else {
-            // Where it stopped, and from where it came there, nobody knows.
-            approach.forget();
-        }
-        result
     }
 }
 
@@ -218,6 +107,7 @@ fn set_point_of(
 mod tests {
     use super::*;
     use compensator::error_table::{EndPolicy, ErrorTable, Interpolation, Limits, Node};
+    use units::MetresPerSecond;
 
     /// Forward 2 µm too far, reverse 5 µm.
     fn compensation() -> Compensation {

@@ -2,13 +2,13 @@
 
 use core::time::Duration;
 
-use drivers::device::{AxisCommand, AxisReading, LatchCommand};
+use drivers::device::AxisCommand;
 use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared};
 
 use crate::assemble;
 use crate::config::{DirectionName, RotaryConfig};
+use crate::connected::{Machine, RotaryMemory};
 use crate::failure::Failure;
-use crate::machine::{Machine, RotaryMemory};
 
 /// Which way round to an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,11 +41,6 @@ impl Way {
 }
 
 impl Machine {
-    /// The names of the rotary axes.
-    pub fn rotary_names(&self) -> Vec<String> {
-        self.rotaries.iter().map(|unit| unit.name.clone()).collect()
-    }
-
     /// The configuration of the rotary axis `axis`.
     ///
     /// # Errors
@@ -53,23 +48,6 @@ impl Machine {
     pub fn rotary_config(&self, axis: &str) -> Result<&RotaryConfig, Failure> {
         let config = self.config.rotary.get(axis);
         config.ok_or_else(|| self.no_such_rotary(axis))
-    }
-
-    /// The newest sample of the rotary axis `axis`; its position counts on over the turns.
-    ///
-    /// # Errors
-    /// When there is no such axis.
-    pub fn rotary_reading(&self, axis: &str) -> Result<Option<AxisReading<Radians>>, Failure> {
-        Ok(self.rotaries[self.rotary_index(axis)?].device.reading())
-    }
-
-    /// Whether the rotary axis `axis` has its zero since its drive was last powered.
-    pub fn is_rotary_zeroed(&self, axis: &str) -> bool {
-        let memory = self.rotary_memory.get(axis);
-        memory.is_some_and(|memory| memory.zeroed)
-            && self
-                .rotary_index(axis)
-                .is_ok_and(|at| self.rotaries[at].device.is_homed())
     }
 
     /// Turns the rotary axis `axis` to the encoder's index mark and makes that its zero.
@@ -95,7 +73,7 @@ impl Machine {
         let limit = assemble::index_limit(config).unwrap_or_default() + Duration::from_secs(5);
         self.enable(axis)?;
         self.turn_command(axis, command, "zero", limit)?;
-        self.remember_table(axis).zeroed = true;
+        self.set_zeroed(axis, true)?;
         Ok(())
     }
 
@@ -105,7 +83,7 @@ impl Machine {
     /// # Errors
     /// Before anything moves: not zeroed. While moving: whatever stops the machine.
     pub fn turn_to(&mut self, axis: &str, angle: Radians, way: Way) -> Result<Radians, Failure> {
-        self.require_table_zeroed(axis)?;
+        self.require_zeroed(axis)?;
         let config = self.rotary_config(axis)?;
         let near = Radians::from_arcsec(config.position_window_arcsec);
         let speed = RadiansPerSecond(config.speed_deg_per_s.to_radians());
@@ -130,44 +108,7 @@ impl Machine {
             speed,
             acceleration: RadiansPerSecondSquared(config.acceleration_deg_per_s2.to_radians()),
         };
-        self.turn_command(axis, command, "move", limit)
-    }
-
-    pub(crate) fn turn_command(
-        &mut self,
-        axis: &str,
-        command: AxisCommand<Radians>,
-        step: &'static str,
-        limit: Duration,
-    ) -> Result<(), Failure> {
-        let at = self.rotary_index(axis)?;
-        self.require_supervised(self.axes.len() + at)?;
-        let now = self.now();
-        self.rotaries[at].device.command(now, command);
-        self.await_outcome(self.axes.len() + at, step, limit)
-    }
-
-    pub(crate) fn latch(
-        &mut self,
-        axis: &str,
-        command: LatchCommand<Radians>,
-    ) -> Result<(), Failure> {
-        let at = self.rotary_index(axis)?;
-        let now = self.now();
-        self.rotaries[at].device.latch(now, command);
-        let limit = Duration::from_secs(5);
-        self.await_outcome(self.axes.len() + at, "touch probe", limit)
-    }
-
-    /// Refuses a rotary axis that has no zero, or is none.
-    pub(crate) fn require_table_zeroed(&self, axis: &str) -> Result<(), Failure> {
-        self.rotary_index(axis)?;
-        if self.is_rotary_zeroed(axis) {
-            return Ok(());
-        }
-        Err(Failure::NotZeroed {
-            axis: axis.to_owned(),
-        })
+        Ok(self.turn_command(axis, command, "move", limit)?)
     }
 
     /// Where the drive says that the zeroed rotary axis `axis` is.
@@ -182,17 +123,11 @@ impl Machine {
         self.rotary_memory.entry(axis.to_owned()).or_default()
     }
 
-    /// The number of a named rotary axis among those.
-    pub(crate) fn rotary_index(&self, axis: &str) -> Result<usize, Failure> {
-        let at = self.rotaries.iter().position(|unit| unit.name == axis);
-        at.ok_or_else(|| self.no_such_rotary(axis))
-    }
-
     fn no_such_rotary(&self, axis: &str) -> Failure {
-        Failure::NoSuchAxis {
+        Failure::Machine(machine::Failure::NoSuchAxis {
             axis: axis.to_owned(),
             known: self.rotary_names().join(", "),
-        }
+        })
     }
 }
 

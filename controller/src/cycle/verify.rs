@@ -11,10 +11,10 @@ use super::calibrate::{missing, note_failure, open_journal};
 use super::measure::{MeasureOptions, Measured};
 use super::run_plan::RunPlan;
 use crate::config::VerifyConfig;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Store, short};
+use machine::Stage;
 
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
 const SCALE_LIMIT_PPM: f64 = 1000.0;

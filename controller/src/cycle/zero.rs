@@ -18,12 +18,12 @@ use super::travel::Correction;
 use super::utc_now;
 use crate::assemble;
 use crate::config::ZeroConfig;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::{Machine, STOP_LIMIT};
-use crate::observer::Stage;
 use crate::store::{
     Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, ZeroEntry, read_journal,
 };
+use machine::{STOP_LIMIT, Stage};
 
 /// A zero that was found.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ impl Machine {
     pub fn zero(&mut self, axis: &str, store: &Store) -> Result<Zeroed, Failure> {
         let config = self.axis_config(axis)?.zero.clone();
         let config = config.ok_or_else(|| missing(axis, "zero"))?;
-        self.remember(axis).zeroed = false;
+        self.set_zeroed(axis, false)?;
         let previous = previous_zero(store, axis);
         let mut journal = Journal::create(&store.runs(), &self.zero_header(axis))?;
         let found = self.find_zero(axis, &config, &mut journal);
@@ -94,21 +94,23 @@ impl Machine {
         config: &ZeroConfig,
         journal: &mut Journal,
     ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
-        self.observer.progress(Stage::Zero, axis, 0, STEPS);
+        self.core.observer().progress(Stage::Zero, axis, 0, STEPS);
         self.enable(axis)?;
         self.reference(axis, config)?;
-        self.observer.progress(Stage::Zero, axis, 1, STEPS);
+        self.core.observer().progress(Stage::Zero, axis, 1, STEPS);
         self.travel(axis, Metres::ZERO, Correction::Off)?;
-        self.observer.progress(Stage::Zero, axis, 2, STEPS);
+        self.core.observer().progress(Stage::Zero, axis, 2, STEPS);
         let usual = assemble::hall_settings(config, self.axis_config(axis)?);
-        let settings = assemble::patient_search(usual, self.patience);
+        let settings = assemble::patient_search(usual, self.patience());
         let outcome = self.search(axis, config, settings)?;
-        self.observer.progress(Stage::Zero, axis, 3, STEPS);
+        self.core.observer().progress(Stage::Zero, axis, 3, STEPS);
         let estimate = self.estimate(axis, config, &settings, &outcome)?;
         let entry = self.zero_entry(&estimate);
         journal.write(&Entry::Zero(entry))?;
         self.adopt_zero(axis, estimate.origin)?;
-        self.observer.progress(Stage::Zero, axis, STEPS, STEPS);
+        self.core
+            .observer()
+            .progress(Stage::Zero, axis, STEPS, STEPS);
         Ok((outcome, estimate, entry))
     }
 
@@ -123,7 +125,7 @@ impl Machine {
             "reference",
             limit,
         )?;
-        self.remember(axis).approach.forget();
+        self.forget_approach(axis)?;
         Ok(())
     }
 
@@ -175,7 +177,7 @@ impl Machine {
     ) -> Result<(), Failure> {
         let command = match *progress {
             Progress::Move { to, speed } => {
-                let acceleration = self.acceleration(axis)?;
+                let acceleration = self.axis_settings(axis)?.acceleration;
                 AxisCommand::MoveTo {
                     target: to,
                     speed,
@@ -185,9 +187,7 @@ impl Machine {
             _ => DriveCommand::Halt.into(),
         };
         if *motion != Some(command) {
-            let at = self.axis_index(axis)?;
-            let now = self.now();
-            self.axes[at].device.command(now, command);
+            self.begin(axis, command)?;
             *motion = Some(command);
         }
         Ok(())
@@ -195,14 +195,7 @@ impl Machine {
 
     /// A move of the search that failed ends the search.
     fn check_motion(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.axis_index(axis)?;
-        match self.axes[at].device.poll_outcome() {
-            Some(Err(source)) => Err(Failure::Device {
-                device: axis.to_owned(),
-                source,
-            }),
-            Some(Ok(())) | None => Ok(()),
-        }
+        Ok(self.outcome(axis)?.unwrap_or(Ok(()))?)
     }
 
     fn estimate(
@@ -242,10 +235,8 @@ impl Machine {
             "set origin",
             Duration::from_secs(5),
         )?;
-        let memory = self.remember(axis);
-        memory.zeroed = true;
-        memory.approach.forget();
-        Ok(())
+        self.set_zeroed(axis, true)?;
+        Ok(self.forget_approach(axis)?)
     }
 
     fn zero_entry(&self, estimate: &ZeroEstimate) -> ZeroEntry {
@@ -302,9 +293,8 @@ impl Machine {
         config: &ZeroConfig,
         pairing: &mut Pairing,
     ) -> Result<Option<Sample>, Failure> {
-        let analog = &self.analogs[self.analog_index(&config.analog)];
-        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.device.reading())
-        else {
+        let analog = self.analog(&config.analog)?;
+        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.reading()) else {
             return Ok(None);
         };
         if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {

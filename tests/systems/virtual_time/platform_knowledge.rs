@@ -2,8 +2,8 @@
 //! that never agree, a fourth screw that contradicts the others.
 
 use tests::{Bench, Edit, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
+use truestage::StopRequest;
 use truestage::cycle::platform::Pose;
-use truestage::machine::StopRequest;
 use truestage::{Failure, config};
 use units::{Metres, Radians};
 
@@ -39,7 +39,13 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
 
     machine.stop_request().stop();
     let stopped = machine.move_pose(pose(0.4, 0.35, -100.0));
-    assert!(matches!(stopped, Err(Failure::Interrupted)), "{stopped:?}");
+    assert!(
+        matches!(
+            stopped,
+            Err(Failure::Machine(machine::Failure::Interrupted))
+        ),
+        "{stopped:?}"
+    );
     machine.share_stop_request(&StopRequest::default());
 
     let target = pose(0.45, 0.2, 0.0);

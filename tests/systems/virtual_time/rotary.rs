@@ -13,9 +13,9 @@ use truestage::cycle::rotary::{
 };
 use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::{Emulated, HallDrift};
-use truestage::observer::{Observer, Stage};
 use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine};
+use truestage::{Observer, Stage};
 use units::Radians;
 use wire::cia402::PowerState;
 
@@ -379,7 +379,10 @@ fn a_plate_that_slips_while_it_is_read_is_noticed_and_the_placements_before_are_
     started(&mut bench);
     let mut hand = hand_of(&bench.emulated).leaves_after(1);
     let left = calibrate(&mut bench, &mut hand, &CalibrateOptions::default());
-    assert!(matches!(left, Err(Failure::Interrupted)), "{left:?}");
+    assert!(
+        matches!(left, Err(Failure::Machine(machine::Failure::Interrupted))),
+        "{left:?}"
+    );
     let resume = check_nothing_stored(&bench, 1);
     // Fixed badly: it moves by some arcseconds between two passes of the second placement.
     started(&mut bench);
@@ -440,7 +443,7 @@ fn a_detector_that_dies_and_power_that_is_lost_end_the_run_and_it_goes_on_afterw
     let code = failed.as_ref().map_err(Failure::exit_code).err();
     assert_eq!(code, Some(4), "{failed:?}");
     let resume = check_nothing_stored(&bench, 2);
-    assert!(!bench.machine.is_rotary_zeroed(AXIS));
+    assert!(!bench.machine.is_zeroed(AXIS));
     let later = bench.machine.now() + Duration::from_secs(1);
     bench.machine.run_until(later).unwrap();
     started(&mut bench);
@@ -455,7 +458,10 @@ fn a_run_is_continued_only_with_the_same_plate_and_set_up() {
     started(&mut bench);
     let mut hand = hand_of(&bench.emulated).leaves_after(1);
     let left = calibrate(&mut bench, &mut hand, &CalibrateOptions::default());
-    assert!(matches!(left, Err(Failure::Interrupted)), "{left:?}");
+    assert!(
+        matches!(left, Err(Failure::Machine(machine::Failure::Interrupted))),
+        "{left:?}"
+    );
     let resume = check_nothing_stored(&bench, 1);
     for (from, to) in [
         ("GP-360-0001", "GP-360-0002"),

@@ -158,10 +158,10 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
         };
         let before = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
         let refused = bench.machine.sweep(AXIS, &fast);
-        let Err(Failure::Device {
+        let Err(Failure::Machine(machine::Failure::Device {
             source: DeviceError::OutOfRange { limit, unit, .. },
             ..
-        }) = refused
+        })) = refused
         else {
             panic!("{refused:?}");
         };
@@ -180,7 +180,10 @@ fn an_angle_is_reached_by_the_way_that_was_asked_for() {
     let mut bench = bench(9);
     run(&mut bench, |bench| {
         let early = bench.machine.turn_to(AXIS, Radians::ZERO, Way::Shortest);
-        assert!(matches!(early, Err(Failure::NotZeroed { .. })));
+        assert!(matches!(
+            early,
+            Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
+        ));
         ready(bench)?;
         for (degrees, way, expected) in [
             (350.0, Way::Shortest, -10.0),
@@ -212,7 +215,7 @@ fn a_power_cycle_takes_the_zero_and_zeroing_again_brings_the_readings_back() {
         bench.machine.shut_down()?;
         bench.power_cycle(HallDrift::default());
         bench.machine.start()?;
-        assert!(!bench.machine.is_rotary_zeroed(AXIS));
+        assert!(!bench.machine.is_zeroed(AXIS));
         bench.machine.zero_rotary(AXIS)?;
         let after = bench.machine.sweep(AXIS, &options(Approach::Forward))?;
         let apart: Vec<f64> = before
@@ -240,7 +243,12 @@ fn a_failure_stops_and_disables_the_table() {
         machine.turn_to(AXIS, Radians::from_degrees(90.0), Way::Shortest)
     });
     assert!(
-        matches!(failed, Err(Failure::Alarm { .. } | Failure::Device { .. })),
+        matches!(
+            failed,
+            Err(Failure::Machine(
+                machine::Failure::Alarm { .. } | machine::Failure::Device { .. }
+            ))
+        ),
         "{failed:?}"
     );
     let state = bench.machine.power_state(AXIS).unwrap().unwrap();

@@ -197,7 +197,7 @@ fn angular_optics_read_pitch_and_yaw() {
 fn check_beam_lost(failure: &Failure) {
     let lost = matches!(
         failure,
-        Failure::Alarm { device, alarm: Alarm::BeamLost } if device == "laser"
+        Failure::Machine(machine::Failure::Alarm { device, alarm: Alarm::BeamLost }) if device == "laser"
     );
     assert!(lost, "{failure}");
 }
@@ -357,7 +357,10 @@ fn the_axes_are_off_while_a_line_is_set_up() {
     assert_eq!(looks.seen.last(), Some(&[true; 3]));
     bench.machine.end_lines(&mut looks).unwrap();
     let refused = bench.machine.set_up_line(&task, &readout(), &mut Absent);
-    assert!(matches!(refused, Err(Failure::Interrupted)));
+    assert!(matches!(
+        refused,
+        Err(Failure::Machine(machine::Failure::Interrupted))
+    ));
 }
 
 /// Nobody is there.
@@ -365,14 +368,14 @@ struct Absent;
 
 impl LineOperator for Absent {
     fn ask_line(&mut self, _task: &LineTask) -> Result<(), Failure> {
-        Err(Failure::Interrupted)
+        Err(Failure::Machine(machine::Failure::Interrupted))
     }
 
     fn is_set_up(&mut self) -> Result<bool, Failure> {
-        Err(Failure::Interrupted)
+        Err(Failure::Machine(machine::Failure::Interrupted))
     }
 
     fn pack_up(&mut self) -> Result<(), Failure> {
-        Err(Failure::Interrupted)
+        Err(Failure::Machine(machine::Failure::Interrupted))
     }
 }

@@ -23,7 +23,7 @@ struct Hand {
 impl LineOperator for Hand {
     fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
         if Some(task.step.0) == self.leaves_before {
-            return Err(Failure::Interrupted);
+            return Err(Failure::Machine(machine::Failure::Interrupted));
         }
         self.asked.push(task.step.0);
         self.emulated.ask_line(task)
@@ -89,7 +89,13 @@ fn another_morning(volume: &mut Volume) {
 fn a_calibration_that_was_interrupted_goes_on_at_its_first_line_that_is_not_whole() {
     let mut volume = Volume::zeroed(1, quick, |text| text);
     let (refused, asked) = calibrate(&mut volume, None, Some(11));
-    assert!(matches!(refused, Err(Failure::Interrupted)), "{refused:?}");
+    assert!(
+        matches!(
+            refused,
+            Err(Failure::Machine(machine::Failure::Interrupted))
+        ),
+        "{refused:?}"
+    );
     let path = journal_of(&volume);
     let before = read(&path);
     assert!(before.failure.is_some() && !before.complete);

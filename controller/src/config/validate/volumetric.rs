@@ -7,7 +7,7 @@ use super::judge::{Finding, Judge};
 use crate::assemble;
 use crate::config::model::MachineConfig;
 use crate::config::volumetric::{FeedConfig, ReactionName, VolumetricConfig};
-use crate::engine::{CHANNELS_MAX, THERMOMETERS_MAX};
+use machine::engine::{CHANNELS_MAX, THERMOMETERS_MAX};
 
 pub(super) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let Some(volumetric) = &config.volumetric else {

@@ -6,8 +6,8 @@ use units::Metres;
 
 use super::failure::{Contradiction, PlatformFailure};
 use super::state::Screw;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 impl Machine {
     /// Refuses screws that would stand, by their models, where no pose has them together.

@@ -14,15 +14,15 @@ use super::failure::PlatformFailure;
 use crate::config::{
     LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig, ScrewMethodName as Method,
 };
+use crate::connected::Machine;
 use crate::cycle::travel::Correction;
 use crate::cycle::{note_failure, utc_now};
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{
     CalibrationRecord, ClosureEntry, Content, Entry, Journal, RecordHead, ScrewContent,
     ScrewMethodName, Store, StrokeEntry,
 };
+use machine::Stage;
 
 /// A screw that was calibrated.
 #[derive(Clone, Debug)]
@@ -112,7 +112,7 @@ impl Machine {
                     let Some(approach) = approach else { continue };
                     strokes.push(self.measure_stroke(at, run, approach, stroke, journal)?);
                     done += 1;
-                    let observer = &mut self.observer;
+                    let observer = self.core.observer();
                     observer.progress(Stage::Calibrate, "platform", done, total);
                 }
             }

@@ -5,8 +5,8 @@ use drivers::device::PoseReading;
 
 use super::failure::PlatformFailure;
 use super::state::from_datum;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 impl Machine {
     /// Where the platform is, seen from where its screws' zeros put it.

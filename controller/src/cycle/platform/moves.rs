@@ -11,9 +11,9 @@ use super::failure::PlatformFailure;
 use super::state::{PlatformState, engaged_by};
 use super::take_up::TakenUp;
 use crate::config::PlatformConfig;
+use crate::connected::Machine;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// Travels below this are none: the drives would not even count them.
 const TRAVEL_MIN: Metres = Metres(1e-9);
@@ -237,17 +237,8 @@ impl Machine {
 
     fn start_together(&mut self, moving: &[(String, usize)]) -> Result<(), Failure> {
         self.await_next_sample(&moving[0].0)?;
-        let now = self.now();
-        let mut started = Vec::new();
-        for (axis, _) in moving {
-            let at = self.axis_index(axis)?;
-            self.axes[at].device.command(now, AxisCommand::Start);
-            started.push((at, self.move_limit(axis)?));
-        }
-        for (at, limit) in started {
-            self.await_outcome(at, "move", limit)?;
-        }
-        Ok(())
+        let axes: Vec<_> = moving.iter().map(|(axis, _)| axis.as_str()).collect();
+        Ok(self.core.start_together(&axes)?)
     }
 
     /// Right after a sample there is the most time until the next SYNC: what is sent now
@@ -279,7 +270,7 @@ impl Machine {
     fn start_skew(&self, moving: &[(String, usize)]) -> Result<Option<Duration>, Failure> {
         let mut times = Vec::new();
         for (axis, _) in moving {
-            times.extend(self.axis(axis)?.device.started_at());
+            times.extend(self.started_at(axis)?);
         }
         let (first, last) = (times.iter().min(), times.iter().max());
         Ok(match (first, last) {
@@ -289,9 +280,7 @@ impl Machine {
     }
 
     fn move_limit(&self, axis: &str) -> Result<Duration, Failure> {
-        Ok(Duration::from_secs_f64(
-            self.axis_config(axis)?.move_timeout_s,
-        ))
+        Ok(self.axis_settings(axis)?.move_timeout)
     }
 
     /// The travel after which a screw is engaged whatever it was before.

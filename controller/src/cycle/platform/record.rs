@@ -2,9 +2,9 @@
 
 use units::Metres;
 
+use crate::connected::Machine;
 use crate::cycle::utc_now;
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{
     ArrangementEntry, Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader,
     SCHEMA_VERSION, Store,

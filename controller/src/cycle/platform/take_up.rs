@@ -4,9 +4,9 @@ use compensator::screw::{Engagement, ScrewCompensation, ScrewMemory};
 use units::{Approach, Metres};
 
 use super::state::Screw;
+use crate::connected::Machine;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// A screw whose play was taken up.
 #[derive(Clone, Debug, PartialEq)]

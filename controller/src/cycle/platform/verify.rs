@@ -10,12 +10,12 @@ use units::{Metres, Radians};
 use super::failure::PlatformFailure;
 use super::state::{difference, largest_error};
 use crate::config::AlignConfig;
+use crate::connected::Machine;
 use crate::cycle::note_failure;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Entry, Journal, PoseEntry, Store};
+use machine::Stage;
 
 /// One pose that was verified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,7 +138,8 @@ impl Machine {
                 skew_s,
             });
             let total = targets.len() as u64;
-            self.observer
+            self.core
+                .observer()
                 .progress(Stage::Verify, "platform", done, total);
         }
         journal.write(&Entry::Complete)?;

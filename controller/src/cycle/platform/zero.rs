@@ -8,11 +8,11 @@ use compensator::platform::Pose;
 use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond};
 
+use crate::connected::Machine;
 use crate::cycle::travel::Correction;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Entry, PoseEntry, Store};
+use machine::Stage;
 
 /// The datum is what everything is measured from: it is looked at so many times more often.
 const DATUM_LOOKS: u32 = 8;
@@ -52,19 +52,22 @@ impl Machine {
         let screws = self.platform_state()?.screws.clone();
         let steps = screws.len() as u64 + 1;
         for screw in &screws {
-            self.remember(&screw.axis).zeroed = false;
+            self.set_zeroed(&screw.axis, false)?;
             self.enable(&screw.axis)?;
         }
         for (done, screw) in (0..).zip(&screws) {
-            self.observer.progress(Stage::Zero, "platform", done, steps);
+            self.core
+                .observer()
+                .progress(Stage::Zero, "platform", done, steps);
             self.home_on_index(&screw.axis, screw.index)?;
-            self.remember(&screw.axis).zeroed = true;
+            self.set_zeroed(&screw.axis, true)?;
         }
         self.approach_zero()?;
         let exposures = self.platform_config()?.exposures * DATUM_LOOKS;
         let datum = self.camera_pose(exposures)?;
         self.platform_state_mut()?.datum = Some(datum);
-        self.observer
+        self.core
+            .observer()
             .progress(Stage::Zero, "platform", steps, steps);
         Ok(datum)
     }
@@ -73,12 +76,8 @@ impl Machine {
         let zero = &self.platform_config()?.zero;
         let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
         let limit = Duration::from_secs_f64(zero.time_limit_s);
-        self.command(
-            axis,
-            AxisCommand::HomeIndex { position, speed },
-            "home on the index",
-            limit,
-        )
+        let command = AxisCommand::HomeIndex { position, speed };
+        Ok(self.command(axis, command, "home on the index", limit)?)
     }
 
     /// All screws to their zero from below, so that all lean on the same flank as ever.

@@ -11,9 +11,9 @@ use super::in_use::TableInUse;
 use super::operator::Operator;
 use super::placement::{Placed, PlateRun};
 use crate::config::ConfigHash;
+use crate::connected::Machine;
 use crate::cycle::{CalibrateOptions, note_failure, utc_now};
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{
     CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, PlatePlanEntry,
     ReadJournal, RecordHead, RotaryContent, SCHEMA_VERSION, Store, first_difference, not_resumable,
@@ -60,7 +60,7 @@ impl Machine {
         if options.accept_drift {
             run.closure_limit = None;
         }
-        self.require_table_zeroed(axis)?;
+        self.require_zeroed(axis)?;
         let offsets: Vec<f64> = config
             .design()?
             .offsets()

@@ -6,10 +6,10 @@ use units::Radians;
 use super::failure::RotaryFailure;
 use super::in_use::TableInUse;
 use crate::assemble;
+use crate::connected::Machine;
 use crate::cycle::Way;
 use crate::cycle::calibrate::missing;
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{RotaryContent, Store};
 
 /// A move of a rotary axis that was made. Angles count on over the turns.
@@ -37,7 +37,7 @@ impl Machine {
         angle: Radians,
         way: Way,
     ) -> Result<RotaryMoved, Failure> {
-        self.require_table_zeroed(axis)?;
+        self.require_zeroed(axis)?;
         let not_an_angle = |source| RotaryFailure::NotAnAngle {
             axis: axis.to_owned(),
             source,
@@ -79,7 +79,7 @@ impl Machine {
         axis: &str,
         store: &Store,
     ) -> Result<Option<String>, Failure> {
-        self.rotary_index(axis)?;
+        self.rotary_config(axis)?;
         let Some(id) = store.active(axis)?.current else {
             return Ok(None);
         };

@@ -10,12 +10,12 @@ use units::{Approach, Radians, RadiansPerSecond};
 use super::failure::RotaryFailure;
 use super::operator::{Operator, PlateMove, PlateTask};
 use crate::config::RotaryCalibrateConfig;
+use crate::connected::Machine;
 use crate::cycle::calibrate::missing;
 use crate::cycle::{Sweep, SweepOptions};
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Entry, Journal, PlacementEntry, PlatePlanEntry, SweepEntry};
+use machine::Stage;
 
 /// How long the machine lives between two looks at the person.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -237,7 +237,7 @@ impl Machine {
             let look = self.now() + LOOK_EVERY;
             self.tick(look)?;
         }
-        self.enable(axis)
+        Ok(self.enable(axis)?)
     }
 
     /// Reads the plate as it lies, `done` passes of `total` being read already. `phase` is that of
@@ -282,7 +282,7 @@ impl Machine {
             journal.write(&Entry::Sweep(entry.clone()))?;
             sweeps.push(entry);
             let done = u64::from(done + number + 1);
-            let observer = &mut self.observer;
+            let observer = self.core.observer();
             observer.progress(run.stage, axis, done, total.into());
         }
         self.warn_of_lines(axis, &sweeps);
@@ -318,7 +318,7 @@ impl Machine {
                 .into());
             }
             again += 1;
-            self.observer.warning(&format!(
+            self.core.observer().warning(&format!(
                 "axis {axis}: {} of {lines} lines were overwritten before they were read; the pass is \
                  made again",
                 sweep.overwritten.len()
@@ -365,7 +365,7 @@ impl Machine {
         };
         let mut say = |text: String| {
             let text = format!("axis {axis}, plate at offset {}: {text}", first.offset);
-            self.observer.warning(&text);
+            self.core.observer().warning(&text);
         };
         let unseen = seldom(|it| &it.missing, sweeps.len());
         if !unseen.is_empty() {

@@ -21,12 +21,12 @@ use super::failure::RotaryFailure;
 use super::in_use::TableInUse;
 use super::operator::Operator;
 use super::placement::{Placed, PlateRun};
+use crate::connected::Machine;
 use crate::cycle::calibrate::missing;
 use crate::cycle::note_failure;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Entry, Journal, JudgedEntry, Store, short};
+use machine::Stage;
 
 /// How much better another place of the plate must fit.
 const BETTER: f64 = 3.0;
@@ -100,7 +100,7 @@ impl Machine {
         compensated: bool,
         operator: &mut dyn Operator,
     ) -> Result<RotaryVerified, Failure> {
-        self.require_table_zeroed(axis)?;
+        self.require_zeroed(axis)?;
         let config = self.rotary_config(axis)?.verify.clone();
         let config = config.ok_or_else(|| missing(axis, "verify"))?;
         let (run, _) = self.plate_run(axis)?;

@@ -2,7 +2,7 @@
 //!
 //! In every period: detectors → displacement from the reference, freed of the beam's drift and of
 //! what a detector beside its slide's zero sees of tilts → less what the memories keep → feed, so that
-//! nothing jumps → model, with roll and temperatures → exact inverse. Size and rate are limited by the engine ([`crate::engine::CorrectionLimits`]), which also
+//! nothing jumps → model, with roll and temperatures → exact inverse. Size and rate are limited by the engine ([`machine::engine::CorrectionLimits`]), which also
 //! slews from one correction to the next; that the rate is enough at the axes' full speed is proven
 //! when the correction is made. Nothing is allocated in a period.
 //!
@@ -37,7 +37,7 @@ use crate::config::{
     BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, MachineConfig,
     ReactionName, RollConfig, VolumetricConfig,
 };
-use crate::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
+use machine::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
 
 /// As what a machine was calibrated: its errors, and what its detectors read then.
 #[derive(Clone, Debug, Default)]

@@ -11,7 +11,7 @@ use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 use super::calibrate::Scatter;
 use crate::assemble::BeamDetectorError;
-use crate::engine::{Cause, Lack, PushError};
+use machine::engine::{Cause, Lack, PushError};
 
 /// Why three axes are not corrected, or not zeroed.
 #[derive(Debug, thiserror::Error)]

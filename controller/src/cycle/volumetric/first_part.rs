@@ -20,10 +20,10 @@ use super::{
 };
 use crate::assemble::work_volume;
 use crate::config::MachineConfig;
-use crate::engine::{Corrected, Correction, Observed};
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{MemoryName, Store};
+use machine::engine::{Corrected, Correction, Observed};
 
 /// So many stretches may lie between two places of an axis that were met.
 const GAP_STRETCHES: f64 = 2.0;

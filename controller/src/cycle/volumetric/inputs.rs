@@ -7,7 +7,7 @@ use units::{Metres, Quantity, Radians, Time, Volts};
 
 use crate::assemble::roll_optics;
 use crate::config::{AnalogConfig, FeedConfig, MachineConfig, RollConfig};
-use crate::engine::{Channel, Observed};
+use machine::engine::{Channel, Observed};
 
 use super::VolumetricFailure;
 

@@ -15,9 +15,9 @@ use super::reference::References;
 use super::{REFERENCES, VolumetricFailure, VolumetricRecords, VolumetricState, memory_pointer};
 use crate::assemble::volume_axis;
 use crate::config::{BeamConfig, VolumetricConfig};
+use crate::connected::Machine;
 use crate::cycle::utc_now;
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{
     AXES, CalibrationRecord, Content, MemoryName, RecordHead, StateMemoryContent, Store,
 };

@@ -9,11 +9,11 @@ use units::Metres;
 use super::VolumetricFailure;
 use crate::assemble::work_volume;
 use crate::config::VolumetricConfig;
-use crate::engine::{
+use crate::connected::Machine;
+use crate::failure::Failure;
+use machine::engine::{
     Cause, Correction, Desk, Engine, Live, NoCorrection, PushError, State, Validity,
 };
-use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// So many time constants of its smoothing after it came, a value is there.
 const SMOOTHINGS: f64 = 3.0;
@@ -100,7 +100,9 @@ impl Machine {
         match validity {
             Validity::Valid => Ok(()),
             Validity::Without(lack) if lack.is_made_up_for() => {
-                self.observer.warning(&format!("corrected without {lack}"));
+                self.core
+                    .observer()
+                    .warning(&format!("corrected without {lack}"));
                 Ok(())
             }
             Validity::Without(lack) | Validity::Lost(lack) => {

@@ -1,7 +1,7 @@
 //! Why a path of three axes is not begun.
 
 use super::VolumetricFailure;
-use crate::engine::PushError;
+use machine::engine::PushError;
 
 /// Why a path is not begun.
 #[derive(Debug, thiserror::Error)]

@@ -17,15 +17,15 @@ use super::thermometers::Thermometry;
 use super::{GEOMETRY, REFERENCES, VolumetricFailure};
 use crate::assemble::{beam_detector, beam_drift, volume_axis};
 use crate::config::{BeamConfig, BeamDetectorConfig, MachineConfig, RollConfig, VolumetricConfig};
+use crate::connected::Machine;
 use crate::cycle::utc_now;
-use crate::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{
     AXES, BeamRecord, BeamReferencesContent, CalibrationRecord, Content, FunctionRecord,
     RecordHead, Store, short,
 };
+use machine::Stage;
+use machine::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
 
 /// How long an axis stands before its detectors count.
 const REST: Duration = Duration::from_millis(50);
@@ -229,7 +229,9 @@ impl Machine {
         let nodes = stops_along(config, axis, own.step_mm);
         let total = nodes.len() as u64;
         for (done, node) in (0..).zip(nodes) {
-            self.observer.progress(Stage::Reference, &name, done, total);
+            self.core
+                .observer()
+                .progress(Stage::Reference, &name, done, total);
             self.move_to(&name, node)?;
             self.stand_still(&name, REST)?;
             let seen = self.watch_at_rest(own.samples)?;
@@ -258,7 +260,8 @@ impl Machine {
                 thermometry.add(still.now, &still.temperatures)?;
             }
         }
-        self.observer
+        self.core
+            .observer()
             .progress(Stage::Reference, &name, total, total);
         Ok(stops)
     }
@@ -310,7 +313,7 @@ impl Machine {
     pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
         let expected = samples as usize;
         let started = self.now();
-        let limit = self.patience.of(SAMPLE_LIMIT);
+        let limit = self.patience().of(SAMPLE_LIMIT);
         let mut seen: Vec<Still> = Vec::with_capacity(expected);
         let (mut last, mut deadline) = (started, started + limit);
         while seen.len() < expected {
@@ -325,9 +328,9 @@ impl Machine {
                 .into());
             }
             self.tick(deadline)?;
-            let oldest = self.analogs.iter();
-            let oldest = oldest.map(|it| it.device.last_sample().unwrap_or(Time::ZERO));
-            let oldest = oldest.min().unwrap_or(Time::ZERO);
+            let newest = self.analogs().map(|it| it.last_sample());
+            let oldest = newest.map(|at| at.unwrap_or(Time::ZERO)).min();
+            let oldest = oldest.unwrap_or(Time::ZERO);
             if oldest <= last {
                 continue;
             }

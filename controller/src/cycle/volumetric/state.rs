@@ -10,8 +10,8 @@ use compensator::volumetric::online::{BeamReference, Memories};
 use super::{VolumetricFailure, VolumetricState};
 use crate::assemble::beam_drift;
 use crate::config::{ConfigHash, VolumetricConfig};
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{
     BeamReferencesContent, CalibrationRecord, GeometryContent, IdentityRecord, MemoryName,
     RecordHead, StateMemoryContent, Store, StoreError, short,

@@ -11,7 +11,7 @@ use super::VolumetricFailure;
 use super::inputs::{confirmed_by_samples, place_of_temperature};
 use crate::assemble::{feed_settings, temperature_settings};
 use crate::config::{FeedConfig, MachineConfig, TemperatureConfig};
-use crate::engine::{Observed, ThermometerSample};
+use machine::engine::{Observed, ThermometerSample};
 
 /// What is read of a thermometer at a moment: when its sample came, and what it said.
 fn newest(seen: &[Option<ThermometerSample>], place: usize) -> Option<(Time, Celsius)> {

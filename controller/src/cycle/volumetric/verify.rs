@@ -12,12 +12,12 @@ use super::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
 use super::{Mover, VolumetricCorrection, VolumetricFailure};
 use crate::assemble::point_of_mm;
 use crate::config::{VolumetricConfig, VolumetricVerifyConfig};
+use crate::connected::Machine;
 use crate::cycle::note_failure;
-use crate::engine::THERMOMETERS_MAX;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{Entry, Journal, LineReadingEntry, Store, VolumeCheckEntry, metres};
+use machine::Stage;
+use machine::engine::THERMOMETERS_MAX;
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -188,7 +188,9 @@ impl Machine {
         let mut points = Vec::new();
         for n in 0..=last {
             let (done, total) = (u64::from(n), u64::from(own.points));
-            self.observer.progress(Stage::Verify, WHOLE, done, total);
+            self.core
+                .observer()
+                .progress(Stage::Verify, WHOLE, done, total);
             let share = f64::from(n) / f64::from(last);
             let way = to - from;
             let at = from + Point::new(way.x * share, way.y * share, way.z * share);

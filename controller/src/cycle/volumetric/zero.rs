@@ -9,9 +9,9 @@ use units::{Metres, MetresPerSecond};
 use super::VolumetricFailure;
 use crate::assemble::volume_axis;
 use crate::config::VolumetricConfig;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
+use machine::Stage;
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -30,17 +30,19 @@ impl Machine {
         let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
         let limit = Duration::from_secs_f64(zero.time_limit_s);
         for axis in &config.axes {
-            self.remember(axis).zeroed = false;
+            self.set_zeroed(axis, false)?;
             self.enable(axis)?;
         }
         let steps = zero.order.len() as u64;
         for (done, name) in (0..).zip(zero.order) {
-            self.observer.progress(Stage::Zero, WHOLE, done, steps);
+            self.core
+                .observer()
+                .progress(Stage::Zero, WHOLE, done, steps);
             let at = volume_axis(name).index();
             let (axis, position) = (&config.axes[at], Metres::from_mm(zero.index_mm[at]));
             let command = AxisCommand::HomeIndex { position, speed };
             self.command(axis, command, "home on the index", limit)?;
-            self.remember(axis).zeroed = true;
+            self.set_zeroed(axis, true)?;
         }
         // Each ran past its pulse before it stopped: whoever goes on finds all of them at rest.
         for name in zero.order {
@@ -49,7 +51,9 @@ impl Machine {
             self.move_to(axis, Metres::from_mm(zero.index_mm[at]))?;
             self.stand_still(axis, REST)?;
         }
-        self.observer.progress(Stage::Zero, WHOLE, steps, steps);
+        self.core
+            .observer()
+            .progress(Stage::Zero, WHOLE, steps, steps);
         Ok(())
     }
 

@@ -43,14 +43,14 @@ use super::thermometers::Thermometry;
 use super::{GEOMETRY, VolumetricFailure};
 use crate::assemble::{beam_drift, function_shape, point_of_mm};
 use crate::config::{VolumetricCalibrateConfig, VolumetricConfig};
+use crate::connected::Machine;
 use crate::cycle::{note_failure, utc_now};
 use crate::failure::Failure;
-use crate::machine::Machine;
-use crate::observer::Stage;
 use crate::store::{
     AgreementRecord, CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader,
     RecordHead, SCHEMA_VERSION, Store, UnknownRecord, VolumeRead, VolumeReferencesEntry,
 };
+use machine::Stage;
 
 use known::Known;
 
@@ -186,7 +186,8 @@ impl Machine {
         let total = session.lines.len();
         let mut is_warm = false;
         for at in 0..total {
-            self.observer
+            self.core
+                .observer()
                 .progress(Stage::Calibrate, WHOLE, at as u64, total as u64);
             if session.read.is_whole(at) {
                 continue;
@@ -200,7 +201,8 @@ impl Machine {
             self.run_line(session, at, journal)?;
         }
         self.end_lines(session.operator)?;
-        self.observer
+        self.core
+            .observer()
             .progress(Stage::Calibrate, WHOLE, total as u64, total as u64);
         Ok(())
     }

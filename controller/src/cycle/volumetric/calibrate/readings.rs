@@ -9,10 +9,10 @@ use units::{Celsius, Metres};
 
 use super::Session;
 use crate::assemble::volume_axis;
+use crate::connected::Machine;
 use crate::cycle::volumetric::correction::lever;
 use crate::cycle::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{Entry, Journal, LineReadEntry, LineReadingEntry};
 
 impl Machine {

@@ -14,10 +14,10 @@ use units::{Metres, Radians};
 
 use crate::assemble::{beam_drift, volume_axis};
 use crate::config::{BeamConfig, ConfigHash, VolumetricCalibrateConfig, VolumetricConfig};
+use crate::connected::Machine;
 use crate::cycle::volumetric::reference::warmth_tolerance_k;
 use crate::cycle::volumetric::{References, VolumetricFailure};
 use crate::failure::Failure;
-use crate::machine::Machine;
 use crate::store::{
     AXES, Entry, Journal, JournalHeader, Store, StoreError, VolumePlanEntry, VolumeRead,
     VolumeReferencesEntry, first_difference, not_resumable,

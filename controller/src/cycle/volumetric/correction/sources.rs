@@ -10,7 +10,7 @@ use units::Time;
 
 use super::super::thermometers::Thermometers;
 use super::VolumetricCorrection;
-use crate::engine::Source;
+use machine::engine::Source;
 
 impl VolumetricCorrection {
     /// Watches displacements without compensating them from now on: the machine is made to be as it

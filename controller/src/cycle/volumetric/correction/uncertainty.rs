@@ -8,7 +8,7 @@ use units::{Metres, Quantity, Radians};
 
 use super::super::thermometers::Thermometers;
 use super::{VolumetricCorrection, per_axis};
-use crate::engine::{AXES_MAX, PerAxis};
+use machine::engine::{AXES_MAX, PerAxis};
 
 impl VolumetricCorrection {
     /// Of a displacement that nobody sees nothing is known but that it is no larger than the

@@ -25,8 +25,8 @@ pub use task::{LineOperator, LineOptics, LineTask};
 
 use super::VolumetricFailure;
 use crate::assemble;
+use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::machine::Machine;
 
 /// How long the machine lives between two looks at the person, or at the light.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -116,7 +116,7 @@ impl Machine {
         let along = task.direction().ok_or(VolumetricFailure::NotALine)?;
         let measure = self.measure_of(task.optics, &readout.instrument)?;
         let axes = self.volumetric_config()?.axes.clone();
-        self.instrument_in_use = None;
+        self.leave_instrument();
         self.go_straight(task.start)?;
         self.rest_all(REST)?;
         for axis in &axes {
@@ -133,7 +133,7 @@ impl Machine {
         let offset = self.read_path(readout)?.vacuum;
         let config = &self.config.instrument[&readout.instrument];
         let settings = assemble::line_corrections(config, measure.has_two_beams());
-        let environment = self.instrument_environment(&readout.instrument);
+        let environment = self.instrument_environment(&readout.instrument)?;
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(settings, &environment);
         let length = length.map_err(|source| Failure::Correction {
@@ -170,7 +170,7 @@ impl Machine {
     ) -> Result<LineReading, Failure> {
         let counted = self.read_path(&line.readout)?;
         let instrument = &line.readout.instrument;
-        let environment = self.instrument_environment(instrument);
+        let environment = self.instrument_environment(instrument)?;
         let environment = assemble::correction_environment(&environment);
         let failed = |source| Failure::Correction {
             instrument: instrument.clone(),
@@ -201,9 +201,7 @@ impl Machine {
     /// # Errors
     /// When nobody can be told.
     pub fn end_lines(&mut self, operator: &mut dyn LineOperator) -> Result<(), Failure> {
-        self.instrument_in_use = None;
-        // What is brought again must say again who it is.
-        self.started_instruments.clear();
+        self.forget_instruments();
         operator.pack_up()
     }
 
@@ -222,7 +220,7 @@ impl Machine {
     /// cyclic motion no drive has a target that it could report as reached.
     fn rest_all(&mut self, span: Duration) -> Result<(), Failure> {
         let axes = self.volumetric_config()?.axes.clone();
-        let limit = self.patience.of(SETTLING_LIMIT) + span;
+        let limit = self.patience().of(SETTLING_LIMIT) + span;
         let begin = self.now();
         let mut since = begin;
         while self.now().since(since) < span {
@@ -233,11 +231,11 @@ impl Machine {
                 }
                 since = self.now();
                 if since.since(begin) > limit {
-                    return Err(Failure::Overdue {
+                    return Err(Failure::Machine(machine::Failure::Overdue {
                         device: axis.clone(),
                         step: "standing still",
                         waited: limit,
-                    });
+                    }));
                 }
             }
         }
@@ -261,16 +259,15 @@ impl Machine {
     /// line up had his hands in the beam.
     fn find_light(&mut self, instrument: &str) -> Result<(), Failure> {
         self.use_instrument(instrument)?;
-        self.instrument_in_use = None;
-        let at = self.instrument_index(instrument);
-        let limit = self.now() + self.patience.of(LIGHT_LIMIT);
+        self.leave_instrument();
+        let limit = self.now() + self.patience().of(LIGHT_LIMIT);
         loop {
             let now = self.now();
-            self.instruments[at].device.set_datum(now);
+            self.set_instrument_datum(instrument)?;
             self.run_until(now + LOOK_EVERY)?;
-            let is_lit = self.instruments[at].device.latest().is_some();
+            let is_lit = self.instrument(instrument)?.latest().is_some();
             if is_lit {
-                return self.use_instrument(instrument);
+                return Ok(self.use_instrument(instrument)?);
             }
             if self.now() >= limit {
                 let instrument = instrument.to_owned();
@@ -282,16 +279,8 @@ impl Machine {
     /// Lets the machine stand, then averages.
     fn read_path(&mut self, readout: &LineReadout) -> Result<DisplacementReading, Failure> {
         self.rest_all(readout.settle)?;
-        let at = self.instrument_index(&readout.instrument);
-        let now = self.now();
-        let device = &mut self.instruments[at].device;
-        device.begin_average(now, readout.samples);
-        let rate = self.config.instrument[&readout.instrument].sample_rate_hz;
-        // Four times the nominal time: the stream comes in batches over USB.
-        let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(readout.samples) / rate);
-        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        let average = self.instruments[at].device.average();
-        Ok(average.expect("an average that ended well is there"))
+        let rate_hz = self.config.instrument[&readout.instrument].sample_rate_hz;
+        Ok(self.average(&readout.instrument, readout.samples, rate_hz)?)
     }
 
     /// What is beyond anything that can be compensated is no error of the machine, but wrong

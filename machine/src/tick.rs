@@ -270,18 +270,13 @@ impl Machine {
         if !lost || at >= self.drive_count() {
             return;
         }
-        let name = self.device_name(at);
-        if at < self.axes.len() {
-            self.remember(&name).zeroed = false;
-        } else {
-            self.rotary_memory.entry(name).or_default().zeroed = false;
-        }
+        self.zeroed[at] = false;
     }
 
     pub(crate) fn port_name(&self, port: Port) -> String {
-        self.port_names
-            .get(&port)
-            .cloned()
-            .unwrap_or_else(|| format!("port {}", port.0))
+        let mut buses = self.buses.iter();
+        let bus = buses.find(|it| it.port == port).map(|it| &it.name);
+        let name = bus.or_else(|| self.lines.get(&port));
+        name.cloned().unwrap_or_else(|| format!("port {}", port.0))
     }
 }

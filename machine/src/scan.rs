@@ -8,15 +8,15 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use drivers::device::Identity;
+use drivers::device::canopen_node::ExpectedIdentity;
 use wire::can::CanFrame;
 use wire::canopen::sdo::{SdoRequest, SdoResponse};
 use wire::canopen::{Function, NodeId, Object};
 use wire::{Arrival, Input, Payload, Port};
 
-use crate::assemble;
-use crate::config::IdentityConfig;
 use crate::failure::Failure;
 use crate::machine::Machine;
+use crate::parts::{Bus, ExpectedNode};
 
 /// What a scan says of one node or device.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,25 +72,18 @@ impl Machine {
     /// When a bus or line cannot be used.
     pub fn scan(&mut self) -> Result<Vec<Found>, Failure> {
         let mut found = Vec::new();
-        let ports: Vec<_> = self
-            .port_names
-            .iter()
-            .map(|(port, name)| (*port, name.clone()))
-            .collect();
-        for (port, name) in ports {
-            if self.config.can.contains_key(&name) {
-                found.extend(self.scan_can(port, &name)?);
-            }
+        for bus in self.buses.clone() {
+            found.extend(self.scan_can(&bus)?);
         }
         found.extend(self.scan_serial()?);
         Ok(found)
     }
 
-    fn scan_can(&mut self, port: Port, name: &str) -> Result<Vec<Found>, Failure> {
+    fn scan_can(&mut self, bus: &Bus) -> Result<Vec<Found>, Failure> {
+        let (port, name, expected) = (bus.port, &*bus.name, &bus.nodes);
         let mut answers = Answers::new();
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
-        let expected = assemble::expected_nodes(&self.config, name);
-        let awaited: Vec<_> = expected.keys().filter_map(|it| NodeId::new(*it)).collect();
+        let awaited: Vec<_> = expected.keys().copied().collect();
         self.observer
             .waiting(&format!("{name}: nodes 1 to 127 are asked who they are"));
         self.ask_once(port, &all, DEVICE_TYPE, &mut answers)?;
@@ -108,13 +101,12 @@ impl Machine {
         }
         let mut found: Vec<_> = answers
             .iter()
-            .map(|(node, values)| judge(name, *node, values, expected.get(&node.raw())))
+            .map(|(node, values)| judge(name, *node, values, expected.get(node)))
             .collect();
-        for (node, (device, _)) in &expected {
-            if !answers.keys().any(|present| present.raw() == *node) {
-                found.push(missing(name, *node, device));
-            }
-        }
+        let absent = expected
+            .iter()
+            .filter(|(node, _)| !answers.contains_key(node));
+        found.extend(absent.map(|(node, it)| missing(name, *node, &it.device)));
         Ok(found)
     }
 
@@ -213,7 +205,7 @@ impl Machine {
         let mut asked = Vec::new();
         for at in 0..self.device_count() {
             let port = self.device_mut(at).port;
-            if self.config.serial.contains_key(&self.port_names[&port]) {
+            if self.lines.contains_key(&port) {
                 self.device_mut(at).device.identify(now);
                 let result = None;
                 asked.push(Asked { at, port, result });
@@ -273,7 +265,7 @@ impl Machine {
         });
         let identity = self.device_mut(at).device.identity();
         Found {
-            port: self.port_names[&port].clone(),
+            port: self.port_name(port),
             node: None,
             name: Some(self.device_name(at)),
             identity: identity.filter(|_| result.is_ok()),
@@ -318,7 +310,7 @@ fn judge(
     port: &str,
     node: NodeId,
     values: &BTreeMap<Object, Option<u32>>,
-    expected: Option<&(String, IdentityConfig)>,
+    expected: Option<&ExpectedNode>,
 ) -> Found {
     let value = |object: Object| values.get(&object).copied().flatten().unwrap_or(0);
     let identity = Identity {
@@ -331,24 +323,24 @@ fn judge(
     };
     let mismatches = match expected {
         None => vec!["is not in the configuration".to_owned()],
-        Some((_, expected)) => differences(&identity, expected),
+        Some(expected) => differences(&identity, &expected.identity),
     };
     Found {
         port: port.to_owned(),
         node: Some(node.raw()),
-        name: expected.map(|(name, _)| name.clone()),
+        name: expected.map(|it| it.device.clone()),
         identity: Some(identity),
         mismatches,
     }
 }
 
-fn differences(seen: &Identity, expected: &IdentityConfig) -> Vec<String> {
+fn differences(seen: &Identity, expected: &ExpectedIdentity) -> Vec<String> {
     let comparisons = [
-        ("device type", Some(expected.device_type), seen.device_type),
-        ("vendor", Some(expected.vendor_id), seen.vendor),
-        ("product", Some(expected.product_code), seen.product),
+        ("device type", expected.device_type, seen.device_type),
+        ("vendor", expected.vendor, seen.vendor),
+        ("product", expected.product, seen.product),
         ("revision", expected.revision, seen.revision),
-        ("serial number", expected.serial_number, seen.serial),
+        ("serial number", expected.serial, seen.serial),
     ];
     comparisons
         .into_iter()
@@ -358,10 +350,10 @@ fn differences(seen: &Identity, expected: &IdentityConfig) -> Vec<String> {
         .collect()
 }
 
-fn missing(port: &str, node: u8, device: &str) -> Found {
+fn missing(port: &str, node: NodeId, device: &str) -> Found {
     Found {
         port: port.to_owned(),
-        node: Some(node),
+        node: Some(node.raw()),
         name: Some(device.to_owned()),
         identity: None,
         mismatches: vec!["does not answer: power, cable, bit rate or node number?".to_owned()],

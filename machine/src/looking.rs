@@ -4,14 +4,14 @@ use core::time::Duration;
 
 use drivers::device::PoseReading;
 
-use crate::camera::inspection_timeout;
 use crate::failure::Failure;
 use crate::machine::Machine;
 
 impl Machine {
     /// The names of the image controllers.
     pub fn camera_names(&self) -> Vec<String> {
-        self.cameras.iter().map(|unit| unit.name.clone()).collect()
+        let names = self.cameras.iter().map(|it| it.unit.name.clone());
+        names.collect()
     }
 
     /// Where image controller `camera` sees the machine's platform now, from `exposures`
@@ -25,18 +25,18 @@ impl Machine {
         let place = self.camera_index(camera)?;
         self.use_camera(camera)?;
         let now = self.now();
-        self.cameras[place].device.begin_pose(now, exposures);
+        self.cameras[place].unit.device.begin_pose(now, exposures);
         // The driver ends by itself; this is the last resort, in a number that a clock can bear.
-        let config = &self.config.camera[camera];
+        let camera = &self.cameras[place];
         let pictures = exposures
-            .saturating_add(config.rejects_max)
+            .saturating_add(camera.rejects_max)
             .clamp(1, 10_000);
-        let limit = 4 * inspection_timeout(config) + Duration::from_secs(10);
+        let limit = 4 * camera.inspection_timeout + Duration::from_secs(10);
         let at = self.camera_device(place);
         let outcome = self.await_outcome(at, "pose", limit * pictures);
         self.instrument_in_use = None;
         outcome?;
-        let pose = self.cameras[place].device.pose();
+        let pose = self.cameras[place].unit.device.pose();
         Ok(pose.expect("a pose that ended well can be read"))
     }
 
@@ -47,9 +47,10 @@ impl Machine {
     }
 
     fn camera_index(&self, name: &str) -> Result<usize, Failure> {
-        let place = self.cameras.iter().position(|unit| unit.name == name);
-        place.ok_or_else(|| Failure::NoSuchCamera {
-            camera: name.to_owned(),
+        let place = self.cameras.iter().position(|it| it.unit.name == name);
+        place.ok_or_else(|| Failure::NoSuchDevice {
+            what: "camera",
+            name: name.to_owned(),
             known: self.camera_names().join(", "),
         })
     }

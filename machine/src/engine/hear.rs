@@ -34,7 +34,7 @@ impl Machine {
 
     /// Puts the newest sample of each analog channel into its place, in the order of the
     /// modules' names.
-    pub(crate) fn hear_channels(&self, channels: &mut [Option<Channel>]) {
+    pub fn hear_channels(&self, channels: &mut [Option<Channel>]) {
         // A module without a sample keeps its places: its channels would else be taken for
         // those of the next one. What it said last stays, as old as it is.
         let mut first = 0;
@@ -56,7 +56,7 @@ impl Machine {
     }
 
     /// Likewise of the thermometers.
-    pub(crate) fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
+    pub fn hear_temperatures(&self, temperatures: &mut [Option<ThermometerSample>]) {
         let modules = self.analogs.iter();
         let mut first = 0;
         for module in modules.filter_map(|it| it.device.thermometers()) {

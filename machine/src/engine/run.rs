@@ -24,11 +24,12 @@ use wire::{Payload, Port};
 use super::account::Trouble;
 use super::pace::Pace;
 use super::{
-    AXES_MAX, AxisLimits, CHANNELS_MAX, Cause, Channel, CorrectionLimits, Engine, EngineFailure,
-    PerAxis, THERMOMETERS_MAX, ThermometerSample,
+    AXES_MAX, CHANNELS_MAX, Cause, Channel, Engine, EngineFailure, PerAxis, THERMOMETERS_MAX,
+    ThermometerSample,
 };
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
+use crate::parts::CyclicSettings;
 
 /// The share of a period in which answers are awaited.
 const LISTEN_SHARE: f64 = 0.5;
@@ -104,49 +105,35 @@ impl Machine {
         })?;
         let leave = DriveCommand::LeaveCyclic;
         self.change_at_rest(engine, &seats, leave, "leaving the cyclic mode")?;
-        for axis in &engine.axes {
-            self.remember(axis).approach.forget();
+        for at in &seats.drive[..seats.count] {
+            self.approach[*at].forget();
         }
         Ok(cause)
     }
 
-    /// What the configuration says about a cyclic axis, and the period of its bus.
-    pub(super) fn cyclic_limits(
-        &self,
-        axis: &str,
-    ) -> Result<(AxisLimits, CorrectionLimits, Duration), Failure> {
-        let config = self.axis_config(axis)?;
-        let of_can = config.can().zip(config.cyclic.as_ref());
-        let Some((can, cyclic)) = of_can else {
+    /// Within which `axis` follows cyclic set-points.
+    ///
+    /// # Errors
+    /// When there is no such axis, or it is not configured for that.
+    pub fn cyclic_settings(&self, axis: &str) -> Result<CyclicSettings, Failure> {
+        let cyclic = self.axis_settings(axis)?.cyclic;
+        cyclic.ok_or_else(|| {
             let axis = axis.to_owned();
-            return Err(EngineFailure::NotConfigured { axis }.into());
-        };
-        let (limits, correction) = crate::assemble::cyclic_settings(config, cyclic);
-        let period_ms = self.config.can[can.bus].sync_period_ms;
-        Ok((
-            limits,
-            correction,
-            Duration::from_secs_f64(period_ms * 1e-3),
-        ))
+            EngineFailure::NotConfigured { axis }.into()
+        })
     }
 
     /// The loop's SYNC goes out on every CAN bus, also those that carry none of its axes.
     pub(super) fn require_one_sync(&self, expected: Duration) -> Result<(), Failure> {
-        let buses = self.config.can.iter();
-        let mut others = buses.filter_map(|(bus, it)| {
-            let seen = Duration::from_secs_f64(it.sync_period_ms * 1e-3);
-            (seen != expected).then(|| (bus.clone(), seen))
-        });
-        match others.next() {
+        let mut buses = self.buses.iter();
+        match buses.find(|it| it.sync_period != expected) {
             None => Ok(()),
-            Some((bus, seen)) => {
-                let periods = EngineFailure::Periods {
-                    bus,
-                    expected,
-                    seen,
-                };
-                Err(periods.into())
+            Some(other) => Err(EngineFailure::Periods {
+                bus: other.name.clone(),
+                expected,
+                seen: other.sync_period,
             }
+            .into()),
         }
     }
 
@@ -155,12 +142,10 @@ impl Machine {
         for (at, axis) in engine.axes.iter().enumerate() {
             drive[at] = self.axis_index(axis)?;
         }
-        let buses = self.port_names.iter();
-        let buses = buses.filter(|(_, name)| self.config.can.contains_key(*name));
         Ok(Seats {
             count: engine.axes.len(),
             drive,
-            buses: buses.map(|(port, _)| *port).collect(),
+            buses: self.buses.iter().map(|it| it.port).collect(),
             channels: [None; CHANNELS_MAX],
             temperatures: [None; THERMOMETERS_MAX],
         })
@@ -217,7 +202,7 @@ impl Machine {
     /// As near as a move ends counts as inside.
     fn require_place(&self, axis: &str, at: Metres) -> Result<(), Failure> {
         let (min, max) = self.soft_limits(axis)?;
-        let window = Metres::from_um(self.axis_config(axis)?.position_window_um);
+        let window = self.axis_settings(axis)?.position_window;
         if min - window <= at && at <= max + window {
             return Ok(());
         }

@@ -56,8 +56,8 @@ impl Machine {
         for unit in &mut self.instruments {
             act(unit.port, &mut *unit.device);
         }
-        for unit in &mut self.cameras {
-            act(unit.port, &mut *unit.device);
+        for camera in &mut self.cameras {
+            act(camera.unit.port, &mut *camera.unit.device);
         }
     }
 
@@ -74,7 +74,8 @@ impl Machine {
         let analogs = self.analogs.iter().map(|it| (&it.name, &*it.device as _));
         let instruments = self.instruments.iter();
         let instruments = instruments.map(|it| (&it.name, &*it.device as _));
-        let cameras = self.cameras.iter().map(|it| (&it.name, &*it.device as _));
+        let cameras = self.cameras.iter().map(|it| &it.unit);
+        let cameras = cameras.map(|it| (&it.name, &*it.device as _));
         let machines_own = axes.chain(rotaries).chain(analogs);
         machines_own.chain(instruments).chain(cameras)
     }
@@ -89,6 +90,13 @@ impl Machine {
         self.devices()
             .filter_map(|(name, device)| Some((name.clone(), device.identity()?)))
             .collect()
+    }
+
+    /// What the device `name` said it is; `None` when it has not said that, or there is no such
+    /// device.
+    pub fn identity(&self, name: &str) -> Option<Identity> {
+        let (_, device) = self.devices().find(|(own, _)| *own == name)?;
+        device.identity()
     }
 
     /// Counters of every device: dropped, late, mismatched and the like.
@@ -124,7 +132,7 @@ impl Machine {
         } else if at < instruments {
             self.instruments[at - machines_own].as_device()
         } else {
-            self.cameras[at - instruments].as_device()
+            self.cameras[at - instruments].unit.as_device()
         }
     }
 
@@ -158,22 +166,6 @@ impl Machine {
             axis: axis.to_owned(),
             known: names.join(", "),
         })
-    }
-
-    /// The number of a named instrument among all devices.
-    pub(crate) fn instrument_index(&self, name: &str) -> usize {
-        self.instruments
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
-    }
-
-    /// The number of a named analog module among those.
-    pub(crate) fn analog_index(&self, name: &str) -> usize {
-        self.analogs
-            .iter()
-            .position(|unit| unit.name == name)
-            .expect("the configuration was checked: references exist")
     }
 
     /// The number, among all devices, of instrument number `at`.

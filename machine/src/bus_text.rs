@@ -4,7 +4,7 @@ use wire::LinkState;
 use wire::can::CanId;
 
 /// With all the digits that it can have, as it stands in a log of the bus.
-pub(crate) fn identifier_text(id: CanId) -> String {
+pub fn identifier_text(id: CanId) -> String {
     match id {
         CanId::Standard(raw) => format!("identifier {raw:#05X}"),
         CanId::Extended(raw) => format!("29-bit identifier {raw:#010X}"),
@@ -12,7 +12,7 @@ pub(crate) fn identifier_text(id: CanId) -> String {
 }
 
 /// What became of a bus or line.
-pub(crate) fn link_text(state: LinkState) -> &'static str {
+pub fn link_text(state: LinkState) -> &'static str {
     match state {
         LinkState::Up => "came back; the machine must be started anew",
         LinkState::Down => {

@@ -135,7 +135,10 @@ impl Engine {
         }; AXES_MAX];
         let mut period = Duration::ZERO;
         for (at, name) in axes.iter().enumerate() {
-            (limits[at], of_correction[at], period) = machine.cyclic_limits(name)?;
+            let cyclic = machine.cyclic_settings(name)?;
+            limits[at] = cyclic.limits;
+            of_correction[at] = cyclic.correction;
+            period = cyclic.period;
         }
         let names: Vec<String> = axes.iter().map(|name| (*name).to_owned()).collect();
         if let Some(twice) = (1..names.len()).find(|at| names[..*at].contains(&names[*at])) {

@@ -7,11 +7,9 @@
 
 use compensator::apply::ApproachTracker;
 use compensator::error_table::{Compensation, ErrorTable};
-use units::{Approach, Metres, MetresPerSecond};
+use units::{Approach, Metres};
 
-use super::{AXES_MAX, Corrected, Correction, EngineFailure, Observed, PerAxis, Validity};
-use crate::failure::Failure;
-use crate::machine::Machine;
+use super::{AXES_MAX, Corrected, Correction, Observed, Validity};
 
 /// Corrects each axis by its own table.
 #[derive(Clone, Debug)]
@@ -80,42 +78,11 @@ fn uncertainty(table: &ErrorTable, position: Metres, approach: Approach) -> Metr
     at(above - 1) * (1.0 - share) + at(above) * share
 }
 
-impl Machine {
-    /// What the calibrations in use say of `axes` ([`Machine::load_active`]), for an engine of
-    /// these axes in this order.
-    ///
-    /// # Errors
-    /// When there is no such axis, it is not configured for the engine, or its correction at full
-    /// speed would change faster than `correction_rate_um_per_s`, or be larger than
-    /// `correction_limit_um`: it would be cut off on the way.
-    pub fn table_correction(&self, axes: &[&str]) -> Result<TableCorrection, Failure> {
-        let mut tables: PerAxis<Option<Compensation>> = core::array::from_fn(|_| None);
-        for (own, axis) in tables.iter_mut().zip(axes) {
-            let (limits, correction, _) = self.cyclic_limits(axis)?;
-            let Some(table) = self.compensation(axis) else {
-                continue;
-            };
-            let rate = MetresPerSecond(table.steepest_slope() * limits.speed.value());
-            let size = table.table().largest();
-            if rate > correction.rate || size > correction.size {
-                return Err(EngineFailure::CorrectionLimit {
-                    axis: (*axis).to_owned(),
-                    size,
-                    rate,
-                }
-                .into());
-            }
-            *own = Some(table.clone());
-        }
-        Ok(TableCorrection::new(tables.into_iter().take(axes.len())))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use compensator::error_table::{EndPolicy, Interpolation, Limits, Node};
-    use units::Time;
+    use units::{MetresPerSecond, Time};
 
     fn table(ends: EndPolicy) -> Compensation {
         let node = |mm: f64, forward_um: f64, u_nm: f64| Node {

@@ -2,12 +2,15 @@
 
 use core::time::Duration;
 
+use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
 use units::Time;
 
-use crate::failure::Failure;
-use crate::machine::{Machine, STOP_LIMIT, Supervision};
+use crate::failure::{Failure, Layered};
+use crate::machine::{Machine, Supervision};
 
+/// The longest a stop may take before the next drive is tried.
+pub const STOP_LIMIT: Duration = Duration::from_secs(2);
 /// How long the slowest module may take to send again after a rest.
 const AWAKE_LIMIT: Duration = Duration::from_secs(1);
 
@@ -78,18 +81,26 @@ impl Machine {
     ///
     /// # Errors
     /// What `procedure` returns.
-    pub fn guarded<R>(
+    pub fn guarded<R, F: Layered>(
         &mut self,
-        procedure: impl FnOnce(&mut Self) -> Result<R, Failure>,
-    ) -> Result<R, Failure> {
+        procedure: impl FnOnce(&mut Self) -> Result<R, F>,
+    ) -> Result<R, F> {
         let result = procedure(self);
-        // Why it failed must be asked before stopping it takes its time.
-        let now = self.now();
         result.map_err(|failure| {
-            let failure = self.bus_watch.explain(now, failure);
-            let failure = self.host_watch.explain(now, failure);
+            // Why it failed must be asked before stopping it takes its time.
+            let failure = self.explain(failure);
             self.make_safe();
             failure
+        })
+    }
+
+    /// The failure that has just happened, or what it came of: somebody who fills a bus, or this
+    /// computer, which was held up.
+    pub fn explain<F: Layered>(&self, failure: F) -> F {
+        let now = self.now();
+        failure.map_machine(|failure| {
+            let failure = self.bus_watch.explain(now, failure);
+            self.host_watch.explain(now, failure)
         })
     }
 
@@ -113,12 +124,7 @@ impl Machine {
             let disabled = self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT);
             self.tell_unconfirmed(at, disabled);
         }
-        for memory in self.memory.values_mut() {
-            memory.approach.forget();
-        }
-        if let Some(platform) = &mut self.platform {
-            platform.interrupted_before_it_ends();
-        }
+        self.approach.iter_mut().for_each(ApproachTracker::forget);
         let _ = self.set_sync(false);
         self.supervision = Supervision::Off;
     }

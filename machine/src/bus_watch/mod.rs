@@ -21,10 +21,9 @@ use wire::canopen::{Function, NodeId};
 use wire::{Arrival, Input, Payload, Port};
 
 use self::load::Load;
-use crate::assemble;
-use crate::config::{AxisConfig, MachineConfig};
 use crate::engine::EngineFailure;
 use crate::failure::Failure;
+use crate::parts;
 
 /// The identifier of SYNC.
 const SYNC_COB_ID: u16 = 0x080;
@@ -58,22 +57,18 @@ struct Server {
 }
 
 impl BusWatch {
-    pub(crate) fn new(config: &MachineConfig, ports: &BTreeMap<String, Port>) -> Self {
-        let buses = config.can.iter().map(|(name, can)| {
-            let period = Duration::from_secs_f64(can.sync_period_ms * 1e-3);
-            let bus = Bus {
-                name: name.clone(),
-                masters_own: masters_own(config, name, can.master_node_id),
-                servers: servers(config, name),
-                load: Load::new(
-                    Duration::from_secs(1) / can.bitrate_bit_per_s,
-                    period * WINDOW_PERIODS,
-                ),
-            };
-            (ports[name], bus)
-        });
+    pub(crate) fn new(buses: &[parts::Bus]) -> Self {
+        let watched = |bus: &parts::Bus| Bus {
+            name: bus.name.clone(),
+            masters_own: masters_own(bus),
+            servers: servers(bus),
+            load: Load::new(
+                Duration::from_secs(1) / bus.bitrate,
+                bus.sync_period * WINDOW_PERIODS,
+            ),
+        };
         Self {
-            buses: buses.collect(),
+            buses: buses.iter().map(|it| (it.port, watched(it))).collect(),
         }
     }
 
@@ -169,38 +164,27 @@ const fn writes(request: &SdoRequest) -> bool {
     )
 }
 
-fn servers(config: &MachineConfig, bus: &str) -> BTreeMap<u16, Server> {
-    let nodes = assemble::expected_nodes(config, bus);
-    let nodes = nodes.keys().filter_map(|raw| NodeId::new(*raw));
-    nodes
+fn servers(bus: &parts::Bus) -> BTreeMap<u16, Server> {
+    bus.nodes
+        .keys()
         .map(|node| {
-            let is_told = false;
-            let server = Server { node, is_told };
-            (node.cob_id(Function::SdoRequest), server)
+            let (node, is_told) = (*node, false);
+            (node.cob_id(Function::SdoRequest), Server { node, is_told })
         })
         .collect()
 }
 
-fn masters_own(config: &MachineConfig, bus: &str, master: u8) -> BTreeMap<u16, &'static str> {
-    let mut own = BTreeMap::from([(SYNC_COB_ID, "a SYNC"), (NMT_COB_ID, "an NMT command")]);
-    if let Some(master) = NodeId::new(master) {
-        own.insert(
-            master.cob_id(Function::ErrorControl),
+fn masters_own(bus: &parts::Bus) -> BTreeMap<u16, &'static str> {
+    let mut own = BTreeMap::from([
+        (SYNC_COB_ID, "a SYNC"),
+        (NMT_COB_ID, "an NMT command"),
+        (
+            bus.master.cob_id(Function::ErrorControl),
             "a heartbeat with this controller's own node number",
-        );
-    }
-    let axes = config.axis.values().filter_map(AxisConfig::can);
-    let axes = axes.map(|it| (it.bus, it.node_id));
-    let rotaries = config.rotary.values();
-    let rotaries = rotaries.map(|it| (&*it.bus, it.node_id));
-    for (_, node_id) in axes.chain(rotaries).filter(|(on, _)| *on == bus) {
-        if let Some(node) = NodeId::new(node_id) {
-            own.insert(
-                node.cob_id(Function::Rpdo1),
-                "a command to one of the drives",
-            );
-        }
-    }
+        ),
+    ]);
+    let drives = bus.drives.iter();
+    own.extend(drives.map(|it| (it.cob_id(Function::Rpdo1), "a command to one of the drives")));
     own
 }
 

@@ -46,7 +46,7 @@ pub struct Lack {
 
 impl Lack {
     /// Of `sources`, the one that matters most; `None` when all are good.
-    pub(crate) fn worst(sources: impl Iterator<Item = (Source, FeedStatus)>) -> Option<Self> {
+    pub fn worst(sources: impl Iterator<Item = (Source, FeedStatus)>) -> Option<Self> {
         let each = sources.map(|(source, status)| Self { source, status });
         let lacking = each.filter(|it| it.weight() > 0);
         lacking.reduce(|worst, it| worst.worse_of(Some(it)))

@@ -1,18 +1,11 @@
-//! One machine: its devices, its transport, and what is known about its axes.
-//!
-//! The machine is driven by plain sequential procedures (the `cycle` folder) that call
-//! [`Machine::tick`]; every wait of every procedure is that one function, so supervision,
-//! heartbeats and the stop request hold at every moment, on real buses and in virtual time
-//! alike (docs/decisions/0001).
+//! One machine: its devices, its transport, and what its drives remember.
 
 use core::time::Duration;
 use std::collections::{BTreeMap, BTreeSet};
 
 use compensator::apply::ApproachTracker;
-use compensator::error_table::Compensation;
 use drivers::device::{
-    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand,
-    PoseInstrument, RotaryAxis,
+    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand, RotaryAxis,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
@@ -20,44 +13,15 @@ use units::{Metres, Time};
 use wire::Port;
 use wire::cia402::PowerState;
 
-use crate::assemble;
 use crate::bus_watch::BusWatch;
-use crate::camera;
-use crate::config::{AxisConfig, ConfigHash, Loaded, MachineConfig};
-use crate::cycle::platform::PlatformState;
-use crate::cycle::rotary::TableInUse;
-use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
 use crate::host_watch::HostWatch;
 use crate::observer::{Observer, Silent};
 use crate::outbox::Outbox;
+use crate::parts::{AxisSettings, Bus, Camera, Parts};
 use crate::patience::Patience;
-pub use crate::stop_request::StopRequest;
+use crate::stop_request::StopRequest;
 use crate::unit::Unit;
-
-/// What is known about an axis beyond what its drive says.
-#[derive(Default)]
-pub(crate) struct AxisMemory {
-    /// Zeroed by the Hall sensors since the drive was last powered.
-    pub(crate) zeroed: bool,
-    /// The calibration in use.
-    pub(crate) compensation: Option<Compensation>,
-    /// What was measured last, and how lengths were corrected since its datum.
-    pub(crate) datum: Option<(RunPlan, Datum)>,
-    /// The direction of the last motion.
-    pub(crate) approach: ApproachTracker,
-}
-
-/// What is known about a rotary axis beyond what its drive says.
-#[derive(Default)]
-pub(crate) struct RotaryMemory {
-    /// Zeroed on the index mark since the drive was last powered.
-    pub(crate) zeroed: bool,
-    /// The calibration in use.
-    pub(crate) calibration: Option<TableInUse>,
-    /// Where the plate was read last, in lines; `None` when somebody may have turned it since.
-    pub(crate) plate_at: Option<f64>,
-}
 
 /// How alarms are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,21 +36,23 @@ pub(crate) enum Supervision {
 
 /// A machine that is connected.
 pub struct Machine {
-    pub(crate) config: MachineConfig,
-    pub(crate) config_hash: ConfigHash,
     pub(crate) patience: Patience,
     pub(crate) transport: Box<dyn Transport>,
     pub(crate) outbox: Outbox,
-    pub(crate) port_names: BTreeMap<Port, String>,
+    pub(crate) buses: Vec<Bus>,
+    pub(crate) lines: BTreeMap<Port, String>,
     pub(crate) axes: Vec<Unit<dyn Axis>>,
+    /// In the order of `axes`.
+    pub(crate) settings: Vec<AxisSettings>,
+    /// In the order of `axes`: the direction of the last motion.
+    pub(crate) approach: Vec<ApproachTracker>,
     pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
+    /// By the numbers of the drives: zeroed since it was last powered.
+    pub(crate) zeroed: Vec<bool>,
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
-    pub(crate) cameras: Vec<Unit<dyn PoseInstrument>>,
+    pub(crate) cameras: Vec<Camera>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
-    pub(crate) memory: BTreeMap<String, AxisMemory>,
-    pub(crate) rotary_memory: BTreeMap<String, RotaryMemory>,
-    pub(crate) platform: Option<PlatformState>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
     pub(crate) host_watch: HostWatch,
@@ -103,38 +69,30 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Lets all that is moved cyclically ask for SCHED_FIFO and locked memory
-    /// ([`Engine::in_real_time`](crate::engine::Engine::in_real_time)). Not for simulated time, which
-    /// passes as fast as the computer goes.
-    pub const fn in_real_time(&mut self) {
-        self.real_time = true;
-    }
-
-    /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
-    /// Nothing is sent yet.
-    pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
-        let config = loaded.config.clone();
-        let ports = assemble::ports(&config);
+    /// A machine of `parts` over `transport`, which must number its ports as they do. Nothing is
+    /// sent yet.
+    pub fn new(parts: Parts, transport: Box<dyn Transport>) -> Self {
+        let (axes, settings): (Vec<_>, Vec<_>) = parts
+            .axes
+            .into_iter()
+            .map(|it| (it.unit, it.settings))
+            .unzip();
+        let heartbeat = |bus: &Bus| (bus.port, HeartbeatProducer::new(bus.master, bus.heartbeat));
         Self {
-            axes: assemble::axes(&config, &ports, loaded.patience),
-            rotaries: assemble::rotaries(&config, &ports, loaded.patience),
-            analogs: assemble::analogs(&config, &ports, loaded.patience),
-            instruments: assemble::instruments(&config, &ports, loaded.patience),
-            cameras: camera::cameras(&config, &ports, loaded.patience),
-            heartbeats: assemble::heartbeats(&config, &ports),
-            bus_watch: BusWatch::new(&config, &ports),
+            heartbeats: parts.buses.iter().map(heartbeat).collect(),
+            bus_watch: BusWatch::new(&parts.buses),
             host_watch: HostWatch::default(),
-            memory: config
-                .axis
-                .keys()
-                .map(|name| (name.clone(), AxisMemory::default()))
-                .collect(),
-            rotary_memory: BTreeMap::new(),
-            port_names: ports.into_iter().map(|(name, port)| (port, name)).collect(),
-            config_hash: loaded.hash.clone(),
-            patience: loaded.patience,
-            platform: PlatformState::of(&config),
-            config,
+            approach: vec![ApproachTracker::new(); axes.len()],
+            zeroed: vec![false; axes.len() + parts.rotaries.len()],
+            axes,
+            settings,
+            rotaries: parts.rotaries,
+            analogs: parts.analogs,
+            instruments: parts.instruments,
+            cameras: parts.cameras,
+            buses: parts.buses,
+            lines: parts.lines,
+            patience: parts.patience,
             transport,
             outbox: Outbox::default(),
             supervision: Supervision::Off,
@@ -147,9 +105,26 @@ impl Machine {
         }
     }
 
+    /// Lets all that is moved cyclically ask for SCHED_FIFO and locked memory
+    /// ([`Engine::in_real_time`](crate::engine::Engine::in_real_time)). Not for simulated time, which
+    /// passes as fast as the computer goes.
+    pub const fn in_real_time(&mut self) {
+        self.real_time = true;
+    }
+
     /// Who is told about progress.
     pub fn observe(&mut self, observer: Box<dyn Observer>) {
         self.observer = observer;
+    }
+
+    /// Whoever is told about progress.
+    pub fn observer(&mut self) -> &mut dyn Observer {
+        &mut *self.observer
+    }
+
+    /// How much longer than usual things are waited for.
+    pub const fn patience(&self) -> Patience {
+        self.patience
     }
 
     /// The flag that stops this machine.
@@ -167,68 +142,48 @@ impl Machine {
         self.transport.now()
     }
 
-    /// The configuration.
-    pub const fn config(&self) -> &MachineConfig {
-        &self.config
-    }
-
-    /// Of what a calibration depends on.
-    pub const fn config_hash(&self) -> &ConfigHash {
-        &self.config_hash
-    }
-
     /// The names of the axes.
     pub fn axis_names(&self) -> Vec<String> {
         self.axes.iter().map(|unit| unit.name.clone()).collect()
     }
 
-    /// The configuration of `axis`.
+    /// Within which `axis` is moved.
+    ///
+    /// # Errors
+    /// When there is no such linear axis.
+    pub fn axis_settings(&self, axis: &str) -> Result<&AxisSettings, Failure> {
+        Ok(&self.settings[self.axis_index(axis)?])
+    }
+
+    /// Whether the (linear or rotary) `axis` was zeroed since its drive was last powered.
+    pub fn is_zeroed(&self, axis: &str) -> bool {
+        self.drive_index(axis)
+            .is_ok_and(|at| self.zeroed[at] && self.drive(at).is_homed())
+    }
+
+    /// Says that `axis` has its zero, until its drive loses power or the machine is started anew;
+    /// or that it has none.
     ///
     /// # Errors
     /// When there is no such axis.
-    pub fn axis_config(&self, axis: &str) -> Result<&AxisConfig, Failure> {
-        self.config
-            .axis
-            .get(axis)
-            .ok_or_else(|| Failure::NoSuchAxis {
-                axis: axis.to_owned(),
-                known: self.axis_names().join(", "),
-            })
-    }
-
-    /// Whether `axis` was zeroed since its drive was last powered.
-    pub fn is_zeroed(&self, axis: &str) -> bool {
-        self.memory.get(axis).is_some_and(|memory| memory.zeroed)
-            && self.axis(axis).is_ok_and(|unit| unit.device.is_homed())
+    pub fn set_zeroed(&mut self, axis: &str, zeroed: bool) -> Result<(), Failure> {
+        let at = self.drive_index(axis)?;
+        self.zeroed[at] = zeroed;
+        Ok(())
     }
 
     /// Coordinates mean something only after the zero.
-    pub(crate) fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// When there is no such axis, or it was not zeroed.
+    pub fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
+        self.drive_index(axis)?;
         if self.is_zeroed(axis) {
             return Ok(());
         }
         Err(Failure::NotZeroed {
             axis: axis.to_owned(),
         })
-    }
-
-    /// The calibration `axis` uses now.
-    pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
-        self.memory.get(axis)?.compensation.as_ref()
-    }
-
-    /// Uses `compensation` (or none) for every move of `axis` from now on.
-    ///
-    /// # Errors
-    /// When there is no such axis.
-    pub fn set_compensation(
-        &mut self,
-        axis: &str,
-        compensation: Option<Compensation>,
-    ) -> Result<(), Failure> {
-        self.axis_config(axis)?;
-        self.remember(axis).compensation = compensation;
-        Ok(())
     }
 
     /// The newest sample of `axis`.
@@ -256,16 +211,8 @@ impl Machine {
     /// When a device does not answer, is another one than configured, or refuses its set-up.
     pub fn start(&mut self) -> Result<(), Failure> {
         self.catch_up();
-        for memory in self.memory.values_mut() {
-            memory.zeroed = false;
-            memory.approach.forget();
-        }
-        for memory in self.rotary_memory.values_mut() {
-            memory.zeroed = false;
-        }
-        if let Some(platform) = &mut self.platform {
-            platform.forget();
-        }
+        self.zeroed.fill(false);
+        self.approach.iter_mut().for_each(ApproachTracker::forget);
         self.set_sync(true)?;
         let machine_devices = self.instrument_device(0);
         let now = self.now();
@@ -279,13 +226,8 @@ impl Machine {
         Ok(())
     }
 
-    /// Starts an instrument, unless it runs already (its datum stands then), and counts its
-    /// alarms from now on.
-    pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
-        self.use_device(self.instrument_device(self.instrument_index(name)), name)
-    }
-
-    /// The same for device number `at`, an instrument or a camera called `name`.
+    /// Starts device number `at`, an instrument or a camera called `name`, unless it runs already,
+    /// and counts its alarms from now on.
     pub(crate) fn use_device(&mut self, at: usize, name: &str) -> Result<(), Failure> {
         if !self.started_instruments.contains(name) {
             let now = self.now();
@@ -297,8 +239,12 @@ impl Machine {
         Ok(())
     }
 
-    /// Gives `command` to `axis` and waits until it is done.
-    pub(crate) fn command(
+    /// Gives `command` to `axis` and waits until it is done, for `limit` at most; `step` is its
+    /// name for a person.
+    ///
+    /// # Errors
+    /// When there is no such linear axis, the machine is not started, or the command fails.
+    pub fn command(
         &mut self,
         axis: &str,
         command: impl Into<AxisCommand>,
@@ -310,6 +256,34 @@ impl Machine {
         let now = self.now();
         self.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
+    }
+
+    /// Gives `command` to `axis` and does not wait: see [`Machine::outcome`].
+    ///
+    /// # Errors
+    /// When there is no such linear axis.
+    pub fn begin(&mut self, axis: &str, command: AxisCommand) -> Result<(), Failure> {
+        let at = self.axis_index(axis)?;
+        let now = self.now();
+        self.axes[at].device.command(now, command);
+        Ok(())
+    }
+
+    /// How the command that was begun last for the linear `axis` ended; `None` while it runs, and
+    /// when it has been asked for.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn outcome(&mut self, axis: &str) -> Result<Option<Result<(), Failure>>, Failure> {
+        let at = self.axis_index(axis)?;
+        let outcome = self.axes[at].device.poll_outcome();
+        let device = || axis.to_owned();
+        Ok(outcome.map(|it| {
+            it.map_err(|source| Failure::Device {
+                device: device(),
+                source,
+            })
+        }))
     }
 
     /// Nothing begins to move while alarms do not count: after a stop, the machine is started
@@ -339,26 +313,19 @@ impl Machine {
     }
 
     pub(crate) fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
-        for (port, name) in &self.port_names {
-            let Some(bus) = self.config.can.get(name) else {
-                continue;
-            };
-            let period = on.then(|| Duration::from_secs_f64(bus.sync_period_ms * 1e-3));
+        for bus in &self.buses {
+            let period = on.then_some(bus.sync_period);
             self.transport
-                .set_sync(*port, period)
+                .set_sync(bus.port, period)
                 .map_err(|source| Failure::Send {
-                    device: format!("SYNC on {name}"),
+                    device: format!("SYNC on {}", bus.name),
                     source,
                 })?;
         }
         Ok(())
     }
 
-    pub(crate) fn remember(&mut self, axis: &str) -> &mut AxisMemory {
-        self.memory.entry(axis.to_owned()).or_default()
-    }
-
-    pub(crate) fn axis(&self, axis: &str) -> Result<&Unit<dyn Axis>, Failure> {
+    fn axis(&self, axis: &str) -> Result<&Unit<dyn Axis>, Failure> {
         let at = self.axis_index(axis)?;
         Ok(&self.axes[at])
     }
@@ -373,15 +340,12 @@ impl Machine {
             })
     }
 
-    /// Where `axis` should be sent so that the point arrives at `target`.
-    pub(crate) fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
-        let config = self.axis_config(axis)?;
-        Ok((
-            Metres::from_mm(config.soft_min_mm),
-            Metres::from_mm(config.soft_max_mm),
-        ))
+    /// The soft limits of `axis`, the lower one first.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn soft_limits(&self, axis: &str) -> Result<(Metres, Metres), Failure> {
+        let settings = self.axis_settings(axis)?;
+        Ok((settings.soft_min, settings.soft_max))
     }
 }
-
-/// The longest a stop may take before the next drive is tried.
-pub(crate) const STOP_LIMIT: Duration = Duration::from_secs(2);

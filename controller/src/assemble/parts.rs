@@ -1,0 +1,128 @@
+//! What a machine is assembled of, from what its configuration says.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+
+use machine::{AxisSettings, Bus, Camera, CyclicSettings, ExpectedNode, LinearAxis, Parts};
+use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
+use wire::Port;
+use wire::canopen::NodeId;
+
+use super::cyclic::cyclic_settings;
+use super::{analogs, axes, expected_identity, instruments, node_id, ports, rotaries};
+use crate::camera::{cameras, inspection_timeout};
+use crate::config::{AxisConfig, CanBus, IdentityConfig, Loaded, MachineConfig};
+
+/// Everything of a machine but its transport, whose ports are numbered as [`ports`] says.
+pub(crate) fn parts(loaded: &Loaded) -> Parts {
+    let (config, patience) = (&loaded.config, loaded.patience);
+    let ports = ports(config);
+    let settings = config.axis.values().map(|axis| axis_settings(axis, config));
+    let units = axes(config, &ports, patience).into_iter().zip(settings);
+    let cameras = cameras(config, &ports, patience).into_iter();
+    Parts {
+        buses: config
+            .can
+            .iter()
+            .map(|it| bus(config, it, &ports))
+            .collect(),
+        lines: config
+            .serial
+            .keys()
+            .map(|name| (ports[name], name.clone()))
+            .collect(),
+        axes: units
+            .map(|(unit, settings)| LinearAxis { unit, settings })
+            .collect(),
+        rotaries: rotaries(config, &ports, patience),
+        analogs: analogs(config, &ports, patience),
+        instruments: instruments(config, &ports, patience),
+        cameras: cameras
+            .zip(config.camera.values())
+            .map(|(unit, camera)| Camera {
+                unit,
+                inspection_timeout: inspection_timeout(camera),
+                rejects_max: camera.rejects_max,
+            })
+            .collect(),
+        patience,
+    }
+}
+
+fn bus(
+    config: &MachineConfig,
+    (name, can): (&String, &CanBus),
+    ports: &BTreeMap<String, Port>,
+) -> Bus {
+    let nodes = nodes(config, name);
+    let drives = nodes.iter().filter(|it| it.is_drive);
+    Bus {
+        name: name.clone(),
+        port: ports[name],
+        bitrate: can.bitrate_bit_per_s,
+        sync_period: sync_period(can),
+        master: node_id(can.master_node_id),
+        heartbeat: Duration::from_millis(can.master_heartbeat_ms.into()),
+        drives: drives.map(|it| it.node).collect(),
+        nodes: nodes.into_iter().map(|it| (it.node, it.expected)).collect(),
+    }
+}
+
+struct Node {
+    node: NodeId,
+    is_drive: bool,
+    expected: ExpectedNode,
+}
+
+/// The nodes that the configuration has on CAN bus `bus`: who they are and must be.
+fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
+    let node = |raw, is_drive, name: &String, identity: &IdentityConfig| Node {
+        node: node_id(raw),
+        is_drive,
+        expected: ExpectedNode {
+            device: name.clone(),
+            identity: expected_identity(identity),
+        },
+    };
+    let axes = config.axis.iter();
+    let axes = axes
+        .filter_map(|(name, axis)| Some((name, axis.can()?)))
+        .filter(|(_, axis)| axis.bus == bus)
+        .map(|(name, axis)| node(axis.node_id, true, name, axis.identity));
+    let rotaries = config.rotary.iter();
+    let rotaries = rotaries
+        .filter(|(_, rotary)| rotary.bus == bus)
+        .map(|(name, rotary)| node(rotary.node_id, true, name, &rotary.identity));
+    let analogs = config.analog.iter();
+    let analogs = analogs
+        .filter(|(_, analog)| analog.bus.as_deref() == Some(bus))
+        .filter_map(|(name, it)| Some(node(it.node_id?, false, name, it.identity.as_ref()?)));
+    axes.chain(rotaries).chain(analogs).collect()
+}
+
+fn sync_period(can: &CanBus) -> Duration {
+    Duration::from_secs_f64(can.sync_period_ms * 1e-3)
+}
+
+fn axis_settings(axis: &AxisConfig, config: &MachineConfig) -> AxisSettings {
+    AxisSettings {
+        soft_min: Metres::from_mm(axis.soft_min_mm),
+        soft_max: Metres::from_mm(axis.soft_max_mm),
+        speed: MetresPerSecond(axis.speed_mm_per_s * 1e-3),
+        acceleration: MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3),
+        position_window: Metres::from_um(axis.position_window_um),
+        move_timeout: Duration::from_secs_f64(axis.move_timeout_s),
+        cyclic: cyclic(axis, config),
+    }
+}
+
+/// `None` for an axis without the section, and for one on a serial line.
+fn cyclic(axis: &AxisConfig, config: &MachineConfig) -> Option<CyclicSettings> {
+    let (can, cyclic) = axis.can().zip(axis.cyclic.as_ref())?;
+    let (limits, correction) = cyclic_settings(axis, cyclic);
+    Some(CyclicSettings {
+        limits,
+        correction,
+        period: sync_period(&config.can[can.bus]),
+    })
+}

@@ -1,0 +1,204 @@
+//! Why a machine of any kind stopped or refused: each says where, what was expected, what was seen.
+
+use core::time::Duration;
+
+use drivers::device::{Alarm, DeviceError};
+use drivers::transport::SendError;
+use units::Metres;
+use wire::LinkState;
+use wire::can::CanId;
+
+use crate::bus_text::{identifier_text, link_text};
+use crate::engine::EngineFailure;
+
+/// What shells add to the number of the signal that ended a program.
+const STOPPED_BY: u8 = 128;
+/// Ctrl-C.
+const SIGINT: u8 = 2;
+
+/// Everything that ends a procedure of a machine, whatever its kind.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The cyclic engine refused, or stopped every drive at once.
+    #[error(transparent)]
+    Engine(#[from] EngineFailure),
+    /// A payload could not be sent; control words are never dropped silently.
+    #[error("sending to {device}: {source}")]
+    Send {
+        /// The device it was for.
+        device: String,
+        /// Why not.
+        source: SendError,
+    },
+    /// A bus or serial line cannot be used any more.
+    #[error("{port}: {}", link_text(*state))]
+    Link {
+        /// The port's name in the configuration.
+        port: String,
+        /// What became of it.
+        state: LinkState,
+    },
+    /// Our CAN controller left the bus.
+    #[error("{port}: bus-off; check cable, termination and bit rate, then start again")]
+    BusOff {
+        /// The port's name in the configuration.
+        port: String,
+    },
+    /// Another master is on the bus.
+    #[error(
+        "{port}: {heard} was heard that this controller did not send: another master is on the \
+         bus; disconnect it, then start again"
+    )]
+    SecondMaster {
+        /// The port's name in the configuration.
+        port: String,
+        /// What only a master sends.
+        heard: &'static str,
+    },
+    /// Somebody takes the bus for himself, and what should have come did not.
+    #[error(
+        "{port}: {} takes {percent:.0} % of the bus and leaves no room; find the device or program \
+         that sends it ({missing})", identifier_text(*id)
+    )]
+    Babbling {
+        /// The port's name in the configuration.
+        port: String,
+        /// What is sent.
+        id: CanId,
+        /// Its share of the bus.
+        percent: f64,
+        /// What did not come or go.
+        missing: Box<Self>,
+    },
+    /// Something went wrong shortly after the program was kept from its buses.
+    #[error(
+        "{failure}. This program was kept from its buses for {:.3} s, until {:.3} s before, which may be \
+         the whole cause: the computer is too busy for real time. Give it SCHED_FIFO (`ulimit -r`) or \
+         less to do; an emulated machine can wait for it (--clock lockstep:PATH)",
+        pause.as_secs_f64(), ago.as_secs_f64()
+    )]
+    HeldUp {
+        /// For how long, by the machine's clock.
+        pause: Duration,
+        /// How long before.
+        ago: Duration,
+        /// What went wrong.
+        failure: Box<Self>,
+    },
+    /// A device raised an alarm.
+    #[error("{device}: {alarm}")]
+    Alarm {
+        /// The device's name in the configuration.
+        device: String,
+        /// What it said.
+        alarm: Alarm,
+    },
+    /// A command of a device failed.
+    #[error("{device}: {source}")]
+    Device {
+        /// The device's name in the configuration.
+        device: String,
+        /// Why.
+        source: DeviceError,
+    },
+    /// A command did not end in time.
+    #[error("{device}: {step} not done within {}", units::ShortSpan(*waited))]
+    Overdue {
+        /// The device's name in the configuration.
+        device: String,
+        /// What was asked.
+        step: &'static str,
+        /// How long we waited.
+        waited: Duration,
+    },
+    /// A move would leave the soft limits; nothing moved.
+    #[error(
+        "axis {axis}: {:.6} mm is outside the soft limits {:.3} to {:.3} mm; nothing was moved",
+        target.mm(), min.mm(), max.mm()
+    )]
+    SoftLimit {
+        /// Which axis.
+        axis: String,
+        /// Where it should have gone.
+        target: Metres,
+        /// The lower limit.
+        min: Metres,
+        /// The upper limit.
+        max: Metres,
+    },
+    /// The verb needs a zeroed axis.
+    #[error("axis {axis}: not zeroed since power-on; run `truestage zero` first")]
+    NotZeroed {
+        /// Which axis.
+        axis: String,
+    },
+    /// The machine was stopped, or was never started: nobody would heed its alarms.
+    #[error("{device}: not moved, the machine was stopped; start it again (`Machine::start`)")]
+    NotStarted {
+        /// The drive.
+        device: String,
+    },
+    /// There is no such axis.
+    #[error("there is no axis `{axis}`; known: {known}")]
+    NoSuchAxis {
+        /// What was asked for.
+        axis: String,
+        /// What there is.
+        known: String,
+    },
+    /// There is no such instrument, analog module or image controller.
+    #[error("there is no {what} `{name}`; known: {known}")]
+    NoSuchDevice {
+        /// Which of them it should be.
+        what: &'static str,
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// Somebody asked to stop (Ctrl-C).
+    #[error("stopped on request")]
+    Interrupted,
+    /// Another program asked to stop (SIGTERM), or the terminal is gone (SIGHUP).
+    #[error("stopped on request (signal {signal})")]
+    Terminated {
+        /// Its number.
+        signal: u8,
+    },
+}
+
+impl Failure {
+    /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus, 128 and the
+    /// signal's number (130 for Ctrl-C, 143 for SIGTERM) when it was stopped on request.
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Engine(failure) => failure.exit_code(),
+            Self::HeldUp { failure, .. } => failure.exit_code(),
+            Self::Interrupted => STOPPED_BY + SIGINT,
+            Self::Terminated { signal } => STOPPED_BY.saturating_add(*signal),
+            Self::NoSuchAxis { .. } | Self::NoSuchDevice { .. } => 2,
+            Self::SoftLimit { .. } | Self::NotZeroed { .. } | Self::NotStarted { .. } => 3,
+            Self::Send { .. }
+            | Self::Link { .. }
+            | Self::BusOff { .. }
+            | Self::SecondMaster { .. }
+            | Self::Babbling { .. }
+            | Self::Alarm { .. }
+            | Self::Device { .. }
+            | Self::Overdue { .. } => 4,
+        }
+    }
+}
+
+/// A failure of a layer above, which may be one of the machine.
+pub trait Layered: From<Failure> {
+    /// Lets `explain` say more of it when it is the machine's own; others stay as they are.
+    #[must_use]
+    fn map_machine(self, explain: impl FnOnce(Failure) -> Failure) -> Self;
+}
+
+impl Layered for Failure {
+    fn map_machine(self, explain: impl FnOnce(Failure) -> Failure) -> Self {
+        explain(self)
+    }
+}

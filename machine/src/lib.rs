@@ -1,0 +1,43 @@
+//! One machine, of whatever kind: its devices, the one loop in which everything waits, how it
+//! stops, and the cyclic engine that moves axes together.
+//!
+//! A [`Machine`] is assembled of [`Parts`] over a [`Transport`](drivers::transport::Transport) and
+//! driven by plain sequential procedures that call [`Machine::tick`]; every wait of every procedure
+//! is that one function, so supervision, heartbeats and the stop request hold at every moment, on
+//! real buses and in virtual time alike (docs/decisions/0001). What a kind of machine knows, a
+//! calibration or the place of a plate, is no business of this crate: each kind is a handle of its
+//! own over the machine (docs/decisions/0020).
+
+mod bus_text;
+mod bus_watch;
+mod devices;
+pub mod engine;
+mod failure;
+mod host_watch;
+mod instruments;
+mod looking;
+mod machine;
+mod observer;
+mod outbox;
+mod parts;
+mod patience;
+mod scan;
+mod stop_request;
+mod stopping;
+mod tick;
+mod travel;
+mod turning;
+mod unit;
+mod waiting;
+
+pub use bus_text::{identifier_text, link_text};
+pub use engine::{Desk, Engine, EngineFailure};
+pub use failure::{Failure, Layered};
+pub use machine::Machine;
+pub use observer::{Observer, Silent, Stage};
+pub use parts::{AxisSettings, Bus, Camera, CyclicSettings, ExpectedNode, LinearAxis, Parts};
+pub use patience::Patience;
+pub use scan::Found;
+pub use stop_request::StopRequest;
+pub use stopping::STOP_LIMIT;
+pub use unit::Unit;
