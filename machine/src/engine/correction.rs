@@ -9,9 +9,10 @@ use core::any::Any;
 use core::time::Duration;
 
 use compensator::apply::{Alarm, SlewedCorrection};
-use units::{Celsius, Metres, MetresPerSecond, Time, Volts};
+use units::{Celsius, Metres, Time, Volts};
 
 use super::cause::Cause;
+use super::limits::CorrectionLimits;
 use super::{AXES_MAX, Lack, PerAxis};
 
 /// Analog channels that a correction sees at most.
@@ -114,15 +115,6 @@ impl Correction for NoCorrection {
     fn correct(&mut self, _observed: &Observed<'_>) -> Corrected {
         Corrected::default()
     }
-}
-
-/// How large a correction may be, and how fast it may change.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CorrectionLimits {
-    /// Beyond this it is cut off.
-    pub size: Metres,
-    /// Faster it does not change.
-    pub rate: MetresPerSecond,
 }
 
 /// The correction in use and how far it is applied.

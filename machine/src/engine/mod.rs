@@ -28,6 +28,7 @@ mod hear;
 mod histogram;
 mod judge;
 mod lack;
+mod limits;
 mod moment;
 mod motion;
 mod pace;
@@ -39,19 +40,20 @@ mod tables;
 use core::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
-use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
+use units::{Metres, MetresPerSecond};
 
 pub use account::{Counts, Live, State};
 pub use cause::Cause;
 pub use correction::{
-    CHANNELS_MAX, Channel, Corrected, Correction, CorrectionLimits, NoCorrection, Observed,
-    THERMOMETERS_MAX, ThermometerSample, Validity,
+    CHANNELS_MAX, Channel, Corrected, Correction, NoCorrection, Observed, THERMOMETERS_MAX,
+    ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, CsvPath, Departure, read_path};
 pub use failure::EngineFailure;
 pub use histogram::Histogram;
 pub use judge::{PathError, PathFault};
 pub use lack::{Lack, Source};
+pub use limits::{AxisLimits, CorrectionLimits};
 pub use moment::Moment;
 pub use motion::{Motion, MotionError};
 pub use pace::Timing;
@@ -75,23 +77,6 @@ const QUEUE_LIVE: usize = 256;
 
 /// One value for each axis of an engine, in their order; what is beyond them means nothing.
 pub type PerAxis<T> = [T; AXES_MAX];
-
-/// Within which an axis is moved.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AxisLimits {
-    /// The lower soft limit.
-    pub min: Metres,
-    /// The upper soft limit.
-    pub max: Metres,
-    /// The greatest speed.
-    pub speed: MetresPerSecond,
-    /// The greatest acceleration, and deceleration of a controlled stop.
-    pub acceleration: MetresPerSecondSquared,
-    /// The greatest jerk.
-    pub jerk: MetresPerSecondCubed,
-    /// How far the axis may be from its latest set-points.
-    pub deviation: Metres,
-}
 
 /// What moves some axes of a machine together; driven by [`Machine::follow`].
 pub struct Engine {

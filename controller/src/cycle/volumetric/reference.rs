@@ -229,9 +229,8 @@ impl Machine {
         let nodes = stops_along(config, axis, own.step_mm);
         let total = nodes.len() as u64;
         for (done, node) in (0..).zip(nodes) {
-            self.core
-                .observer()
-                .progress(Stage::Reference, &name, done, total);
+            let observer = self.core.observer();
+            observer.progress(Stage::Reference, &name, done, total);
             self.move_to(&name, node)?;
             self.stand_still(&name, REST)?;
             let seen = self.watch_at_rest(own.samples)?;
@@ -260,9 +259,8 @@ impl Machine {
                 thermometry.add(still.now, &still.temperatures)?;
             }
         }
-        self.core
-            .observer()
-            .progress(Stage::Reference, &name, total, total);
+        let observer = self.core.observer();
+        observer.progress(Stage::Reference, &name, total, total);
         Ok(stops)
     }
 
@@ -330,8 +328,7 @@ impl Machine {
             self.tick(deadline)?;
             let newest = self.analogs().map(|it| it.last_sample());
             let oldest = newest.map(|at| at.unwrap_or(Time::ZERO)).min();
-            let oldest = oldest.unwrap_or(Time::ZERO);
-            if oldest <= last {
+            if oldest.unwrap_or(Time::ZERO) <= last {
                 continue;
             }
             (last, deadline) = (self.now(), self.now() + limit);
