@@ -68,7 +68,7 @@ impl Transport for Apart {
 /// stopped in its period `stop`.
 ///
 /// # Errors
-/// As [`Machine::follow`].
+/// As [`Machine::follow`](machine::Machine::follow).
 pub fn used_by_the_loop(
     machine: &mut Machine,
     engine: &mut Engine,
