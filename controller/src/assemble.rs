@@ -6,12 +6,8 @@
 mod cia404;
 mod copley;
 mod cyclic;
-mod line;
 mod parts;
 mod patience;
-mod rotary;
-mod table;
-mod volumetric;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -19,19 +15,10 @@ use std::collections::BTreeMap;
 pub use cia404::cia404_settings;
 pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
-pub(crate) use line::{angular_separation, line_corrections};
 pub(crate) use parts::parts;
+pub(crate) use patience::patient_drive;
 pub(crate) use patience::patient_search;
-use patience::{patient_drive, patient_node, patient_pdos};
-pub(crate) use rotary::{index_limit, rotaries};
-pub use rotary::{periodic_compensation, rotary_settings};
-pub use table::{compensation, harmless};
-pub(crate) use volumetric::point_of_mm;
-pub use volumetric::{
-    BeamDetectorError, beam_detector, beam_drift, bend_plans, feed_settings, function_shape,
-    influences, model_limits, roll_optics, temperature_settings, thermal, volume_axis,
-    volumetric_chain, work_volume,
-};
+use patience::{patient_node, patient_pdos};
 
 use compensator::hall_zero;
 use compensator::length_correction::{
@@ -64,7 +51,7 @@ use crate::config::{
 const CO2_UMOL_PER_MOL: f64 = 450.0;
 /// Relative standard uncertainty of a stabilised HeNe laser's wavelength.
 const WAVELENGTH_U: f64 = 2e-8;
-const CHECKED: &str = "the configuration was checked when it was loaded";
+pub(crate) const CHECKED: &str = "the configuration was checked when it was loaded";
 
 /// Port numbers by name: CAN buses first, then serial lines, each in the order of names.
 pub fn ports(config: &MachineConfig) -> BTreeMap<String, Port> {
@@ -167,11 +154,11 @@ fn node_id(raw: u8) -> NodeId {
     NodeId::new(raw).expect(CHECKED)
 }
 
-const fn millis(ms: u16) -> Duration {
+pub(crate) const fn millis(ms: u16) -> Duration {
     Duration::from_millis(ms as u64)
 }
 
-fn node_settings(
+pub(crate) fn node_settings(
     node: u8,
     bus: &CanBus,
     identity: &IdentityConfig,
@@ -203,14 +190,14 @@ fn expected_identity(identity: &IdentityConfig) -> ExpectedIdentity {
     }
 }
 
-const fn home_offset(name: HomeOffsetName) -> HomeOffset {
+pub(crate) const fn home_offset(name: HomeOffsetName) -> HomeOffset {
     match name {
         HomeOffsetName::PositionAtHome => HomeOffset::IsPositionAtHome,
         HomeOffsetName::ZeroFromHome => HomeOffset::IsZeroFromHome,
     }
 }
 
-fn option_codes(config: &OptionCodesConfig, usual: OptionCodes) -> OptionCodes {
+pub(crate) fn option_codes(config: &OptionCodesConfig, usual: OptionCodes) -> OptionCodes {
     OptionCodes {
         quick_stop: config.quick_stop.or(usual.quick_stop),
         shutdown: config.shutdown.or(usual.shutdown),

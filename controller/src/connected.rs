@@ -8,10 +8,10 @@ use drivers::transport::Transport;
 
 use crate::assemble;
 use crate::config::{AxisConfig, ConfigHash, Loaded, MachineConfig};
-use crate::cycle::platform::PlatformState;
-use crate::cycle::rotary::TableInUse;
-use crate::cycle::{Datum, RunPlan};
 use crate::failure::Failure;
+use crate::linear::{Datum, RunPlan};
+use crate::platform::PlatformState;
+use crate::rotary::TableInUse;
 
 /// What is known about a linear axis beyond what its drive says.
 #[derive(Default)]

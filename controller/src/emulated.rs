@@ -23,10 +23,10 @@ use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::assemble;
 use crate::config::MachineConfig;
-use crate::cycle::volumetric::{LineOperator, LineOptics, LineTask};
 use crate::edit::Edit;
 use crate::failure::Failure;
 use crate::ports::{self, Endpoint, Overrides};
+use crate::volumetric::{LineOperator, LineOptics, LineTask};
 use compensator::volumetric::{Axis, Point};
 
 pub use error::EmulatedError;

@@ -11,11 +11,11 @@ use machine::{EngineFailure, Layered};
 use units::Metres;
 
 use crate::config::ConfigError;
-use crate::cycle::platform::PlatformFailure;
-use crate::cycle::rotary::RotaryFailure;
-use crate::cycle::volumetric::{PathRefusal, VolumetricFailure};
 use crate::emulated::EmulatedError;
+use crate::platform::PlatformFailure;
+use crate::rotary::RotaryFailure;
 use crate::store::StoreError;
+use crate::volumetric::{PathRefusal, VolumetricFailure};
 
 /// Everything that ends a verb without its result.
 #[derive(Debug, thiserror::Error)]

@@ -6,9 +6,6 @@ use compensator::iso230::{Directional, Figures};
 use serde_json::{Value, json};
 use units::Metres;
 
-pub mod rotary;
-pub mod screw;
-
 /// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
 pub fn um(length: Metres) -> f64 {
     let rounded = (length.um() * 1e4).round() / 1e4;

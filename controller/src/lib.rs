@@ -32,20 +32,25 @@ pub mod bus_plan;
 pub mod camera;
 pub mod config;
 mod connected;
-pub mod cycle;
+mod correction;
 mod edit;
 pub mod emulated;
 pub mod failure;
 pub mod json;
+pub mod linear;
+pub mod page;
+pub mod platform;
 pub mod ports;
-pub mod report;
+pub mod rotary;
+pub mod run;
 pub mod store;
 pub mod text;
+pub mod volumetric;
 
 pub use connected::Machine;
 pub use edit::Edit;
 pub use failure::Failure;
 pub use machine::{
-    Desk, Engine, EngineFailure, Observer, Patience, Silent, Stage, StopRequest, engine,
+    Desk, Engine, EngineFailure, Found, Observer, Patience, Silent, Stage, StopRequest, engine,
 };
 pub use store::Store;

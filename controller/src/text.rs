@@ -5,8 +5,8 @@ use compensator::iso230::{Conformity, Directional, Figures};
 use compensator::screw::ScrewModel;
 use units::Metres;
 
-use crate::assemble;
 use crate::config::MachineConfig;
+use crate::linear::settings;
 
 /// A row of a table of figures: name, symbol, and the figure of each column.
 pub(crate) type Row = (&'static str, &'static str, fn(&Figures) -> Metres);
@@ -92,7 +92,7 @@ pub fn table_notes(config: &MachineConfig) -> Vec<String> {
     let axes = config.axis.iter();
     let own = axes.filter_map(|(name, it)| Some((name, it.compensation.as_ref()?)));
     own.map(|(name, limits)| {
-        let harmless = assemble::harmless(config, name).um();
+        let harmless = settings::harmless(config, name).um();
         let by = match limits.jump_limit_um {
             None => "half of what its instrument counts; `jump_limit_um` is not needed",
             Some(_) => {

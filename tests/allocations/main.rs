@@ -11,8 +11,8 @@ use tests::apart::{Apart, used_by_the_loop};
 use tests::stream::{Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::config::MachineConfig;
-use truestage::cycle::volumetric::{FirstPartCorrection, VolumetricCorrection, VolumetricFailure};
 use truestage::engine::{Cause, Correction, Engine, NoCorrection};
+use truestage::volumetric::{FirstPartCorrection, VolumetricCorrection, VolumetricFailure};
 
 #[global_allocator]
 static COUNTED: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;

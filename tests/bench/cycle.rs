@@ -26,8 +26,8 @@ use tests::stream::{self, Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::Failure;
 use truestage::config::MachineConfig;
-use truestage::cycle::volumetric::VolumetricCorrection;
 use truestage::engine::{Cause, Correction, Engine, Histogram, NoCorrection, Timing};
+use truestage::volumetric::VolumetricCorrection;
 use units::Metres;
 
 const SCREWS: [&str; 4] = ["u", "v", "w", "r"];

@@ -10,7 +10,8 @@ use drivers::transport::live::{Live, SlcanSettings};
 use drivers::transport::lockstep::Participant;
 use nix::sys::signal::Signal;
 use tests::Rig;
-use truestage::store::{PointEntry, ReadJournal, read_journal};
+use truestage::linear::PointEntry;
+use truestage::store::{ReadJournal, read_journal};
 use wire::{Input, Payload, Port};
 
 use crate::programs::{Bench, Process, live_rigs};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use tests::{Bench, Edit, UVW};
-use truestage::cycle::platform::Pose;
+use truestage::platform::Pose;
 
 use crate::programs::{check_says, page, truestage};
 

@@ -4,7 +4,8 @@ use std::fs;
 
 use nix::sys::signal::Signal;
 use tests::{Edit, ROTARY, Rig};
-use truestage::store::{ReadJournal, SweepEntry, read_journal};
+use truestage::rotary::SweepEntry;
+use truestage::store::{ReadJournal, read_journal};
 
 use crate::programs::{Bench, live_rigs, number, text};
 

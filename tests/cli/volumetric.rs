@@ -7,8 +7,9 @@ use std::path::Path;
 
 use tests::volume::{Volume, good, quick};
 use tests::{Edit, VOLUMETRIC};
-use truestage::cycle::volumetric::{VerifyBy, WarmUp};
-use truestage::store::{OpticsName, read_journal};
+use truestage::store::read_journal;
+use truestage::volumetric::OpticsName;
+use truestage::volumetric::{VerifyBy, WarmUp};
 
 use crate::programs::{check_error, check_says, number, page, text, truestage};
 

@@ -13,9 +13,9 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use tests::volume::point_mm;
 use tests::{Edit, INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
-use truestage::cycle::volumetric::{LineOptics, LineTask};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::read_journal;
+use truestage::volumetric::{LineOptics, LineTask};
 
 use crate::programs::{
     Ended, Process, check_error, live_rigs, number, one_machine, program, text, truestage,

@@ -11,7 +11,6 @@ use drivers::device::{
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::plant::HallDrift;
 use tests::{Desk, Emulator, Rig, Setup, rigs};
-use truestage::assemble;
 use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared};
 
 type Table = Desk<Cia402Drive<Radians>>;
@@ -25,7 +24,7 @@ fn table(rig: Rig, setup: &Setup) -> Table {
     let emulator = Emulator::new(rig, setup);
     let loaded = &emulator.loaded;
     let (rotary, bus) = (&loaded.config.rotary["c"], &loaded.config.can["can0"]);
-    let settings = assemble::rotary_settings(rotary, bus, loaded.patience);
+    let settings = truestage::rotary::settings::rotary_settings(rotary, bus, loaded.patience);
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
 

@@ -12,13 +12,13 @@ use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::volume::{Volume, good};
 use tests::{Bench, Edit, VOLUMETRIC};
-use truestage::config::BeamDetectorConfig;
-use truestage::cycle::volumetric::{VolumetricCorrection, VolumetricState};
+use truestage::Failure;
 use truestage::engine::{
     Cause, Channel, Corrected, Correction, Engine, Live, Observed, Source, ThermometerSample,
     Validity,
 };
-use truestage::{Failure, assemble};
+use truestage::volumetric::BeamDetectorConfig;
+use truestage::volumetric::{VolumetricCorrection, VolumetricState};
 use truestage::{Observer, Stage};
 use units::{Celsius, Metres, Quantity, Radians};
 
@@ -109,7 +109,8 @@ fn constant<Q: Quantity>(value: Q) -> Function<Q> {
 
 /// What a detector whose channels begin at `first` sees.
 fn place(config: &BeamDetectorConfig, first: usize, seen: &Seen) -> [Metres; 2] {
-    let mut detector = assemble::beam_detector(config).expect("it was checked");
+    let mut detector =
+        truestage::volumetric::settings::beam_detector(config).expect("it was checked");
     let channel = |k: usize| seen.0[first + k].expect("all have sent");
     let sample = Sample {
         channels: core::array::from_fn(|k| channel(k).volts),
@@ -128,12 +129,12 @@ fn risen(bench: &Bench, seen: &Seen) -> VolumetricState {
         let [first, second] = place(&beam.slider, 8 * at, seen);
         let up = if axis == Axis::X { RISEN } else { Metres::ZERO };
         let end = place(beam.end.as_ref().expect("it has one"), 8 * at + 4, seen);
-        let drift = assemble::beam_drift(beam).expect("it was checked");
+        let drift = truestage::volumetric::settings::beam_drift(beam).expect("it was checked");
         let slider = [constant(first), constant(second - up)];
         Some(BeamReference::new(slider, end, drift).expect("sound"))
     });
     let roll = config.roll.as_ref().expect("it has one");
-    let optics = assemble::roll_optics(roll).expect("it was checked");
+    let optics = truestage::volumetric::settings::roll_optics(roll).expect("it was checked");
     let reading = |k: usize| {
         let volts = seen.0[24 + k].expect("all have sent").volts;
         Metres::from_mm(volts.value() * roll.mm_per_v[k])

@@ -4,8 +4,9 @@
 use std::fs;
 
 use tests::{Bench, Edit};
-use truestage::cycle::CalibrateOptions;
-use truestage::store::{CalibrationRecord, Content, Lease, RotaryContent, StoreError};
+use truestage::rotary::RotaryContent;
+use truestage::run::CalibrateOptions;
+use truestage::store::{CalibrationRecord, Content, Lease, StoreError};
 use truestage::{Failure, Machine, Store};
 
 use crate::scene::shortened;

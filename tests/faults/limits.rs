@@ -2,7 +2,8 @@
 //! large or too steep, and those that make the axis worse (classes 48, 49).
 
 use tests::Bench;
-use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::linear::VerifyOptions;
+use truestage::run::CalibrateOptions;
 use truestage::store::{CalibrationRecord, Content};
 use truestage::{Failure, Machine, Store};
 use units::Metres;

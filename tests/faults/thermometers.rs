@@ -10,8 +10,8 @@ use mock_bus::fault::{Fault, FaultConfig};
 use tests::Edit;
 use tests::volume::{Off, Volume, good, point_mm, size};
 use truestage::Failure;
-use truestage::cycle::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
 use truestage::engine::{Cause, Live, Source};
+use truestage::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
 use units::{Metres, Quantity, Time};
 
 /// When the machine becomes warm, and when it is.

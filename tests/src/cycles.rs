@@ -2,9 +2,11 @@
 
 use core::time::Duration;
 
-use truestage::cycle::platform::Pose;
-use truestage::cycle::volumetric::WarmUp;
-use truestage::cycle::{CalibrateOptions, VerifyOptions, Way};
+use truestage::linear::VerifyOptions;
+use truestage::platform::Pose;
+use truestage::rotary::Way;
+use truestage::run::CalibrateOptions;
+use truestage::volumetric::WarmUp;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Radians};
 

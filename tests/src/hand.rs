@@ -1,7 +1,7 @@
 //! The hand that turns the plate of an emulated table.
 
 use truestage::Failure;
-use truestage::cycle::rotary::{Operator, PlateTask};
+use truestage::rotary::{Operator, PlateTask};
 
 /// Does what is asked, unless it is told to be mistaken; sees nothing of the machine.
 pub struct Hand<'a> {

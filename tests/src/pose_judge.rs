@@ -1,7 +1,7 @@
 //! Judging a platform by the plant's truth.
 
 use mock_bus::simulation::Simulation;
-use truestage::cycle::platform::Pose;
+use truestage::platform::Pose;
 use units::Metres;
 
 /// Where errors of the angle count as lengths, as in the shipped configurations.

@@ -8,11 +8,11 @@ use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::BeamReference;
 use mock_bus::runner::Running;
 use mock_bus::simulation::Simulation;
-use truestage::config::VolumetricConfig;
-use truestage::cycle::volumetric::VolumetricState;
 use truestage::emulated::Emulated;
 use truestage::engine::{AXES_MAX, Cause, Desk, Engine, Live, PushError, State};
-use truestage::{Failure, Machine, assemble};
+use truestage::volumetric::VolumetricConfig;
+use truestage::volumetric::VolumetricState;
+use truestage::{Failure, Machine};
 use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 /// How many set-points an axis may be behind: as many as the engine grants.
@@ -77,7 +77,7 @@ pub fn nothing_known(config: &VolumetricConfig) -> VolumetricState {
     let ends = [Metres(-0.01), Metres(0.51)];
     let zero = || Function::new(&ends, &[Metres::ZERO; 2], Shape::Linear).expect("it is good");
     let beams = config.beam.each().map(|beam| {
-        let drift = assemble::beam_drift(beam?).expect("it was checked");
+        let drift = truestage::volumetric::settings::beam_drift(beam?).expect("it was checked");
         BeamReference::new([zero(), zero()], [Metres::ZERO; 2], drift).ok()
     });
     let roll = Function::new(&ends, &[Radians(0.0); 2], Shape::Linear);

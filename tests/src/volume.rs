@@ -9,14 +9,12 @@ use compensator::volumetric::model::{AxisErrors, Squareness};
 use compensator::volumetric::online::StateMap;
 use compensator::volumetric::{Axis, Point};
 use mock_bus::plant::VolumetricTruth;
-use truestage::cycle::volumetric::{
-    GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
-};
 use truestage::emulated::with_rare_heartbeats;
 use truestage::engine::{Live, Observed};
-use truestage::store::{
-    BendRecord, CalibrationRecord, Content, GeometryContent, MemoryName, RecordHead,
-    StateMemoryContent,
+use truestage::store::{CalibrationRecord, Content, RecordHead};
+use truestage::volumetric::{BendRecord, GeometryContent, MemoryName, StateMemoryContent};
+use truestage::volumetric::{
+    GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
 };
 use units::{Celsius, Metres, Radians, Time};
 

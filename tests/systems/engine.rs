@@ -17,8 +17,8 @@ use tests::stream::{
 };
 use tests::{Rig, Setup, Stand, not_run, rigs, true_pose};
 use truestage::Failure;
-use truestage::cycle::volumetric::VolumetricCorrection;
 use truestage::engine::{Cause, Engine, NoCorrection, Timing};
+use truestage::volumetric::VolumetricCorrection;
 use units::{Metres, MetresPerSecond};
 
 const SCREWS: [&str; 4] = ["u", "v", "w", "r"];

@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use tests::{Setup, Stand, on_every_rig};
 use truestage::Failure;
-use truestage::cycle::{CalibrateOptions, Verified, VerifyOptions};
 use truestage::emulated::{DriftLimits, HallDrift};
+use truestage::linear::{Verified, VerifyOptions};
+use truestage::run::CalibrateOptions;
 use truestage::text::largest_deviation;
 use units::{Metres, Volts};
 

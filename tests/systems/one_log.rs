@@ -7,8 +7,8 @@ use std::thread::JoinHandle;
 use mock_bus::simulation::Simulation;
 use tests::{Rig, Setup, Stand, rigs};
 use truestage::Failure;
-use truestage::cycle::Way;
-use truestage::cycle::platform::Pose;
+use truestage::platform::Pose;
+use truestage::rotary::Way;
 use units::{Metres, Radians};
 
 /// What a machine did on its buses.

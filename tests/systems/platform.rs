@@ -2,8 +2,8 @@
 
 use tests::{PoseJudge, Setup, Stand, on_every_rig};
 use truestage::Failure;
-use truestage::cycle::platform::Pose;
 use truestage::emulated::HallDrift;
+use truestage::platform::Pose;
 use units::{Metres, Radians};
 
 /// Zero, as found, calibrate, as left, power cycle, zero, as left, align.

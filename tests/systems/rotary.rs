@@ -2,8 +2,9 @@
 
 use tests::{Emulator, Hand, Setup, Stand, on_every_rig};
 use truestage::Failure;
-use truestage::cycle::{CalibrateOptions, Way};
 use truestage::emulated::HallDrift;
+use truestage::rotary::Way;
+use truestage::run::CalibrateOptions;
 use units::Radians;
 
 const AXIS: &str = "c";

@@ -81,6 +81,14 @@ impl Imports {
             .expect("every crate has a root")
     }
 
+    /// Every import: who, and what of the same crate.
+    pub(crate) fn each(&self) -> impl Iterator<Item = (&[String], &[String])> {
+        self.modules.iter().flat_map(|(module, names)| {
+            let others = names.paths.iter().map(|path| self.home(path));
+            others.map(move |other| (module.as_slice(), other))
+        })
+    }
+
     /// Circles of files, the largest first; each by the names of its modules.
     pub(crate) fn circles(&self) -> Vec<Vec<String>> {
         let mut graph = DiGraph::<&[String], ()>::new();
@@ -89,12 +97,9 @@ impl Imports {
             .keys()
             .map(|module| (module.as_slice(), graph.add_node(module)))
             .collect();
-        for (module, names) in &self.modules {
-            for path in &names.paths {
-                let other = self.home(path);
-                if !other.starts_with(module) && !module.starts_with(other) {
-                    graph.update_edge(nodes[module.as_slice()], nodes[other], ());
-                }
+        for (module, other) in self.each() {
+            if !other.starts_with(module) && !module.starts_with(other) {
+                graph.update_edge(nodes[module], nodes[other], ());
             }
         }
         let mut circles: Vec<Vec<String>> = tarjan_scc(&graph)

@@ -9,9 +9,10 @@ use wire::Port;
 use wire::canopen::NodeId;
 
 use super::cyclic::cyclic_settings;
-use super::{analogs, axes, expected_identity, instruments, node_id, ports, rotaries};
+use super::{analogs, axes, expected_identity, instruments, node_id, ports};
 use crate::camera::{cameras, inspection_timeout};
 use crate::config::{AxisConfig, CanBus, IdentityConfig, Loaded, MachineConfig};
+use crate::rotary::settings::rotaries;
 
 /// Everything of a machine but its transport, whose ports are numbered as [`ports`] says.
 pub(crate) fn parts(loaded: &Loaded) -> Parts {

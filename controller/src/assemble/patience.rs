@@ -38,7 +38,7 @@ pub(super) fn patient_node(usual: NodeTimeouts, patience: Patience) -> NodeTimeo
     }
 }
 
-pub(super) fn patient_drive(usual: Cia402Timeouts, patience: Patience) -> Cia402Timeouts {
+pub(crate) fn patient_drive(usual: Cia402Timeouts, patience: Patience) -> Cia402Timeouts {
     Cia402Timeouts {
         transition: patience.of(usual.transition),
         mode: patience.of(usual.mode),

@@ -7,12 +7,10 @@ mod camera;
 mod dependence;
 mod diagnostic;
 mod drive;
+pub(crate) mod judge;
 mod load;
 mod model;
-mod platform;
-mod rotary;
-mod validate;
-mod volumetric;
+pub(crate) mod validate;
 
 pub use camera::{CameraConfig, CameraDevice};
 pub use dependence::ConfigHash;
@@ -24,19 +22,4 @@ pub use model::{
     CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, InstrumentConfig,
     InstrumentDevice, InterpolationName, MachineConfig, MachineSection, OpticsConfig, SerialAxis,
     SerialLine, VerifyConfig, ZeroConfig,
-};
-pub use platform::{
-    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
-    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig, ScrewMethodName,
-};
-pub use rotary::{
-    DirectionName, EdgeName, LineDetectorConfig, OptimiseName, PeriodicInterpolationName,
-    PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
-    RotaryVerifyConfig, RotaryZeroConfig,
-};
-pub use volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
-    FeedConfig, InfluenceConfig, LayoutName, ReactionName, ReferenceConfig, RollConfig, ShapeName,
-    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
-    VolumetricConfig, VolumetricVerifyConfig, VolumetricZeroConfig,
 };

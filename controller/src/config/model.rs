@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use super::camera::CameraConfig;
 use super::drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
-use super::platform::PlatformConfig;
-use super::rotary::RotaryConfig;
-use super::volumetric::VolumetricConfig;
+use crate::platform::config::PlatformConfig;
+use crate::rotary::RotaryConfig;
+use crate::volumetric::VolumetricConfig;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]

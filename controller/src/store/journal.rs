@@ -10,15 +10,16 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::difference::{Difference, first_difference};
-use super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
-use super::pose::{ArrangementEntry, PoseEntry, StrokeEntry};
-use super::record::{EnvironmentRecord, IdentityRecord, InstrumentRecord};
-use super::volume::{
+use super::record::{IdentityRecord, InstrumentRecord};
+use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound};
+use crate::config::ConfigHash;
+use crate::linear::{PointEntry, ZeroEntry};
+use crate::platform::{ArrangementEntry, PoseEntry, StrokeEntry};
+use crate::rotary::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+use crate::volumetric::{
     LineReadEntry, LineReadingEntry, VolumeCheckEntry, VolumePlanEntry, VolumeRead,
     VolumeReferencesEntry,
 };
-use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound};
-use crate::config::ConfigHash;
 
 /// What a run is: written first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,48 +49,6 @@ pub struct JournalHeader {
     pub targets_m: Vec<f64>,
     /// How many runs.
     pub runs: u32,
-}
-
-/// One measured point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PointEntry {
-    /// Which run, from 1.
-    pub run: u32,
-    /// `+` or `-`.
-    pub approach: char,
-    /// Where it should be, metres.
-    pub target_m: f64,
-    /// What the drive was sent, metres.
-    pub set_point_m: f64,
-    /// What the encoder said, metres.
-    pub encoder_m: f64,
-    /// What the instrument said, corrected, metres.
-    pub measured_m: f64,
-    /// Standard deviation of the readings averaged, metres.
-    pub scatter_m: f64,
-    /// Monotonic time of the machine, seconds.
-    pub at_s: f64,
-    /// The environment then.
-    pub environment: EnvironmentRecord,
-}
-
-/// What a zero search found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ZeroEntry {
-    /// The origin in the drive's coordinates before it became zero, metres.
-    pub origin_m: f64,
-    /// Its standard uncertainty, metres.
-    pub standard_uncertainty_m: f64,
-    /// The patent's P0 in the same coordinates, metres.
-    pub patent_p0_m: f64,
-    /// Highest voltage of the peak sensor, volts.
-    pub peak_max_v: f64,
-    /// Voltage of the slope sensor at the origin, volts.
-    pub mid_v: f64,
-    /// Monotonic time of the machine, seconds.
-    pub at_s: f64,
 }
 
 /// The datum's place, measured again after a run.
@@ -491,6 +450,7 @@ fn take(
 mod tests {
     use super::*;
     use crate::Edit;
+    use crate::store::EnvironmentRecord;
 
     fn hash() -> ConfigHash {
         ConfigHash::only("h")

@@ -13,251 +13,29 @@
 mod atomic;
 mod calibration;
 mod difference;
+mod failure;
 #[cfg(test)]
 mod golden_tests;
 mod journal;
 mod lease;
 mod name;
-mod plate;
-mod pose;
-mod record;
+pub(crate) mod record;
 mod sound;
-mod volume;
-
-use std::path::{Path, PathBuf};
 
 pub use calibration::{ActivePointer, Store};
 pub(crate) use difference::first_difference;
+pub use failure::StoreError;
 pub(crate) use journal::not_resumable;
-pub use journal::{
-    ClosureEntry, Entry, Journal, JournalHeader, PointEntry, ReadJournal, ZeroEntry, read_journal,
-};
+pub use journal::{ClosureEntry, Entry, Journal, JournalHeader, ReadJournal, read_journal};
 pub use lease::Lease;
 pub use name::short;
-pub use plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
-pub use pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use record::{
-    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, CalibrationRecord, Content,
-    EnvironmentRecord, ExpansionRecord, FunctionRecord, FunctionShape, GeometryContent,
-    HarmonicRecord, IdentityRecord, InstrumentRecord, LinearContent, MemoryName, MemoryRecord,
-    NodeRecord, ReadingName, RecordHead, RotaryContent, ScrewContent, ScrewMethodName,
-    StateMemoryContent, StrokeRecord, UnknownRecord,
+    CalibrationRecord, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead,
 };
-pub use volume::{
-    BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
-    VolumeCheckEntry, VolumePlanEntry, VolumeRead, VolumeReferencesEntry,
-};
-
-pub(crate) use record::{AXES, error_name};
-pub(crate) use volume::{metres, point};
 
 pub(crate) use atomic::write_new_or_replace;
+pub(crate) use failure::io_error;
+use failure::unsound;
 
 /// The version of every file this program writes.
 pub const SCHEMA_VERSION: u32 = 1;
-
-/// Why something cannot be stored, or what is stored cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The operating system refused.
-    #[error("{}: cannot {action}: {source}; the files already stored are untouched", path.display())]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// With which file.
-        path: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
-    /// The bytes are not those that were stored.
-    #[error("{}: damaged: its content hashes to {seen}; roll back or calibrate again", path.display())]
-    Damaged {
-        /// Which file.
-        path: PathBuf,
-        /// The hash of what is there.
-        seen: String,
-    },
-    /// The bytes are no record of ours.
-    #[error("{}: line {line}: not a record of this program: {cause}", path.display())]
-    Format {
-        /// Which file.
-        path: PathBuf,
-        /// Counted from 1.
-        line: usize,
-        /// The parser's words.
-        cause: String,
-    },
-    /// Whole, but it cannot be so.
-    #[error(
-        "{}: {place}: {expected} is expected there, seen: {seen}; the file was edited, or another \
-         program wrote it, and nothing of it is used: restore it, or measure again",
-        at_line(path, *line)
-    )]
-    Unsound {
-        /// Which file.
-        path: PathBuf,
-        /// Of a journal, which line, from 1.
-        line: Option<usize>,
-        /// Which key of it.
-        place: String,
-        /// What can stand there.
-        expected: String,
-        /// What does.
-        seen: String,
-    },
-    /// Written by a newer program.
-    #[error(
-        "{}: written with schema version {seen}, this program knows {SCHEMA_VERSION}; \
-         use the newer program", path.display()
-    )]
-    Newer {
-        /// Which file.
-        path: PathBuf,
-        /// Its version.
-        seen: u32,
-    },
-    /// The calibration belongs to another machine or another set-up of this one.
-    #[error(
-        "calibration {id}: {what} is `{expected}` there, but `{seen}` here; it is refused on \
-         this machine, calibrate again"
-    )]
-    Foreign {
-        /// The calibration.
-        id: String,
-        /// What differs.
-        what: &'static str,
-        /// What the calibration says.
-        expected: String,
-        /// What this machine is.
-        seen: String,
-    },
-    /// The calibration holds another kind of model than is needed.
-    #[error(
-        "calibration {id} of axis {axis} is of the kind `{seen}`, but `{expected}` is needed here; \
-         calibrate the axis again, or roll back to a calibration of that kind"
-    )]
-    OtherKind {
-        /// The calibration.
-        id: String,
-        /// Its axis.
-        axis: String,
-        /// The kind wanted.
-        expected: &'static str,
-        /// The kind it is.
-        seen: &'static str,
-    },
-    /// Another program uses the machine.
-    #[error("the machine is in use by {owner}; stop that first")]
-    Leased {
-        /// Who.
-        owner: String,
-    },
-    /// No calibration has this name.
-    #[error("no calibration `{id}`; `truestage cal list` shows what there is")]
-    Unknown {
-        /// What was asked for.
-        id: String,
-    },
-    /// More than one calibration starts like this.
-    #[error("`{id}` begins the name of {count} calibrations; give more digits")]
-    Ambiguous {
-        /// What was asked for.
-        id: String,
-        /// How many fit.
-        count: usize,
-    },
-    /// There is nothing to go back to.
-    #[error("axis {axis}: no earlier calibration to roll back to")]
-    NoEarlier {
-        /// Which axis.
-        axis: String,
-    },
-    /// The nodes of the record make no table.
-    #[error("calibration {id}: {source}")]
-    Table {
-        /// The calibration.
-        id: String,
-        /// Why.
-        source: compensator::error_table::TableError,
-    },
-    /// The values of the record make no table of a rotary axis.
-    #[error("calibration {id}: {source}")]
-    Periodic {
-        /// The calibration.
-        id: String,
-        /// Why.
-        source: compensator::rotary::PeriodicError,
-    },
-    /// The nodes of the record make no function of a position.
-    #[error("calibration {id}, {name}: {source}")]
-    Function {
-        /// The calibration.
-        id: String,
-        /// Which function.
-        name: String,
-        /// Why.
-        source: compensator::volumetric::function::FunctionError,
-    },
-    /// The record has a part that three axes do not have, or has it twice.
-    #[error("calibration {id}: `{name}` is no error of three axes, or is there twice")]
-    ErrorName {
-        /// The calibration.
-        id: String,
-        /// What it is called.
-        name: String,
-    },
-    /// The record's references belong to no beam.
-    #[error("calibration {id}: {source}")]
-    Beam {
-        /// The calibration.
-        id: String,
-        /// Why.
-        source: compensator::volumetric::online::DriftError,
-    },
-    /// Nothing is left of the run to be done.
-    #[error("{}: this run is complete; start a new one without --resume", path.display())]
-    AlreadyComplete {
-        /// Which journal.
-        path: PathBuf,
-    },
-    /// The journal cannot be continued.
-    #[error("{}: cannot be resumed: {what} was `{expected}`, is now `{seen}`", path.display())]
-    NotResumable {
-        /// Which journal.
-        path: PathBuf,
-        /// What differs.
-        what: String,
-        /// What the journal says.
-        expected: String,
-        /// What this run would be.
-        seen: String,
-    },
-}
-
-fn at_line(path: &Path, line: Option<usize>) -> String {
-    let line = line.map_or_else(String::new, |it| format!(": line {it}"));
-    path.display().to_string() + &line
-}
-
-fn unsound(path: &Path, line: Option<usize>) -> impl FnOnce(sound::Unsound) -> StoreError {
-    let path = path.to_owned();
-    move |it| StoreError::Unsound {
-        path,
-        line,
-        place: it.place,
-        expected: it.expected,
-        seen: it.seen,
-    }
-}
-
-pub(crate) fn io_error(
-    action: &'static str,
-    path: &Path,
-) -> impl FnOnce(std::io::Error) -> StoreError {
-    let path = path.to_owned();
-    move |source| StoreError::Io {
-        action,
-        path,
-        source,
-    }
-}

@@ -3,7 +3,8 @@
 use compensator::iso230::Figures;
 use tests::Bench;
 use tests::Edit;
-use truestage::cycle::{CalibrateOptions, Corrected, VerifyOptions};
+use truestage::linear::{Corrected, VerifyOptions};
+use truestage::run::CalibrateOptions;
 use truestage::{Failure, text};
 use units::{Metres, Time};
 

@@ -6,7 +6,7 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
 use tests::{Bench, EDGE, Edit, PoseJudge, Shipped, UVW, UVW_COPLEY, true_pose};
 use truestage::Failure;
-use truestage::cycle::platform::{Pose, PoseMoved};
+use truestage::platform::{Pose, PoseMoved};
 use units::{Approach, Metres, Time};
 
 /// How many poses are visited as found, and as left.

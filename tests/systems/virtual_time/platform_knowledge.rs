@@ -3,7 +3,7 @@
 
 use tests::{Bench, Edit, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
 use truestage::StopRequest;
-use truestage::cycle::platform::Pose;
+use truestage::platform::Pose;
 use truestage::{Failure, config};
 use units::{Metres, Radians};
 

@@ -8,7 +8,8 @@ use std::time::Instant;
 use drivers::transport::record::Recorder;
 use tests::Bench;
 use truestage::assemble;
-use truestage::cycle::{CalibrateOptions, VerifyOptions};
+use truestage::linear::VerifyOptions;
+use truestage::run::CalibrateOptions;
 
 /// What a recorder writes and a test reads.
 #[derive(Clone, Default)]

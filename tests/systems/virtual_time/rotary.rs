@@ -8,11 +8,12 @@ use std::rc::Rc;
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
-use truestage::cycle::rotary::{
+use truestage::emulated::{Emulated, HallDrift};
+use truestage::rotary::Way;
+use truestage::rotary::{
     Operator, PlateMove, PlateTask, RotaryCalibrated, RotaryFailure, RotaryVerified,
 };
-use truestage::cycle::{CalibrateOptions, Way};
-use truestage::emulated::{Emulated, HallDrift};
+use truestage::run::CalibrateOptions;
 use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine};
 use truestage::{Observer, Stage};

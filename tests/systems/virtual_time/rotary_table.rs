@@ -6,8 +6,8 @@ use drivers::device::DeviceError;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit};
 use truestage::Failure;
-use truestage::cycle::{Sweep, SweepOptions, Way};
 use truestage::emulated::HallDrift;
+use truestage::rotary::{Sweep, SweepOptions, Way};
 use units::{Approach, Radians, RadiansPerSecond};
 
 const AXIS: &str = "c";

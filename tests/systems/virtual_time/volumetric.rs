@@ -69,7 +69,7 @@ fn references_and_memories_of_other_errors_are_refused() {
     let cleared = volume
         .bench
         .machine
-        .clear_memory(&store, truestage::store::MemoryName::First);
+        .clear_memory(&store, truestage::volumetric::MemoryName::First);
     assert_eq!(good(cleared), (records.first_memory, None));
     assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
 }

@@ -2,7 +2,7 @@
 
 use tests::Edit;
 use tests::volume::{Frame, Volume, good, percentile_95, spread};
-use truestage::cycle::volumetric::{GEOMETRY, WarmUp};
+use truestage::volumetric::{GEOMETRY, WarmUp};
 use units::Metres;
 
 /// Hardly any gradient and films, but scales that become a kelvin and more warmer meanwhile.

@@ -20,7 +20,7 @@ use tests::volume::{
     random_places, spread,
 };
 use tests::{Bench, VOLUMETRIC};
-use truestage::cycle::volumetric::WarmUp;
+use truestage::volumetric::WarmUp;
 use units::{Metres, Time};
 
 /// How long the day is; what it is like is looked at every hour.

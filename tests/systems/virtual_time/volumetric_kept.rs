@@ -6,8 +6,8 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::online::Memories;
 use tests::Edit;
 use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
-use truestage::cycle::volumetric::{Remembered, VolumetricState};
-use truestage::store::MemoryName;
+use truestage::volumetric::MemoryName;
+use truestage::volumetric::{Remembered, VolumetricState};
 use units::{Metres, Time};
 
 /// The tool of the shipped machine, and of its emulation.

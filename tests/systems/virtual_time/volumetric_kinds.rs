@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use tests::Edit;
 use tests::volume::{Frame, TRAVEL_MM, Volume, calm, good, percentile_95, spread};
-use truestage::cycle::volumetric::WarmUp;
+use truestage::volumetric::WarmUp;
 use units::Metres;
 
 /// Where the volume begins.

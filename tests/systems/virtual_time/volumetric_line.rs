@@ -10,10 +10,10 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::plant::LineTruth;
 use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::Failure;
-use truestage::cycle::volumetric::{
+use truestage::emulated::Emulated;
+use truestage::volumetric::{
     Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask, VolumetricFailure,
 };
-use truestage::emulated::Emulated;
 use units::{Metres, Radians};
 use wire::cia402::PowerState;
 

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use compensator::volumetric::function::Shape;
 use tests::volume::{Volume, good, quick};
 use truestage::Failure;
-use truestage::cycle::volumetric::{
-    LineOperator, LineTask, VolumetricCalibrated, VolumetricEvaluated, WarmUp,
-};
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::store::{ReadJournal, read_journal};
+use truestage::volumetric::{
+    LineOperator, LineTask, VolumetricCalibrated, VolumetricEvaluated, WarmUp,
+};
 
 /// Sets lines up, notes which, and goes home before the one that it is told.
 struct Hand {

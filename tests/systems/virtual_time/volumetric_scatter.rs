@@ -3,9 +3,9 @@
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use tests::volume::{Volume, quick};
 use truestage::Failure;
-use truestage::cycle::volumetric::{LineOperator, LineTask, VolumetricFailure, WarmUp};
 use truestage::emulated::Emulated;
 use truestage::store::read_journal;
+use truestage::volumetric::{LineOperator, LineTask, VolumetricFailure, WarmUp};
 
 /// Some micrometres: more than these errors are known to, less than a machine of this size has.
 const HALF_WAVELENGTHS: i64 = 30;

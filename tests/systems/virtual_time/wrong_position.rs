@@ -6,8 +6,7 @@
 
 use compensator::error_table::{ErrorTable, Node};
 use tests::{Bench, Edit, random};
-use truestage::assemble;
-use truestage::cycle::CalibrateOptions;
+use truestage::run::CalibrateOptions;
 use truestage::{Failure, Store};
 use units::Metres;
 
@@ -175,14 +174,18 @@ impl Count {
 
     fn spoil(&mut self, bench: &Bench, table: &ErrorTable, seed: u64) {
         let config = &bench.loaded.config;
-        let refused = |wrong: ErrorTable| assemble::compensation(config, "x", wrong).is_err();
+        let refused = |wrong: ErrorTable| {
+            truestage::linear::settings::compensation(config, "x", wrong).is_err()
+        };
         let inner = table.nodes().len() - 4;
         let at = 2 + (random(&mut (seed ^ 0xBAD)) * inner as f64) as usize;
         for (half_wavelengths, found) in &mut self.found {
             let error = HALF_WAVELENGTH * f64::from(*half_wavelengths);
             *found += u32::from(refused(with_error(table, at, error)));
         }
-        if let Ok(Some(noticed)) = table.judge_neighbours(assemble::harmless(config, "x")) {
+        if let Ok(Some(noticed)) =
+            table.judge_neighbours(truestage::linear::settings::harmless(config, "x"))
+        {
             self.noticed.push(noticed);
             self.certain.1 += 1;
             self.certain.0 += u32::from(refused(with_error(table, at, noticed * 3.0)));
@@ -248,7 +251,8 @@ fn a_position_that_is_wrong_in_every_run_is_refused_and_named() {
         let mut bench = Bench::new(seed);
         let table = calibrated(&mut bench).unwrap_or_else(|failure| panic!("{failure}"));
         let wrong = with_error(&table, 12, HALF_WAVELENGTH * 5.0);
-        let failure = assemble::compensation(&bench.loaded.config, "x", wrong).unwrap_err();
+        let failure = truestage::linear::settings::compensation(&bench.loaded.config, "x", wrong)
+            .unwrap_err();
         assert_eq!(failure.exit_code(), 3);
         let text = failure.to_string();
         for part in [

@@ -9,8 +9,8 @@ use core::fmt::{Debug, Formatter, Result};
 
 use super::super::drive::IdentityConfig;
 use super::super::model::{AxisConfig, AxisDevice, MachineConfig};
-use super::super::rotary::{DirectionName, RotaryConfig};
-use super::super::volumetric::{
+use crate::rotary::{DirectionName, RotaryConfig};
+use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, CurvePointConfig, LayoutName, RollConfig,
     VolumeAxisName, VolumetricConfig,
 };

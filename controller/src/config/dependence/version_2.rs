@@ -6,13 +6,13 @@
 
 use super::super::drive::IdentityConfig;
 use super::super::model::{AnalogConfig, AxisConfig, AxisDevice, MachineConfig};
-use super::super::platform::ActuatorConfig;
-use super::super::rotary::{DirectionName, RotaryConfig, RotaryDevice};
-use super::super::volumetric::{
+use super::text::{Place, Value, quoted};
+use crate::platform::config::ActuatorConfig;
+use crate::rotary::{DirectionName, RotaryConfig, RotaryDevice};
+use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, LayoutName, RollConfig, VolumeAxisName,
     VolumetricConfig,
 };
-use super::text::{Place, Value, quoted};
 
 pub(super) fn text(config: &MachineConfig) -> String {
     let mut text = String::from("truestage: what a calibration depends on, version 2\n");

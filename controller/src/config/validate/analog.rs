@@ -1,9 +1,9 @@
 //! Whether an analog module makes sense, and its device has what it needs and nothing else.
 
-use super::judge::Judge;
-use super::{check_heartbeat, check_watch};
+use super::drive::{check_heartbeat, check_watch};
 use crate::assemble;
-use crate::config::model::{AnalogConfig, AnalogDevice, MachineConfig};
+use crate::config::judge::Judge;
+use crate::config::{AnalogConfig, AnalogDevice, MachineConfig};
 
 /// Inputs of a cia404 module that the driver knows.
 const CIA404_INPUTS: u8 = 8;

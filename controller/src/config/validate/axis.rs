@@ -7,24 +7,12 @@ use drivers::device::cia402::{interpolation_period, period_from};
 
 use units::Short;
 
-use super::judge::{Finding, Judge};
-use super::{check_heartbeat, check_watch};
-use crate::config::model::{AxisConfig, AxisDevice, CyclicConfig, MachineConfig};
+use super::drive::{check_heartbeat, check_watch};
+use crate::config::judge::{Finding, Judge};
+use crate::config::{AxisConfig, AxisDevice, CyclicConfig, MachineConfig};
 
 /// The rates that both amplifiers and serial ports have.
 const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
-
-/// Axes name files, and stand in words of the command line (`x=1mm`).
-pub(super) fn check_axis_name(findings: &mut Vec<Finding>, section: &str, name: &str) {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.is_empty() || !name.chars().all(plain) {
-        findings.push(Finding {
-            key: format!("{section}.{name}"),
-            cause: format!("`{name}` cannot name an axis"),
-            help: "use letters, digits and _".into(),
-        });
-    }
-}
 
 pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
     judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);

@@ -2,7 +2,7 @@
 
 use wire::in_sight::Cell;
 
-use super::judge::{Finding, Judge};
+use crate::config::judge::{Finding, Judge};
 use crate::config::{CameraConfig, MachineConfig};
 
 pub(super) fn check_cameras(config: &MachineConfig, findings: &mut Vec<Finding>) {

@@ -1,24 +1,20 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
 mod analog;
-mod axis;
+pub(crate) mod axis;
 mod camera;
-mod cycle;
-mod detectors;
-mod judge;
-mod platform;
-mod rotary;
-mod volumetric;
+pub(crate) mod drive;
 
 use std::collections::BTreeMap;
 
 use self::analog::check_analog;
-use self::axis::{check_axis, check_axis_name, check_lines};
+use self::axis::{check_axis, check_lines};
 use self::camera::check_cameras;
-use self::cycle::check_cycle;
-pub(super) use self::judge::Finding;
-use self::judge::Judge;
-use self::rotary::check_rotaries;
+use self::drive::check_axis_name;
+pub(super) use crate::config::judge::Finding;
+use crate::config::judge::Judge;
+use crate::linear::check::check_cycle;
+use crate::rotary::check::check_rotaries;
 use drivers::device::cia402::period_from;
 use drivers::protocol::bus_load::BusLoadError;
 
@@ -75,8 +71,8 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         );
     }
     check_cameras(config, &mut findings);
-    platform::check(config, &mut findings);
-    volumetric::check(config, &mut findings);
+    crate::platform::check::check(config, &mut findings);
+    crate::volumetric::check::check(config, &mut findings);
     check_node_ids(config, &mut findings);
     check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.
@@ -142,36 +138,6 @@ fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
         5.0,
         10_000.0,
     );
-}
-
-fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u16) {
-    judge.within("heartbeat_producer_ms", producer.into(), 5.0, 10_000.0);
-    if consumer < producer.saturating_mul(2) {
-        judge.say(
-            "heartbeat_consumer_ms",
-            format!("{consumer} ms leaves no room for one late heartbeat every {producer} ms"),
-            format!("give at least {}", producer.saturating_mul(2)),
-        );
-    }
-}
-
-fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_master_ms: u16) {
-    let Some(bus) = config.can.get(bus) else {
-        return;
-    };
-    let least = bus.master_heartbeat_ms.saturating_mul(2);
-    if watch_master_ms < least {
-        judge.say(
-            "watch_master_ms",
-            format!(
-                "{watch_master_ms} ms with a master heartbeat every {} ms",
-                bus.master_heartbeat_ms
-            ),
-            format!(
-                "give at least {least}; without it a killed controller would not stop the stage"
-            ),
-        );
-    }
 }
 
 fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &InstrumentConfig) {
@@ -274,13 +240,13 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
 
 /// What tests of the single parts share.
 #[cfg(test)]
-mod told {
+pub(crate) mod told {
     use crate::Edit;
     use crate::config::{ConfigError, parse};
 
     /// With the first `from` in `text` become `to`, the finding at `key` says so.
     #[track_caller]
-    pub(super) fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
+    pub(crate) fn check(text: &str, from: &str, to: &str, key: &str, says: &str) {
         match parse(&text.edit_first(from, to), "machine.toml") {
             Err(ConfigError::Invalid { findings }) => {
                 let told = findings

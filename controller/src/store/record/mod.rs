@@ -1,35 +1,21 @@
 //! What one calibration says: a head that all kinds share, and the content of its kind.
 //!
-//! Each kind of content has a file of its own here. Another kind is: its file with its plain
-//! struct (`deny_unknown_fields`, every key with its unit), a variant of [`Content`], its arms in
+//! Each kind of content is a file `record` of its kind of machine. Another one is: its file with its
+//! plain struct (`deny_unknown_fields`, every key with its unit), a variant of [`Content`], its arms in
 //! `kind` and `summary`, and a way from [`CalibrationRecord`] to it that ends in
 //! [`CalibrationRecord::other_kind`]. In the file the keys of head and content stand side by side.
 
-mod agreement;
-mod linear;
-mod rotary;
-mod screw;
-mod volumetric;
-mod warmth;
+mod head;
 
-use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
 
 use super::{StoreError, short};
-use crate::config::ConfigHash;
+use crate::linear::LinearContent;
+use crate::platform::ScrewContent;
+use crate::rotary::RotaryContent;
+use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent};
 
-pub use agreement::AgreementRecord;
-pub use linear::{LinearContent, NodeRecord};
-pub use rotary::{ReadingName, RotaryContent};
-pub use screw::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
-pub use volumetric::{
-    BeamRecord, BeamReferencesContent, FunctionRecord, FunctionShape, GeometryContent, MemoryName,
-    MemoryRecord, StateMemoryContent,
-};
-pub use warmth::{BendRecord, ExpansionRecord, UnknownRecord};
-
-pub(crate) use volumetric::error_name;
-pub(crate) use warmth::AXES;
+pub use head::{EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead};
 
 /// One calibration of one axis: a signed statement of what was measured, with what, when,
 /// on which machine, and how well.
@@ -41,39 +27,6 @@ pub struct CalibrationRecord {
     /// What it says. It is read last: what the head does not know must be known here.
     #[serde(flatten)]
     pub content: Content,
-}
-
-/// What every calibration says, whatever its kind.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RecordHead {
-    /// Of the record.
-    pub schema_version: u32,
-    /// The machine's name.
-    pub machine: String,
-    /// The stage's serial number.
-    pub stage_serial: String,
-    /// BLAKE3 of what a calibration depends on in the configuration.
-    pub config_hash: String,
-    /// Which axis.
-    pub axis: String,
-    /// Who the drive was.
-    pub drive: IdentityRecord,
-    /// One encoder count of a linear axis, metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub resolution_m: Option<f64>,
-    /// One encoder count of a rotary axis, radians.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub resolution_rad: Option<f64>,
-    /// When, UTC, RFC 3339.
-    pub created: String,
-    /// The program that made it.
-    pub program: String,
-    /// The run journal or data file it was made from.
-    pub source: String,
-    /// What measured, and which corrections its readings got.
-    pub instrument: InstrumentRecord,
-    /// Means over the run, where known.
-    pub environment: EnvironmentRecord,
 }
 
 /// The model a calibration holds; the key `kind` says which.
@@ -121,6 +74,72 @@ impl Content {
 }
 
 impl CalibrationRecord {
+    /// The error table of a linear axis.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn linear(&self, id: &str) -> Result<&LinearContent, StoreError> {
+        match &self.content {
+            Content::LinearErrorTable(content) => Ok(content),
+            _ => Err(self.other_kind(id, LinearContent::KIND)),
+        }
+    }
+
+    /// The error table of a rotary axis.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn rotary(&self, id: &str) -> Result<&RotaryContent, StoreError> {
+        match &self.content {
+            Content::RotaryErrorTable(content) => Ok(content),
+            _ => Err(self.other_kind(id, RotaryContent::KIND)),
+        }
+    }
+
+    /// The model of a ball screw.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn screw(&self, id: &str) -> Result<&ScrewContent, StoreError> {
+        match &self.content {
+            Content::ScrewModel(content) => Ok(content),
+            _ => Err(self.other_kind(id, ScrewContent::KIND)),
+        }
+    }
+
+    /// The errors of three axes.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn geometry(&self, id: &str) -> Result<&GeometryContent, StoreError> {
+        match &self.content {
+            Content::VolumetricGeometry(content) => Ok(content),
+            _ => Err(self.other_kind(id, GeometryContent::KIND)),
+        }
+    }
+
+    /// What the detectors of three axes read.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn beam_references(&self, id: &str) -> Result<&BeamReferencesContent, StoreError> {
+        match &self.content {
+            Content::BeamReferences(content) => Ok(content),
+            _ => Err(self.other_kind(id, BeamReferencesContent::KIND)),
+        }
+    }
+
+    /// Displacements of three axes that are to be kept.
+    ///
+    /// # Errors
+    /// When this calibration, named `id`, is of another kind.
+    pub fn state_memory(&self, id: &str) -> Result<&StateMemoryContent, StoreError> {
+        match &self.content {
+            Content::StateMemory(content) => Ok(content),
+            _ => Err(self.other_kind(id, StateMemoryContent::KIND)),
+        }
+    }
+
     /// The error for who wanted a calibration of kind `expected` and got this one, named `id`.
     pub fn other_kind(&self, id: &str, expected: &'static str) -> StoreError {
         StoreError::OtherKind {
@@ -138,127 +157,5 @@ impl CalibrationRecord {
     }
 }
 
-impl RecordHead {
-    /// Whether the calibration `id` with this head belongs to `here`, a machine whose configuration
-    /// has `hash`.
-    ///
-    /// # Errors
-    /// Naming the first thing that differs.
-    pub fn belongs_to(&self, id: &str, here: &Self, hash: &ConfigHash) -> Result<(), StoreError> {
-        // A table measured elsewhere may not know the drive's serial number (0 in 0x1018:04).
-        let serial_known = self.drive.serial != 0;
-        let drive = |head: &Self| {
-            let it = &head.drive;
-            let product = format!("{:#X}:{:#X}", it.vendor, it.product);
-            if serial_known {
-                format!("{product} serial {}", it.serial)
-            } else {
-                product
-            }
-        };
-        let comparisons = [
-            (
-                "the stage's serial number",
-                self.stage_serial.clone(),
-                here.stage_serial.clone(),
-            ),
-            ("the axis", self.axis.clone(), here.axis.clone()),
-            ("the drive", drive(self), drive(here)),
-            ("one encoder count", self.resolution(), here.resolution()),
-            (
-                "the configuration's hash",
-                self.config_hash.clone(),
-                hash.beside(&self.config_hash).to_owned(),
-            ),
-        ];
-        for (what, expected, seen) in comparisons {
-            if expected != seen {
-                return Err(StoreError::Foreign {
-                    id: short(id),
-                    what,
-                    expected,
-                    seen,
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn resolution(&self) -> String {
-        match (self.resolution_m, self.resolution_rad) {
-            (Some(metres), _) => format!("{} nm", units::Short(metres * 1e9)),
-            (None, Some(radians)) => {
-                format!("{} arcsec", units::Short(units::Radians(radians).arcsec()))
-            }
-            (None, None) => "unknown".into(),
-        }
-    }
-}
-
-/// The identity of a device.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(
-    missing_docs,
-    reason = "the fields of objects 0x1000, 0x1018 and 0x1008"
-)]
-pub struct IdentityRecord {
-    pub device_type: u32,
-    pub vendor: u32,
-    pub product: u32,
-    pub revision: u32,
-    pub serial: u32,
-    pub name: String,
-}
-
-impl From<&Identity> for IdentityRecord {
-    fn from(identity: &Identity) -> Self {
-        Self {
-            device_type: identity.device_type,
-            vendor: identity.vendor,
-            product: identity.product,
-            revision: identity.revision,
-            serial: identity.serial,
-            name: identity.name.clone(),
-        }
-    }
-}
-
-/// What measured, and how its readings were corrected.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names say which correction was on")]
-pub struct InstrumentRecord {
-    pub name: String,
-    pub identity: String,
-    pub air_corrected: bool,
-    pub material_corrected: bool,
-    pub dead_path_corrected: bool,
-    pub cosine_corrected: bool,
-    pub standard_uncertainty_m: f64,
-}
-
-/// The environment, SI (temperatures in °C); `None` where no sensor said.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry the units")]
-pub struct EnvironmentRecord {
-    pub air_temperature_c: Option<f64>,
-    pub material_temperature_c: Option<f64>,
-    pub pressure_pa: Option<f64>,
-    pub relative_humidity: Option<f64>,
-}
-
-impl From<&Environment> for EnvironmentRecord {
-    fn from(environment: &Environment) -> Self {
-        Self {
-            air_temperature_c: environment.air_temperature.map(|it| it.value()),
-            material_temperature_c: environment.material_temperature.map(|it| it.value()),
-            pressure_pa: environment.pressure.map(|it| it.value()),
-            relative_humidity: environment.humidity.map(|it| it.value()),
-        }
-    }
-}
-
 #[cfg(test)]
-pub(in crate::store) mod tests;
+pub(crate) mod tests;

@@ -1,5 +1,8 @@
 use super::*;
 use crate::config::ConfigHash;
+use crate::linear::NodeRecord;
+use crate::platform::{HarmonicRecord, ScrewMethodName, StrokeRecord};
+use crate::rotary::ReadingName;
 use crate::store::{SCHEMA_VERSION, Store, write_new_or_replace};
 
 /// Written by the first program, before there were other kinds, and named by its hash then.
@@ -10,7 +13,7 @@ fn hash() -> ConfigHash {
     ConfigHash::only("h")
 }
 
-pub(in crate::store) fn record(serial: &str) -> CalibrationRecord {
+pub(crate) fn record(serial: &str) -> CalibrationRecord {
     let node = |position_m| NodeRecord {
         position_m,
         forward_m: Some(1e-6),

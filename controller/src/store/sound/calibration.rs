@@ -1,14 +1,16 @@
 //! Calibrations of every kind.
 
-use super::super::record::{
-    AXES, BeamReferencesContent, CalibrationRecord, Content, EnvironmentRecord, FunctionRecord,
-    GeometryContent, LinearContent, RecordHead, RotaryContent, ScrewContent, StateMemoryContent,
-    error_name,
-};
+use super::super::record::{CalibrationRecord, Content, EnvironmentRecord, RecordHead};
 use super::{
     ANGLE_RAD, ANGLE_U_RAD, CELSIUS, COUNT_MAX, ERROR_M, ERROR_U_M, HUMIDITY, Judged, LENGTH_M,
     PASCAL, PER_KELVIN, PER_KELVIN_U, PLACE_M, RATIO, RESOLUTION, SLOPE, approach, as_many,
     counted, file_name, increasing, is, letter, model, number, numbers, optional, optionals,
+};
+use crate::linear::LinearContent;
+use crate::platform::ScrewContent;
+use crate::rotary::RotaryContent;
+use crate::volumetric::{
+    AXES, BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent, error_name,
 };
 
 /// Periodic terms of a screw at most, and the finest of them.

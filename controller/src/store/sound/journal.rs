@@ -1,16 +1,16 @@
 //! Lines of journals: each by itself, and against those before it.
 
-use super::super::journal::{
-    ClosureEntry, Entry, JournalHeader, PointEntry, ReadJournal, ZeroEntry,
-};
-use super::super::plate::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
-use super::super::pose::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+use super::super::journal::{Entry, JournalHeader, ReadJournal};
 use super::calibration::environment;
 use super::{
     ANGLE_RAD, ANGLE_U_RAD, COUNT_MAX, ERROR_M, ERROR_U_M, Judged, LENGTH_M, PLACE_M, SECONDS,
     SPEED_RAD_PER_S, TURNS_RAD, VOLTS, approach, as_many, counted, is, number, numbers, once,
     optional, optionals, unsound, volume,
 };
+use crate::linear::{PointEntry, ZeroEntry};
+use crate::platform::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+use crate::rotary::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+use crate::store::ClosureEntry;
 
 /// Passes over a plate, and runs, at most.
 const PASSES_MAX: usize = 10_000;

@@ -2,15 +2,15 @@
 
 use compensator::volumetric::model::Chain;
 
-use super::super::record::{AXES, error_name};
-use super::super::volume::{
-    LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeCheckEntry, VolumePlanEntry,
-    VolumeRead, VolumeReferencesEntry,
-};
 use super::calibration::references as beams;
 use super::{
     ANGLE_RAD, CELSIUS, ERROR_M, ERROR_U_M, Judged, KELVIN_U, LENGTH_M, PLACE_M, SECONDS, as_many,
     counted, increasing, is, letter, model, number, numbers, once, optional, unsound,
+};
+use crate::volumetric::{AXES, error_name};
+use crate::volumetric::{
+    LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeCheckEntry, VolumePlanEntry,
+    VolumeRead, VolumeReferencesEntry,
 };
 
 /// Lines, nodes of an axis, places of a line, thermometers, at most.

@@ -1,0 +1,88 @@
+//! Findings, and the small rules that make them.
+
+use std::collections::BTreeMap;
+
+use units::Short;
+
+/// Something that cannot be, at a dotted key.
+#[derive(Clone, Debug)]
+pub(crate) struct Finding {
+    pub(crate) key: String,
+    pub(crate) cause: String,
+    pub(crate) help: String,
+}
+
+/// Collects findings below one key.
+pub(crate) struct Judge<'a> {
+    prefix: String,
+    findings: &'a mut Vec<Finding>,
+}
+
+impl<'a> Judge<'a> {
+    pub(crate) const fn at(prefix: String, findings: &'a mut Vec<Finding>) -> Self {
+        Self { prefix, findings }
+    }
+
+    pub(crate) fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
+        let key = if key.is_empty() {
+            self.prefix.clone()
+        } else {
+            format!("{}.{key}", self.prefix)
+        };
+        self.findings.push(Finding {
+            key,
+            cause: cause.into(),
+            help: help.into(),
+        });
+    }
+
+    pub(crate) fn within(&mut self, key: &str, value: f64, low: f64, high: f64) {
+        if !(low..=high).contains(&value) {
+            self.say(
+                key,
+                format!("{} is impossible", Short(value)),
+                format!("give {} to {}", Short(low), Short(high)),
+            );
+        }
+    }
+
+    pub(crate) fn below(&mut self, low: (&str, f64), high: (&str, f64)) {
+        // A NaN, which TOML can write, is not in order, either.
+        let in_order = low.1 < high.1;
+        if !in_order {
+            let cause = format!(
+                "{} must be greater than {} ({} and {})",
+                high.0,
+                low.0,
+                Short(high.1),
+                Short(low.1)
+            );
+            self.say(
+                high.0,
+                cause,
+                format!("raise {} or lower {}", high.0, low.0),
+            );
+        }
+    }
+
+    pub(crate) fn known<T>(
+        &mut self,
+        key: &str,
+        name: &str,
+        table: &BTreeMap<String, T>,
+        kind: &str,
+    ) {
+        if !table.contains_key(name) {
+            let names = table
+                .keys()
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", ");
+            self.say(
+                key,
+                format!("there is no {kind} `{name}`"),
+                format!("known: {names}"),
+            );
+        }
+    }
+}

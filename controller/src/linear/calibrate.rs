@@ -1,0 +1,230 @@
+//! Calibrate: measure the deviations, fit the error table, store it with all it depends on.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::error_table::{self, Compensation, FitOptions, Fitted};
+use units::Metres;
+
+use crate::config::{CalibrateConfig, ConfigHash};
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::linear::LinearContent;
+use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
+use crate::linear::run_plan::RunPlan;
+use crate::linear::settings;
+use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
+use crate::store::{
+    CalibrationRecord, Content, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
+};
+use machine::Stage;
+
+/// A calibration that was made, stored and activated.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// Its name: the BLAKE3 of its file.
+    pub id: String,
+    /// Where it is.
+    pub path: PathBuf,
+    /// Where every point is.
+    pub journal: PathBuf,
+    /// What it says.
+    pub record: CalibrationRecord,
+    /// How the fit went.
+    pub fitted: Fitted,
+    /// What was measured.
+    pub measured: Measured,
+    /// The smallest error of one position that would have been noticed by its neighbours.
+    pub noticed: Option<Metres>,
+}
+
+impl Machine {
+    /// Measures `axis` with its instrument, fits the table, stores and activates it, and
+    /// uses it from now on.
+    ///
+    /// # Errors
+    /// When the axis is not zeroed, anything stops the machine, the measurement drifted, or
+    /// the table breaks a limit. The calibration in use before stays in use then.
+    pub fn calibrate(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        options: &CalibrateOptions,
+    ) -> Result<Calibrated, Failure> {
+        let config = self.axis_config(axis)?.calibrate.clone();
+        let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
+        self.require_zeroed(axis)?;
+        let plan = RunPlan {
+            closure_limit: (!options.accept_drift)
+                .then(|| Metres::from_um(config.closure_limit_um)),
+            ..run_plan(&config)
+        };
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
+        let header = self.journal_header("calibrate", axis, &plan, None);
+        let (mut journal, earlier) =
+            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
+        let measuring = MeasureOptions {
+            stage: Stage::Calibrate,
+            compensated: false,
+        };
+        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, earlier);
+        let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
+        let fitted = self.fit_table(axis, &plan, &measured)?;
+        let compensation = self.prepare(axis, fitted.table.clone())?;
+        let harmless = settings::harmless(&self.config, axis);
+        let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
+        let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
+        let id = store.save(&record)?;
+        store.activate(axis, &id)?;
+        self.set_compensation(axis, Some(compensation))?;
+        Ok(Calibrated {
+            path: store.calibration_path(&id),
+            journal: journal.path().to_owned(),
+            id,
+            record,
+            fitted,
+            measured,
+            noticed,
+        })
+    }
+
+    /// Loads the calibration that `store` says is active for `axis`, after checking that it
+    /// belongs to this machine; returns its name, `None` when there is none.
+    ///
+    /// # Errors
+    /// When it is damaged, belongs to another machine or set-up, or breaks a limit.
+    pub fn load_active(&mut self, axis: &str, store: &Store) -> Result<Option<String>, Failure> {
+        let Some(id) = store.active(axis)?.current else {
+            return Ok(None);
+        };
+        let record = store.load(&id)?;
+        record
+            .head
+            .belongs_to(&id, &self.this_machine(axis), &self.config_hash)?;
+        let compensation = self.prepare(axis, record.linear(&id)?.table(&id)?)?;
+        self.set_compensation(axis, Some(compensation))?;
+        Ok(Some(id))
+    }
+
+    fn fit_table(
+        &self,
+        axis: &str,
+        plan: &RunPlan,
+        measured: &Measured,
+    ) -> Result<Fitted, Failure> {
+        let instrument = &self.config.instrument[&plan.instrument];
+        let options = FitOptions {
+            u_instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
+            ..FitOptions::default()
+        };
+        error_table::analyse(&measured.series()?, &options).map_err(|source| Failure::Fit {
+            axis: axis.to_owned(),
+            source,
+        })
+    }
+
+    /// Proves that a table can be applied within the limits of the configuration.
+    pub(crate) fn prepare(
+        &self,
+        axis: &str,
+        table: error_table::ErrorTable,
+    ) -> Result<Compensation, Failure> {
+        settings::compensation(&self.config, axis, table)
+    }
+
+    fn calibration_record(
+        &self,
+        axis: &str,
+        plan: &RunPlan,
+        journal: &Journal,
+        measured: &Measured,
+        fitted: &Fitted,
+    ) -> CalibrationRecord {
+        let head = RecordHead {
+            created: utc_now(),
+            source: journal
+                .path()
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            instrument: self.instrument_record(&plan.instrument),
+            environment: measured.environment,
+            ..self.this_machine(axis)
+        };
+        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
+        CalibrationRecord {
+            head,
+            content: Content::LinearErrorTable(content),
+        }
+    }
+
+    pub(super) fn journal_header(
+        &self,
+        verb: &str,
+        axis: &str,
+        plan: &RunPlan,
+        calibration: Option<String>,
+    ) -> JournalHeader {
+        JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: verb.to_owned(),
+            machine: self.config.machine.name.clone(),
+            stage_serial: self.config.machine.stage_serial.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
+            axis: axis.to_owned(),
+            drive: self.drive_record(axis),
+            instrument: self.instrument_record(&plan.instrument),
+            started: utc_now(),
+            calibration,
+            targets_m: plan.targets.iter().map(|target| target.value()).collect(),
+            runs: plan.runs,
+        }
+    }
+}
+
+pub(super) fn open_journal(
+    store: &Store,
+    header: &JournalHeader,
+    resume: Option<&PathBuf>,
+    hash: &ConfigHash,
+) -> Result<(Journal, EarlierRuns), Failure> {
+    match resume {
+        None => Ok((
+            Journal::create(&store.runs(), header)?,
+            EarlierRuns::default(),
+        )),
+        Some(path) => {
+            let (journal, read) = Journal::resume(path, header, hash)?;
+            let earlier = EarlierRuns {
+                points: read.points,
+                closures: read.closures,
+            };
+            Ok((journal, earlier))
+        }
+    }
+}
+
+fn run_plan(config: &CalibrateConfig) -> RunPlan {
+    let steps = ((config.end_mm - config.start_mm) / config.step_mm + 1e-9).floor() as u32;
+    let mut targets: Vec<_> = (0..=steps)
+        .map(|step| Metres::from_mm(config.start_mm + f64::from(step) * config.step_mm))
+        .collect();
+    let end = Metres::from_mm(config.end_mm);
+    if let Some(last) = targets.last()
+        && end - *last > Metres::from_mm(config.step_mm * 1e-3)
+    {
+        targets.push(end);
+    }
+    RunPlan {
+        instrument: config.instrument.clone(),
+        targets,
+        runs: config.runs,
+        overrun: Metres::from_mm(config.overrun_mm),
+        settle: Duration::from_millis(config.settle_ms.into()),
+        average_samples: config.average_samples,
+        scale_limit_ppm: config.scale_limit_ppm,
+        closure_limit: None,
+    }
+}

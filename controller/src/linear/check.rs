@@ -1,0 +1,287 @@
+//! What the steps of the cycle are asked to do.
+
+use units::Short;
+
+use crate::assemble;
+use crate::config::judge::{Finding, Judge};
+use crate::config::{
+    AxisConfig, CalibrateConfig, CompensationConfig, EndPolicyName, MachineConfig, VerifyConfig,
+    ZeroConfig,
+};
+
+pub(crate) fn check_cycle(
+    findings: &mut Vec<Finding>,
+    config: &MachineConfig,
+    name: &str,
+    axis: &AxisConfig,
+) {
+    if let Some(zero) = &axis.zero {
+        check_zero(
+            &mut Judge::at(format!("axis.{name}.zero"), findings),
+            config,
+            axis,
+            zero,
+        );
+    }
+    if axis.calibrate.is_some() && axis.compensation.is_none() {
+        findings.push(Finding {
+            key: format!("axis.{name}.calibrate"),
+            cause: "a calibration cannot be used without limits for it".into(),
+            help: format!("add [axis.{name}.compensation]"),
+        });
+    }
+    if let Some(run) = &axis.calibrate {
+        check_calibrate(
+            &mut Judge::at(format!("axis.{name}.calibrate"), findings),
+            config,
+            axis,
+            run,
+        );
+    }
+    if let Some(run) = &axis.verify {
+        check_verify(
+            &mut Judge::at(format!("axis.{name}.verify"), findings),
+            config,
+            axis,
+            run,
+        );
+    }
+    if let Some(compensation) = &axis.compensation {
+        let judge = &mut Judge::at(format!("axis.{name}.compensation"), findings);
+        judge.within("size_limit_um", compensation.size_limit_um, 1e-3, 1e5);
+        judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
+        judge.within(
+            "rate_limit_um_per_s",
+            compensation.rate_limit_um_per_s,
+            1e-3,
+            1e9,
+        );
+        check_jump_limit(judge, axis, compensation);
+        let fades = compensation.end_policy == EndPolicyName::FadeOut;
+        if fades != compensation.fade_out_mm.is_some() {
+            judge.say(
+                "end_policy",
+                "fade_out and `fade_out_mm` go together",
+                "give both or neither",
+            );
+        }
+        if let Some(fade_out_mm) = compensation.fade_out_mm {
+            judge.within("fade_out_mm", fade_out_mm, 1e-3, 1e4);
+        }
+    }
+}
+
+/// A position that stands off by more than the slope allows is refused for its slope.
+fn check_jump_limit(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &CompensationConfig) {
+    let Some(jump_limit_um) = limits.jump_limit_um else {
+        return;
+    };
+    judge.within("jump_limit_um", jump_limit_um, 1e-3, 1e5);
+    let Some(run) = &axis.calibrate else { return };
+    let steepest_um = limits.slope_limit * run.step_mm * 1e3;
+    if jump_limit_um > steepest_um {
+        judge.say(
+            "jump_limit_um",
+            format!(
+                "{} um accept nothing more: `slope_limit` refuses changes above {} um over the \
+                 {} mm from one position to the next",
+                Short(jump_limit_um),
+                Short(steepest_um),
+                Short(run.step_mm)
+            ),
+            "leave it out: the table's own positions then say what is believed of one of them",
+        );
+    }
+}
+
+fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig, zero: &ZeroConfig) {
+    check_zero_place(judge, axis, zero);
+    check_zero_search(judge, axis, zero);
+    check_rails(judge, config, zero);
+    judge.known("analog", &zero.analog, &config.analog, "analog module");
+    if let Some(analog) = config.analog.get(&zero.analog)
+        && analog.channels.len() != 2
+    {
+        judge.say(
+            "analog",
+            "zeroing needs two channels, peak and slope",
+            "list both in `channels`",
+        );
+    }
+}
+
+/// Wrong signs here send an axis into its limit switch, or beyond it.
+fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig) {
+    let is_beyond = zero.negative_limit_mm < axis.soft_min_mm;
+    if !is_beyond || zero.negative_limit_mm.is_infinite() {
+        judge.say(
+            "negative_limit_mm",
+            format!(
+                "the limit switch at {} mm is not beyond the soft limit of {} mm",
+                zero.negative_limit_mm, axis.soft_min_mm
+            ),
+            "give the switch's place seen from the zero, below soft_min_mm: usually negative",
+        );
+    }
+    if !(axis.soft_min_mm..=axis.soft_max_mm).contains(&0.0) {
+        judge.say(
+            "",
+            format!(
+                "the zero lies outside the soft limits {} to {} mm: the axis cannot go there",
+                axis.soft_min_mm, axis.soft_max_mm
+            ),
+            "soft limits are seen from the zero",
+        );
+    }
+}
+
+fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig) {
+    let speed_max = axis.speed_max_mm_per_s;
+    for (key, value, low, high) in [
+        (
+            "reference_speed_mm_per_s",
+            zero.reference_speed_mm_per_s,
+            1e-3,
+            speed_max.min(1e3),
+        ),
+        (
+            "search_speed_mm_per_s",
+            zero.search_speed_mm_per_s,
+            1e-3,
+            speed_max.min(100.0),
+        ),
+        ("search_limit_mm", zero.search_limit_mm, 0.01, 1000.0),
+        ("samples", zero.samples as f64, 2.0, 100_000.0),
+        ("delta1_mv", zero.delta1_mv, 1e-3, 1e4),
+        ("delta2_mv", zero.delta2_mv, 1e-3, 1e4),
+        ("delta3_mv", zero.delta3_mv, 1e-3, 1e4),
+        ("delta4_mv", zero.delta4_mv, 1e-3, 1e4),
+        (
+            "standard_uncertainty_limit_um",
+            zero.standard_uncertainty_limit_um,
+            1e-4,
+            1e4,
+        ),
+    ] {
+        judge.within(key, value, low, high);
+    }
+    judge.within("time_limit_s", zero.time_limit_s, 0.1, 1e5);
+    if zero.level_below_peak_v * 1e3 <= zero.delta1_mv {
+        judge.say(
+            "level_below_peak_v",
+            "is not above delta1",
+            "the flanks lie well below the peak",
+        );
+    } else if (0.1..=1e5).contains(&zero.time_limit_s)
+        && let Err(error) = assemble::hall_settings(zero, axis).validate()
+    {
+        judge.say(
+            "",
+            error.to_string(),
+            "vc is `level_below_peak_v`, vc0 is `turn_below_peak_v`",
+        );
+    }
+}
+
+/// A rail that the converter never shows is a saturation that nobody sees.
+fn check_rails(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) {
+    judge.below(
+        ("rail_low_v", zero.rail_low_v),
+        ("rail_high_v", zero.rail_high_v),
+    );
+    let analog = config.analog.get(&zero.analog);
+    for full_scale in analog.into_iter().flat_map(|it| &it.full_scale_v) {
+        let reach = full_scale.abs();
+        for (key, rail) in [
+            ("rail_low_v", zero.rail_low_v),
+            ("rail_high_v", zero.rail_high_v),
+        ] {
+            if !(-reach..=reach).contains(&rail) {
+                judge.say(
+                    key,
+                    format!("a converter of ±{reach} V never reads {rail} V"),
+                    "give the voltage from which on sensor or converter are saturated",
+                );
+            }
+        }
+    }
+}
+
+fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, overrun: f64) {
+    judge.below(("start_mm", start), ("end_mm", end));
+    // Without it the first and the last target have no approach of their own.
+    judge.within("overrun_mm", overrun, 1e-3, 1e4);
+    let reachable = axis.soft_min_mm..=axis.soft_max_mm;
+    if !reachable.contains(&-overrun) {
+        judge.say(
+            "overrun_mm",
+            format!(
+                "the datum at 0 mm is approached from {} mm, outside the soft limits",
+                Short(-overrun)
+            ),
+            "shorten it, or lower soft_min_mm",
+        );
+    }
+    for (key, value) in [("start_mm", start - overrun), ("end_mm", end + overrun)] {
+        if !reachable.contains(&value) {
+            judge.say(
+                key,
+                format!("with its overrun reaches {} mm", Short(value)),
+                format!(
+                    "stay within {} to {} mm",
+                    Short(axis.soft_min_mm),
+                    Short(axis.soft_max_mm)
+                ),
+            );
+        }
+    }
+}
+
+fn check_calibrate(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    axis: &AxisConfig,
+    run: &CalibrateConfig,
+) {
+    judge.known(
+        "instrument",
+        &run.instrument,
+        &config.instrument,
+        "instrument",
+    );
+    check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
+    judge.within(
+        "step_mm",
+        run.step_mm,
+        1e-3,
+        (run.end_mm - run.start_mm).max(1e-3),
+    );
+    judge.within("runs", run.runs.into(), 2.0, 1000.0);
+    judge.within("average_samples", run.average_samples.into(), 1.0, 1e6);
+    judge.within("closure_limit_um", run.closure_limit_um, 1e-3, 1e5);
+    judge.within("scale_limit_ppm", run.scale_limit_ppm, 1.0, 1e5);
+}
+
+fn check_verify(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    axis: &AxisConfig,
+    run: &VerifyConfig,
+) {
+    judge.known(
+        "instrument",
+        &run.instrument,
+        &config.instrument,
+        "instrument",
+    );
+    check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
+    judge.within("targets", run.targets.into(), 2.0, 10_000.0);
+    judge.within("runs", run.runs.into(), 2.0, 1000.0);
+    judge.within("average_samples", run.average_samples.into(), 1.0, 1e6);
+    judge.within(
+        "accuracy_tolerance_um",
+        run.accuracy_tolerance_um,
+        1e-3,
+        1e6,
+    );
+}

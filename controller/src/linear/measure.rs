@@ -1,0 +1,327 @@
+//! Measuring runs: every target approached from both sides, each point into the journal.
+
+use core::time::Duration;
+
+use compensator::length_correction::EnvironmentWatch;
+use compensator::measurement::{LinearSeries, Measurement};
+use drivers::device::Environment;
+use units::{Approach, Metres};
+
+use crate::assemble;
+use crate::connected::Machine;
+use crate::correction::Correction;
+use crate::failure::Failure;
+use crate::linear::PointEntry;
+use crate::linear::cross_check::{CrossCheck, Plausible, Run, judge_scale};
+use crate::linear::datum_in_use::Datum;
+use crate::linear::run_plan::RunPlan;
+use crate::store::ClosureEntry;
+use crate::store::{Entry, EnvironmentRecord, Journal};
+use machine::Stage;
+
+/// How a series is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasureOptions {
+    /// For progress.
+    pub stage: Stage,
+    /// Whether the active calibration corrects the moves.
+    pub compensated: bool,
+}
+
+/// The whole runs of a measurement that was interrupted; none for a new one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct EarlierRuns {
+    pub(crate) points: Vec<PointEntry>,
+    pub(crate) closures: Vec<ClosureEntry>,
+}
+
+impl EarlierRuns {
+    fn last(&self) -> Option<Run<'_>> {
+        let closure = *self.closures.last()?;
+        let begin = self.points.partition_point(|it| it.run < closure.run);
+        let points = &self.points[begin..];
+        Some(Run { points, closure })
+    }
+}
+
+/// A measured series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Every point.
+    pub points: Vec<PointEntry>,
+    /// The same place, measured after a run minus before the first: the largest of all runs.
+    pub closure: Metres,
+    /// Mean environment of the points.
+    pub environment: EnvironmentRecord,
+}
+
+impl Measured {
+    /// The points as the mathematics takes them.
+    ///
+    /// # Errors
+    /// When they make no series (which a whole run never does).
+    pub fn series(&self) -> Result<LinearSeries, Failure> {
+        series_of(&self.points)
+    }
+}
+
+/// Journal points as a series.
+///
+/// # Errors
+/// When they make none: a point is not finite, or measured twice.
+pub fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
+    let measurements = points
+        .iter()
+        .map(|point| Measurement {
+            run: point.run,
+            approach: approach_of(point.approach),
+            target: Metres(point.target_m),
+            measured: Metres(point.measured_m),
+        })
+        .collect();
+    Ok(LinearSeries::new(measurements)?)
+}
+
+const fn approach_of(symbol: char) -> Approach {
+    match symbol {
+        '-' => Approach::Reverse,
+        _ => Approach::Forward,
+    }
+}
+
+/// Where a run's points stand in the whole measurement, for progress.
+struct Counter {
+    stage: Stage,
+    done: u64,
+    total: u64,
+}
+
+/// The series being measured.
+struct Session<'a> {
+    axis: &'a str,
+    plan: &'a RunPlan,
+    correction: Correction,
+    datum: Datum,
+    journal: &'a mut Journal,
+    counter: Counter,
+    check: CrossCheck,
+    watch: EnvironmentWatch,
+}
+
+/// Values that the instrument's sensors sent are never older than this.
+const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
+/// What a stage can do at most where the configuration says nothing.
+const SLOPE_MAX: f64 = 0.01;
+const SIZE_MAX: Metres = Metres(50e-6);
+
+impl Machine {
+    /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
+    /// The runs of an interrupted measurement are kept (`earlier`).
+    ///
+    /// The datum is the axis's zero, approached forward; the same place is measured again at
+    /// the end of each run.
+    ///
+    /// # Errors
+    /// Whatever stops the machine, a datum that drifted, and an instrument that disagrees
+    /// with the encoder beyond reason.
+    pub(crate) fn measure_runs(
+        &mut self,
+        axis: &str,
+        plan: &RunPlan,
+        options: MeasureOptions,
+        journal: &mut Journal,
+        mut runs: EarlierRuns,
+    ) -> Result<Measured, Failure> {
+        let per_run = plan.targets.len() * 2;
+        // A run that was whole but wrong ended the measurement that is continued here.
+        for run in runs.points.chunk_by(|a, b| a.run == b.run) {
+            judge_scale(axis, plan.scale_limit_ppm, run)?;
+        }
+        self.use_instrument(&plan.instrument)?;
+        let plausible = self.plausible(axis, plan)?;
+        let datum = self.set_datum(axis, plan)?;
+        self.remember(axis).datum = Some((plan.clone(), datum));
+        let counter = Counter {
+            stage: options.stage,
+            done: runs.points.len() as u64,
+            total: per_run as u64 * u64::from(plan.runs),
+        };
+        let correction = if options.compensated {
+            Correction::On
+        } else {
+            Correction::Off
+        };
+        let mut session = Session {
+            axis,
+            plan,
+            correction,
+            datum,
+            journal,
+            counter,
+            check: CrossCheck::new(axis, plausible),
+            watch: self.environment_watch(plan),
+        };
+        let first = runs.points.last().map_or(1, |point| point.run + 1);
+        let mut start = Metres::ZERO;
+        for run in first..=plan.runs {
+            let points = self.measure_run(&mut session, run)?;
+            let closure = self.close_run(&mut session, run, start, &runs, &points)?;
+            start = Metres(closure.closure_m);
+            runs.points.extend(points);
+            runs.closures.push(closure);
+        }
+        session.journal.write(&Entry::Complete)?;
+        session.journal.flush_to_disk()?;
+        self.leave_instrument();
+        let environment = mean_environment(&runs.points);
+        Ok(Measured {
+            closure: largest(&runs.closures),
+            points: runs.points,
+            environment,
+        })
+    }
+
+    fn measure_run(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+    ) -> Result<Vec<PointEntry>, Failure> {
+        let plan = session.plan;
+        let mut points = Vec::new();
+        let (first, last) = (plan.targets[0], plan.targets[plan.targets.len() - 1]);
+        self.travel(session.axis, first - plan.overrun, Correction::Off)?;
+        for target in &plan.targets {
+            points.push(self.measure_point(session, run, Approach::Forward, *target)?);
+        }
+        self.travel(session.axis, last + plan.overrun, Correction::Off)?;
+        for target in plan.targets.iter().rev() {
+            points.push(self.measure_point(session, run, Approach::Reverse, *target)?);
+        }
+        judge_scale(session.axis, plan.scale_limit_ppm, &points)?;
+        Ok(points)
+    }
+
+    fn measure_point(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+        approach: Approach,
+        target: Metres,
+    ) -> Result<PointEntry, Failure> {
+        let axis = session.axis;
+        let set_point = self.travel(axis, target, session.correction)?;
+        let reading = self.read_displacement(session.axis, session.plan)?;
+        let environment = self.watched_environment(session)?;
+        let measured = self.correct(session.plan, &reading, &environment, &session.datum)?;
+        let encoder = self
+            .reading(axis)?
+            .expect("an axis that moved has been read")
+            .position;
+        let point = PointEntry {
+            run,
+            approach: approach.symbol(),
+            target_m: target.value(),
+            set_point_m: set_point.value(),
+            encoder_m: encoder.value(),
+            measured_m: measured.value(),
+            scatter_m: reading.standard_deviation.value(),
+            at_s: reading.at.seconds(),
+            environment: EnvironmentRecord::from(&environment),
+        };
+        session.check.take(&point)?;
+        session.journal.write(&Entry::Point(point))?;
+        session.counter.done += 1;
+        let Counter { stage, done, total } = session.counter;
+        self.core.observer().progress(stage, axis, done, total);
+        Ok(point)
+    }
+
+    /// Measures the datum's place again; a run after which it has moved is worth nothing.
+    fn close_run(
+        &mut self,
+        session: &mut Session<'_>,
+        run: u32,
+        start: Metres,
+        earlier: &EarlierRuns,
+        points: &[PointEntry],
+    ) -> Result<ClosureEntry, Failure> {
+        self.go_to_datum(session.axis, session.plan)?;
+        let reading = self.read_calm(session.axis, session.plan)?;
+        let environment = self.watched_environment(session)?;
+        let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
+        let closure = ClosureEntry {
+            run,
+            start_m: start.value(),
+            closure_m: seen.value(),
+        };
+        if let Some(before) = earlier.last() {
+            session.check.compare(&before, &Run { points, closure })?;
+        }
+        // A comparison with NaN is false, so that it is refused too.
+        let is_closed = |limit| seen.abs() <= limit;
+        if let Some(limit) = session.plan.closure_limit.filter(|it| !is_closed(*it)) {
+            return Err(Failure::Closure {
+                axis: session.axis.to_owned(),
+                seen,
+                limit,
+            });
+        }
+        session.journal.write(&Entry::Closed(closure))?;
+        Ok(closure)
+    }
+
+    /// What a stage like this can do from one point to the next.
+    fn plausible(&self, axis: &str, plan: &RunPlan) -> Result<Plausible, Failure> {
+        let limits = self.axis_config(axis)?.compensation.as_ref();
+        Ok(Plausible {
+            slope: limits.map_or(SLOPE_MAX, |it| it.slope_limit),
+            step: limits.map_or(SIZE_MAX, |it| Metres::from_um(it.size_limit_um)),
+            scale_limit_ppm: plan.scale_limit_ppm,
+            half_wavelength: assemble::half_wavelength(&self.config.instrument[&plan.instrument]),
+        })
+    }
+
+    fn environment_watch(&self, plan: &RunPlan) -> EnvironmentWatch {
+        let config = &self.config.instrument[&plan.instrument];
+        let frozen = Duration::from_secs_f64(config.environment_frozen_s);
+        EnvironmentWatch::new(frozen, ENVIRONMENT_STALE)
+    }
+
+    /// The environment, as long as its sensors can be believed.
+    fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
+        let instrument = &session.plan.instrument;
+        let environment = self.instrument_environment(instrument)?;
+        let reading = assemble::correction_environment(&environment);
+        match session.watch.observe(self.now(), reading) {
+            Ok(()) => Ok(environment),
+            Err(source) => Err(Failure::Correction {
+                instrument: instrument.clone(),
+                source,
+            }),
+        }
+    }
+}
+
+fn largest(closures: &[ClosureEntry]) -> Metres {
+    closures
+        .iter()
+        .map(|closure| Metres(closure.closure_m))
+        .max_by(|a, b| a.abs().value().total_cmp(&b.abs().value()))
+        .unwrap_or(Metres::ZERO)
+}
+
+fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {
+    let mean = |of: fn(&EnvironmentRecord) -> Option<f64>| {
+        let values: Vec<f64> = points
+            .iter()
+            .filter_map(|point| of(&point.environment))
+            .collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    EnvironmentRecord {
+        air_temperature_c: mean(|it| it.air_temperature_c),
+        material_temperature_c: mean(|it| it.material_temperature_c),
+        pressure_pa: mean(|it| it.pressure_pa),
+        relative_humidity: mean(|it| it.relative_humidity),
+    }
+}

@@ -1,0 +1,82 @@
+//! The deviations of a linear axis (`linear_error_table`).
+
+use compensator::error_table::{ErrorTable, Node};
+use serde::{Deserialize, Serialize};
+use units::Metres;
+
+use crate::store::StoreError;
+
+/// An error table as it is stored.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinearContent {
+    /// How many runs.
+    pub runs: u32,
+    /// Difference of the same place measured first and last, metres, where measured.
+    pub closure_m: Option<f64>,
+    /// Mean lost motion (reverse − forward), metres, where both approaches were measured.
+    pub lost_motion_m: Option<f64>,
+    /// Its standard uncertainty, metres.
+    pub lost_motion_u_m: Option<f64>,
+    /// Deviation (actual − target) at each calibrated position.
+    pub nodes: Vec<NodeRecord>,
+}
+
+/// One calibrated position, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "the names carry quantity and unit")]
+pub struct NodeRecord {
+    pub position_m: f64,
+    pub forward_m: Option<f64>,
+    pub reverse_m: Option<f64>,
+    pub forward_u_m: Option<f64>,
+    pub reverse_u_m: Option<f64>,
+}
+
+impl LinearContent {
+    /// The name of this kind.
+    pub const KIND: &'static str = "linear_error_table";
+
+    /// What `table` says, measured in `runs` runs with this closure error.
+    pub fn new(table: &ErrorTable, runs: u32, closure: Option<Metres>) -> Self {
+        let lost_motion = table.lost_motion();
+        let metres = |value: Option<Metres>| value.map(Metres::value);
+        let nodes = table.nodes().iter().map(|node| NodeRecord {
+            position_m: node.position.value(),
+            forward_m: metres(node.forward),
+            reverse_m: metres(node.reverse),
+            forward_u_m: metres(node.u_forward),
+            reverse_u_m: metres(node.u_reverse),
+        });
+        Self {
+            runs,
+            closure_m: metres(closure),
+            lost_motion_m: lost_motion.map(|it| it.mean.value()),
+            lost_motion_u_m: metres(lost_motion.and_then(|it| it.standard_uncertainty)),
+            nodes: nodes.collect(),
+        }
+    }
+
+    /// The error table that calibration `id` holds.
+    ///
+    /// # Errors
+    /// When its nodes make no table.
+    pub fn table(&self, id: &str) -> Result<ErrorTable, StoreError> {
+        let nodes = self
+            .nodes
+            .iter()
+            .map(|node| Node {
+                position: Metres(node.position_m),
+                forward: node.forward_m.map(Metres),
+                reverse: node.reverse_m.map(Metres),
+                u_forward: node.forward_u_m.map(Metres),
+                u_reverse: node.reverse_u_m.map(Metres),
+            })
+            .collect();
+        ErrorTable::new(nodes).map_err(|source| StoreError::Table {
+            id: id.to_owned(),
+            source,
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! The page of a linear axis: facts, deviations, figures of ISO 230-2, its table and its zeros.
+
+mod deviations;
+
+use core::fmt::Write as _;
+
+use compensator::iso230::Figures;
+use units::Metres;
+
+use crate::linear::{LinearContent, PointEntry, ZeroEntry};
+use crate::page::{document, escape, facts};
+use crate::text;
+
+/// One measured series on the page.
+#[derive(Clone, Debug)]
+pub struct Section<'a> {
+    /// Its heading: `as found`, `as left` …
+    pub title: String,
+    /// Its figures.
+    pub figures: &'a Figures,
+    /// Its points.
+    pub points: &'a [PointEntry],
+}
+
+/// What a page shows.
+#[derive(Clone, Debug, Default)]
+pub struct Page<'a> {
+    /// Heading.
+    pub title: String,
+    /// Name and value, for the head of the page.
+    pub facts: Vec<(String, String)>,
+    /// Measured series.
+    pub sections: Vec<Section<'a>>,
+    /// The calibration in use.
+    pub calibration: Option<&'a LinearContent>,
+    /// Zeros found, in order.
+    pub zeros: Vec<ZeroEntry>,
+}
+
+/// The page as HTML.
+pub fn render(page: &Page<'_>) -> String {
+    let mut html = facts(&page.facts);
+    if !page.sections.is_empty() {
+        html += "<h2>ISO 230-2 figures</h2>";
+        html += &figures(&page.sections);
+    }
+    for section in &page.sections {
+        html += &format!("<h2>Deviation {}</h2>", escape(&section.title));
+        html += &format!("<figure>{}</figure>", deviations::deviations(section));
+    }
+    if let Some(calibration) = page.calibration {
+        html += "<h2>Calibration</h2>";
+        html += &table(calibration);
+    }
+    if !page.zeros.is_empty() {
+        html += "<h2>Zeros</h2>";
+        html += &zeros(&page.zeros);
+    }
+    let note = "deviation = actual − target. Bars are mean ± 2 s at each target.";
+    document(&page.title, &html, note)
+}
+
+fn figures(sections: &[Section<'_>]) -> String {
+    let mut html = String::from("<table><tr><th>µm</th><th></th>");
+    for section in sections {
+        let _ = write!(html, "<th>{}</th>", escape(&section.title));
+    }
+    html += "</tr>";
+    for (name, symbol, figure) in text::ROWS {
+        let _ = write!(html, "<tr><td>{name}</td><td>{symbol}</td>");
+        for section in sections {
+            let _ = write!(html, "<td>{:.3}</td>", figure(section.figures).um());
+        }
+        html += "</tr>";
+    }
+    html + "</table>"
+}
+
+fn table(content: &LinearContent) -> String {
+    let cell = |value: Option<f64>| {
+        value.map_or("–".to_owned(), |metres| {
+            format!("{:.3}", Metres(metres).um())
+        })
+    };
+    let mut html = String::from(
+        "<table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
+         <th>u ↑ (µm)</th><th>u ↓ (µm)</th></tr>",
+    );
+    for node in &content.nodes {
+        let _ = write!(
+            html,
+            "<tr><td>{:.3}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            Metres(node.position_m).mm(),
+            cell(node.forward_m),
+            cell(node.reverse_m),
+            cell(node.forward_u_m),
+            cell(node.reverse_u_m)
+        );
+    }
+    html + "</table>"
+}
+
+fn zeros(zeros: &[ZeroEntry]) -> String {
+    let mut html = String::from(
+        "<table><tr><th>no.</th><th>origin before (µm)</th><th>u (µm)</th><th>peak (V)</th>\
+         <th>mid voltage (V)</th></tr>",
+    );
+    for (at, zero) in zeros.iter().enumerate() {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{:.3}</td><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td></tr>",
+            at + 1,
+            Metres(zero.origin_m).um(),
+            Metres(zero.standard_uncertainty_m).um(),
+            zero.peak_max_v,
+            zero.mid_v
+        );
+    }
+    html + "</table>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_person_typed_cannot_become_markup() {
+        let page = Page {
+            title: "<script>\"x\"&".into(),
+            ..Page::default()
+        };
+        let html = render(&page);
+        assert!(!html.contains("<script>"));
+        assert!(html.contains("&lt;script&gt;&quot;x&quot;&amp;"));
+    }
+}

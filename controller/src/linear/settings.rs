@@ -1,0 +1,74 @@
+//! Tables of linear axes: what of a table is believed, and how it is applied.
+
+use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
+use drivers::device::umd2::Umd2Settings;
+use units::{Metres, MetresPerSecond};
+
+use crate::assemble::{CHECKED, half_wavelength};
+use crate::config::{CompensationConfig, EndPolicyName, InterpolationName, MachineConfig};
+use crate::failure::Failure;
+
+/// How far a position of `axis` may stand off its neighbours whatever the others do: what the
+/// configuration says, and half of what the instrument counts. Less than that is no lost count.
+pub fn harmless(config: &MachineConfig, axis: &str) -> Metres {
+    let of_axis = config.axis.get(axis);
+    let configured = of_axis
+        .and_then(|it| it.compensation.as_ref()?.jump_limit_um)
+        .map_or(Metres::ZERO, Metres::from_um);
+    let instrument =
+        of_axis.and_then(|it| config.instrument.get(&it.calibrate.as_ref()?.instrument));
+    let count = instrument.map_or(
+        Umd2Settings::default().vacuum_wavelength / 2.0,
+        half_wavelength,
+    );
+    configured.max(count / 2.0)
+}
+
+/// A table made ready to be applied to `axis` within the limits of the configuration.
+///
+/// # Errors
+/// When the axis has no limits, a position stands off its neighbours, or the table breaks a limit
+/// of size or slope.
+pub fn compensation(
+    config: &MachineConfig,
+    axis: &str,
+    table: ErrorTable,
+) -> Result<Compensation, Failure> {
+    let own = config
+        .axis
+        .get(axis)
+        .and_then(|it| it.compensation.as_ref());
+    let own = own.ok_or_else(|| Failure::NotConfigured {
+        axis: axis.to_owned(),
+        section: "compensation",
+    })?;
+    let axis = axis.to_owned();
+    if let Err(source) = table.judge_neighbours(harmless(config, &axis)) {
+        return Err(Failure::StandsOff { axis, source });
+    }
+    let limits = Limits {
+        size: Metres::from_um(own.size_limit_um),
+        slope: own.slope_limit,
+        rate: MetresPerSecond(own.rate_limit_um_per_s * 1e-6),
+    };
+    Compensation::new(table, interpolation(own), limits, ends(own))
+        .map_err(|source| Failure::Compensation { axis, source })
+}
+
+fn interpolation(config: &CompensationConfig) -> Interpolation {
+    match config.interpolation {
+        InterpolationName::PiecewiseConstant => Interpolation::PiecewiseConstant,
+        InterpolationName::Linear => Interpolation::Linear,
+        InterpolationName::MonotoneCubic => Interpolation::MonotoneCubic,
+    }
+}
+
+fn ends(config: &CompensationConfig) -> EndPolicy {
+    match config.end_policy {
+        EndPolicyName::Refuse => EndPolicy::Refuse,
+        EndPolicyName::Hold => EndPolicy::Hold,
+        EndPolicyName::FadeOut => {
+            EndPolicy::FadeOut(Metres::from_mm(config.fade_out_mm.expect(CHECKED)))
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Verify: measure again, at positions between the calibrated ones, and judge by ISO 230-2.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::error_table::ErrorTable;
+use compensator::iso230::{self, Figures};
+use units::Metres;
+
+use crate::config::VerifyConfig;
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::linear::calibrate::open_journal;
+use crate::linear::measure::{MeasureOptions, Measured};
+use crate::linear::run_plan::RunPlan;
+use crate::run::{missing, note_failure};
+use crate::store::{Store, short};
+use machine::Stage;
+
+/// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
+const SCALE_LIMIT_PPM: f64 = 1000.0;
+
+/// How a verification is made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VerifyOptions {
+    /// With the calibration in use (as left), or without (as found).
+    pub compensated: bool,
+    /// The name of the calibration in use, for the journal.
+    pub calibration: Option<String>,
+    /// Continue this journal instead of starting a new one.
+    pub resume: Option<PathBuf>,
+}
+
+/// What a verification gave.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// The figures.
+    pub figures: Figures,
+    /// Where every point is.
+    pub journal: PathBuf,
+    /// What was measured.
+    pub measured: Measured,
+    /// The tolerance of the configuration.
+    pub tolerance: Metres,
+}
+
+impl Verified {
+    /// Whether the bidirectional accuracy is within the tolerance.
+    pub fn is_within_tolerance(&self) -> bool {
+        self.figures.accuracy.bidirectional <= self.tolerance
+    }
+}
+
+impl Machine {
+    /// Measures `axis` at the configuration's verification targets and evaluates ISO 230-2.
+    /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
+    /// than without the calibration is one, and takes the calibration out of use.
+    ///
+    /// # Errors
+    /// When the axis is not zeroed or anything stops the machine.
+    pub fn verify(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        options: &VerifyOptions,
+    ) -> Result<Verified, Failure> {
+        let of_axis = self.axis_config(axis)?;
+        // One figure for both runs: the scale is the same.
+        let scale_limit_ppm = of_axis
+            .calibrate
+            .as_ref()
+            .map_or(SCALE_LIMIT_PPM, |it| it.scale_limit_ppm);
+        let config = of_axis.verify.clone();
+        let config = config.ok_or_else(|| missing(axis, "verify"))?;
+        self.require_zeroed(axis)?;
+        if options.compensated && self.compensation(axis).is_none() {
+            return Err(Failure::Usage {
+                what: format!("axis {axis} uses no calibration"),
+                help: "load or make one, or verify uncompensated".into(),
+            });
+        }
+        let plan = run_plan(&config, scale_limit_ppm);
+        // Before the header, which says who measures.
+        self.use_instrument(&plan.instrument)?;
+        let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
+        let (mut journal, earlier) =
+            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
+        let measuring = MeasureOptions {
+            stage: Stage::Verify,
+            compensated: options.compensated,
+        };
+        let measured = self
+            .measure_runs(axis, &plan, measuring, &mut journal, earlier)
+            .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        let verified = Verified {
+            figures: iso230::evaluate(&measured.series()?)?,
+            journal: journal.path().to_owned(),
+            measured,
+            tolerance: Metres::from_um(config.accuracy_tolerance_um),
+        };
+        if options.compensated {
+            self.judge_benefit(axis, store, &verified, options.calibration.as_deref())
+                .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        }
+        Ok(verified)
+    }
+
+    /// A calibration that is out of tolerance and makes the axis worse than it was found is
+    /// taken out of use (fault class 48: sign, axis or index exchanged).
+    fn judge_benefit(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        verified: &Verified,
+        calibration: Option<&str>,
+    ) -> Result<(), Failure> {
+        let Some(compensation) = self.compensation(axis) else {
+            return Ok(());
+        };
+        let before = systematic_deviation(compensation.table());
+        let after = verified.figures.systematic_deviation.bidirectional;
+        if verified.is_within_tolerance() || after <= before {
+            return Ok(());
+        }
+        let in_use = self.fall_back(axis, store, calibration)?;
+        Err(Failure::MadeWorse {
+            axis: axis.to_owned(),
+            calibration: calibration.map_or_else(|| "in use".to_owned(), short),
+            before,
+            after,
+            in_use: in_use.as_deref().map(short),
+        })
+    }
+
+    /// Goes back to the newest calibration before `calibration` that fits this machine, or to
+    /// none.
+    fn fall_back(
+        &mut self,
+        axis: &str,
+        store: &Store,
+        calibration: Option<&str>,
+    ) -> Result<Option<String>, Failure> {
+        self.set_compensation(axis, None)?;
+        // One that is not the active one is only forgotten here.
+        if calibration.is_none() || store.active(axis)?.current.as_deref() != calibration {
+            return Ok(None);
+        }
+        while store.retire(axis)?.is_some() {
+            if let Ok(loaded) = self.load_active(axis, store) {
+                return Ok(loaded);
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The range of the deviations that a table takes away, both approaches together.
+fn systematic_deviation(table: &ErrorTable) -> Metres {
+    let deviations = || {
+        let nodes = table.nodes().iter();
+        nodes
+            .flat_map(|node| [node.forward, node.reverse])
+            .flatten()
+    };
+    let largest = deviations().fold(Metres(f64::NEG_INFINITY), Metres::max);
+    let smallest = deviations().fold(Metres(f64::INFINITY), Metres::min);
+    largest - smallest
+}
+
+fn run_plan(config: &VerifyConfig, scale_limit_ppm: f64) -> RunPlan {
+    let step = (config.end_mm - config.start_mm) / f64::from(config.targets - 1);
+    let targets = (0..config.targets)
+        .map(|at| Metres::from_mm(config.start_mm + f64::from(at) * step))
+        .collect();
+    RunPlan {
+        instrument: config.instrument.clone(),
+        targets,
+        runs: config.runs,
+        overrun: Metres::from_mm(config.overrun_mm),
+        settle: Duration::from_millis(config.settle_ms.into()),
+        average_samples: config.average_samples,
+        scale_limit_ppm,
+        closure_limit: None,
+    }
+}

@@ -1,0 +1,335 @@
+//! Zero: find the drift-free origin with the two Hall sensors (system S5).
+//!
+//! Coarse: the drive homes on its negative limit switch (repeatable to tens of micrometres),
+//! which says where the nominal zero is. Fine: the patent's search with its regression. Last:
+//! the drive's coordinates are set so that the origin found is zero (homing method 37).
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::hall_zero::{
+    Outcome, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
+};
+use drivers::device::{AxisCommand, DriveCommand};
+use units::{Metres, MetresPerSecond, Time, Volts};
+
+use crate::assemble;
+use crate::config::ZeroConfig;
+use crate::connected::Machine;
+use crate::correction::Correction;
+use crate::failure::Failure;
+use crate::linear::ZeroEntry;
+use crate::run::missing;
+use crate::run::utc_now;
+use crate::store::{
+    Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, read_journal,
+};
+use machine::{STOP_LIMIT, Stage};
+
+/// A zero that was found.
+#[derive(Clone, Debug)]
+pub struct Zeroed {
+    /// The regression's result, in the drive's coordinates before they were set.
+    pub estimate: ZeroEstimate,
+    /// The patent's search.
+    pub outcome: Outcome,
+    /// Where it is recorded.
+    pub journal: PathBuf,
+    /// What was found now.
+    pub entry: ZeroEntry,
+    /// The zero before it, from the newest complete journal of this axis: what the sensors
+    /// have drifted since.
+    pub previous: Option<ZeroEntry>,
+}
+
+impl Zeroed {
+    /// Where the zero of the art before the patent would be: at a fixed voltage of the slope
+    /// sensor. In the coordinates of [`ZeroEstimate::origin`]; `None` when the search did not
+    /// pass that voltage. For comparison only.
+    pub fn single_threshold(&self, threshold: Volts) -> Option<Metres> {
+        let points: Vec<_> = self.outcome.samples.iter().map(Sample::point).collect();
+        single_threshold_zero(&points, threshold, Metres::from_um(100.0))
+    }
+}
+
+/// How long the axis stands before its drive's coordinates are set.
+const REST: Duration = Duration::from_millis(30);
+/// The steps of zeroing that progress counts.
+const STEPS: u64 = 4;
+
+impl Machine {
+    /// Finds the origin of `axis` and makes it the drive's zero; the axis is enabled and
+    /// stands at its origin afterwards.
+    ///
+    /// # Errors
+    /// Whatever stops the machine; a search or a regression that fails, with step and
+    /// values; an origin that is not certain enough. The axis is not zeroed then.
+    pub fn zero(&mut self, axis: &str, store: &Store) -> Result<Zeroed, Failure> {
+        let config = self.axis_config(axis)?.zero.clone();
+        let config = config.ok_or_else(|| missing(axis, "zero"))?;
+        self.set_zeroed(axis, false)?;
+        let previous = previous_zero(store, axis);
+        let mut journal = Journal::create(&store.runs(), &self.zero_header(axis))?;
+        let found = self.find_zero(axis, &config, &mut journal);
+        if let Err(failure) = &found {
+            // The cause is on its way to the operator; the journal is only a second place.
+            let _ = journal.write(&Entry::Failed {
+                cause: failure.to_string(),
+            });
+        }
+        let (outcome, estimate, entry) = found?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(Zeroed {
+            estimate,
+            outcome,
+            journal: journal.path().to_owned(),
+            entry,
+            previous,
+        })
+    }
+
+    fn find_zero(
+        &mut self,
+        axis: &str,
+        config: &ZeroConfig,
+        journal: &mut Journal,
+    ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
+        self.core.observer().progress(Stage::Zero, axis, 0, STEPS);
+        self.enable(axis)?;
+        self.reference(axis, config)?;
+        self.core.observer().progress(Stage::Zero, axis, 1, STEPS);
+        self.travel(axis, Metres::ZERO, Correction::Off)?;
+        self.core.observer().progress(Stage::Zero, axis, 2, STEPS);
+        let usual = assemble::hall_settings(config, self.axis_config(axis)?);
+        let settings = assemble::patient_search(usual, self.patience());
+        let outcome = self.search(axis, config, settings)?;
+        self.core.observer().progress(Stage::Zero, axis, 3, STEPS);
+        let estimate = self.estimate(axis, config, &settings, &outcome)?;
+        let entry = self.zero_entry(&estimate);
+        journal.write(&Entry::Zero(entry))?;
+        self.adopt_zero(axis, estimate.origin)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, axis, STEPS, STEPS);
+        Ok((outcome, estimate, entry))
+    }
+
+    /// Coarse reference on the negative limit switch.
+    fn reference(&mut self, axis: &str, config: &ZeroConfig) -> Result<(), Failure> {
+        let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
+        let limit = assemble::reference_limit(config, self.axis_config(axis)?);
+        let position = Metres::from_mm(config.negative_limit_mm);
+        self.command(
+            axis,
+            AxisCommand::HomeNegativeLimit { position, speed },
+            "reference",
+            limit,
+        )?;
+        self.forget_approach(axis)?;
+        Ok(())
+    }
+
+    /// Runs the patent's search, one step a sample.
+    fn search(
+        &mut self,
+        axis: &str,
+        config: &ZeroConfig,
+        settings: Settings,
+    ) -> Result<Outcome, Failure> {
+        let failed = |source| Failure::SearchSettings {
+            axis: axis.to_owned(),
+            source,
+        };
+        let mut search = Search::new(settings, Metres::ZERO, self.now()).map_err(failed)?;
+        let mut pairing = self.pairing(axis, config)?;
+        let mut motion = None;
+        loop {
+            let deadline = search
+                .poll_timeout()
+                .min(self.now() + Duration::from_millis(100));
+            self.tick(deadline)?;
+            self.check_motion(axis)?;
+            let progress = match self.paired_sample(axis, config, &mut pairing)? {
+                Some(sample) => Some(search.handle_sample(&sample)),
+                None => search.handle_timeout(self.now()),
+            };
+            match progress {
+                None => {}
+                Some(Progress::Found(outcome)) => return Ok(*outcome),
+                Some(Progress::Failed(source)) => {
+                    self.command(axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
+                    return Err(Failure::Search {
+                        axis: axis.to_owned(),
+                        source,
+                    });
+                }
+                Some(step) => self.obey(axis, &step, &mut motion)?,
+            }
+        }
+    }
+
+    /// Turns the search's wish into a profile move or a halt, when it differs from the last.
+    fn obey(
+        &mut self,
+        axis: &str,
+        progress: &Progress,
+        motion: &mut Option<AxisCommand>,
+    ) -> Result<(), Failure> {
+        let command = match *progress {
+            Progress::Move { to, speed } => {
+                let acceleration = self.axis_settings(axis)?.acceleration;
+                AxisCommand::MoveTo {
+                    target: to,
+                    speed,
+                    acceleration,
+                }
+            }
+            _ => DriveCommand::Halt.into(),
+        };
+        if *motion != Some(command) {
+            self.begin(axis, command)?;
+            *motion = Some(command);
+        }
+        Ok(())
+    }
+
+    /// A move of the search that failed ends the search.
+    fn check_motion(&mut self, axis: &str) -> Result<(), Failure> {
+        Ok(self.outcome(axis)?.unwrap_or(Ok(()))?)
+    }
+
+    fn estimate(
+        &self,
+        axis: &str,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> Result<ZeroEstimate, Failure> {
+        let estimate = outcome.refine(settings).map_err(|source| Failure::Refine {
+            axis: axis.to_owned(),
+            source,
+        })?;
+        let limit = Metres::from_um(config.standard_uncertainty_limit_um);
+        if estimate.standard_uncertainty > limit {
+            let seen = estimate.standard_uncertainty;
+            return Err(Failure::ZeroUncertain {
+                axis: axis.to_owned(),
+                seen,
+                limit,
+            });
+        }
+        Ok(estimate)
+    }
+
+    /// Goes to the origin and makes it the drive's zero.
+    fn adopt_zero(&mut self, axis: &str, origin: Metres) -> Result<(), Failure> {
+        self.travel(axis, origin, Correction::Off)?;
+        self.stand_still(axis, REST)?;
+        let reading = self
+            .reading(axis)?
+            .expect("an axis that moved has been read");
+        let position = reading.position - origin;
+        self.command(
+            axis,
+            AxisCommand::HomeHere { position },
+            "set origin",
+            Duration::from_secs(5),
+        )?;
+        self.set_zeroed(axis, true)?;
+        Ok(self.forget_approach(axis)?)
+    }
+
+    fn zero_entry(&self, estimate: &ZeroEstimate) -> ZeroEntry {
+        ZeroEntry {
+            origin_m: estimate.origin.value(),
+            standard_uncertainty_m: estimate.standard_uncertainty.value(),
+            patent_p0_m: estimate.p0_patent.unwrap_or(estimate.origin).value(),
+            peak_max_v: estimate.peak_max.value(),
+            mid_v: estimate.mid_voltage.value(),
+            at_s: self.now().seconds(),
+        }
+    }
+
+    fn zero_header(&self, axis: &str) -> JournalHeader {
+        let here = self.this_machine(axis);
+        JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: "zero".into(),
+            machine: here.machine,
+            stage_serial: here.stage_serial,
+            config_hash: here.config_hash,
+            axis: here.axis,
+            drive: here.drive,
+            instrument: InstrumentRecord::default(),
+            started: utc_now(),
+            calibration: None,
+            targets_m: Vec::new(),
+            runs: 0,
+        }
+    }
+
+    fn pairing(&self, axis: &str, config: &ZeroConfig) -> Result<Pairing, Failure> {
+        let can = self.axis_config(axis)?.can();
+        let bus = can.expect("the check asks for a drive on CAN").bus;
+        let sync_s = self.config.can[bus].sync_period_ms * 1e-3;
+        let poll_s = self.config.analog[&config.analog]
+            .poll_period_ms
+            .map_or(0.0, |ms| ms * 1e-3);
+        let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
+        Ok(Pairing {
+            window,
+            used_axis: Time::ZERO,
+            used_analog: Time::ZERO,
+        })
+    }
+
+    /// The newest position and voltages that belong together and were not used before.
+    ///
+    /// On CAN both are sampled at one SYNC and arrive together; members of different SYNC
+    /// periods lie further apart than the window and are never paired.
+    fn paired_sample(
+        &self,
+        axis: &str,
+        config: &ZeroConfig,
+        pairing: &mut Pairing,
+    ) -> Result<Option<Sample>, Failure> {
+        let analog = self.analog(&config.analog)?;
+        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.reading()) else {
+            return Ok(None);
+        };
+        if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {
+            return Ok(None);
+        }
+        let apart = position
+            .at
+            .since(voltages.at)
+            .max(voltages.at.since(position.at));
+        if apart > pairing.window {
+            return Ok(None);
+        }
+        pairing.used_axis = position.at;
+        pairing.used_analog = voltages.at;
+        Ok(Some(Sample {
+            at: position.at.max(voltages.at),
+            position: position.position,
+            peak: voltages.volts[0],
+            slope: voltages.volts[1],
+            standing: position.standing,
+        }))
+    }
+}
+
+/// The newest zero on record. A trend is worth having but never worth failing for: a journal
+/// that cannot be read is no reason not to zero.
+fn previous_zero(store: &Store, axis: &str) -> Option<ZeroEntry> {
+    let path = store.newest_run("zero", axis).ok().flatten()?;
+    read_journal(&path).ok()?.zeros.pop()
+}
+
+/// Which samples were used already.
+struct Pairing {
+    window: Duration,
+    used_axis: Time,
+    used_analog: Time,
+}

@@ -1,0 +1,111 @@
+//! Pages for people: self-contained, of facts, tables and pictures. No script, no network.
+
+pub(crate) mod band;
+pub(crate) mod chart;
+pub(crate) mod svg;
+
+use core::fmt::Write as _;
+
+use crate::store::{IdentityRecord, ReadJournal};
+
+pub(crate) const STYLE: &str = "\
+body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;\
+color:#1c2430;background:#fff}h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2.2rem}\
+h3{font-size:1rem}\
+table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem;text-align:right;\
+border-bottom:1px solid #dde3ea}th{color:#566}td:first-child,th:first-child{text-align:left}\
+svg{width:100%;height:auto}.note{color:#566}figure{margin:0}";
+
+/// The fact that names the calibration in use.
+pub(crate) const IN_USE: &str = "calibration in use";
+
+/// A whole page around `body`; `note` says how to read it.
+pub(crate) fn document(title: &str, body: &str, note: &str) -> String {
+    let title = escape(title);
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\
+         <style>{STYLE}</style></head><body><h1>{title}</h1>{body}\
+         <p class=\"note\">{note} Made by truestage; not a certificate.</p></body></html>\n"
+    )
+}
+
+/// The head of a page for one run.
+pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
+    let header = &journal.header;
+    let points = journal.points.len() + journal.strokes.len() + journal.poses.len();
+    let mut facts = vec![
+        (
+            "machine".to_owned(),
+            format!("{} (stage {})", header.machine, header.stage_serial),
+        ),
+        ("axis".to_owned(), header.axis.clone()),
+        (
+            "run".to_owned(),
+            format!("{}, started {}", header.verb, header.started),
+        ),
+        (
+            IN_USE.to_owned(),
+            header.calibration.clone().unwrap_or("none".into()),
+        ),
+        ("points".to_owned(), points.to_string()),
+        (
+            "complete".to_owned(),
+            if journal.complete { "yes" } else { "no" }.to_owned(),
+        ),
+    ];
+    if let Some(cause) = &journal.failure {
+        facts.push(("ended because".to_owned(), cause.clone()));
+    }
+    // What several drives move together names none of them.
+    let drive = &header.drive;
+    if *drive != IdentityRecord::default() {
+        let value = format!(
+            "{} {:#X}:{:#X}, serial {}",
+            drive.name, drive.vendor, drive.product, drive.serial
+        );
+        facts.push(("drive".to_owned(), value));
+    }
+    if !header.instrument.name.is_empty() {
+        let it = &header.instrument;
+        let on = [
+            ("air", it.air_corrected),
+            ("material", it.material_corrected),
+            ("dead path", it.dead_path_corrected),
+            ("cosine", it.cosine_corrected),
+        ];
+        let on: Vec<_> = on
+            .iter()
+            .filter(|(_, on)| *on)
+            .map(|(name, _)| *name)
+            .collect();
+        let corrected = if on.is_empty() {
+            "nothing".to_owned()
+        } else {
+            on.join(", ")
+        };
+        let value = format!("{} ({}), corrected for {corrected}", it.name, it.identity);
+        facts.push(("instrument".to_owned(), value));
+    }
+    facts
+}
+
+pub(crate) fn facts(facts: &[(String, String)]) -> String {
+    let rows = facts.iter().fold(String::new(), |mut rows, (name, value)| {
+        let value = escape(value);
+        let _ = write!(
+            rows,
+            "<tr><th>{}</th><td style=\"text-align:left\">{value}</td></tr>",
+            escape(name)
+        );
+        rows
+    });
+    format!("<table>{rows}</table>")
+}
+
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}

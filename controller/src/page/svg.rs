@@ -1,0 +1,130 @@
+//! Plots as plain SVG.
+
+use core::fmt::Write as _;
+
+pub(crate) const WIDTH: f64 = 960.0;
+pub(crate) const HEIGHT: f64 = 320.0;
+pub(crate) const LEFT: f64 = 64.0;
+pub(crate) const RIGHT: f64 = 20.0;
+pub(crate) const TOP: f64 = 24.0;
+pub(crate) const BOTTOM: f64 = 44.0;
+pub(crate) const FORWARD: &str = "#0b66c3";
+pub(crate) const REVERSE: &str = "#c2410c";
+
+/// From data to the page.
+pub(crate) struct Axes {
+    pub(crate) x: (f64, f64),
+    pub(crate) y: (f64, f64),
+}
+
+impl Axes {
+    pub(crate) fn px(&self, x: f64) -> f64 {
+        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+    }
+
+    pub(crate) fn py(&self, y: f64) -> f64 {
+        HEIGHT - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (HEIGHT - TOP - BOTTOM)
+    }
+}
+
+/// The range of `values`, widened on both sides by `share` of it, and never empty.
+pub(crate) fn padded(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if low > high {
+        return (0.0, 1.0);
+    }
+    // What is the same but for rounding has a range that its places can be told in.
+    let rounding = low.abs().max(high.abs()) * 1e-12;
+    let margin = ((high - low) * share).max(1e-6).max(rounding);
+    (low - margin, high + margin)
+}
+
+/// 1, 2 or 5 times a power of ten, giving about `wanted` steps.
+pub(crate) fn step(range: f64, wanted: f64) -> f64 {
+    let raw = range / wanted;
+    let power = 10_f64.powf(raw.log10().floor());
+    let factor = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|it| it * power >= raw)
+        .unwrap_or(10.0);
+    factor * power
+}
+
+/// Ticks of an axis at most: rounding makes no more of those that are wanted.
+pub(crate) const TICKS_MAX: usize = 100;
+
+pub(crate) fn ticks(range: (f64, f64), wanted: f64) -> Vec<f64> {
+    let step = step(range.1 - range.0, wanted);
+    if !(step > 0.0 && step.is_finite()) {
+        return Vec::new();
+    }
+    let first = (range.0 / step).ceil() as i64;
+    let last = (range.1 / step).floor() as i64;
+    let each = (first..=last).take(TICKS_MAX);
+    each.map(|at| at as f64 * step).collect()
+}
+
+/// As few digits as tell the ticks apart.
+pub(crate) fn label(value: f64, step: f64) -> String {
+    let digits = (-step.log10().floor()).max(0.0) as usize;
+    format!("{:.digits$}", value + 0.0)
+}
+
+/// Lines, numbers, and what both axes are.
+pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
+    let mut svg = String::from("<g font-size=\"12\" fill=\"#566\" stroke-width=\"1\">");
+    let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+    let y_step = step(axes.y.1 - axes.y.0, 6.0);
+    for y in ticks(axes.y, 6.0) {
+        let py = axes.py(y);
+        let colour = if y.abs() < y_step * 1e-6 {
+            "#8794a3"
+        } else {
+            "#e4e9ef"
+        };
+        let _ = write!(
+            svg,
+            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>"
+        );
+        let (x, y_text, text) = (LEFT - 8.0, py + 4.0, label(y, y_step));
+        let _ = write!(
+            svg,
+            "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>"
+        );
+    }
+    let x_step = step(axes.x.1 - axes.x.0, 10.0);
+    for x in ticks(axes.x, 10.0) {
+        let (px, y, text) = (axes.px(x), bottom + 18.0, label(x, x_step));
+        let _ = write!(
+            svg,
+            "<text x=\"{px:.1}\" y=\"{y}\" text-anchor=\"middle\">{text}</text>"
+        );
+    }
+    let (middle, base) = ((LEFT + right) / 2.0, HEIGHT - 6.0);
+    let _ = write!(
+        svg,
+        "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">{x_label}</text>"
+    );
+    let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">{y_label}</text></g>");
+    svg
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers_inside_the_range() {
+        assert_eq!(ticks((-0.3, 10.2), 5.0), [0.0, 5.0, 10.0]);
+        assert_eq!(ticks((0.0, 1.0), 5.0).len(), 6);
+        assert_eq!(label(0.5, 0.5), "0.5");
+        assert_eq!(label(20.0, 10.0), "20");
+    }
+
+    #[test]
+    fn an_empty_plot_has_a_range() {
+        assert_eq!(padded([].into_iter(), 0.1), (0.0, 1.0));
+    }
+}

@@ -1,0 +1,362 @@
+//! Calibrate a platform: each screw alone through its strokes from both sides, seen by the
+//! camera; a model for each, stored and activated together (S1, test step S100).
+
+use std::path::PathBuf;
+
+use compensator::measurement::Stroke;
+use compensator::platform::Pose;
+use compensator::screw::{
+    self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier, patent,
+};
+use units::{Approach, Metres};
+
+use crate::connected::Machine;
+use crate::correction::Correction;
+use crate::failure::Failure;
+use crate::platform::config::ScrewMethodName as Method;
+use crate::platform::failure::PlatformFailure;
+use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
+use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
+use crate::run::{note_failure, utc_now};
+use crate::store::ClosureEntry;
+use crate::store::{CalibrationRecord, Content, Entry, Journal, RecordHead, Store};
+use machine::Stage;
+
+/// A screw that was calibrated.
+#[derive(Clone, Debug)]
+pub struct ScrewCalibrated {
+    /// Its axis.
+    pub axis: String,
+    /// Its calibration's name.
+    pub id: String,
+    /// Its model.
+    pub model: ScrewModel,
+    /// How many strokes were measured.
+    pub strokes: usize,
+    /// Those of them that do not fit the others and were left out.
+    pub outliers: Vec<StrokeOutlier>,
+}
+
+/// A platform that was calibrated.
+#[derive(Clone, Debug)]
+pub struct PlatformCalibrated {
+    /// Each screw, in the order of the configuration.
+    pub screws: Vec<ScrewCalibrated>,
+    /// Where every stroke is.
+    pub journal: PathBuf,
+    /// How far the largest of the strokes was off at zero after everything.
+    pub closure: Metres,
+}
+
+impl Machine {
+    /// Measures every screw, fits its model, stores and activates all of them, and uses them
+    /// from now on.
+    ///
+    /// # Errors
+    /// Not zeroed, whatever stops the machine, a datum that drifted, strokes that give no
+    /// model, or a model beyond the limits. Nothing is activated then.
+    pub fn calibrate_platform(&mut self, store: &Store) -> Result<PlatformCalibrated, Failure> {
+        self.require_platform_zeroed()?;
+        let missing = |section| PlatformFailure::NotConfigured { section };
+        let config = self.platform_config()?;
+        let plan = config.calibrate.clone().ok_or(missing("calibrate"))?;
+        config
+            .compensation
+            .as_ref()
+            .ok_or(missing("compensation"))?;
+        self.check_single_screws(&plan)?;
+        let mut journal = self.platform_journal(store, "calibrate", plan.runs, None, None)?;
+        let measured = self.measure_screws(&plan, &mut journal);
+        let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
+        let stored = self.fit_and_store(store, &journal, &plan, &strokes);
+        let screws = stored.inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(PlatformCalibrated {
+            screws,
+            journal: journal.path().to_owned(),
+            closure,
+        })
+    }
+
+    /// One screw moves while the others stand: three bear that, four contradict each other.
+    /// Refused before the first of them moves, not in the middle of its run.
+    fn check_single_screws(&self, plan: &PlatformCalibrateConfig) -> Result<(), Failure> {
+        let count = self.platform_state()?.screws.len();
+        let stops = round(&targets(plan), plan);
+        for at in 0..count {
+            for (stroke, _) in &stops {
+                let strokes = alone(at, *stroke, count);
+                self.check_agreement(Pose::default(), &strokes, "; nothing was moved")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn measure_screws(
+        &mut self,
+        plan: &PlatformCalibrateConfig,
+        journal: &mut Journal,
+    ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
+        let count = self.platform_state()?.screws.len();
+        let targets = targets(plan);
+        let total = (count * targets.len() * 2) as u64 * u64::from(plan.runs);
+        let mut all = vec![Vec::new(); count];
+        let mut done = 0;
+        for (at, strokes) in all.iter_mut().enumerate() {
+            for run in 1..=plan.runs {
+                for (stroke, approach) in round(&targets, plan) {
+                    self.go_to_strokes(&alone(at, stroke, count), Correction::Off)?;
+                    let Some(approach) = approach else { continue };
+                    strokes.push(self.measure_stroke(at, run, approach, stroke, journal)?);
+                    done += 1;
+                    let observer = self.core.observer();
+                    observer.progress(Stage::Calibrate, "platform", done, total);
+                }
+            }
+            self.approach_zero()?;
+        }
+        let closure = self.platform_closure(plan)?;
+        journal.write(&Entry::Closed(ClosureEntry {
+            run: plan.runs,
+            start_m: 0.0,
+            closure_m: closure.value(),
+        }))?;
+        Ok((all, closure))
+    }
+
+    fn measure_stroke(
+        &mut self,
+        at: usize,
+        run: u32,
+        approach: Approach,
+        stroke: Metres,
+        journal: &mut Journal,
+    ) -> Result<Stroke, Failure> {
+        let pose = self.measure_pose()?;
+        let measured = self.platform_state()?.kinematics.strokes(pose)[at];
+        let axis = self.platform_state()?.screws[at].axis.clone();
+        journal.write(&Entry::Stroke(StrokeEntry {
+            axis,
+            run,
+            approach: approach.symbol(),
+            stroke_m: stroke.value(),
+            measured_m: measured.value(),
+            pose: pose.into(),
+            at_s: self.now().seconds(),
+        }))?;
+        Ok(Stroke {
+            approach,
+            stroke,
+            deviation: measured - stroke,
+        })
+    }
+
+    /// The pose zero looked at again: it must still be there.
+    fn platform_closure(&mut self, plan: &PlatformCalibrateConfig) -> Result<Metres, Failure> {
+        let pose = self.measure_pose()?;
+        let strokes = self.platform_state()?.kinematics.strokes(pose);
+        let seen = strokes.into_iter().map(Metres::abs);
+        let seen = seen.fold(Metres::ZERO, Metres::max);
+        let limit = Metres::from_um(plan.closure_limit_um);
+        // A comparison with NaN is false, so that it is refused too.
+        let is_closed = seen <= limit;
+        if is_closed {
+            return Ok(seen);
+        }
+        Err(Failure::Closure {
+            axis: "platform".into(),
+            seen,
+            limit,
+        })
+    }
+
+    fn fit_screw(
+        &self,
+        at: usize,
+        plan: &PlatformCalibrateConfig,
+        strokes: &[Stroke],
+    ) -> Result<(ScrewModel, Vec<StrokeOutlier>), Failure> {
+        let config = self.platform_config()?;
+        let axis = config.actuator[at].axis.clone();
+        let (model, outliers) = match plan.method {
+            Method::LeastSquares => {
+                let options = FitOptions {
+                    lead: Some(Metres::from_mm(config.actuator[at].lead_mm)),
+                    harmonics_max: plan.harmonics_max,
+                    significance: plan.significance,
+                    ..FitOptions::default()
+                };
+                let fitted = screw::fit(strokes, &options);
+                let fitted = fitted.map_err(|source| PlatformFailure::Fit { axis, source })?;
+                (fitted.model, fitted.outliers)
+            }
+            Method::Patent => {
+                // The mean over strokes reached in reverse, from a zero set forward, is what the
+                // patent takes for the lost motion.
+                let reverse = |it: &&Stroke| it.approach == Approach::Reverse;
+                let strokes: Vec<_> = strokes.iter().filter(reverse).copied().collect();
+                let estimate = patent::estimate(&strokes);
+                let estimate = estimate.map_err(|source| PlatformFailure::Fit { axis, source })?;
+                (estimate.model(), Vec::new())
+            }
+        };
+        self.prepare_screw(at, model.clone())?;
+        Ok((model, outliers))
+    }
+
+    /// Proves that a model can be applied within the limits of the configuration.
+    fn prepare_screw(&self, at: usize, model: ScrewModel) -> Result<ScrewCompensation, Failure> {
+        let config = self.platform_config()?;
+        let axis = &config.actuator[at].axis;
+        let section = "compensation";
+        let limits = config.compensation.as_ref();
+        let limits = limits.ok_or(PlatformFailure::NotConfigured { section })?;
+        let resolution = Metres(self.axis_config(axis)?.resolution_nm.abs() * 1e-9);
+        ScrewCompensation::new(model, limits_of(limits, resolution), rule_of(limits)).map_err(
+            |source| {
+                let axis = axis.clone();
+                Failure::ScrewCompensation { axis, source }
+            },
+        )
+    }
+
+    fn fit_and_store(
+        &mut self,
+        store: &Store,
+        journal: &Journal,
+        plan: &PlatformCalibrateConfig,
+        strokes: &[Vec<Stroke>],
+    ) -> Result<Vec<ScrewCalibrated>, Failure> {
+        let mut fitted = Vec::new();
+        for (at, strokes) in strokes.iter().enumerate() {
+            fitted.push(self.fit_screw(at, plan, strokes)?);
+        }
+        self.store_screws(store, journal, plan, strokes, &fitted)
+    }
+
+    fn store_screws(
+        &mut self,
+        store: &Store,
+        journal: &Journal,
+        plan: &PlatformCalibrateConfig,
+        strokes: &[Vec<Stroke>],
+        fitted: &[(ScrewModel, Vec<StrokeOutlier>)],
+    ) -> Result<Vec<ScrewCalibrated>, Failure> {
+        let method = match plan.method {
+            Method::LeastSquares => ScrewMethodName::LeastSquares,
+            Method::Patent => ScrewMethodName::Patent,
+        };
+        let source = journal.path().file_name().unwrap_or_default();
+        let mut calibrated = Vec::new();
+        for (at, (model, outliers)) in fitted.iter().enumerate() {
+            let axis = self.platform_state()?.screws[at].axis.clone();
+            let head = RecordHead {
+                created: utc_now(),
+                source: source.to_string_lossy().into_owned(),
+                instrument: self.camera_record()?,
+                ..self.this_machine(&axis)
+            };
+            let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
+            let content = ScrewContent::new(model, method, rows).without(outliers);
+            let content = Content::ScrewModel(content);
+            let id = store.save(&CalibrationRecord { head, content })?;
+            calibrated.push(ScrewCalibrated {
+                axis,
+                id,
+                model: model.clone(),
+                strokes: strokes[at].len(),
+                outliers: outliers.clone(),
+            });
+        }
+        // Only when all of them are on the disk.
+        for (at, screw) in calibrated.iter().enumerate() {
+            store.activate(&screw.axis, &screw.id)?;
+            let compensation = self.prepare_screw(at, screw.model.clone())?;
+            let state = &mut self.platform_state_mut()?.screws[at];
+            state.compensation = Some(compensation);
+            state.calibration = Some(screw.id.clone());
+        }
+        Ok(calibrated)
+    }
+
+    /// Loads the calibrations that `store` says are active for the screws, after checking that
+    /// they belong to this machine; returns their names by axis, `None` where there is none.
+    ///
+    /// # Errors
+    /// When one is damaged, of another kind, belongs to another machine or breaks a limit.
+    pub fn load_active_screws(
+        &mut self,
+        store: &Store,
+    ) -> Result<Vec<(String, Option<String>)>, Failure> {
+        let axes: Vec<_> = self
+            .platform_state()?
+            .screws
+            .iter()
+            .map(|it| it.axis.clone())
+            .collect();
+        let mut loaded = Vec::new();
+        for (at, axis) in axes.into_iter().enumerate() {
+            let id = store.active(&axis)?.current;
+            if let Some(id) = &id {
+                let record = store.load(id)?;
+                record
+                    .head
+                    .belongs_to(id, &self.this_machine(&axis), &self.config_hash)?;
+                let model = record.screw(id)?.model();
+                let compensation = self.prepare_screw(at, model)?;
+                let state = &mut self.platform_state_mut()?.screws[at];
+                state.compensation = Some(compensation);
+                state.calibration = Some(id.clone());
+            }
+            loaded.push((axis, id));
+        }
+        Ok(loaded)
+    }
+}
+
+fn targets(plan: &PlatformCalibrateConfig) -> Vec<Metres> {
+    let steps = ((plan.last_mm - plan.first_mm) / plan.step_mm + 1e-9).floor() as u32;
+    (0..=steps)
+        .map(|step| Metres::from_mm(plan.first_mm + f64::from(step) * plan.step_mm))
+        .collect()
+}
+
+/// One of `count` screws at `stroke`, the others at zero.
+fn alone(at: usize, stroke: Metres, count: usize) -> Vec<Metres> {
+    let mut strokes = vec![Metres::ZERO; count];
+    strokes[at] = stroke;
+    strokes
+}
+
+/// The stops of one run: below the first target, up through all, beyond the last, and back.
+fn round(targets: &[Metres], plan: &PlatformCalibrateConfig) -> Vec<(Metres, Option<Approach>)> {
+    let overrun = Metres::from_mm(plan.overrun_mm);
+    let (first, last) = (targets[0], targets[targets.len() - 1]);
+    let up = targets.iter().map(|it| (*it, Some(Approach::Forward)));
+    let down = targets
+        .iter()
+        .rev()
+        .map(|it| (*it, Some(Approach::Reverse)));
+    core::iter::once((first - overrun, None))
+        .chain(up)
+        .chain(core::iter::once((last + overrun, None)))
+        .chain(down)
+        .collect()
+}
+
+fn limits_of(config: &ScrewCompensationConfig, resolution: Metres) -> Limits {
+    Limits {
+        size: Metres::from_um(config.size_limit_um),
+        slope: config.slope_limit,
+        extrapolation: Metres::from_mm(config.extrapolation_mm),
+        resolution: resolution / 2.0,
+    }
+}
+
+const fn rule_of(config: &ScrewCompensationConfig) -> Rule {
+    match config.rule {
+        LostMotionRule::Engagement => Rule::Engagement,
+        LostMotionRule::Patent => Rule::Patent,
+    }
+}

@@ -1,0 +1,251 @@
+//! Whether a platform can be held, reached and calibrated as it is described.
+
+use compensator::platform::{Platform, Point, Pose};
+use units::portable::hypot;
+use units::{Metres, Radians, Short};
+
+use crate::config::MachineConfig;
+use crate::config::judge::{Finding, Judge};
+use crate::platform::config::{PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig};
+use crate::platform::kinematics;
+
+pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    let Some(platform) = &config.platform else {
+        return;
+    };
+    check_numbers(&mut Judge::at("platform".into(), findings), platform);
+    check_references(findings, config, platform);
+    if let Some(run) = &platform.calibrate {
+        let judge = &mut Judge::at("platform.calibrate".into(), findings);
+        check_calibrate(judge, config, platform, run);
+    }
+    if let Some(compensation) = &platform.compensation {
+        let judge = &mut Judge::at("platform.compensation".into(), findings);
+        check_compensation(judge, compensation);
+    }
+    if platform.calibrate.is_some() && platform.compensation.is_none() {
+        Judge::at("platform".into(), findings).say(
+            "calibrate",
+            "a calibration cannot be used without limits for it",
+            "add [platform.compensation]",
+        );
+    }
+    // What is wrong with the arrangement can only be told of numbers that are sound.
+    if findings.is_empty() {
+        check_arrangement(
+            &mut Judge::at("platform".into(), findings),
+            config,
+            platform,
+        );
+    }
+}
+
+fn check_numbers(judge: &mut Judge<'_>, platform: &PlatformConfig) {
+    judge.within("exposures", platform.exposures.into(), 1.0, 1000.0);
+    judge.within("speed_mm_per_s", platform.speed_mm_per_s, 1e-3, 1e3);
+    let acceleration = platform.acceleration_mm_per_s2;
+    judge.within("acceleration_mm_per_s2", acceleration, 1e-2, 1e6);
+    judge.within("x_max_mm", platform.x_max_mm, 0.0, 1e3);
+    judge.within("y_max_mm", platform.y_max_mm, 0.0, 1e3);
+    judge.within("theta_max_deg", platform.theta_max_deg, 0.0, 90.0);
+    judge.within("edge_mm", platform.edge_mm, 0.0, 1e4);
+    judge.within("condition_max", platform.condition_max, 1.0 + 1e-9, 1e6);
+    check_inconsistency(judge, platform);
+    let speed = platform.zero.search_speed_mm_per_s;
+    judge.within("zero.search_speed_mm_per_s", speed, 1e-3, 1e3);
+    judge.within("zero.time_limit_s", platform.zero.time_limit_s, 0.1, 1e5);
+    if let Some(verify) = &platform.verify {
+        judge.within("verify.poses", verify.poses.into(), 1.0, 1e6);
+        judge.within("verify.tolerance_um", verify.tolerance_um, 1e-3, 1e6);
+    }
+    if let Some(align) = &platform.align {
+        judge.within("align.tolerance_um", align.tolerance_um, 1e-3, 1e6);
+        judge.within(
+            "align.iterations_max",
+            align.iterations_max.into(),
+            1.0,
+            1000.0,
+        );
+    }
+}
+
+/// Only a screw more than needed can contradict the others.
+fn check_inconsistency(judge: &mut Judge<'_>, platform: &PlatformConfig) {
+    let key = "inconsistency_limit_um";
+    match (platform.inconsistency_limit_um, platform.actuator.len()) {
+        (Some(limit), 4..) => judge.within(key, limit, 1e-3, 1e5),
+        (None, 4..) => judge.say(
+            "",
+            format!("four screws can contradict each other, and `{key}` is missing"),
+            "say by how much they may: what the platform bears without being strained",
+        ),
+        (Some(_), _) => judge.say(
+            key,
+            "three screws cannot contradict each other",
+            "leave it out",
+        ),
+        (None, _) => {}
+    }
+    check_lone_homing(judge, platform);
+}
+
+/// A screw that looks for its index pushes the platform while the others stand. Nobody can tell
+/// by how far four contradict each other then, since none has a coordinate yet.
+fn check_lone_homing(judge: &mut Judge<'_>, platform: &PlatformConfig) {
+    let key = "zero.lone_homing";
+    match (platform.zero.lone_homing, platform.actuator.len()) {
+        (false, 4..) => judge.say(
+            "",
+            "each of the four screws homes while the others stand, and nothing says that \
+             the platform bears it",
+            format!(
+                "give `{key} = true` if couplings or guides yield over the whole way to the \
+                 index; otherwise build the platform with three screws"
+            ),
+        ),
+        (true, ..4) => judge.say(key, "three screws never strain a platform", "leave it out"),
+        _ => {}
+    }
+}
+
+fn check_references(
+    findings: &mut Vec<Finding>,
+    config: &MachineConfig,
+    platform: &PlatformConfig,
+) {
+    Judge::at("platform".into(), findings).known(
+        "camera",
+        &platform.camera,
+        &config.camera,
+        "camera",
+    );
+    for (at, actuator) in platform.actuator.iter().enumerate() {
+        let judge = &mut Judge::at(format!("platform.actuator[{at}]"), findings);
+        judge.known("axis", &actuator.axis, &config.axis, "axis");
+        judge.within("lead_mm", actuator.lead_mm, 1e-3, 1e3);
+        judge.within("index_mm", actuator.index_mm, -1e4, 1e4);
+        let [x, y] = actuator.direction;
+        judge.within("direction", hypot(x, y), 1e-6, 1e6);
+        if let Some(axis) = config.axis.get(&actuator.axis) {
+            if actuator.index_mm >= axis.soft_max_mm {
+                judge.say(
+                    "index_mm",
+                    "the index lies beyond the upper soft limit",
+                    "give the first index pulse off the negative limit switch",
+                );
+            }
+            judge.within(
+                "axis speed",
+                platform.speed_mm_per_s,
+                0.0,
+                axis.speed_max_mm_per_s,
+            );
+        }
+    }
+}
+
+fn check_calibrate(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    platform: &PlatformConfig,
+    run: &PlatformCalibrateConfig,
+) {
+    judge.below(("first_mm", run.first_mm), ("last_mm", run.last_mm));
+    judge.within(
+        "step_mm",
+        run.step_mm,
+        1e-6,
+        (run.last_mm - run.first_mm).max(1e-6),
+    );
+    judge.within("runs", run.runs.into(), 1.0, 1000.0);
+    judge.within("closure_limit_um", run.closure_limit_um, 1e-3, 1e4);
+    judge.within("harmonics_max", run.harmonics_max.into(), 0.0, 32.0);
+    judge.within("significance", run.significance, 1e-9, 0.5);
+    let lost_motion_um = platform
+        .compensation
+        .as_ref()
+        .map_or(0.0, |it| it.lost_motion_max_um);
+    judge.within(
+        "overrun_mm",
+        run.overrun_mm,
+        (lost_motion_um * 1e-3).max(1e-6),
+        1e3,
+    );
+    for actuator in &platform.actuator {
+        let Some(axis) = config.axis.get(&actuator.axis) else {
+            continue;
+        };
+        let fits = run.first_mm - run.overrun_mm >= axis.soft_min_mm
+            && run.last_mm + run.overrun_mm <= axis.soft_max_mm;
+        if !fits {
+            judge.say(
+                "",
+                format!(
+                    "strokes and overrun leave the soft limits of axis {} ({} to {} mm)",
+                    actuator.axis, axis.soft_min_mm, axis.soft_max_mm
+                ),
+                "shorten the strokes or the overrun",
+            );
+        }
+    }
+}
+
+fn check_compensation(judge: &mut Judge<'_>, compensation: &ScrewCompensationConfig) {
+    judge.within("size_limit_um", compensation.size_limit_um, 1e-3, 1e5);
+    judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
+    judge.within("extrapolation_mm", compensation.extrapolation_mm, 0.0, 1e3);
+    judge.within(
+        "lost_motion_max_um",
+        compensation.lost_motion_max_um,
+        1e-3,
+        1e3,
+    );
+}
+
+fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &PlatformConfig) {
+    let held = match kinematics(platform, config) {
+        Ok(held) => held,
+        Err(error) => {
+            let help = "check point_mm and direction of each [[platform.actuator]]";
+            judge.say("actuator", error.to_string(), help);
+            return;
+        }
+    };
+    if let Some((pose, cause)) = unreachable_corner(&held, platform) {
+        judge.say(
+            "",
+            format!(
+                "the work range reaches x = {} mm, y = {} mm, theta = {}°, which the screws do not: \
+                 {cause}",
+                Short(pose.x.mm()),
+                Short(pose.y.mm()),
+                Short(pose.angle.value().to_degrees()),
+            ),
+            "lower x_max_mm, y_max_mm or theta_max_deg, or widen the axes' soft limits",
+        );
+    }
+}
+
+/// Strokes are monotonic enough over small ranges that the corners decide.
+fn unreachable_corner(held: &Platform, platform: &PlatformConfig) -> Option<(Pose, String)> {
+    let signs = [-1.0, 1.0];
+    let corners = signs.iter().flat_map(|x| {
+        let with_y = signs.iter().map(move |y| (x, y));
+        with_y.flat_map(|(x, y)| signs.iter().map(move |angle| (x, y, angle)))
+    });
+    corners
+        .map(|(x, y, angle)| Pose {
+            x: Metres::from_mm(x * platform.x_max_mm),
+            y: Metres::from_mm(y * platform.y_max_mm),
+            angle: Radians(angle * platform.theta_max_deg.to_radians()),
+        })
+        .find_map(|pose| Some((pose, held.check(pose).err()?.to_string())))
+        .or_else(|| {
+            let centre = Point::default();
+            let angles = held.reachable_angles(centre);
+            let pose = Pose::default();
+            angles
+                .is_none()
+                .then(|| (pose, "nothing is in reach".into()))
+        })
+}

@@ -1,0 +1,337 @@
+//! Moves of a platform: pose → strokes → set-points → all screws at once.
+
+use core::time::Duration;
+
+use compensator::platform::Pose;
+use compensator::screw::ScrewMemory;
+use drivers::device::AxisCommand;
+use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
+
+use crate::connected::Machine;
+use crate::correction::Correction;
+use crate::failure::Failure;
+use crate::platform::PlatformConfig;
+use crate::platform::failure::PlatformFailure;
+use crate::platform::state::{PlatformState, engaged_by};
+use crate::platform::take_up::TakenUp;
+
+/// Travels below this are none: the drives would not even count them.
+const TRAVEL_MIN: Metres = Metres(1e-9);
+
+/// A move of a platform that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseMoved {
+    /// Where it was told to be.
+    pub target: Pose,
+    /// What each screw was commanded, in the order of the configuration.
+    pub set_points: Vec<(String, Metres)>,
+    /// From the start of the first screw to that of the last, where more than one moved.
+    pub skew: Option<Duration>,
+    /// The largest standard uncertainty of the screws' places, where calibrated.
+    pub standard_uncertainty: Option<Metres>,
+    /// The screws whose play was taken up before, because nobody knew how they stood.
+    pub taken_up: Vec<TakenUp>,
+}
+
+/// What one screw is to do.
+#[derive(Clone, Copy, Debug)]
+struct Planned {
+    set_point: Metres,
+    travel: Metres,
+    after: ScrewMemory,
+    standard_uncertainty: Option<Metres>,
+}
+
+impl Machine {
+    /// Whether the platform may be told to be at `target`: by its work range and its screws'
+    /// reach, without their calibrations. Asks no device.
+    ///
+    /// # Errors
+    /// When it may not.
+    pub fn check_pose(&self, target: Pose) -> Result<(), Failure> {
+        check_work_range(self.platform_config()?, target)?;
+        self.strokes_to(target).map(drop)
+    }
+
+    fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
+        let strokes = self.platform_state()?.kinematics.check(target);
+        Ok(strokes.map_err(PlatformFailure::from)?)
+    }
+
+    /// Moves the platform to `target`, compensated where screws have a calibration.
+    ///
+    /// # Errors
+    /// Before anything moves: not zeroed, outside the work range, a screw's reach or
+    /// calibration, or a way there that leaves them. While moving: whatever stops the machine.
+    pub fn move_pose(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
+        self.require_platform_zeroed()?;
+        self.check_pose(target)?;
+        self.plan(&self.strokes_to(target)?, Correction::On)?;
+        let taken_up = self.take_up()?;
+        let moved = self.go_to_pose(target, Correction::On)?;
+        Ok(PoseMoved { taken_up, ..moved })
+    }
+
+    pub(super) fn go_to_pose(
+        &mut self,
+        target: Pose,
+        correction: Correction,
+    ) -> Result<PoseMoved, Failure> {
+        let strokes = self.strokes_to(target)?;
+        let state = self.platform_state()?;
+        if let Some(from) = state.pose {
+            let path = state.kinematics.check_path(from, target);
+            path.map_err(PlatformFailure::from)?;
+        }
+        let planned = self.plan(&strokes, correction)?;
+        let moved = self.go_agreed(&planned, target)?;
+        self.platform_state_mut()?.pose = Some(target);
+        Ok(PoseMoved { target, ..moved })
+    }
+
+    /// Brings each screw to its stroke, all at once.
+    ///
+    /// # Errors
+    /// Before anything moves: a screw's reach or calibration, four screws that would contradict
+    /// each other there. After it: the same by their encoders. While moving: whatever stops the
+    /// machine.
+    pub(super) fn go_to_strokes(
+        &mut self,
+        strokes: &[Metres],
+        correction: Correction,
+    ) -> Result<PoseMoved, Failure> {
+        let near = self.platform_state()?.pose.unwrap_or_default();
+        let planned = self.plan(strokes, correction)?;
+        self.go_agreed(&planned, near)
+    }
+
+    /// Moves all screws, which must agree about a pose near `near`, there and then.
+    fn go_agreed(&mut self, planned: &[Planned], near: Pose) -> Result<PoseMoved, Failure> {
+        let after: Vec<_> = planned.iter().map(|it| it.after).collect();
+        self.check_planned(near, &after)?;
+        let moved = self.go(planned)?;
+        self.check_standing(near)?;
+        Ok(moved)
+    }
+
+    fn go(&mut self, planned: &[Planned]) -> Result<PoseMoved, Failure> {
+        let target = self.platform_state()?.pose.unwrap_or_default();
+        let skew = self.launch(planned)?;
+        let state = self.platform_state_mut()?;
+        state.pose = None;
+        for (screw, planned) in state.screws.iter_mut().zip(planned) {
+            screw.memory = Some(planned.after);
+        }
+        let names = state.screws.iter().map(|screw| screw.axis.clone());
+        Ok(PoseMoved {
+            target,
+            set_points: names.zip(planned.iter().map(|it| it.set_point)).collect(),
+            skew,
+            standard_uncertainty: planned
+                .iter()
+                .filter_map(|it| it.standard_uncertainty)
+                .reduce(Metres::max),
+            taken_up: Vec::new(),
+        })
+    }
+
+    fn plan(&self, strokes: &[Metres], correction: Correction) -> Result<Vec<Planned>, Failure> {
+        let state = self.platform_state()?;
+        let lost_motion_max = self.lost_motion_max()?;
+        let mut planned = Vec::new();
+        for (screw, stroke) in state.screws.iter().zip(strokes) {
+            let memory = self.screw_memory(&screw.axis, screw.memory)?;
+            let expected = match (&screw.compensation, correction) {
+                (Some(compensation), Correction::On) => {
+                    let corrected = compensation.correct(*stroke, &memory);
+                    Some(
+                        corrected.map_err(|source| PlatformFailure::OutOfCalibration {
+                            axis: screw.axis.clone(),
+                            source,
+                        })?,
+                    )
+                }
+                (Some(compensation), Correction::Off) => {
+                    Some(compensation.expected(*stroke, &memory))
+                }
+                (None, _) => None,
+            };
+            let set_point = expected.map_or(*stroke, |it| it.set_point);
+            self.check_soft_limits(&screw.axis, set_point)?;
+            let travel = set_point - memory.set_point;
+            let engagement = engaged_by(travel, lost_motion_max, memory.engagement);
+            let uncalibrated = ScrewMemory {
+                set_point,
+                engagement,
+            };
+            planned.push(Planned {
+                set_point,
+                travel,
+                after: expected.map_or(uncalibrated, |it| it.after),
+                standard_uncertainty: expected.and_then(|it| it.standard_uncertainty),
+            });
+        }
+        Ok(planned)
+    }
+
+    /// What is remembered of a screw, or that nothing is but where it stands.
+    pub(super) fn screw_memory(
+        &self,
+        axis: &str,
+        memory: Option<ScrewMemory>,
+    ) -> Result<ScrewMemory, Failure> {
+        if let Some(memory) = memory {
+            return Ok(memory);
+        }
+        let here = self.reading(axis)?.map(|reading| reading.position);
+        Ok(ScrewMemory::unknown_at(here.unwrap_or(Metres::ZERO)))
+    }
+
+    /// Prepares every screw that has to travel, then starts all of them together; their speeds
+    /// are such that they arrive together too.
+    fn launch(&mut self, planned: &[Planned]) -> Result<Option<Duration>, Failure> {
+        let longest = planned
+            .iter()
+            .map(|it| it.travel.abs())
+            .fold(Metres::ZERO, Metres::max);
+        if longest < TRAVEL_MIN {
+            return Ok(None);
+        }
+        let config = self.platform_config()?;
+        let (speed, acceleration, settle) = (
+            MetresPerSecond(config.speed_mm_per_s * 1e-3),
+            MetresPerSecondSquared(config.acceleration_mm_per_s2 * 1e-3),
+            Duration::from_millis(config.settle_ms.into()),
+        );
+        let moving = self.moving_axes(planned)?;
+        self.platform_state_mut()?.interrupted_before_it_ends();
+        for (axis, at) in &moving {
+            let planned = &planned[*at];
+            let share = planned.travel.abs() / longest;
+            let command = AxisCommand::Prepare {
+                target: planned.set_point,
+                speed: speed * share,
+                acceleration: acceleration * share,
+            };
+            let limit = self.move_limit(axis)?;
+            self.command(axis, command, "prepare", limit)?;
+        }
+        self.start_together(&moving)?;
+        let skew = self.start_skew(&moving)?;
+        for (axis, _) in &moving {
+            self.stand_still(axis, settle)?;
+        }
+        Ok(skew)
+    }
+
+    fn moving_axes(&self, planned: &[Planned]) -> Result<Vec<(String, usize)>, Failure> {
+        let screws = &self.platform_state()?.screws;
+        Ok(planned
+            .iter()
+            .zip(screws)
+            .enumerate()
+            .filter(|(_, (planned, _))| planned.travel.abs() >= TRAVEL_MIN)
+            .map(|(at, (_, screw))| (screw.axis.clone(), at))
+            .collect())
+    }
+
+    fn start_together(&mut self, moving: &[(String, usize)]) -> Result<(), Failure> {
+        self.await_next_sample(&moving[0].0)?;
+        let axes: Vec<_> = moving.iter().map(|(axis, _)| axis.as_str()).collect();
+        Ok(self.core.start_together(&axes)?)
+    }
+
+    /// Right after a sample there is the most time until the next SYNC: what is sent now
+    /// reaches all drives before it. A sample that was read late is no such moment. On a line
+    /// without SYNC there is nothing to wait for.
+    fn await_next_sample(&mut self, axis: &str) -> Result<(), Failure> {
+        let Some(period) = self.sync_period(axis)? else {
+            return Ok(());
+        };
+        let deadline = self.now() + self.move_limit(axis)?;
+        let before = self.reading(axis)?.map(|reading| reading.at);
+        loop {
+            let sample = self.reading(axis)?.map(|reading| reading.at);
+            let is_new = sample != before;
+            let is_fresh = sample.is_some_and(|at| self.now().since(at) * 2 <= period);
+            if is_new && is_fresh || self.now() >= deadline {
+                return Ok(());
+            }
+            self.tick(deadline)?;
+        }
+    }
+
+    fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
+        let bus = self.axis_config(axis)?.bus.as_ref();
+        let bus = bus.and_then(|bus| self.config.can.get(bus));
+        Ok(bus.map(|bus| Duration::from_secs_f64(bus.sync_period_ms * 1e-3)))
+    }
+
+    fn start_skew(&self, moving: &[(String, usize)]) -> Result<Option<Duration>, Failure> {
+        let mut times = Vec::new();
+        for (axis, _) in moving {
+            times.extend(self.started_at(axis)?);
+        }
+        let (first, last) = (times.iter().min(), times.iter().max());
+        Ok(match (first, last) {
+            (Some(first), Some(last)) if times.len() > 1 => Some(last.since(*first)),
+            _ => None,
+        })
+    }
+
+    fn move_limit(&self, axis: &str) -> Result<Duration, Failure> {
+        Ok(self.axis_settings(axis)?.move_timeout)
+    }
+
+    /// The travel after which a screw is engaged whatever it was before.
+    pub(super) fn lost_motion_max(&self) -> Result<Metres, Failure> {
+        let compensation = self.platform_config()?.compensation.as_ref();
+        Ok(compensation.map_or(LOST_MOTION_MAX, |it| Metres::from_um(it.lost_motion_max_um)))
+    }
+
+    pub(super) fn platform_config(&self) -> Result<&PlatformConfig, Failure> {
+        let config = self.config.platform.as_ref();
+        Ok(config.ok_or(PlatformFailure::None)?)
+    }
+
+    pub(super) fn platform_state(&self) -> Result<&PlatformState, Failure> {
+        Ok(self.platform.as_ref().ok_or(PlatformFailure::None)?)
+    }
+
+    pub(super) fn platform_state_mut(&mut self) -> Result<&mut PlatformState, Failure> {
+        Ok(self.platform.as_mut().ok_or(PlatformFailure::None)?)
+    }
+
+    pub(super) fn require_platform_zeroed(&self) -> Result<(), Failure> {
+        let state = self.platform_state()?;
+        let zeroed = state.screws.iter().all(|it| self.is_zeroed(&it.axis));
+        if zeroed && state.datum.is_some() {
+            return Ok(());
+        }
+        Err(PlatformFailure::NotZeroed.into())
+    }
+}
+
+/// More lost motion than a screw of a precision platform has.
+const LOST_MOTION_MAX: Metres = Metres(50e-6);
+
+fn check_work_range(config: &PlatformConfig, target: Pose) -> Result<(), PlatformFailure> {
+    let degrees = target.angle.value().to_degrees();
+    for (what, seen, unit, limit) in [
+        ("x", target.x.mm(), "mm", config.x_max_mm),
+        ("y", target.y.mm(), "mm", config.y_max_mm),
+        ("theta", degrees, "deg", config.theta_max_deg),
+    ] {
+        // A comparison with NaN is false, so that it is refused too.
+        let is_within = seen.abs() <= limit;
+        if !is_within {
+            return Err(PlatformFailure::OutOfRange {
+                what,
+                seen,
+                unit,
+                limit,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,428 @@
+//! Pages of an alignment platform: what each pose was off, what each screw does, where the zero is.
+
+use core::fmt::Write as _;
+
+use compensator::platform::Pose;
+use compensator::screw::ScrewModel;
+use units::{Approach, Metres, Radians};
+
+use crate::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
+use crate::page::{IN_USE, document, escape, facts};
+use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
+use crate::platform::{difference, largest_error};
+use crate::store::ClosureEntry;
+use crate::store::{CalibrationRecord, ReadJournal, short};
+use crate::text;
+
+/// How finely a model's curve is drawn.
+const CURVE_POINTS: u32 = 240;
+
+/// What a page of a platform shows; what is empty is left out.
+#[derive(Clone, Debug, Default)]
+pub struct PlatformPage<'a> {
+    /// Heading.
+    pub title: String,
+    /// Name and value, for the head of the page.
+    pub facts: Vec<(String, String)>,
+    /// Verifications: a heading (`as found`, `as left` …) and the run.
+    pub visits: Vec<(String, &'a ReadJournal)>,
+    /// The run that calibrated, with the calibrations made from it by their names.
+    pub calibrated: Option<(&'a ReadJournal, Vec<(String, CalibrationRecord)>)>,
+    /// Runs that found the zero.
+    pub zeros: Vec<&'a ReadJournal>,
+}
+
+impl<'a> PlatformPage<'a> {
+    /// The page of one run; `calibrations` are those made from it.
+    pub fn of(journal: &'a ReadJournal, calibrations: Vec<(String, CalibrationRecord)>) -> Self {
+        let header = &journal.header;
+        let mut page = Self {
+            title: format!("{} of platform {}", header.verb, header.machine),
+            facts: facts_of(journal),
+            ..Self::default()
+        };
+        let visited = journal.poses.iter().any(|it| it.target.is_some());
+        if visited {
+            let compensated = header.calibration.is_some();
+            let title = if compensated { "as left" } else { "as found" };
+            page.visits.push((title.to_owned(), journal));
+        } else if !journal.poses.is_empty() {
+            page.zeros.push(journal);
+        }
+        if !journal.strokes.is_empty() {
+            page.calibrated = Some((journal, calibrations));
+        }
+        page
+    }
+}
+
+/// The head of a page of one run, with the calibrations' names as short as elsewhere.
+pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
+    let mut facts = crate::page::facts_of(journal);
+    let named = facts.iter_mut().filter(|(name, _)| name == IN_USE);
+    for (_, value) in named {
+        let each = value.split(' ').map(|it| match it.split_once('=') {
+            Some((axis, id)) => format!("{axis} {}", short(id)),
+            None => it.to_owned(),
+        });
+        *value = each.collect::<Vec<_>>().join(", ");
+    }
+    // What is corrected for air or material is an interferometer.
+    let seen_by = facts.iter_mut().filter(|(name, _)| name == "instrument");
+    for (_, value) in seen_by {
+        let end = value.rfind(", corrected for").unwrap_or(value.len());
+        value.truncate(end);
+    }
+    facts
+}
+
+/// The page as HTML.
+pub fn render(page: &PlatformPage<'_>) -> String {
+    let mut html = facts(&page.facts);
+    let visits: Vec<Visit<'_>> = page.visits.iter().map(Visit::of).collect();
+    if !visits.is_empty() {
+        html += "<h2>Errors of poses, open loop</h2>";
+        html += &visit_figures(&visits);
+    }
+    for visit in &visits {
+        html += &visit_section(visit);
+    }
+    if let Some((journal, calibrations)) = &page.calibrated {
+        html += &screws(journal, calibrations);
+    }
+    if !page.zeros.is_empty() {
+        html += "<h2>Zero</h2>";
+        html += &zeros(&page.zeros);
+    }
+    let note = "error = seen − target; deviation = stroke seen − stroke commanded. Poses are \
+                counted from where all screws stand at their zero, reached forward.";
+    document(&page.title, &html, note)
+}
+
+/// A verification, computed.
+struct Visit<'a> {
+    title: &'a str,
+    poses: Vec<Visited<'a>>,
+    edge: Metres,
+    tolerance: Option<Metres>,
+}
+
+struct Visited<'a> {
+    entry: &'a PoseEntry,
+    target: Pose,
+    error: Pose,
+    largest: Metres,
+}
+
+impl<'a> Visit<'a> {
+    fn of((title, journal): &'a (String, &'a ReadJournal)) -> Self {
+        let arrangement = journal.arrangement.as_ref();
+        let edge = Metres(arrangement.map_or(0.0, |it| it.edge_m));
+        let visited = |entry: &'a PoseEntry| {
+            let target = Pose::from(entry.target?);
+            let error = difference(entry.seen.into(), target);
+            let largest = largest_error(error, edge);
+            Some(Visited {
+                entry,
+                target,
+                error,
+                largest,
+            })
+        };
+        Self {
+            title,
+            poses: journal.poses.iter().filter_map(visited).collect(),
+            edge,
+            tolerance: arrangement.and_then(|it| it.tolerance_m).map(Metres),
+        }
+    }
+
+    fn largest(&self) -> Metres {
+        let errors = self.poses.iter().map(|it| it.largest);
+        errors.fold(Metres::ZERO, Metres::max)
+    }
+
+    fn rms(&self) -> Metres {
+        let squares: f64 = self.poses.iter().map(|it| it.largest.value().powi(2)).sum();
+        Metres((squares / self.poses.len().max(1) as f64).sqrt())
+    }
+
+    fn skew_max_s(&self) -> Option<f64> {
+        let skews = self.poses.iter().filter_map(|it| it.entry.skew_s);
+        skews.reduce(f64::max)
+    }
+}
+
+fn at_edge(angle: Radians, edge: Metres) -> Metres {
+    Metres(angle.value() * edge.value())
+}
+
+/// A row of figures: its name, and its cell for each visit.
+type Row = (&'static str, fn(&Visit<'_>) -> String);
+
+const ROWS: [Row; 5] = [
+    ("poses", |it| it.poses.len().to_string()),
+    ("largest error (µm)", |it| um(it.largest())),
+    ("rms error (µm)", |it| um(it.rms())),
+    ("tolerance (µm)", |it| or_dash(it.tolerance.map(um))),
+    ("largest skew of the starts (ms)", |it| {
+        or_dash(it.skew_max_s().map(|it| format!("{:.3}", it * 1e3)))
+    }),
+];
+
+fn um(length: Metres) -> String {
+    format!("{:.3}", length.um())
+}
+
+fn or_dash(text: Option<String>) -> String {
+    text.unwrap_or("–".to_owned())
+}
+
+fn visit_figures(visits: &[Visit<'_>]) -> String {
+    let mut html = String::from("<table><tr><th></th>");
+    for visit in visits {
+        let _ = write!(html, "<th>{}</th>", escape(visit.title));
+    }
+    html += "</tr>";
+    for (name, cell) in ROWS {
+        let _ = write!(html, "<tr><td>{name}</td>");
+        for visit in visits {
+            let _ = write!(html, "<td>{}</td>", cell(visit));
+        }
+        html += "</tr>";
+    }
+    html + "</table>"
+}
+
+fn visit_section(visit: &Visit<'_>) -> String {
+    let title = escape(visit.title);
+    let numbered = |of: &dyn Fn(&Visited<'_>) -> Metres| {
+        let poses = visit.poses.iter().enumerate();
+        poses
+            .map(|(at, it)| ((at + 1) as f64, of(it).um()))
+            .collect()
+    };
+    let series = |name, colour, points| Series {
+        name,
+        colour,
+        mark: Mark::Dots,
+        points,
+    };
+    let all = [
+        series("x", BLUE, numbered(&|it| it.error.x)),
+        series("y", ORANGE, numbered(&|it| it.error.y)),
+        series(
+            "angle at the edge",
+            GREEN,
+            numbered(&|it| at_edge(it.error.angle, visit.edge)),
+        ),
+    ];
+    let limit = visit.tolerance.map(Metres::um);
+    let errors = chart(
+        &format!("Error of each pose {}", visit.title),
+        ("pose", "error (µm)"),
+        &all,
+        limit,
+    );
+    let arrows: Vec<Arrow> = visit
+        .poses
+        .iter()
+        .map(|it| Arrow {
+            at: (it.target.x.mm(), it.target.y.mm()),
+            shows: (it.error.x.um(), it.error.y.um()),
+        })
+        .collect();
+    let place = map(
+        &format!("Errors over the work range {}", visit.title),
+        "mm",
+        "µm",
+        &arrows,
+    );
+    format!(
+        "<h2>Error of each pose {title}</h2><figure>{errors}</figure>\
+         <h2>Errors over the work range {title}</h2><figure>{place}</figure>\
+         <details><summary>All poses {title}</summary>{}</details>",
+        pose_table(visit)
+    )
+}
+
+fn pose_table(visit: &Visit<'_>) -> String {
+    let mut html = String::from(
+        "<table><tr><th>pose</th><th>x (mm)</th><th>y (mm)</th><th>angle (″)</th>\
+         <th>error x (µm)</th><th>error y (µm)</th><th>error angle (″)</th><th>largest (µm)</th>\
+         <th>skew (ms)</th></tr>",
+    );
+    for (at, it) in visit.poses.iter().enumerate() {
+        let skew = it.entry.skew_s;
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.2}</td><td>{:.3}</td><td>{:.3}</td>\
+             <td>{:.3}</td><td>{:.3}</td><td>{}</td></tr>",
+            at + 1,
+            it.target.x.mm(),
+            it.target.y.mm(),
+            it.target.angle.arcsec(),
+            it.error.x.um(),
+            it.error.y.um(),
+            it.error.angle.arcsec(),
+            it.largest.um(),
+            or_dash(skew.map(|it| format!("{:.3}", it * 1e3))),
+        );
+    }
+    html + "</table>"
+}
+
+/// Every screw of a calibration: its model, its strokes and what the model leaves of them.
+fn screws(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -> String {
+    let mut html = String::from("<h2>Screws</h2>");
+    if let Some(ClosureEntry { closure_m, .. }) = journal.closures.last() {
+        let closure = Metres(*closure_m).um();
+        let _ = write!(
+            html,
+            "<p>At the end the zero was off by {closure:.3} µm (closure).</p>"
+        );
+    }
+    for axis in axes_of(journal) {
+        let strokes: Vec<_> = journal
+            .strokes
+            .iter()
+            .filter(|it| it.axis == axis)
+            .collect();
+        let record = calibrations.iter().find(|(_, it)| it.head.axis == axis);
+        html += &format!("<h2>Screw {}</h2>", escape(axis));
+        let content = record.and_then(|(id, it)| Some((id, it.screw(id).ok()?)));
+        let model = content.map(|(_, it)| it.model());
+        match content {
+            Some((id, content)) => {
+                let _ = write!(
+                    html,
+                    "<p>calibration {}, {} strokes, a single stop scatters by {} µm</p>{}",
+                    short(id),
+                    strokes.len(),
+                    or_dash(content.scatter_m.map(|it| um(Metres(it)))),
+                    screw_table(content)
+                );
+            }
+            None => html += "<p>No calibration was made from this run.</p>",
+        }
+        html += &format!(
+            "<figure>{}</figure>",
+            deviations(axis, &strokes, model.as_ref())
+        );
+        if let Some(model) = &model {
+            html += &format!("<figure>{}</figure>", residuals(axis, &strokes, model));
+        }
+    }
+    html
+}
+
+/// The screws in the order of the configuration, or as they appear.
+fn axes_of(journal: &ReadJournal) -> Vec<&str> {
+    let Some(ArrangementEntry { axes, .. }) = &journal.arrangement else {
+        let mut axes: Vec<&str> = journal.strokes.iter().map(|it| it.axis.as_str()).collect();
+        axes.dedup();
+        return axes;
+    };
+    axes.iter().map(String::as_str).collect()
+}
+
+const APPROACHES: [(Approach, &str, &str, &str); 2] = [
+    (Approach::Forward, "forward ↑", "model ↑", BLUE),
+    (Approach::Reverse, "reverse ↓", "model ↓", ORANGE),
+];
+
+fn of_approach<'a>(
+    strokes: &'a [&'a StrokeEntry],
+    approach: Approach,
+) -> impl Iterator<Item = &'a StrokeEntry> {
+    let strokes = strokes.iter().copied();
+    strokes.filter(move |it| it.approach == approach.symbol())
+}
+
+fn deviations(axis: &str, strokes: &[&StrokeEntry], model: Option<&ScrewModel>) -> String {
+    let mut series = Vec::new();
+    for (approach, seen, modelled, colour) in APPROACHES {
+        let point = |it: &StrokeEntry| {
+            let deviation = Metres(it.measured_m - it.stroke_m);
+            (Metres(it.stroke_m).mm(), deviation.um())
+        };
+        series.push(Series {
+            name: seen,
+            colour,
+            mark: Mark::Dots,
+            points: of_approach(strokes, approach).map(point).collect(),
+        });
+        series.extend(model.map(|model| Series {
+            name: modelled,
+            colour,
+            mark: Mark::Line,
+            points: curve(model, approach),
+        }));
+    }
+    let title = format!("Deviation of screw {axis}");
+    chart(&title, ("stroke (mm)", "deviation (µm)"), &series, None)
+}
+
+fn curve(model: &ScrewModel, approach: Approach) -> Vec<(f64, f64)> {
+    let point = |at: u32| {
+        let share = f64::from(at) / f64::from(CURVE_POINTS);
+        let stroke = model.first + (model.last - model.first) * share;
+        (stroke.mm(), model.deviation(stroke, approach).um())
+    };
+    (0..=CURVE_POINTS).map(point).collect()
+}
+
+fn residuals(axis: &str, strokes: &[&StrokeEntry], model: &ScrewModel) -> String {
+    let series = APPROACHES.map(|(approach, seen, _, colour)| {
+        let point = |it: &StrokeEntry| {
+            let stroke = Metres(it.stroke_m);
+            let left = Metres(it.measured_m - it.stroke_m) - model.deviation(stroke, approach);
+            (stroke.mm(), left.um())
+        };
+        Series {
+            name: seen,
+            colour,
+            mark: Mark::Dots,
+            points: of_approach(strokes, approach).map(point).collect(),
+        }
+    });
+    let title = format!("What the model of screw {axis} leaves");
+    chart(&title, ("stroke (mm)", "seen − model (µm)"), &series, None)
+}
+
+fn zeros(journals: &[&ReadJournal]) -> String {
+    let mut html = String::from(
+        "<table><tr><th>found</th><th>seen at x (µm)</th><th>y (µm)</th><th>angle (″)</th></tr>",
+    );
+    for journal in journals {
+        for it in &journal.poses {
+            let seen = Pose::from(it.seen);
+            let _ = write!(
+                html,
+                "<tr><td>{}</td><td>{:.3}</td><td>{:.3}</td><td>{:.3}</td></tr>",
+                escape(&journal.header.started),
+                seen.x.um(),
+                seen.y.um(),
+                seen.angle.arcsec()
+            );
+        }
+    }
+    html + "</table><p class=\"note\">Where the camera sees the platform with all screws at their \
+            zero, in the machine's frame.</p>"
+}
+
+fn screw_table(content: &ScrewContent) -> String {
+    let mut html = String::from("<table><tr><th>term</th><th>value</th><th>u</th></tr>");
+    for term in text::screw_terms(&content.model()) {
+        let u = term.standard_uncertainty;
+        let _ = write!(
+            html,
+            "<tr><td>{} ({})</td><td>{:.4}</td><td>{}</td></tr>",
+            term.name,
+            term.unit,
+            term.value,
+            u.map_or("–".to_owned(), |u| format!("{u:.4}")),
+        );
+    }
+    html + "</table>"
+}

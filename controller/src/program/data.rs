@@ -1,0 +1,211 @@
+//! `truestage fit` and `truestage iso230`: the mathematics on data measured elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+use compensator::error_table::{self, FitOptions, Fitted};
+use compensator::hall_zero::fit_hall;
+use compensator::iso230;
+use compensator::measurement::{HallSeries, LinearSeries};
+use serde_json::json;
+use truestage::config::MachineConfig;
+use truestage::linear::LinearContent;
+use truestage::store::{CalibrationRecord, Content, Store, short};
+use truestage::{Failure, config, json as to_json, text};
+use units::Metres;
+
+use crate::program::data_file::{head_of, read};
+use crate::program::output::{Ended, Output};
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum FitCommand {
+    /// An error table from columns run,approach,target_mm,measured_mm.
+    Linear {
+        /// The data file.
+        data: PathBuf,
+        /// Store it as a calibration of this machine (activate it with `cal activate`).
+        #[arg(long, value_name = "CONFIG")]
+        save: Option<PathBuf>,
+        /// The axis it belongs to; the only one when there is one.
+        #[arg(long)]
+        axis: Option<String>,
+    },
+    /// The drift-free zero from columns position_um,peak_v,slope_v.
+    Hall {
+        /// The data file.
+        data: PathBuf,
+    },
+    /// Ball screws, from columns axis,approach,stroke_um,deviation_um.
+    Screw(super::platform::fit::ScrewArgs),
+    /// A rotary table's error, from columns offset,line,deviation_arcsec.
+    Rotary(super::rotary::fit::RotaryArgs),
+    /// The errors of three axes, from the journal of a calibration or from columns
+    /// line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u.
+    Volumetric(super::volumetric::fit::VolumetricArgs),
+}
+
+pub(crate) fn iso230(path: &Path, output: Output) -> Ended {
+    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let figures = iso230::evaluate(&series)?;
+    let text = text::figures_table(&[("measured", &figures)]);
+    output.result(&text, &to_json::figures(&figures))
+}
+
+pub(crate) fn fit(command: &FitCommand, output: Output) -> Ended {
+    match command {
+        FitCommand::Linear { data, save, axis } => {
+            linear(data, save.as_deref(), axis.as_deref(), output)
+        }
+        FitCommand::Hall { data } => hall(data, output),
+        FitCommand::Screw(args) => super::platform::fit::run(args, output),
+        FitCommand::Rotary(args) => super::rotary::fit::fit(args, output),
+        FitCommand::Volumetric(args) => super::volumetric::fit::fit(args, output),
+    }
+}
+
+fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) -> Ended {
+    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let name = axis.unwrap_or("x").to_owned();
+    let fitted = error_table::analyse(&series, &FitOptions::default())
+        .map_err(|source| Failure::Fit { axis: name, source })?;
+    let mut value = to_json::fitted(&fitted);
+    let mut text = format!(
+        "{} positions, largest deviation {:.3} µm, {} of {} points left out",
+        fitted.table.nodes().len(),
+        fitted.table.largest().um(),
+        fitted.robust.outliers.len(),
+        series.measurements().len()
+    );
+    if let Some(lost_motion) = fitted.table.lost_motion() {
+        let u = lost_motion.standard_uncertainty;
+        text += &format!(
+            "\nlost motion (reverse − forward) {:.3} µm, standard uncertainty {}",
+            lost_motion.mean.um(),
+            u.map_or("unknown (one run)".into(), |u| format!("{:.3} µm", u.um()))
+        );
+    }
+    let judged = fitted.table.judge_neighbours(Metres::ZERO);
+    text += &match judged {
+        Ok(noticed) => format!("\n{}", text::noticed(noticed)),
+        Err(stand_off) => format!("\nNOT TO BE BELIEVED AS IT IS: {stand_off}"),
+    };
+    value["wrong_position_noticed_um"] = json!(judged.ok().flatten().map(to_json::um));
+    value["stands_off"] = json!(judged.err().map(|it| it.to_string()));
+    if let Some(config) = save {
+        let id = store_fit(config, axis, path, &series, &fitted)?;
+        text += &format!(
+            "\nstored as {}; use it with `truestage cal activate {} {}`",
+            short(&id),
+            config.display(),
+            short(&id)
+        );
+        value["calibration"] = json!(id);
+    }
+    output.result(&text, &value)
+}
+
+/// Stores a table measured elsewhere.
+fn store_fit(
+    config_path: &Path,
+    axis: Option<&str>,
+    data: &Path,
+    series: &LinearSeries,
+    fitted: &Fitted,
+) -> Result<String, Failure> {
+    let loaded = config::load(config_path)?;
+    let axes = &loaded.config.axis;
+    let name = linear_axis(config_path, &loaded.config, axis)?;
+    let head = head_of(&loaded, &name, data)?;
+    if axes[&name].compensation.is_some() {
+        truestage::linear::settings::compensation(&loaded.config, &name, fitted.table.clone())?;
+    }
+    let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
+    let record = CalibrationRecord {
+        head,
+        content: Content::LinearErrorTable(content),
+    };
+    Ok(Store::of(&loaded.config.machine).save(&record)?)
+}
+
+/// The linear axis that a table is stored for.
+fn linear_axis(path: &Path, config: &MachineConfig, axis: Option<&str>) -> Result<String, Failure> {
+    let names: Vec<&str> = config.axis.keys().map(String::as_str).collect();
+    let usage = |what, help| Err(Failure::Usage { what, help });
+    match (axis, names.as_slice()) {
+        (Some(axis), [_, ..]) => Ok(axis.to_owned()),
+        (None, [only]) => Ok((*only).to_owned()),
+        (None, [_, ..]) => usage(
+            "the machine has several linear axes".into(),
+            format!("add --axis with one of {}", names.join(", ")),
+        ),
+        (_, []) => {
+            let rotary: Vec<&str> = config.rotary.keys().map(String::as_str).collect();
+            let what = match rotary.as_slice() {
+                [] => "no axis at all".to_owned(),
+                _ => format!("only the rotary {}", rotary.join(", ")),
+            };
+            usage(
+                format!(
+                    "{}: a linear table is for a linear axis, and this machine has {what}",
+                    path.display()
+                ),
+                "name the configuration of a linear axis; `truestage fit rotary` is for rotary ones"
+                    .into(),
+            )
+        }
+    }
+}
+
+fn hall(path: &Path, output: Output) -> Ended {
+    let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
+        axis: path.display().to_string(),
+        source,
+    })?;
+    let text = format!(
+        "origin {:.4} µm, standard uncertainty {:.4} µm ({} points)\nflanks at {:.1} and {:.1} µm, \
+         mid voltage {:.4} V",
+        estimate.origin.um(),
+        estimate.standard_uncertainty.um(),
+        estimate.points,
+        estimate.left.position.um(),
+        estimate.right.position.um(),
+        estimate.mid_voltage.value()
+    );
+    output.result(&text, &to_json::zero(&estimate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+
+    #[track_caller]
+    fn check(text: &str, axis: Option<&str>, expected: Result<&str, &str>) {
+        let config = config::parse(text, "m.toml").unwrap().config;
+        match (linear_axis(Path::new("m.toml"), &config, axis), expected) {
+            (Ok(name), Ok(wanted)) => assert_eq!(name, wanted),
+            (Err(failure), Err(words)) => {
+                let said = failure.to_string();
+                assert!(said.contains(words), "{said}");
+            }
+            (seen, _) => panic!("{seen:?}"),
+        }
+    }
+
+    #[test]
+    fn a_linear_table_is_stored_for_a_linear_axis_or_it_is_said_that_there_is_none() {
+        check(LINEAR, None, Ok("x"));
+        check(UVW, None, Err("add --axis with one of u, v, w"));
+        check(UVW, Some("v"), Ok("v"));
+        check(ROTARY, None, Err("this machine has only the rotary c"));
+        check(
+            ROTARY,
+            Some("c"),
+            Err("a linear table is for a linear axis"),
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! A file of data measured elsewhere, and the head of a calibration made from it.
+
+use core::f64::consts::TAU;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use drivers::device::Identity;
+use truestage::run::utc_now;
+use truestage::store::{
+    EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead, SCHEMA_VERSION,
+};
+use truestage::volumetric::VolumetricFailure;
+use truestage::{Failure, config};
+
+pub(crate) fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|source| Failure::File {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be
+/// asked here, so its identity is what the configuration expects; with a serial number there it is
+/// checked like any other, without one any drive of that product will do.
+pub(crate) fn head_of(
+    loaded: &config::Loaded,
+    axis: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let axes = &loaded.config.axis;
+    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
+    Ok(RecordHead {
+        resolution_m: Some(it.resolution_nm * 1e-9),
+        ..head(loaded, axis, &it.configured_identity(), data)
+    })
+}
+
+/// The same of the rotary `axis`.
+pub(crate) fn rotary_head_of(
+    loaded: &config::Loaded,
+    axis: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let axes = &loaded.config.rotary;
+    let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
+    Ok(RecordHead {
+        resolution_rad: Some(TAU / f64::from(it.counts_per_turn)),
+        ..head(loaded, axis, &it.identity.configured(), data)
+    })
+}
+
+/// The same of three axes, whose record is called `pointer`.
+pub(crate) fn volume_head_of(
+    loaded: &config::Loaded,
+    pointer: &str,
+    data: &Path,
+) -> Result<RecordHead, Failure> {
+    let volumetric = loaded.config.volumetric.as_ref();
+    let [first, ..] = &volumetric.ok_or(VolumetricFailure::None)?.axes;
+    Ok(RecordHead {
+        axis: pointer.to_owned(),
+        ..head_of(loaded, first, data)?
+    })
+}
+
+fn no_such_axis<T>(axis: &str, axes: &BTreeMap<String, T>) -> Failure {
+    Failure::Machine(machine::Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: axes.keys().cloned().collect::<Vec<_>>().join(", "),
+    })
+}
+
+fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> RecordHead {
+    let section = &loaded.config.machine;
+    RecordHead {
+        schema_version: SCHEMA_VERSION,
+        machine: section.name.clone(),
+        stage_serial: section.stage_serial.clone(),
+        config_hash: loaded.hash.as_str().to_owned(),
+        axis: axis.to_owned(),
+        drive: IdentityRecord::from(drive),
+        resolution_m: None,
+        resolution_rad: None,
+        created: utc_now(),
+        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+        source: data
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        instrument: InstrumentRecord {
+            name: "measured elsewhere".into(),
+            ..Default::default()
+        },
+        environment: EnvironmentRecord::default(),
+    }
+}

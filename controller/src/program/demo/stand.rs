@@ -1,0 +1,132 @@
+//! What all demonstrations share: what they are asked, the machine that is shown, power cycles, the page.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde_json::Value;
+use truestage::emulated::{EmulatedOnPtys, HallDrift};
+use truestage::store::ReadJournal;
+use truestage::{Failure, Machine, Store};
+use units::Time;
+
+/// How long the mains stays off, and what the drives take to boot, in machine time.
+const POWER_OFF: Duration = Duration::from_millis(800);
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Which machine.
+    #[arg(long, value_enum, default_value_t = Which::Linear)]
+    pub(crate) machine: Which,
+    /// The emulated stage's errors, noise and drift; the same seed is the same stage.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Let the emulated machine live by the wall's clock, so many times as fast (10, say), for
+    /// whoever wants to watch; without it time passes as fast as the computer goes.
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) speed: Option<f64>,
+    /// How often the power is cycled.
+    #[arg(long, default_value_t = 3)]
+    pub(crate) power_cycles: u64,
+    /// Where calibrations, runs and the report go; the configuration's folder if not given.
+    #[arg(long)]
+    pub(crate) data_dir: Option<PathBuf>,
+}
+
+/// The machines there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Which {
+    /// A linear-motor stage with Hall sensors and a laser interferometer.
+    Linear,
+    /// An alignment platform on three screws, seen by an image controller.
+    Uvw,
+    /// The same with amplifiers on a serial line in place of drives on CAN.
+    UvwCopley,
+    /// A rotary table and a plate of lines, turned from placement to placement.
+    Rotary,
+    /// Three axes corrected throughout their volume, for eight hours in virtual time.
+    Volumetric,
+}
+
+impl Which {
+    /// Where its configuration ships, that configuration, and what it is emulated from.
+    pub(crate) const fn files(self) -> [&'static str; 3] {
+        match self {
+            Self::Linear => [
+                "configs/machines/linear.toml",
+                include_str!("../../../../configs/machines/linear.toml"),
+                include_str!("../../../../configs/emulated/linear.toml"),
+            ],
+            Self::Uvw => [
+                "configs/machines/uvw.toml",
+                include_str!("../../../../configs/machines/uvw.toml"),
+                include_str!("../../../../configs/emulated/uvw.toml"),
+            ],
+            Self::Rotary => [
+                "configs/machines/rotary.toml",
+                include_str!("../../../../configs/machines/rotary.toml"),
+                include_str!("../../../../configs/emulated/rotary.toml"),
+            ],
+            Self::Volumetric => [
+                "configs/machines/volumetric.toml",
+                include_str!("../../../../configs/machines/volumetric.toml"),
+                include_str!("../../../../configs/emulated/volumetric.toml"),
+            ],
+            Self::UvwCopley => [
+                "configs/machines/uvw-copley.toml",
+                include_str!("../../../../configs/machines/uvw-copley.toml"),
+                include_str!("../../../../configs/emulated/uvw-copley.toml"),
+            ],
+        }
+    }
+}
+
+/// A machine to show, and its emulation.
+pub(crate) struct Stand {
+    pub(crate) machine: Machine,
+    pub(crate) store: Store,
+    pub(crate) emulated: EmulatedOnPtys,
+    pub(crate) started: Instant,
+}
+
+/// Switches the machine off and everything's power off and on, `drift` meanwhile, and starts again.
+pub(crate) fn power_cycle(
+    machine: &mut Machine,
+    emulated: &EmulatedOnPtys,
+    drift: HallDrift,
+) -> Result<(), Failure> {
+    machine.shut_down()?;
+    emulated.power_cycle(drift)?;
+    let back = machine.now() + POWER_OFF;
+    machine.run_until(back)?;
+    machine.start()
+}
+
+/// Writes the page of a demonstration whose run `journal` is, and says where.
+pub(crate) fn write_page(
+    store: &Store,
+    journal: &ReadJournal,
+    html: &str,
+) -> Result<PathBuf, Failure> {
+    let stamp = journal.header.started.replace([':', '-'], "");
+    let path = store.reports().join(format!("{stamp}-demo.html"));
+    store.write_report(&path, html)?;
+    Ok(path)
+}
+
+/// What was shown.
+pub(crate) struct Shown {
+    pub(crate) text: String,
+    pub(crate) value: Value,
+    /// What is out of tolerance, if anything is.
+    pub(crate) bad: Option<Failure>,
+}
+
+/// The last line of every demonstration: how long it took, and how long the machine lived.
+pub(crate) fn took(wall: Duration, lived: Time) -> String {
+    format!(
+        "took {:.1} s; the emulated machine lived {:.0} s meanwhile",
+        wall.as_secs_f64(),
+        lived.seconds()
+    )
+}

@@ -1,0 +1,146 @@
+//! What `move` says of a linear axis: the encoder's place, and plainly what was not corrected.
+
+use serde_json::{Value, json};
+use truestage::linear::{Corrected, Moved};
+use truestage::store::short;
+use units::{Metres, Short};
+
+/// For people: where the encoder stands, then what to know about the correction.
+pub(crate) fn text(axis: &str, moved: &Moved, calibration: Option<&str>) -> String {
+    let by = calibration.map_or(String::new(), |id| format!(", calibration {}", short(id)));
+    let mut text = format!(
+        "axis {axis}: encoder at {:.6} mm (target {:.6} mm, set-point {:.6} mm{by})",
+        moved.encoder.mm(),
+        moved.target.mm(),
+        moved.set_point.mm()
+    );
+    if let Some(warning) = warning(moved) {
+        text += &format!("\naxis {axis}: {warning}");
+    }
+    text
+}
+
+/// The same for programs.
+pub(crate) fn value(axis: &str, moved: &Moved, calibration: Option<&str>) -> Value {
+    let (corrected, range) = match moved.corrected {
+        Corrected::No => ("no", None),
+        Corrected::Within => ("yes", None),
+        Corrected::Held { first, last } => ("held", Some((first, last))),
+        Corrected::Fading { first, last, .. } => ("fading", Some((first, last))),
+    };
+    json!({
+        "axis": axis,
+        "target_mm": moved.target.mm(),
+        "set_point_mm": moved.set_point.mm(),
+        "encoder_mm": moved.encoder.mm(),
+        "calibration": calibration,
+        "corrected": corrected,
+        "beyond_calibrated_mm": range.map(|(first, last)| [first.mm(), last.mm()]),
+        "warning": warning(moved),
+    })
+}
+
+/// What of the move nobody measured.
+fn warning(moved: &Moved) -> Option<String> {
+    let beyond = |first: Metres, last: Metres| {
+        format!(
+            "{} mm is BEYOND THE CALIBRATED RANGE of {} to {} mm",
+            Short(moved.target.mm()),
+            Short(first.mm()),
+            Short(last.mm())
+        )
+    };
+    match moved.corrected {
+        Corrected::Within => None,
+        Corrected::No => Some(
+            "NOT CORRECTED: the axis has no calibration, the drive went to the target by its encoder \
+             alone and the point is off by whatever the stage deviates there; run `truestage \
+             calibrate`, or activate a calibration with `truestage cal activate`"
+                .into(),
+        ),
+        Corrected::Held { first, last } => Some(format!(
+            "{}; the correction of its end was held, and how the stage deviates here nobody \
+             measured; calibrate a wider range, or set end_policy = \"refuse\"",
+            beyond(first, last)
+        )),
+        Corrected::Fading {
+            first,
+            last,
+            distance,
+        } => Some(format!(
+            "{}; the correction of its end fades to nothing over {} mm, and how the stage deviates \
+             here nobody measured; calibrate a wider range, or set end_policy = \"refuse\"",
+            beyond(first, last),
+            Short(distance.mm())
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(corrected: Corrected) -> Moved {
+        Moved {
+            target: Metres::from_mm(61.0),
+            set_point: Metres::from_mm(60.997_123),
+            encoder: Metres::from_mm(60.997_111),
+            corrected,
+        }
+    }
+
+    const ID: &str = "0123456789abcdef";
+    const RANGE: (Metres, Metres) = (Metres(0.0), Metres(0.06));
+
+    #[track_caller]
+    fn check(corrected: Corrected, id: Option<&str>, word: &str, said: Option<&str>) {
+        let moved = moved(corrected);
+        let (text, value) = (text("x", &moved, id), value("x", &moved, id));
+        let head = "axis x: encoder at 60.997111 mm (target 61.000000 mm, set-point 60.997123 mm";
+        assert!(text.starts_with(head), "{text}");
+        assert_eq!(value["encoder_mm"], moved.encoder.mm());
+        assert_eq!(value["corrected"], word);
+        match said {
+            None => {
+                assert_eq!(text.lines().count(), 1, "{text}");
+                assert_eq!(value["warning"], Value::Null);
+            }
+            Some(said) => {
+                assert!(
+                    text.lines().nth(1).is_some_and(|it| it.contains(said)),
+                    "{text}"
+                );
+                assert!(
+                    value["warning"]
+                        .as_str()
+                        .is_some_and(|it| it.contains(said))
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_nobody_measured_is_said_plainly_in_text_and_in_json() {
+        let (first, last) = RANGE;
+        check(Corrected::Within, Some(ID), "yes", None);
+        check(Corrected::No, None, "no", Some("NOT CORRECTED"));
+        let said = "61 mm is BEYOND THE CALIBRATED RANGE of 0 to 60 mm; the correction of its end was held";
+        check(
+            Corrected::Held { first, last },
+            Some(ID),
+            "held",
+            Some(said),
+        );
+        let fading = Corrected::Fading {
+            first,
+            last,
+            distance: Metres::from_mm(5.0),
+        };
+        check(
+            fading,
+            Some(ID),
+            "fading",
+            Some("fades to nothing over 5 mm"),
+        );
+    }
+}

@@ -1,0 +1,441 @@
+//! The command line. Its words are the cycle's own.
+
+mod cal;
+mod check;
+mod data;
+mod data_file;
+mod demo;
+mod kind;
+mod linear;
+mod operator;
+mod output;
+mod page;
+mod platform;
+mod progress;
+mod reset;
+mod resume;
+mod rotary;
+mod scan;
+mod session;
+#[cfg(test)]
+mod stored_tests;
+mod targets;
+mod verbs;
+mod volumetric;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use wire::lockstep::path_of;
+
+use kind::{Kind, by_kind};
+use output::Output;
+use truestage::Failure;
+use truestage::ports::Pace;
+
+/// What a shell script learns of an end: [`truestage::Failure::exit_code`].
+const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
+                          4 device or bus, 5 out of tolerance,\n130 stopped by Ctrl-C, 143 by \
+                          SIGTERM, 129 by SIGHUP";
+
+/// Makes precision motion stages go where they are told.
+#[derive(Debug, Parser)]
+#[command(name = "truestage", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+struct Cli {
+    /// Print one JSON object on stdout instead of text.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The whole cycle on an emulated machine: start here.
+    Demo(demo::DemoArgs),
+    /// Judge a configuration; touches no bus.
+    Check {
+        /// The machine's configuration.
+        #[arg(default_value = "machine.toml")]
+        config: PathBuf,
+    },
+    /// Who is on the buses, and what does not match the configuration; nothing is changed.
+    Scan(MachineArgs),
+    /// Acknowledge the fault of a drive, once; nothing moves.
+    Reset(AxisArgs),
+    /// Find the origin: with Hall sensors, on index pulses, or on an index mark.
+    Zero(AxisArgs),
+    /// Zero, measure the deviations, store and activate the calibration.
+    Calibrate(CalibrateArgs),
+    /// Zero, measure between the calibrated positions, judge.
+    Verify(VerifyArgs),
+    /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
+    Move(MoveArgs),
+    /// Zero, then take down what the detectors of three axes read, for the errors in use.
+    Reference(MachineArgs),
+    /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
+    ///
+    /// Between its rows each axis goes along the cubic spline through them, at rest at both ends, not
+    /// along straight lines: where rows turn a corner or suddenly end, it swings out. By how much at
+    /// most, and where, is said before anything moves. Everything that will be driven is judged
+    /// first (soft limits, speed, acceleration, jerk, calibrated volume), not only the rows.
+    Run(RunArgs),
+    /// What three axes are to keep although it deviates.
+    #[command(subcommand)]
+    Memory(MemoryCommand),
+    /// Stored calibrations.
+    #[command(subcommand)]
+    Cal(cal::CalCommand),
+    /// The same mathematics on data measured elsewhere.
+    #[command(subcommand)]
+    Fit(data::FitCommand),
+    /// What to measure, before anything is measured.
+    #[command(subcommand)]
+    Plan(rotary::fit::PlanCommand),
+    /// ISO 230-2 figures of measured data (columns run,approach,target_mm,measured_mm).
+    Iso230 {
+        /// The data file.
+        data: PathBuf,
+    },
+    /// A self-contained HTML page of a run.
+    Report(page::ReportArgs),
+}
+
+/// How a machine is reached.
+#[derive(Clone, Debug, Args)]
+struct MachineArgs {
+    /// The machine's configuration.
+    #[arg(default_value = "machine.toml")]
+    config: PathBuf,
+    /// Use another endpoint for a bus or line of the configuration: `can0=slcan:/dev/pts/3`,
+    /// `can0=socketcan:vcan0`, `laser=/dev/pts/4`. May be given several times.
+    #[arg(long = "port", value_name = "NAME=ENDPOINT")]
+    ports: Vec<String>,
+    /// The clock of an emulated machine that runs faster than real time (`mock-bus --speed`).
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    clock_speed: f64,
+    /// `lockstep:PATH`: the clock of an emulated machine that waits for its controller (`mock-bus
+    /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
+    #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "clock_speed")]
+    clock: Option<PathBuf>,
+    /// Who does what people are asked for: the hand of the emulated machine at this socket
+    /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, who sits here.
+    #[arg(long, value_name = "PATH")]
+    hand: Option<PathBuf>,
+    /// Write everything on the buses to this file, in candump's log format; it must not exist yet.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+}
+
+impl MachineArgs {
+    /// Whose time the machine lives by.
+    fn pace(&self, verb: &str) -> Result<Pace, Failure> {
+        match &self.clock {
+            None => Ok(Pace::Wall(self.clock_speed)),
+            Some(path) => Pace::lockstep(path, &format!("truestage {verb}")),
+        }
+    }
+
+    /// Where an emulated machine's hand does what people are asked for.
+    fn hand(&self) -> Option<&Path> {
+        let hand = self.hand.as_deref().or(self.clock.as_deref());
+        hand.filter(|hand| *hand != Path::new("ask"))
+    }
+}
+
+#[derive(Clone, Debug, Args)]
+struct AxisArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Which axis; the only one when there is one.
+    #[arg(long)]
+    axis: Option<String>,
+}
+
+impl AxisArgs {
+    fn by_kind(&self, verb: impl FnOnce(Kind) -> output::Ended) -> output::Ended {
+        by_kind(&self.machine, self.axis.as_deref().into_iter(), verb)
+    }
+}
+
+/// What a bare `--resume` stands for; no file is called that by accident.
+const NEWEST_RUN: &str = "<newest>";
+
+#[derive(Clone, Debug, Args)]
+struct CalibrateArgs {
+    #[command(flatten)]
+    axis: AxisArgs,
+    /// Continue the newest interrupted run of this axis, or the journal given.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
+    resume: Option<PathBuf>,
+    /// Save although the place measured first and last differs by more than the limit.
+    #[arg(long)]
+    accept_drift: bool,
+    /// Do not wait for the person who turns the plate of a rotary table, or sets up the lines of
+    /// an interferometer.
+    #[arg(long)]
+    yes: bool,
+    /// Three axes: let them go to and fro for so long, then measure again what warmth changes.
+    #[arg(long, value_name = "MINUTES")]
+    warm_up_min: Option<f64>,
+}
+
+#[derive(Clone, Debug, Args)]
+struct VerifyArgs {
+    #[command(flatten)]
+    axis: AxisArgs,
+    /// Without the calibration: the stage as found.
+    #[arg(long)]
+    uncompensated: bool,
+    /// Continue the newest interrupted run of this axis, or the journal given.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
+    resume: Option<PathBuf>,
+    /// Do not wait for the person who turns the plate of a rotary table.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// What is done with the state memories of three axes.
+#[derive(Debug, Subcommand)]
+enum MemoryCommand {
+    /// Zero, then record the present state at stops along each axis, before parts are made: all
+    /// parts from now on are made with the state of this hour. Nothing is corrected meanwhile, so
+    /// it is not the state of a part that was made before; `run --first-part` records that.
+    Record(MemoryArgs),
+    /// Keep nothing by it any more; nothing moves.
+    Clear(MemoryArgs),
+}
+
+/// Which memory, of which machine.
+#[derive(Clone, Debug, Args)]
+struct MemoryArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// What the machine was built with, or what all parts are to be made with beyond that.
+    #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
+    memory: MemoryChoice,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MemoryChoice {
+    First,
+    Second,
+}
+
+impl From<MemoryChoice> for truestage::volumetric::MemoryName {
+    fn from(choice: MemoryChoice) -> Self {
+        match choice {
+            MemoryChoice::First => Self::First,
+            MemoryChoice::Second => Self::Second,
+        }
+    }
+}
+
+/// A path, and on which machine.
+#[derive(Clone, Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
+    path: Option<PathBuf>,
+    /// The first of several parts: what the detectors see meanwhile is not corrected but recorded
+    /// as the second memory, and all later parts are made with it, like this one.
+    #[arg(long)]
+    first_part: bool,
+}
+
+impl RunArgs {
+    /// `truestage run path.csv` means `./machine.toml`, as with every verb.
+    fn settle(mut self) -> (MachineArgs, PathBuf) {
+        let path = self
+            .path
+            .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
+        (self.machine, path)
+    }
+}
+
+/// Which way round a rotary axis goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum WayName {
+    /// Less than half a turn.
+    Shortest,
+    /// With growing angles, less than a turn.
+    Forward,
+    /// With falling angles, less than a turn.
+    Reverse,
+    /// As many turns as the angle says, from the zero.
+    Turns,
+}
+
+#[derive(Clone, Debug, Args)]
+struct MoveArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`, a rotary axis `c=90deg`.
+    #[arg(value_name = "AXIS=PLACE")]
+    targets: Vec<String>,
+    /// A platform moves on until the image agrees.
+    #[arg(long)]
+    align: bool,
+    /// Which way round a rotary axis goes; the shortest when not given.
+    #[arg(long, value_enum)]
+    way: Option<WayName>,
+}
+
+impl MoveArgs {
+    /// `truestage move x=12.5mm` means `./machine.toml`, as with every verb.
+    fn settle(mut self) -> Self {
+        let first = self.machine.config.to_string_lossy();
+        if first.contains('=') && !self.machine.config.exists() {
+            self.targets.insert(0, first.into_owned());
+            self.machine.config = "machine.toml".into();
+        }
+        self
+    }
+
+    /// The axes that it names.
+    fn named(&self) -> impl Iterator<Item = &str> {
+        let targets = self.targets.iter();
+        targets.filter_map(|it| Some(it.split_once('=')?.0))
+    }
+
+    /// # Errors
+    /// When it says which way round what does not turn.
+    fn without_way(&self) -> Result<(), truestage::Failure> {
+        match self.way {
+            None => Ok(()),
+            Some(_) => Err(truestage::Failure::Usage {
+                what: "--way is for rotary axes".into(),
+                help: "leave it out".into(),
+            }),
+        }
+    }
+}
+
+/// Runs the command line of this process.
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let output = Output::new(cli.json);
+    let result = match cli.command {
+        Command::Demo(args) => demo::run(&args, output),
+        Command::Check { config } => check::run(&config, output),
+        Command::Scan(args) => scan::run(&args, output),
+        Command::Reset(args) => reset::run(&args, output),
+        Command::Zero(args) => args.by_kind(|kind| (kind.verbs().zero)(&args, output)),
+        Command::Calibrate(args) => args
+            .axis
+            .by_kind(|kind| (kind.verbs().calibrate)(&args, output)),
+        Command::Verify(args) => args
+            .axis
+            .by_kind(|kind| (kind.verbs().verify)(&args, output)),
+        Command::Move(args) => {
+            let args = args.settle();
+            by_kind(&args.machine, args.named(), |kind| {
+                (kind.verbs().move_to)(&args, output)
+            })
+        }
+        Command::Reference(args) => volumetric::verbs::reference(&args, output),
+        Command::Run(args) => {
+            let is_first = args.first_part;
+            let (machine, path) = args.settle();
+            volumetric::part::run(&machine, &path, is_first, output)
+        }
+        Command::Memory(MemoryCommand::Record(args)) => {
+            volumetric::part::memory_record(&args, output)
+        }
+        Command::Memory(MemoryCommand::Clear(args)) => {
+            volumetric::part::memory_clear(&args, output)
+        }
+        Command::Cal(command) => cal::run(&command, output),
+        Command::Fit(command) => data::fit(&command, output),
+        Command::Plan(command) => rotary::fit::plan(&command, output),
+        Command::Iso230 { data } => data::iso230(&data, output),
+        Command::Report(args) => page::run(&args, output),
+    };
+    match result {
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(failure)) => {
+            output.note(&format!("error: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
+        Err(failure) => {
+            output.failure(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(words: &[&str]) -> Command {
+        let words = ["truestage"].iter().chain(words);
+        Cli::try_parse_from(words)
+            .unwrap_or_else(|error| panic!("{error}"))
+            .command
+    }
+
+    #[test]
+    fn every_verb_can_be_parsed() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_path_without_a_configuration_is_run_on_the_machine_here() {
+        let settled = |words: &[&str]| match parsed(words) {
+            Command::Run(args) => args.settle(),
+            _ => panic!("another verb"),
+        };
+        let (machine, path) = settled(&["run", "p.csv"]);
+        assert_eq!(
+            (machine.config, path),
+            ("machine.toml".into(), "p.csv".into())
+        );
+        let (machine, path) = settled(&["run", "m.toml", "p.csv"]);
+        assert_eq!((machine.config, path), ("m.toml".into(), "p.csv".into()));
+    }
+
+    #[test]
+    fn a_bare_resume_means_the_newest_run() {
+        let Command::Calibrate(args) = parsed(&["calibrate", "m.toml", "--resume"]) else {
+            panic!("another verb")
+        };
+        assert_eq!(args.resume, Some(NEWEST_RUN.into()));
+        let Command::Verify(args) = parsed(&["verify", "m.toml", "--resume", "a.jsonl"]) else {
+            panic!("another verb")
+        };
+        assert_eq!(args.resume, Some("a.jsonl".into()));
+    }
+
+    #[test]
+    fn a_first_part_is_made_when_asked_for_only() {
+        for (words, expected) in [
+            (&["run", "m.toml", "part.csv"][..], false),
+            (&["run", "m.toml", "part.csv", "--first-part"][..], true),
+        ] {
+            let Command::Run(args) = parsed(words) else {
+                panic!("another verb")
+            };
+            assert_eq!(args.first_part, expected);
+        }
+    }
+
+    #[test]
+    fn a_move_without_a_configuration_uses_the_one_here() {
+        let Command::Move(args) = parsed(&["move", "x=1mm", "y=2mm"]) else {
+            panic!("another verb")
+        };
+        let args = args.settle();
+        assert_eq!(args.machine.config, PathBuf::from("machine.toml"));
+        assert_eq!(args.targets, ["x=1mm", "y=2mm"]);
+        let Command::Move(args) = parsed(&["move", "m.toml", "x=1mm"]) else {
+            panic!("another verb")
+        };
+        let args = args.settle();
+        assert_eq!(args.machine.config, PathBuf::from("m.toml"));
+        assert_eq!(args.targets, ["x=1mm"]);
+    }
+}

@@ -1,0 +1,144 @@
+//! The alignment platform: index pulses, one model a screw by the camera, poses, alignment.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use truestage::emulated::HallDrift;
+use truestage::platform::report as page;
+use truestage::platform::report::PlatformPage;
+use truestage::platform::{Aligned, PlatformCalibrated, PlatformVerified, PlatformZeroed, Pose};
+use truestage::store::read_journal;
+use truestage::{Failure, Store, json as to_json};
+use units::{Metres, Radians};
+
+use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::output::Output;
+use crate::program::page::made_from;
+use crate::program::platform::verbs::{
+    calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
+};
+
+/// Everything the demonstration found.
+struct Story {
+    zeros: [PlatformZeroed; 2],
+    found: PlatformVerified,
+    calibrated: PlatformCalibrated,
+    left: PlatformVerified,
+    after: PlatformVerified,
+    aligned: Aligned,
+}
+
+pub(crate) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+    let story = tell(stand, args, output)?;
+    let report = write_report(&stand.store, &story)?;
+    let wall = stand.started.elapsed();
+    let bad = [&story.left, &story.after];
+    let bad = bad.into_iter().find(|it| !it.is_within_tolerance());
+    Ok(Shown {
+        text: [
+            String::new(),
+            verified_text("as found", &story.found),
+            String::new(),
+            calibrated_text(&story.calibrated),
+            String::new(),
+            verified_text("as left", &story.left),
+            verified_text("after a power cycle", &story.after),
+            format!(
+                "aligned by the image in {} moves: {:.3} µm off after the first, {:.3} µm then",
+                story.aligned.moves,
+                story.aligned.open_loop.um(),
+                story.aligned.left.um()
+            ),
+            String::new(),
+            format!("report       {}", report.display()),
+            took(wall, stand.machine.now()),
+        ]
+        .join("\n"),
+        value: json!({
+            "as_found": verified_value(&story.found),
+            "calibration": calibrated_value(&story.calibrated),
+            "as_left": verified_value(&story.left),
+            "as_left_after_power_cycle": verified_value(&story.after),
+            "alignment": {
+                "moves": story.aligned.moves,
+                "open_loop_um": to_json::um(story.aligned.open_loop),
+                "left_um": to_json::um(story.aligned.left),
+            },
+            "report": report,
+            "wall_s": wall.as_secs_f64(),
+        }),
+        bad: bad.map(out_of_tolerance),
+    })
+}
+
+fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Failure> {
+    let Stand {
+        machine,
+        store,
+        emulated,
+        ..
+    } = stand;
+    machine.guarded(|machine| {
+        output.note("1 start: identities, set-up, supervision");
+        machine.start()?;
+        output.note("2 zero: every screw on its index pulse, reached forward");
+        let first = machine.zero_platform(store)?;
+        output.note("3 as found: poses all over the work range, seen by the camera");
+        let found = machine.verify_platform(store, false)?;
+        machine.move_pose(Pose::default())?;
+        output.note("4 calibrate: lead error, periodic error and lost motion of each screw");
+        let calibrated = machine.calibrate_platform(store)?;
+        output.note("5 as left: the same poses, compensated, open loop");
+        let left = machine.verify_platform(store, true)?;
+        output.note("6 power off and on; zero again, as left");
+        power_cycle(machine, emulated, HallDrift::default())?;
+        let second = machine.zero_platform(store)?;
+        let after = machine.verify_platform(store, true)?;
+        output.note("7 align: move until the image agrees");
+        let aligned = machine.align_pose(somewhere(args.seed))?;
+        machine.shut_down()?;
+        Ok(Story {
+            zeros: [first, second],
+            found,
+            calibrated,
+            left,
+            after,
+            aligned,
+        })
+    })
+}
+
+fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
+    let read = |path: &Path| read_journal(path).map_err(Failure::from);
+    let found = read(&story.found.journal)?;
+    let left = read(&story.left.journal)?;
+    let after = read(&story.after.journal)?;
+    let measured = read(&story.calibrated.journal)?;
+    let zeros = [
+        read(&story.zeros[0].journal)?,
+        read(&story.zeros[1].journal)?,
+    ];
+    let calibrations = made_from(&story.calibrated.journal)?;
+    let page = PlatformPage {
+        title: format!("truestage: platform {}", left.header.machine),
+        facts: page::facts_of(&left),
+        visits: vec![
+            ("as found".into(), &found),
+            ("as left".into(), &left),
+            ("after a power cycle".into(), &after),
+        ],
+        calibrated: Some((&measured, calibrations)),
+        zeros: zeros.iter().collect(),
+    };
+    write_page(store, &left, &page::render(&page))
+}
+
+/// Another pose for each seed.
+fn somewhere(seed: u64) -> Pose {
+    let place = |step: f64| ((seed as f64 * step).fract() - 0.5) * 2.0;
+    Pose {
+        x: Metres::from_mm(place(0.618)),
+        y: Metres::from_mm(place(0.414)),
+        angle: Radians::from_arcsec(900.0 * place(0.732)),
+    }
+}

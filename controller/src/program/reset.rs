@@ -1,0 +1,35 @@
+//! `truestage reset`: a fault of a drive is acknowledged.
+
+use serde_json::json;
+use truestage::json as to_json;
+use truestage::ports::Use;
+use wire::cia402::PowerState;
+
+use crate::program::AxisArgs;
+use crate::program::output::{Ended, Output};
+use crate::program::session::{Session, choose_axis};
+
+/// Acknowledges a drive's fault; nothing moves.
+pub(crate) fn run(args: &AxisArgs, output: Output) -> Ended {
+    let mut session = Session::open(&args.machine, "reset", Use::Motion, output)?;
+    let mut names = session.machine.axis_names();
+    names.extend(session.machine.rotary_names());
+    let axis = choose_axis(names, args)?;
+    let (before, after, counters) = session.machine.guarded(|machine| {
+        machine.start()?;
+        let before = machine.power_state(&axis)?;
+        machine.reset_fault(&axis)?;
+        let after = machine.power_state(&axis)?;
+        machine.shut_down()?;
+        Ok((before, after, to_json::counters(&machine.counters())))
+    })?;
+    let word = |state: Option<PowerState>| state.map_or("unknown".into(), |it| it.to_string());
+    let text = format!(
+        "axis {axis}: was in {}, is in {}; zero it before it moves",
+        word(before),
+        word(after)
+    );
+    let value = json!({"axis": axis, "before": word(before), "after": word(after),
+                       "counters": counters});
+    output.result(&text, &value)
+}

@@ -1,0 +1,136 @@
+//! Runs that were stopped, and go on with `--resume`.
+
+use std::path::{Path, PathBuf};
+
+use truestage::Failure;
+use truestage::store::{Store, read_journal};
+
+use crate::program::NEWEST_RUN;
+
+/// The journal named, or, for a bare `--resume`, the newest incomplete one of this axis.
+pub(crate) fn journal_to_resume(
+    resume: Option<&PathBuf>,
+    store: &Store,
+    verb: &str,
+    axis: &str,
+) -> Result<Option<PathBuf>, Failure> {
+    let Some(path) = resume else { return Ok(None) };
+    if path.extension().is_some_and(|it| it == "toml") {
+        return Err(Failure::Usage {
+            what: format!("--resume {}: that is no journal", path.display()),
+            help: format!(
+                "write the configuration first: truestage {verb} {} --resume",
+                path.display()
+            ),
+        });
+    }
+    if path.as_os_str() != NEWEST_RUN {
+        return Ok(Some(path.clone()));
+    }
+    let newest = store.newest_run(verb, axis)?;
+    let incomplete = match &newest {
+        Some(path) => !read_journal(path)?.complete,
+        None => false,
+    };
+    match newest.filter(|_| incomplete) {
+        Some(path) => Ok(Some(path)),
+        None => Err(Failure::Usage {
+            what: format!("axis {axis} has no interrupted {verb} run"),
+            help: "start a new one without --resume".into(),
+        }),
+    }
+}
+
+/// Runs what writes a journal of `verb` on `axis`; when somebody stops it, says how it goes on.
+pub(crate) fn resumable<R>(
+    store: &Store,
+    verb: &str,
+    axis: &str,
+    resumed: Option<&Path>,
+    run: impl FnOnce() -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    let before = store.newest_run(verb, axis)?;
+    run().map_err(|failure| {
+        let is_asked = matches!(
+            failure,
+            Failure::Machine(machine::Failure::Interrupted | machine::Failure::Terminated { .. })
+        );
+        let begun = || {
+            store
+                .newest_run(verb, axis)
+                .ok()?
+                .filter(|it| Some(it) != before.as_ref())
+        };
+        match resumed.map(Path::to_owned).or_else(begun) {
+            Some(journal) if is_asked => Failure::Resumable {
+                source: Box::new(failure),
+                journal,
+            },
+            _ => failure,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn store() -> (tempfile::TempDir, Store) {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path(), "m");
+        fs::create_dir_all(store.runs()).unwrap();
+        fs::write(store.runs().join("20200101-calibrate-x-00.jsonl"), "").unwrap();
+        (folder, store)
+    }
+
+    fn stopped(store: &Store, begins: bool, failure: Failure) -> String {
+        let run = || {
+            if begins {
+                fs::write(store.runs().join("20200102-calibrate-x-00.jsonl"), "").unwrap();
+            }
+            Err::<(), _>(failure)
+        };
+        let failed = resumable(store, "calibrate", "x", None, run).unwrap_err();
+        failed.to_string()
+    }
+
+    #[test]
+    fn a_run_that_somebody_stops_says_how_it_goes_on() {
+        let (_folder, store) = store();
+        let said = stopped(
+            &store,
+            true,
+            Failure::Machine(machine::Failure::Interrupted),
+        );
+        assert!(said.contains("20200102-calibrate-x-00.jsonl"), "{said}");
+        assert!(said.contains("--resume"), "{said}");
+    }
+
+    #[test]
+    fn where_nothing_was_begun_or_something_failed_nothing_is_promised() {
+        let (_folder, store) = self::store();
+        let said = stopped(
+            &store,
+            false,
+            Failure::Machine(machine::Failure::Interrupted),
+        );
+        assert!(!said.contains("--resume"), "{said}");
+        let said = stopped(&store, true, Failure::ScanMismatch { wrong: 1 });
+        assert!(!said.contains("--resume"), "{said}");
+    }
+
+    #[test]
+    fn a_run_that_was_continued_is_continued_again() {
+        let (_folder, store) = store();
+        let journal = store.runs().join("20200101-calibrate-x-00.jsonl");
+        let run = || {
+            Err::<(), _>(Failure::Machine(machine::Failure::Terminated {
+                signal: 15,
+            }))
+        };
+        let failed = resumable(&store, "calibrate", "x", Some(&journal), run).unwrap_err();
+        assert_eq!(failed.exit_code(), 143);
+        assert!(failed.to_string().contains("20200101"), "{failed}");
+    }
+}

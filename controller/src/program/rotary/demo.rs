@@ -1,0 +1,163 @@
+//! The rotary table: index mark, a plate in planned placements, one table error, moves.
+
+use std::path::PathBuf;
+
+use compensator::rotary::Design;
+use serde_json::json;
+use truestage::emulated::{EmulatedOnPtys, HallDrift};
+use truestage::rotary::Way;
+use truestage::rotary::report as page;
+use truestage::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryMoved, RotaryVerified};
+use truestage::run::CalibrateOptions;
+use truestage::store::read_journal;
+use truestage::{Failure, Store};
+use units::Radians;
+
+use crate::program::demo::stand::{Shown, Stand, power_cycle, took, write_page};
+use crate::program::output::Output;
+use crate::program::page::made_from;
+use crate::program::rotary::verbs::{
+    calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
+    verified_value,
+};
+
+const AXIS: &str = "c";
+/// Two turns on and a little.
+const SOMEWHERE_DEG: f64 = 770.123;
+
+/// Everything the demonstration found.
+struct Story {
+    plan: Design,
+    calibrated: RotaryCalibrated,
+    left: RotaryVerified,
+    after: RotaryVerified,
+    moved: RotaryMoved,
+}
+
+/// The person who turns the plate, here the emulator's own hand.
+struct Hand<'a> {
+    emulated: &'a EmulatedOnPtys,
+    lies_at: f64,
+    output: Output,
+}
+
+impl Operator for Hand<'_> {
+    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
+        self.output.note(&format!("  > {}", task.text()));
+        self.emulated.turn_plate(task.offset - self.lies_at)?;
+        self.lies_at = task.offset;
+        Ok(())
+    }
+
+    fn is_done(&mut self) -> Result<bool, Failure> {
+        Ok(true)
+    }
+}
+
+pub(crate) fn show(stand: &mut Stand, output: Output) -> Result<Shown, Failure> {
+    let story = tell(stand, output)?;
+    let report = write_report(&stand.store, &story)?;
+    let wall = stand.started.elapsed();
+    let bad = [&story.left, &story.after];
+    let bad = bad.into_iter().find_map(|it| out_of_tolerance(AXIS, it));
+    let id = Some(story.calibrated.id.as_str());
+    Ok(Shown {
+        text: [
+            String::new(),
+            calibrated_text(&story.calibrated),
+            String::new(),
+            verified_text(&story.left),
+            "after a power cycle:".to_owned(),
+            verified_text(&story.after),
+            String::new(),
+            moved_text(AXIS, &story.moved, id),
+            String::new(),
+            format!("report       {}", report.display()),
+            took(wall, stand.machine.now()),
+        ]
+        .join("\n"),
+        value: json!({
+            "offsets": story.plan.offsets(),
+            "calibration": calibrated_value(&story.calibrated),
+            "verified": verified_value(&story.left),
+            "verified_after_power_cycle": verified_value(&story.after),
+            "move": moved_value(AXIS, &story.moved, id),
+            "report": report,
+            "wall_s": wall.as_secs_f64(),
+        }),
+        bad,
+    })
+}
+
+fn tell(stand: &mut Stand, output: Output) -> Result<Story, Failure> {
+    let Stand {
+        machine,
+        store,
+        emulated,
+        ..
+    } = stand;
+    let mut hand = Hand {
+        emulated,
+        lies_at: 0.0,
+        output,
+    };
+    machine.guarded(|machine| {
+        output.note("1 start: identity, set-up, touch probe, supervision");
+        machine.start()?;
+        output.note("2 zero: the encoder's index mark");
+        machine.zero_rotary(AXIS)?;
+        output.note("3 plan: how to place a plate that is worse than the table");
+        let plan = planned(machine, output)?;
+        output.note("4 calibrate: every line in every placement, forward and reverse");
+        let options = CalibrateOptions::default();
+        let calibrated = machine.calibrate_rotary(AXIS, store, &options, &mut hand)?;
+        output.note("5 as found and as left: the plate half a line beside all of these");
+        let left = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+        output.note("6 power off and on; zero again, as left");
+        power_cycle(machine, emulated, HallDrift::default())?;
+        machine.zero_rotary(AXIS)?;
+        let after = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+        output.note("7 move: two turns on, across the seam, compensated");
+        let target = Radians::from_degrees(SOMEWHERE_DEG);
+        let moved = machine.move_rotary(AXIS, target, Way::Turns)?;
+        machine.shut_down()?;
+        Ok(Story {
+            plan,
+            calibrated,
+            left,
+            after,
+            moved,
+        })
+    })
+}
+
+/// One page: the calibration, and both verifications under it.
+fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
+    let measured = read_journal(&story.calibrated.journal)?;
+    let (left, after) = (
+        read_journal(&story.left.journal)?,
+        read_journal(&story.after.journal)?,
+    );
+    let calibrations = made_from(&story.calibrated.journal)?;
+    let later = [("", &left), (", after a power cycle", &after)];
+    let html = page::render_with(&measured, &calibrations, &later);
+    write_page(store, &left, &html)
+}
+
+fn planned(machine: &truestage::Machine, output: Output) -> Result<Design, Failure> {
+    let config = machine.rotary_config(AXIS)?.calibrate.as_ref();
+    let config = config.ok_or_else(|| Failure::NotConfigured {
+        axis: AXIS.to_owned(),
+        section: "calibrate",
+    })?;
+    let plan = config.design()?;
+    let pair = Design::new(plan.lines(), &[0, 1], f64::INFINITY);
+    let pair = pair.map_or(f64::NAN, |it| it.rms_amplification());
+    output.note(&format!(
+        "  offsets {:?}: a table error is {:.2} times as uncertain as a reading; {pair:.2} times with \
+         the patent's two placements",
+        plan.offsets(),
+        plan.rms_amplification(),
+    ));
+    Ok(plan)
+}

@@ -1,0 +1,160 @@
+//! A machine for one verb: configuration, lease, ports, Ctrl-C.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, ErrorKind};
+use std::path::Path;
+
+use drivers::transport::Transport;
+use drivers::transport::record::Recorder;
+use truestage::config::{self, Loaded};
+use truestage::ports::{self, Overrides, Use};
+use truestage::store::Lease;
+use truestage::{Failure, Machine, StopRequest, Store, assemble};
+
+use crate::program::output::Output;
+use crate::program::progress::Bars;
+use crate::program::{AxisArgs, MachineArgs};
+
+/// A machine that is connected and leased to this process.
+pub(crate) struct Session {
+    pub(crate) machine: Machine,
+    pub(crate) store: Store,
+    _lease: Lease,
+}
+
+impl Session {
+    /// Reads the configuration, takes the lease, opens the ports. Nothing is sent.
+    pub(crate) fn open(
+        args: &MachineArgs,
+        verb: &str,
+        purpose: Use,
+        output: Output,
+    ) -> Result<Self, Failure> {
+        let mut loaded = config::load(&args.config)?;
+        let overrides = Overrides::parse(&args.ports, &loaded.config)?;
+        if let Some(path) = &args.record {
+            refuse_existing(path)?;
+        }
+        let store = Store::of(&loaded.config.machine);
+        let lease = Lease::take(&store, verb)?;
+        let pace = args.pace(verb)?;
+        loaded.patience = pace.patience();
+        let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
+        let transport = recorded(transport, args, &loaded)?;
+        let mut machine = Machine::new(&loaded, transport);
+        machine.in_real_time();
+        machine.observe(Box::new(Bars::new(output.is_json())));
+        stop_on_signals(&machine.stop_request())?;
+        Ok(Self {
+            machine,
+            store,
+            _lease: lease,
+        })
+    }
+}
+
+fn recorded(
+    transport: impl Transport + 'static,
+    args: &MachineArgs,
+    loaded: &Loaded,
+) -> Result<Box<dyn Transport>, Failure> {
+    let Some(path) = &args.record else {
+        return Ok(Box::new(transport));
+    };
+    let failed = |source| Failure::File {
+        path: path.clone(),
+        source,
+    };
+    let log = BufWriter::new(new_file(path)?);
+    let ports = assemble::ports(&loaded.config);
+    let names: Vec<_> = ports
+        .iter()
+        .map(|(name, port)| (*port, name.as_str()))
+        .collect();
+    Ok(Box::new(
+        Recorder::new(transport, log, &names).map_err(failed)?,
+    ))
+}
+
+/// Yesterday's record is not written over; said before anything is opened.
+fn refuse_existing(path: &Path) -> Result<(), Failure> {
+    if !path.is_file() {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: format!("--record {}: there is such a file already", path.display()),
+        help: "it was not touched; give another name, or move it away".into(),
+    })
+}
+
+/// A file for a record, or what takes records and is no file (a pipe, `/dev/null`).
+fn new_file(path: &Path) -> Result<File, Failure> {
+    let failed = |source| Failure::File {
+        path: path.to_owned(),
+        source,
+    };
+    match File::create_new(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            refuse_existing(path)?;
+            OpenOptions::new().write(true).open(path).map_err(failed)
+        }
+        created => created.map_err(failed),
+    }
+}
+
+/// Ctrl-C and termination ask for a controlled stop; a second one ends the process at once,
+/// and the drives, which watch our heartbeat, stop by themselves.
+pub(crate) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let failed = |source| Failure::File {
+        path: "signal handler".into(),
+        source,
+    };
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        // A shell's exit code of a program that a signal has ended.
+        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, stop.flag())
+            .map_err(failed)?;
+        let number = usize::try_from(signal).unwrap_or_default();
+        signal_hook::flag::register_usize(signal, stop.signal(), number).map_err(failed)?;
+        signal_hook::flag::register(signal, stop.flag()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// The axis asked for, or the only one of `names`.
+pub(crate) fn choose_axis(names: Vec<String>, args: &AxisArgs) -> Result<String, Failure> {
+    match (&args.axis, names.as_slice()) {
+        (Some(axis), known) if known.contains(axis) => Ok(axis.clone()),
+        (Some(axis), known) => Err(Failure::Machine(machine::Failure::NoSuchAxis {
+            axis: axis.clone(),
+            known: known.join(", "),
+        })),
+        (None, [only]) => Ok(only.clone()),
+        (None, _) => Err(Failure::Usage {
+            what: "the machine has several axes".into(),
+            help: format!("add --axis with one of {}", names.join(", ")),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_never_takes_the_place_of_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bus.log");
+        new_file(&path).unwrap();
+        std::fs::write(&path, "yesterday").unwrap();
+        let refused = new_file(&path).unwrap_err();
+        assert_eq!(refused.exit_code(), 2);
+        let said = refused.to_string();
+        assert!(
+            said.contains("bus.log") && said.contains("another name"),
+            "{said}"
+        );
+        assert_eq!(std::fs::read(&path).unwrap(), b"yesterday");
+        new_file(Path::new("/dev/null")).unwrap();
+    }
+}

@@ -1,0 +1,17 @@
+//! Three axes that are corrected throughout their volume, on the command line.
+
+pub(crate) mod demo;
+pub(crate) mod fit;
+pub(crate) mod part;
+pub(crate) mod shown;
+pub(crate) mod verbs;
+
+use super::verbs::Verbs;
+
+/// What it does for the verbs of the cycle.
+pub(crate) const VERBS: Verbs = Verbs {
+    zero: verbs::zero,
+    calibrate: verbs::calibrate,
+    verify: verbs::verify,
+    move_to: verbs::move_to,
+};

@@ -1,0 +1,381 @@
+//! Parts: a path of three axes that is followed, what the correction said along it, and the state
+//! that later parts are to be made with.
+
+use std::path::Path;
+
+use compensator::volumetric::{Axis, Point};
+use serde_json::{Value, json};
+use truestage::engine::{CsvPath, Departure, Lack, Live, Validity, read_path};
+use truestage::ports::Use;
+use truestage::store::short;
+use truestage::volumetric::MemoryName;
+use truestage::volumetric::{FirstPart, GEOMETRY, Mover, PathRefusal, Remembered};
+use truestage::{Failure, Machine, Store};
+use units::Metres;
+
+use crate::program::data_file::read;
+use crate::program::output::{Ended, Output};
+use crate::program::session::Session;
+use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
+use crate::program::{MachineArgs, MemoryArgs};
+
+/// How a path was followed.
+struct Followed {
+    count: usize,
+    corrected: Option<CorrectedPath>,
+    timing: String,
+    /// How the loop's thread was scheduled.
+    thread: String,
+    /// What later parts are made with, when this was the first.
+    kept: Option<Remembered>,
+}
+
+/// What drives a path, and what is recorded meanwhile.
+struct Ready {
+    /// `None`: nothing is known to correct.
+    mover: Option<Mover>,
+    part: Option<FirstPart>,
+}
+
+pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
+    let path = read(file)?;
+    let session = Session::open(args, "run", Use::Motion, output)?;
+    let is_measured = session.store.active(GEOMETRY)?.current.is_some();
+    // Long paths take seconds to judge: before the drives wait for our heartbeat.
+    let path = judged(&session.machine, (file, &path), is_measured)?;
+    output.note(&before_it_moves(file, &path));
+    let CsvPath { points, departure } = path;
+    let ready = |machine: &Machine, store: &Store| {
+        if is_first {
+            let (mover, part) = machine.first_part(store)?;
+            let (mover, part) = (Some(mover), Some(part));
+            return Ok(Ready { mover, part });
+        }
+        let mover = machine.stored_mover(store)?;
+        Ok(Ready { mover, part: None })
+    };
+    let follow =
+        |machine: &mut Machine, store: &Store, ready| followed(machine, store, ready, points);
+    let (followed, counters) = zeroed_volume(session, ready, follow)?;
+    let said = match &followed.corrected {
+        Some(corrected) => corrected.text(),
+        None => "uncorrected: the errors were never measured".into(),
+    };
+    let (count, timing) = (followed.count, &followed.timing);
+    let mut text = format!("{count} points followed, {said}\n{timing}");
+    let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
+                           "largest_departure": departure_value(&departure),
+                           "thread": followed.thread, "counters": counters});
+    if let Some(corrected) = &followed.corrected {
+        corrected.write_into(&mut value);
+    }
+    if let Some(kept) = &followed.kept {
+        text += &format!(
+            "\nmade without what the detectors saw; {} keeps that: all later parts are made with it\n{}",
+            short(&kept.id),
+            kept_text(kept)
+        );
+        value["memory"] = kept_value(kept);
+    }
+    output.result(&text, &value)
+}
+
+/// What is driven, for whoever may still stop it: rows that turn a corner are not joined straight.
+fn before_it_moves(file: &Path, path: &CsvPath) -> String {
+    let CsvPath { points, departure } = path;
+    let at = Axis::ALL.into_iter().zip(&departure.place);
+    let at: Vec<String> = at
+        .map(|(axis, it)| format!("{axis} {:.3}", it.mm()))
+        .collect();
+    let [from, to] = departure.lines;
+    format!(
+        "{}: {} points along the cubic spline through the rows; it leaves their straight joins by \
+         {:.3} mm at most, at {:.3} s (lines {from} to {to}), {} mm",
+        file.display(),
+        points.len(),
+        departure.size.mm(),
+        departure.at_s,
+        at.join(" "),
+    )
+}
+
+fn departure_value(departure: &Departure) -> Value {
+    let place = departure.place.iter().map(|it| it.mm());
+    json!({"mm": departure.size.mm(), "at_s": departure.at_s, "lines": departure.lines,
+           "place_mm": place.collect::<Vec<_>>()})
+}
+
+/// Reads and judges all of the path, point by point as it will be driven: what cannot be made to
+/// its end is not begun.
+fn judged(
+    machine: &Machine,
+    (file, text): (&Path, &str),
+    is_corrected: bool,
+) -> Result<CsvPath, Failure> {
+    let refused = |source| Failure::Path {
+        path: file.to_owned(),
+        source,
+    };
+    let mover = machine.uncorrected_mover()?;
+    let engine = mover.engine();
+    let path = read_path(text, engine.axes(), engine.period());
+    let path = path.map_err(|source| Failure::Usage {
+        what: format!("{}: {source}", file.display()),
+        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm, README.md says more"
+            .into(),
+    })?;
+    let checked = mover.check_path(&path.points);
+    checked.map_err(|source| refused(source.into()))?;
+    if is_corrected {
+        for (point, period) in path.points.iter().zip(0..) {
+            let place = Point::new(point[0], point[1], point[2]);
+            let at_s = f64::from(period) * engine.period().as_secs_f64();
+            let checked = machine.check_volume(place).map_err(Box::new);
+            checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
+        }
+    }
+    Ok(path)
+}
+
+fn followed(
+    machine: &mut Machine,
+    store: &Store,
+    Ready { mover, part }: Ready,
+    points: Vec<Vec<Metres>>,
+) -> Result<Followed, Failure> {
+    let is_corrected = mover.is_some();
+    let mut mover = match mover {
+        Some(mover) => mover,
+        None => machine.uncorrected_mover()?,
+    };
+    machine.correct_volume(&mut mover, is_corrected)?;
+    if let Some(part) = &part {
+        part.recorder.listen();
+    }
+    let mut corrected = CorrectedPath::default();
+    let count = points.len();
+    machine.drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
+    let timing = mover.engine().timing();
+    let (timing, thread) = (timing.to_string(), timing.scheduling.clone());
+    let kept = match part {
+        Some(part) => Some(machine.keep_part(store, mover, part)?),
+        None => None,
+    };
+    Ok(Followed {
+        count,
+        corrected: is_corrected.then_some(corrected),
+        timing,
+        thread,
+        kept,
+    })
+}
+
+/// What the correction said along a path.
+#[derive(Default)]
+struct CorrectedPath {
+    largest: [Metres; 3],
+    u: [Metres; 3],
+    periods: u64,
+    /// The worst that it had to do without, and for how many periods.
+    without: Option<Lack>,
+    degraded: u64,
+    limited: u64,
+}
+
+impl CorrectedPath {
+    fn note(&mut self, live: &Live) {
+        self.periods += 1;
+        for axis in 0..3 {
+            self.largest[axis] = self.largest[axis].max(live.offset[axis].abs());
+            self.u[axis] = self.u[axis].max(live.uncertainty[axis]);
+        }
+        if let Validity::Without(lack) = live.validity {
+            self.without = Some(lack.worse_of(self.without));
+        }
+        self.degraded += u64::from(live.validity != Validity::Valid);
+        let is_limited = live.alarms.iter().any(Option::is_some) || live.clamped.contains(&true);
+        self.limited += u64::from(is_limited);
+    }
+
+    fn text(&self) -> String {
+        let (largest, u) = (self.largest.map(|it| it.um()), self.u.map(|it| it.um()));
+        let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
+        if self.degraded > 0 {
+            let (degraded, periods) = (self.degraded, self.periods);
+            text += &format!("\nnot all was known in {degraded} of {periods} periods");
+        }
+        if let Some(lack) = &self.without {
+            text += &format!("; without {lack}");
+        }
+        if self.limited > 0 {
+            let limited = self.limited;
+            text += &format!("\nthe correction was limited in {limited} periods");
+        }
+        text
+    }
+
+    fn write_into(&self, value: &mut Value) {
+        value["largest_correction_um"] = json!(self.largest.map(|it| it.um()));
+        value["u_max_um"] = json!(self.u.map(|it| it.um()));
+        value["periods_degraded"] = json!(self.degraded);
+        value["without"] = json!(self.without.map(|it| it.to_string()));
+        value["periods_limited"] = json!(self.limited);
+    }
+}
+
+pub(crate) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
+    let which = MemoryName::from(args.memory);
+    let ready = |machine: &Machine, store: &Store| machine.check_memory(store, which);
+    let record = |machine: &mut Machine, store: &Store, ()| machine.record_memory(store, which);
+    let (kept, counters) =
+        with_zeroed_volume(&args.machine, "memory", Use::Motion, output, ready, record)?;
+    let text = format!(
+        "{} keeps the present state: all parts from now on are made with it\n{}",
+        short(&kept.id),
+        kept_text(&kept)
+    );
+    let mut value = kept_value(&kept);
+    value["counters"] = counters;
+    output.result(&text, &value)
+}
+
+fn kept_text(kept: &Remembered) -> String {
+    let axes = Axis::ALL.into_iter().zip(kept.covers);
+    let axes = axes.filter_map(|(axis, covers)| {
+        let (from, to) = covers?;
+        Some(format!("{axis} {:.3} to {:.3} mm", from.mm(), to.mm()))
+    });
+    let axes: Vec<String> = axes.collect();
+    format!(
+        "recorded along {}; beyond, the ends hold{}",
+        axes.join(", "),
+        foreign_text(kept.foreign.as_deref())
+    )
+}
+
+/// A second memory that no longer fits the first.
+fn foreign_text(foreign: Option<&str>) -> String {
+    let foreign = foreign.map(short);
+    foreign.map_or_else(String::new, |it| {
+        format!(
+            "\nthe second memory {it} counts beyond another first one: before the next part record it \
+             again (`truestage memory record`) or clear it (`truestage memory clear`)"
+        )
+    })
+}
+
+fn kept_value(kept: &Remembered) -> Value {
+    let axes = Axis::ALL.into_iter().zip(kept.covers);
+    let axes = axes.filter_map(|(axis, covers)| {
+        let (from, to) = covers?;
+        Some(json!({"axis": axis.to_string(), "from_mm": from.mm(), "to_mm": to.mm()}))
+    });
+    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "foreign_second": kept.foreign})
+}
+
+pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
+    let which = MemoryName::from(args.memory);
+    let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
+    let (before, foreign) = session.machine.clear_memory(&session.store, which)?;
+    let text = match &before {
+        Some(id) => format!("{} is kept no more", short(id)),
+        None => "nothing was kept".into(),
+    };
+    let text = text + &foreign_text(foreign.as_deref());
+    output.result(
+        &text,
+        &json!({"cleared": before, "foreign_second": foreign}),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use drivers::transport::{SendError, Transport};
+    use truestage::config;
+    use units::Time;
+    use wire::{Arrival, Payload, Port};
+
+    use super::*;
+
+    /// Nobody is there, and nobody is asked.
+    struct Nobody;
+
+    impl Transport for Nobody {
+        fn now(&self) -> Time {
+            Time::ZERO
+        }
+
+        fn send(&mut self, _: Port, _: &Payload) -> Result<(), SendError> {
+            panic!("nothing is sent before a path is judged")
+        }
+
+        fn receive(&mut self, _: Time) -> Option<Arrival> {
+            None
+        }
+
+        fn sleep_until(&mut self, _: Time) {}
+
+        fn set_sync(&mut self, _: Port, _: Option<Duration>) -> Result<(), SendError> {
+            Ok(())
+        }
+    }
+
+    fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
+        let toml = include_str!("../../../../configs/machines/volumetric.toml");
+        let loaded = config::parse(toml, "volumetric.toml").unwrap();
+        let machine = Machine::new(&loaded, Box::new(Nobody));
+        judged(&machine, (Path::new("path.csv"), text), is_corrected)
+    }
+
+    /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.
+    fn sudden_end(end_mm: f64) -> String {
+        let rows = (0..=8).map(|row: u32| {
+            let left = 5.0 * f64::from(4_u32.saturating_sub(row));
+            format!("{row},{},100,100\n", end_mm - left)
+        });
+        "time_s,x_mm,y_mm,z_mm\n".to_owned() + &rows.collect::<String>()
+    }
+
+    #[track_caller]
+    fn check_refused(text: &str, is_corrected: bool, why: &str) {
+        let refused = judge(text, is_corrected).unwrap_err();
+        assert_eq!(refused.exit_code(), 3, "{refused}");
+        let said = refused.to_string();
+        for part in ["path.csv", why, "nothing was moved"] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
+
+    #[test]
+    fn a_path_is_judged_as_its_spline_runs_between_the_rows() {
+        // x may go to 503 mm, and is calibrated to 500 mm and 0.25 mm beyond.
+        check_refused(&sudden_end(502.9), false, "axis x: ");
+        check_refused(&sudden_end(499.9), true, "outside the calibrated");
+        judge(&sudden_end(499.0), true).unwrap();
+        judge(&sudden_end(502.0), false).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_is_no_path_is_a_matter_of_usage() {
+        let refused = judge("time_s,x_mm\n", false).unwrap_err();
+        assert_eq!(refused.exit_code(), 2, "{refused}");
+    }
+
+    #[test]
+    fn before_it_moves_it_is_said_how_far_a_corner_is_overshot_and_where() {
+        let path = judge(&sudden_end(400.0), false).unwrap();
+        let said = before_it_moves(Path::new("path.csv"), &path);
+        let by = path.departure.size.mm();
+        assert!((0.3..0.6).contains(&by), "{said}");
+        for part in [
+            "path.csv: 4001 points",
+            "cubic spline",
+            "lines 6 to 7",
+            "x 400.",
+        ] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
+}

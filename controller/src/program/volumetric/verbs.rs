@@ -1,0 +1,411 @@
+//! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::volumetric::identify::{Identified, scatter_limit};
+use compensator::volumetric::{Axis, Point};
+use serde_json::{Value, json};
+use truestage::config::MachineConfig;
+use truestage::engine::Live;
+use truestage::ports::Use;
+use truestage::store::short;
+use truestage::volumetric::UnknownRecord;
+use truestage::volumetric::{
+    GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
+    VolumetricVerified, WarmUp, measured_geometry,
+};
+use truestage::{Failure, Machine, Store, config, json as to_json};
+use units::Metres;
+
+use crate::program::operator::Terminal;
+use crate::program::output::{Ended, Output};
+use crate::program::resume::{journal_to_resume, resumable};
+use crate::program::session::Session;
+use crate::program::targets::axis_target;
+use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
+
+/// How long the tool is seen to stand at its target.
+const STAND: Duration = Duration::from_millis(200);
+
+/// Starts the machine, zeroes it, runs `procedure`, switches off. What `prepare` refuses is refused
+/// when the devices have said who they are and before anything moves; what it made ready goes to
+/// `procedure`.
+pub(crate) fn with_zeroed_volume<P, R>(
+    args: &MachineArgs,
+    verb: &str,
+    purpose: Use,
+    output: Output,
+    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
+) -> Result<(R, Value), Failure> {
+    zeroed_volume(
+        Session::open(args, verb, purpose, output)?,
+        prepare,
+        procedure,
+    )
+}
+
+/// The same on a machine that is connected.
+pub(crate) fn zeroed_volume<P, R>(
+    mut session: Session,
+    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
+) -> Result<(R, Value), Failure> {
+    let store = session.store.clone();
+    session.machine.guarded(|machine| {
+        machine.start()?;
+        let prepared = prepare(machine, &store)?;
+        machine.zero_volumetric()?;
+        let result = procedure(machine, &store, prepared)?;
+        machine.shut_down()?;
+        Ok((result, to_json::counters(&machine.counters())))
+    })
+}
+
+pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
+    let (machine, ready) = (&args.machine, |_: &Machine, _: &Store| Ok(()));
+    let run = |_: &mut Machine, _: &Store, ()| Ok(());
+    let ((), counters) = with_zeroed_volume(machine, "zero", Use::Motion, output, ready, run)?;
+    let text = "x, y and z: zero found on their index pulses";
+    output.result(
+        text,
+        &json!({"axes": ["x", "y", "z"], "counters": counters}),
+    )
+}
+
+pub(crate) fn reference(args: &MachineArgs, output: Output) -> Ended {
+    // Before any bus: a machine of another kind would be asked for a calibration of this one's.
+    has_a_volume(&config::load(&args.config)?.config)?;
+    let ready = |_: &Machine, store: &Store| measured_geometry(store);
+    let run = |machine: &mut Machine, store: &Store, _| machine.reference_volumetric(store);
+    let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;
+    let mut value = referenced_value(&taken);
+    value["counters"] = counters;
+    output.result(&referenced_text(&taken), &value)
+}
+
+fn has_a_volume(config: &MachineConfig) -> Result<(), Failure> {
+    if config.volumetric.is_some() {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what:
+            "`reference` is for three axes corrected throughout their volume, and this machine has \
+               no [volumetric]"
+                .into(),
+        help: "to find an axis's origin run `truestage zero`".into(),
+    })
+}
+
+pub(crate) fn referenced_text(taken: &VolumetricReferenced) -> String {
+    let content = &taken.references.content;
+    let axes: String = content.beams.iter().map(|it| it.axis).collect();
+    format!(
+        "references {} of the beams of {axes}{} are in use, for the errors {}",
+        short(&taken.id),
+        if content.roll.is_some() {
+            " and the roll"
+        } else {
+            ""
+        },
+        short(&content.geometry)
+    )
+}
+
+fn referenced_value(taken: &VolumetricReferenced) -> Value {
+    let temperatures = taken.references.temperatures.iter();
+    json!({
+        "references": taken.id,
+        "geometry": taken.references.content.geometry,
+        "temperatures_c": temperatures.map(|it| it.value()).collect::<Vec<_>>(),
+    })
+}
+
+pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    if args.accept_drift {
+        return Err(Failure::Usage {
+            what: "a calibration of three axes is not judged by its closure".into(),
+            help: "start it again without --accept-drift".into(),
+        });
+    }
+    let warm_up = match args.warm_up_min {
+        None => WarmUp::None,
+        Some(minutes) if minutes.is_finite() && minutes > 0.0 && minutes < 1e5 => {
+            WarmUp::Travel(Duration::from_secs_f64(minutes * 60.0))
+        }
+        Some(minutes) => {
+            return Err(Failure::Usage {
+                what: format!("--warm-up-min is {minutes}"),
+                help: "give the minutes for which the axes go to and fro".into(),
+            });
+        }
+    };
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
+    let ready = |_: &Machine, store: &Store| {
+        journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
+    };
+    let run = |machine: &mut Machine, store: &Store, resume: Option<PathBuf>| {
+        let resume = resume.as_deref();
+        resumable(store, "calibrate", GEOMETRY, resume, || {
+            machine.calibrate_volumetric(store, warm_up, resume, &mut operator)
+        })
+    };
+    let (machine, purpose) = (&args.axis.machine, Use::Measurement);
+    let (made, counters) = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run)?;
+    let mut value = calibrated_value(&made);
+    value["counters"] = counters;
+    output.result(&calibrated_text(&made), &value)
+}
+
+pub(crate) fn calibrated_text(made: &VolumetricCalibrated) -> String {
+    format!(
+        "errors {} and references {} are in use: {}\n  {}{}",
+        short(&made.id),
+        short(&made.references),
+        made.agreement.readings_text(),
+        made.agreement.tool_text(),
+        warmth_text(&made.found) + &unknown_text(&made.unknown),
+    )
+}
+
+/// What warmth does, a line each.
+pub(crate) fn warmth_text(found: &Identified) -> String {
+    let mut text = String::new();
+    for it in &found.expansions {
+        let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
+        text += &format!(
+            "\n  scale of {}: {value:.3} ppm/K, u {u:.3} ppm/K",
+            it.plan.axis
+        );
+    }
+    for it in &found.bends {
+        let (value, u) = (it.bow.um(), it.u.um());
+        let plan = it.plan;
+        text += &format!(
+            "\n  guide of {} bends towards {}: {value:.3} µm/K, u {u:.3} µm/K",
+            plan.axis, plan.towards
+        );
+    }
+    text
+}
+
+/// What nobody knows after this calibration, and what would tell it.
+pub(crate) fn unknown_text(unknown: &UnknownRecord) -> String {
+    let mut text = String::new();
+    for [axis, towards] in &unknown.bends {
+        text += &format!(
+            "\n  guide of {axis} bends towards {towards}: not measured, for all lines were read at one warmth; it \
+             is not corrected and in no uncertainty: calibrate with --warm-up-min"
+        );
+    }
+    for name in &unknown.without_effect {
+        text += &format!(
+            "\n  {name}: taken as zero, no tool given shows it: give second_tool_offset_mm"
+        );
+    }
+    text
+}
+
+pub(crate) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
+    let mut value = found_value(&made.found);
+    value["geometry"] = json!(made.id);
+    value["references"] = json!(made.references);
+    value["lines"] = json!(made.lines);
+    value["journal"] = json!(made.journal);
+    value["u_tool_max_um"] = json!(made.u_max.um());
+    add_unknown(&mut value, &made.unknown);
+    value
+}
+
+pub(crate) fn add_unknown(value: &mut Value, unknown: &UnknownRecord) {
+    let bends = unknown.bends.iter();
+    let bends = bends.map(|[axis, towards]| json!({"axis": axis, "towards": towards}));
+    value["unknown_bends"] = bends.collect();
+    value["taken_as_zero"] = json!(unknown.without_effect);
+}
+
+/// How well the readings agree, and what warmth does.
+pub(crate) fn found_value(found: &Identified) -> Value {
+    let expansions = found.expansions.iter().map(|it| {
+        json!({"axis": it.plan.axis.to_string(), "ppm_per_k": it.per_kelvin * 1e6,
+               "u_ppm_per_k": it.u * 1e6})
+    });
+    let bends = found.bends.iter().map(|it| {
+        json!({"axis": it.plan.axis.to_string(), "towards": it.plan.towards.to_string(),
+               "um_per_k": it.bow.um(), "u_um_per_k": it.u.um()})
+    });
+    json!({
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "birge_ratio": found.birge_ratio,
+        "birge_ratio_limit": scatter_limit(found.degrees_of_freedom),
+        "expansions": expansions.collect::<Vec<_>>(),
+        "bends": bends.collect::<Vec<_>>(),
+    })
+}
+
+pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    if args.resume.is_some() {
+        return Err(Failure::Usage {
+            what: "a verification of three axes cannot be resumed".into(),
+            help: "it is one line: start it again".into(),
+        });
+    }
+    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
+    let by = match args.uncompensated {
+        true => VerifyBy::AsFound,
+        false => VerifyBy::Everything,
+    };
+    let ready = |machine: &Machine, store: &Store| machine.check_verify(store, by);
+    let run = |machine: &mut Machine, store: &Store, ()| {
+        machine.verify_volumetric(store, by, &mut operator)
+    };
+    let (machine, purpose) = (&args.axis.machine, Use::Measurement);
+    let (verified, counters) = with_zeroed_volume(machine, "verify", purpose, output, ready, run)?;
+    let mut value = verified_value(&verified);
+    value["counters"] = counters;
+    let text = verified_text(&verified);
+    if args.uncompensated || verified.is_within_tolerance() {
+        return output.result(&text, &value);
+    }
+    output.bad_result(&text, value, out_of_tolerance(&verified))
+}
+
+pub(crate) fn out_of_tolerance(verified: &VolumetricVerified) -> Failure {
+    VolumetricFailure::OutOfTolerance {
+        seen: verified.range,
+        limit: verified.limit,
+    }
+    .into()
+}
+
+pub(crate) fn verified_text(verified: &VolumetricVerified) -> String {
+    let head = format!(
+        "deviations along the line: range {:.3} µm, limit {:.3} µm\n        x        y        z (mm)  \
+         deviation (µm)   u (µm)",
+        verified.range.um(),
+        verified.limit.um()
+    );
+    verified.points.iter().fold(head, |text, it| {
+        let [x, y, z] = mm(it.at);
+        text + &format!(
+            "\n {x:>8.3} {y:>8.3} {z:>8.3}  {:>19.3} {:>8.3}",
+            it.deviation.um(),
+            it.u.um()
+        )
+    })
+}
+
+pub(crate) fn verified_value(verified: &VolumetricVerified) -> Value {
+    let points = verified.points.iter().map(
+        |it| json!({"at_mm": mm(it.at), "deviation_um": it.deviation.um(), "u_um": it.u.um()}),
+    );
+    json!({
+        "range_um": verified.range.um(),
+        "limit_um": verified.limit.um(),
+        "journal": verified.journal,
+        "points": points.collect::<Vec<_>>(),
+    })
+}
+
+fn mm(point: Point) -> [f64; 3] {
+    Axis::ALL.map(|axis| point.along(axis).mm())
+}
+
+/// Where the axes that are not named stay: where the zero left them.
+pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    args.without_way()?;
+    if args.align {
+        return Err(Failure::Usage {
+            what: "--align is for platforms, which a camera sees".into(),
+            help: "leave it out".into(),
+        });
+    }
+    let mut target: [Option<Metres>; 3] = [None; 3];
+    for text in &args.targets {
+        let (axis, place) = axis_target(text)?;
+        let known = "x, y, z".to_owned();
+        let at = ["x", "y", "z"].iter().position(|it| *it == axis);
+        let at = at.ok_or(Failure::Machine(machine::Failure::NoSuchAxis {
+            axis,
+            known,
+        }))?;
+        target[at] = Some(place);
+    }
+    if target.iter().all(Option::is_none) {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=PLACE with a unit: x=12.5mm y=20mm z=5mm".into(),
+        });
+    }
+    let ready = |machine: &Machine, store: &Store| {
+        let index_mm = machine.volumetric_config()?.zero.index_mm;
+        let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
+        let target = Point::new(at(0), at(1), at(2));
+        let mover = machine.stored_mover(store)?;
+        machine.uncorrected_mover()?.check_target(target)?;
+        if mover.is_some() {
+            machine.check_volume(target)?;
+        }
+        Ok((mover, target))
+    };
+    let run = |machine: &mut Machine, _: &Store, (mover, target): (Option<Mover>, Point)| {
+        let Some(mut mover) = mover else {
+            return machine.go_straight(target).map(|()| None);
+        };
+        machine.correct_volume(&mut mover, true)?;
+        machine.drive_to(&mut mover, target, STAND).map(Some)
+    };
+    let machine = &args.machine;
+    let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
+    let Some(live) = live else {
+        let text = "NOT CORRECTED: the errors of these axes were never measured; run `truestage calibrate`";
+        return output.result(text, &json!({"corrected": false, "counters": counters}));
+    };
+    let value =
+        json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
+    output.result(&live_text(&live), &value)
+}
+
+fn live_text(live: &Live) -> String {
+    let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
+        let offset = live.offset[k].um();
+        let u = match live.uncertainty[k].um() {
+            known if known.is_finite() => format!("{known:.3} µm"),
+            _ => "unknown".into(),
+        };
+        let set_point = (live.nominal[k] + live.offset[k]).mm();
+        format!(
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
+            live.nominal[k].mm()
+        )
+    });
+    rows.collect::<Vec<_>>().join("\n")
+}
+
+fn live_value(live: &Live) -> Value {
+    let axes = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
+        json!({"axis": name, "target_mm": live.nominal[k].mm(), "correction_um": live.offset[k].um(),
+               "u_um": live.uncertainty[k].um()})
+    });
+    axes.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_without_a_volume_is_told_so_and_not_asked_for_its_calibration() {
+        let judge = |text| has_a_volume(&config::parse(text, "m.toml").unwrap().config);
+        let linear = judge(include_str!("../../../../configs/machines/linear.toml"));
+        let failure = linear.unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        let text = failure.to_string();
+        assert!(
+            text.contains("three axes") && !text.contains("calibrate"),
+            "{text}"
+        );
+        assert!(judge(include_str!("../../../../configs/machines/volumetric.toml")).is_ok());
+    }
+}

@@ -1,0 +1,239 @@
+//! Whether what is said about a rotary axis makes sense.
+
+use super::line_speed;
+use crate::config::MachineConfig;
+use crate::config::judge::{Finding, Judge};
+use crate::config::validate::drive::{check_axis_name, check_heartbeat, check_watch};
+use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
+
+pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    for (name, rotary) in &config.rotary {
+        check_axis_name(findings, "rotary", name);
+        let judge = &mut Judge::at(format!("rotary.{name}"), findings);
+        if config.axis.contains_key(name) {
+            judge.say(
+                "",
+                format!("there is an axis `{name}` too"),
+                "give one of them another name",
+            );
+        }
+        check_drive(judge, config, rotary);
+        check_range(judge, rotary);
+        if let Some(zero) = &rotary.zero {
+            let judge = &mut Judge::at(format!("rotary.{name}.zero"), findings);
+            let speed = zero.index_speed_deg_per_s;
+            judge.within(
+                "index_speed_deg_per_s",
+                speed,
+                1e-3,
+                rotary.speed_max_deg_per_s,
+            );
+            judge.within("index_deg", zero.index_deg, 0.0, 360.0);
+        }
+        check_cycle(name, config, rotary, findings);
+    }
+}
+
+/// Calibration, verification, compensation.
+fn check_cycle(
+    name: &str,
+    config: &MachineConfig,
+    rotary: &RotaryConfig,
+    findings: &mut Vec<Finding>,
+) {
+    let mut design = None;
+    if let Some(run) = &rotary.calibrate {
+        let judge = &mut Judge::at(format!("rotary.{name}.calibrate"), findings);
+        for (section, is_there) in [
+            ("zero", rotary.zero.is_some()),
+            ("line_detector", rotary.line_detector.is_some()),
+            ("compensation", rotary.compensation.is_some()),
+        ] {
+            if !is_there {
+                let help = format!("add [rotary.{name}.{section}], or leave the calibration out");
+                judge.say("", format!("needs the section `{section}`"), help);
+            }
+        }
+        check_run(judge, config, rotary, run);
+        design = check_placements(judge, run);
+    }
+    if let Some(verify) = &rotary.verify {
+        let judge = &mut Judge::at(format!("rotary.{name}.verify"), findings);
+        match (&rotary.calibrate, design) {
+            (None, _) => judge.say(
+                "",
+                "needs the section `calibrate`, which says what the plate is",
+                format!("add [rotary.{name}.calibrate], or leave the verification out"),
+            ),
+            (Some(run), design) => check_verify(judge, run, design.unwrap_or_default(), verify),
+        }
+    }
+    if let Some(compensation) = &rotary.compensation {
+        let judge = &mut Judge::at(format!("rotary.{name}.compensation"), findings);
+        let size = compensation.size_limit_arcsec;
+        judge.within("size_limit_arcsec", size, 1e-4, 1e5);
+        judge.within("slope_limit", compensation.slope_limit, 1e-9, 0.5);
+    }
+}
+
+fn check_run(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    rotary: &RotaryConfig,
+    run: &RotaryCalibrateConfig,
+) {
+    if run.plate.trim().is_empty() {
+        let help = "give the serial number on the plate: a resumed run and a verification need \
+                    the same one";
+        judge.say("plate", "is empty", help);
+    }
+    judge.within("passes", run.passes.into(), 1.0, 1000.0);
+    let noise = run.reading_noise_arcsec;
+    judge.within("reading_noise_arcsec", noise, 1e-6, 1e4);
+    let amplification = run.amplification_limit;
+    judge.within("amplification_limit", amplification, 0.1, 1e6);
+    let closure = run.closure_limit_arcsec;
+    judge.within("closure_limit_arcsec", closure, 1e-6, 1e4);
+    let speed = run.speed_deg_per_s.unwrap_or(rotary.speed_deg_per_s);
+    judge.within("speed_deg_per_s", speed, 1e-3, rotary.speed_max_deg_per_s);
+    let Some(bus) = config.can.get(&rotary.bus) else {
+        return;
+    };
+    let fits = line_speed::speed_max(run.lines, bus.sync_period_ms);
+    if speed > fits {
+        judge.say(
+            "speed_deg_per_s",
+            format!(
+                "{} lines pass too fast at {speed}°/s for each to be read with SYNC every {} ms",
+                run.lines, bus.sync_period_ms
+            ),
+            format!("give at most {fits:.3}, or shorten sync_period_ms"),
+        );
+    }
+}
+
+/// The offsets, when they are of use.
+fn check_placements(judge: &mut Judge<'_>, run: &RotaryCalibrateConfig) -> Option<Vec<usize>> {
+    if !(12..=100_000).contains(&run.lines) {
+        let lines = f64::from(run.lines);
+        judge.within("lines", lines, 12.0, 100_000.0);
+        return None;
+    }
+    if run.offsets.is_some() == run.placements.is_some() {
+        judge.say(
+            "offsets",
+            "either `offsets` or `placements` says how the plate is placed",
+            "give `placements = 4` to have the offsets planned, or `offsets = [0, 1, …]`",
+        );
+        return None;
+    }
+    if run.optimise.is_some() && run.offsets.is_some() {
+        let help = "leave one of them out";
+        judge.say("optimise", "`offsets` leave nothing to optimise", help);
+    }
+    match run.design() {
+        Ok(design) => Some(design.offsets().to_vec()),
+        Err(error) => {
+            let key = if run.offsets.is_some() {
+                "offsets"
+            } else {
+                "placements"
+            };
+            judge.say(key, error.to_string(), "see `truestage plan rotary --help`");
+            None
+        }
+    }
+}
+
+fn check_verify(
+    judge: &mut Judge<'_>,
+    run: &RotaryCalibrateConfig,
+    offsets: Vec<usize>,
+    verify: &RotaryVerifyConfig,
+) {
+    let offset = verify.offset_lines;
+    let most = f64::from(run.lines).next_down();
+    judge.within("offset_lines", offset, 0.0, most);
+    judge.within("passes", verify.passes.into(), 1.0, 1000.0);
+    judge.within("tolerance_arcsec", verify.tolerance_arcsec, 1e-6, 1e6);
+    let quarters = offset * 4.0;
+    if quarters != quarters.round() {
+        let help = "give whole lines, halves or quarters: 200, 200.5, 200.25";
+        judge.say("offset_lines", format!("{offset} is hard to set"), help);
+    }
+    if offsets.iter().any(|used| *used as f64 == offset) {
+        judge.say(
+            "offset_lines",
+            format!("the plate lies there in the calibration already (offsets {offsets:?})"),
+            "give another number; half a line beyond a whole one shows the places between lines",
+        );
+    }
+}
+
+fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
+    judge.known("bus", &rotary.bus, &config.can, "CAN bus");
+    judge.within("node_id", rotary.node_id.into(), 1.0, 127.0);
+    let speed_max = rotary.speed_max_deg_per_s;
+    for (key, value, low, high) in [
+        ("speed_max_deg_per_s", speed_max, 1e-3, 1e5),
+        ("speed_deg_per_s", rotary.speed_deg_per_s, 1e-3, speed_max),
+        (
+            "acceleration_deg_per_s2",
+            rotary.acceleration_deg_per_s2,
+            1e-2,
+            1e6,
+        ),
+        (
+            "quick_stop_deceleration_deg_per_s2",
+            rotary.quick_stop_deceleration_deg_per_s2,
+            1e-2,
+            1e6,
+        ),
+        (
+            "following_error_limit_arcsec",
+            rotary.following_error_limit_arcsec,
+            1e-3,
+            1e6,
+        ),
+        (
+            "position_window_arcsec",
+            rotary.position_window_arcsec,
+            1e-4,
+            1e5,
+        ),
+        ("move_timeout_s", rotary.move_timeout_s, 0.01, 1e5),
+    ] {
+        judge.within(key, value, low, high);
+    }
+    check_heartbeat(
+        judge,
+        rotary.heartbeat_producer_ms,
+        rotary.heartbeat_consumer_ms,
+    );
+    check_watch(judge, config, &rotary.bus, rotary.watch_master_ms);
+}
+
+/// What the drive's 32 bits can hold.
+fn check_range(judge: &mut Judge<'_>, rotary: &RotaryConfig) {
+    const REGISTER: f64 = i32::MAX as f64;
+    let counts = f64::from(rotary.counts_per_turn);
+    judge.within("counts_per_turn", counts, 360.0, REGISTER);
+    let fastest = [
+        ("speed_max_deg_per_s", rotary.speed_max_deg_per_s),
+        ("acceleration_deg_per_s2", rotary.acceleration_deg_per_s2),
+        (
+            "quick_stop_deceleration_deg_per_s2",
+            rotary.quick_stop_deceleration_deg_per_s2,
+        ),
+    ];
+    for (key, value) in fastest {
+        let needed = value * counts / 360.0;
+        if needed > REGISTER {
+            judge.say(
+                key,
+                format!("{value} is {needed:.0} counts, a drive has 2147483647"),
+                format!("give at most {:.0}", REGISTER * 360.0 / counts),
+            );
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! The page of a rotary table's run: what was read of the plate, what it says of table and plate,
+//! and the table as found and as left.
+
+use core::fmt::Write as _;
+
+use units::Radians;
+
+use crate::page::band::{Sure, band, enlargement, said};
+use crate::page::chart::{BLUE, Mark, ORANGE, Series, chart};
+use crate::page::{document, escape, facts, facts_of};
+use crate::rotary::{Evaluated, evaluated};
+use crate::rotary::{JudgedEntry, RotaryContent};
+use crate::store::{CalibrationRecord, Content, ReadJournal};
+
+/// So many readings that were left out are named.
+const NAMED: usize = 20;
+
+/// The page of `journal`, with the calibrations that were made from it.
+pub fn render(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -> String {
+    render_with(journal, calibrations, &[])
+}
+
+/// The same, with verifications that were made later, each under its name.
+pub fn render_with(
+    journal: &ReadJournal,
+    calibrations: &[(String, CalibrationRecord)],
+    later: &[(&str, &ReadJournal)],
+) -> String {
+    let header = &journal.header;
+    let mut html = facts(&facts_of_run(journal, calibrations));
+    html += &placements(journal);
+    for (_, record) in calibrations {
+        if let Content::RotaryErrorTable(content) = &record.content {
+            html += &calibration(content);
+        }
+    }
+    if header.verb == "calibrate" {
+        html += &match evaluated(journal) {
+            Some(it) => residuals(&it),
+            None => "<p class=\"note\">The placements read so far do not part table and \
+                     plate.</p>"
+                .to_owned(),
+        };
+    }
+    let own = core::iter::once(("", journal));
+    for (name, journal) in own.chain(later.iter().copied()) {
+        if let Some(judged) = &journal.judged {
+            html += &verification(name, judged, journal);
+        }
+    }
+    let note = "deviation = actual − target, table error = reading − true angle: one is the negative \
+                of the other. Angles are those of the table.";
+    let title = format!("{} of rotary axis {}", header.verb, header.axis);
+    document(&title, &html, note)
+}
+
+fn facts_of_run(
+    journal: &ReadJournal,
+    calibrations: &[(String, CalibrationRecord)],
+) -> Vec<(String, String)> {
+    let mut facts = facts_of(journal);
+    // Readings of a plate are no points.
+    facts.retain(|(name, _)| name != "points" && name != "instrument");
+    let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
+    if let Some(plan) = &journal.plate_plan {
+        let offsets: Vec<_> = plan.offsets.iter().map(f64::to_string).collect();
+        add("plate", format!("{}, {} lines", plan.plate, plan.lines));
+        add("placements", format!("at {} lines", offsets.join(", ")));
+        add(
+            "read",
+            format!(
+                "{} pass(es) in each direction at {:.3} °/s, the first repeated at the end",
+                plan.passes,
+                plan.speed_rad_per_s.to_degrees()
+            ),
+        );
+    }
+    for (id, _) in calibrations {
+        add("calibration made", id.clone());
+    }
+    facts
+}
+
+fn arcsec(radians: f64) -> f64 {
+    Radians(radians).arcsec()
+}
+
+/// What was read in each placement.
+fn placements(journal: &ReadJournal) -> String {
+    let mut html = String::from(
+        "<h2>Placements</h2><table><tr><th>offset (lines)</th><th>passes</th><th>readings</th>\
+         <th>not read</th><th>moved meanwhile (″)</th></tr>",
+    );
+    let mut offsets: Vec<f64> = journal.sweeps.iter().map(|it| it.offset).collect();
+    offsets.dedup();
+    for offset in offsets {
+        let own = || journal.sweeps.iter().filter(move |it| it.offset == offset);
+        let all = own().map(|it| it.deviations_rad.len()).sum::<usize>();
+        let read = own().map(|it| it.deviations_rad.iter().flatten().count());
+        let read: usize = read.sum();
+        let closed = journal.placements.iter().find(|it| it.offset == offset);
+        let moved = closed.map_or("not read to its end".to_owned(), |it| {
+            format!("{:+.4}", arcsec(it.closure_rad))
+        });
+        let _ = write!(
+            html,
+            "<tr><td>{offset}</td><td>{}</td><td>{read}</td><td>{}</td><td>{moved}</td></tr>",
+            own().count(),
+            all - read
+        );
+    }
+    html + "</table>"
+}
+
+/// Degrees on the table, and arcseconds.
+fn points<'a>(values: impl Iterator<Item = Option<f64>> + 'a, lines: u32) -> Vec<(f64, f64)> {
+    let place = move |at: u32| 360.0 * f64::from(at) / f64::from(lines.max(1));
+    (0..)
+        .zip(values)
+        .filter_map(|(at, value)| Some((place(at), arcsec(value?))))
+        .collect()
+}
+
+const fn series(
+    name: &'static str,
+    colour: &'static str,
+    mark: Mark,
+    points: Vec<(f64, f64)>,
+) -> Series {
+    Series {
+        name,
+        colour,
+        mark,
+        points,
+    }
+}
+
+fn calibration(content: &RotaryContent) -> String {
+    let lines = content.lines;
+    let table = || content.table_error_rad.iter().copied();
+    let curve = points(table().map(Some), lines);
+    let sure = content.standard_uncertainty_rad.iter().flatten();
+    let sure = curve.iter().zip(sure);
+    let sure = sure.map(|((x, y), u)| (*x, *y, arcsec(*u)));
+    let sure: Vec<Sure> = sure.collect();
+    let factor = enlargement([sure.as_slice()].into_iter());
+    let mut table_series = vec![series("table error", BLUE, Mark::Line, curve)];
+    let mut shaded = String::new();
+    if !sure.is_empty() {
+        // Beneath the curve.
+        table_series.insert(0, band("2 u", ORANGE, &sure, factor));
+        shaded = said(factor);
+    }
+    let plate = points(content.plate_error_rad.iter().copied(), lines);
+    let plate = [series("plate error", BLUE, Mark::Dots, plate)];
+    let u = content.uncertainty_max();
+    let u = u.map_or("unknown".to_owned(), |u| {
+        format!("{:.4} ″ at most", u.arcsec())
+    });
+    let mut html = format!(
+        "<h2>Table error</h2><p>Up to {:.3} ″ at the lines; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
+         degrees of freedom; noise of a reading amplified {:.3} times.</p><figure>{}</figure>{shaded}\
+         <h2>Plate error</h2><figure>{}</figure>",
+        content.largest_error().arcsec(),
+        arcsec(content.residual_rms_rad),
+        content.degrees_of_freedom,
+        content.noise_amplification,
+        chart(
+            "Table error and how sure it is",
+            ("table angle (°)", "reading − true angle (″)"),
+            &table_series,
+            None,
+        ),
+        chart(
+            "Plate error",
+            (
+                "line, as an angle on the plate (°)",
+                "error of the line (″)"
+            ),
+            &plate,
+            None,
+        ),
+    );
+    html += &named(
+        "Missing readings",
+        &content
+            .missing
+            .iter()
+            .map(|it| (it.line, it.offset))
+            .collect::<Vec<_>>(),
+    );
+    html += &named(
+        "Left out as outliers",
+        &content
+            .outliers
+            .iter()
+            .map(|it| (it.line, it.offset))
+            .collect::<Vec<_>>(),
+    );
+    html
+}
+
+fn named(what: &str, readings: &[(u32, u32)]) -> String {
+    if readings.is_empty() {
+        return String::new();
+    }
+    let mut names: Vec<_> = readings
+        .iter()
+        .take(NAMED)
+        .map(|(line, offset)| format!("line {line} at offset {offset}"))
+        .collect();
+    if readings.len() > NAMED {
+        names.push(format!("and {} more", readings.len() - NAMED));
+    }
+    format!("<p>{}: {}.</p>", escape(what), names.join(", "))
+}
+
+fn residuals(evaluated: &Evaluated) -> String {
+    let each = evaluated.residuals.iter().flatten();
+    let points = each.map(|(at, residual)| (at.degrees(), residual.arcsec()));
+    let dots = [series("one reading", BLUE, Mark::Dots, points.collect())];
+    format!(
+        "<h2>Residuals</h2><p>What is left of each reading, all placements together.</p>\
+         <figure>{}</figure>",
+        chart(
+            "Residuals of all placements",
+            ("table angle (°)", "reading − model (″)"),
+            &dots,
+            None,
+        )
+    )
+}
+
+fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal) -> String {
+    let plan = journal.plate_plan.as_ref();
+    let offset = plan.and_then(|it| it.offsets.first()).copied();
+    let offset = offset.unwrap_or(0.0);
+    let mut html = format!("<h2>As found and as left{}</h2>", escape(name));
+    if !judged.plate_known {
+        html += "<p>No calibration knows the plate: its errors are in these deviations.</p>";
+    }
+    html += "<table><tr><th></th><th>largest (″)</th><th>rms (″)</th></tr>";
+    let left = judged.left_rad.as_ref();
+    let both = [("as found", Some(&judged.found_rad)), ("as left", left)];
+    for (name, values) in both {
+        let Some(values) = values else { continue };
+        let seen: Vec<f64> = values.iter().flatten().map(|it| arcsec(*it)).collect();
+        let largest = seen.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let rms = compensator::uncertainty::rms(&seen);
+        let _ = write!(
+            html,
+            "<tr><td>{name}</td><td>{largest:.4}</td><td>{rms:.4}</td></tr>"
+        );
+    }
+    html += "</table>";
+    for (name, values) in both {
+        let Some(values) = values else { continue };
+        let lines = values.len().max(1) as f64;
+        let place = |line: usize| ((line as f64 + offset) % lines) * 360.0 / lines;
+        let each = values.iter().enumerate();
+        let mut points: Vec<_> = each
+            .filter_map(|(line, value)| Some((place(line), arcsec((*value)?))))
+            .collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let limit = (name == "as left").then(|| arcsec(judged.tolerance_rad));
+        let dots = [series("deviation", BLUE, Mark::Dots, points)];
+        let labels = ("table angle (°)", "deviation (″)");
+        let _ = write!(
+            html,
+            "<h3>Deviation {name}</h3><figure>{}</figure>",
+            chart(name, labels, &dots, limit)
+        );
+    }
+    html
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 40 lines; the interpolation between them goes beyond the largest of them.
+    fn content() -> RotaryContent {
+        let error = |line: u32| 5e-5 * (f64::from(line) * 0.7 + 0.3).sin();
+        RotaryContent {
+            lines: 40,
+            offsets: vec![0, 1],
+            table_error_rad: (0..40).map(error).collect(),
+            standard_uncertainty_rad: Some(vec![5e-8; 40]),
+            plate_error_rad: vec![Some(1e-6); 40],
+            ..RotaryContent::default()
+        }
+    }
+
+    #[test]
+    fn the_curve_lies_on_its_band_which_is_enlarged_until_it_is_seen() {
+        let html = calibration(&content());
+        let (band, curve) = (html.find("<polygon"), html.find("<polyline"));
+        assert!(band.is_some() && band < curve, "{band:?} {curve:?}");
+        assert!(html.contains("enlarged 50 times"), "{html}");
+        let unsure = RotaryContent {
+            standard_uncertainty_rad: None,
+            ..content()
+        };
+        let html = calibration(&unsure);
+        assert!(!html.contains("<polygon") && !html.contains("Shaded"));
+    }
+
+    #[test]
+    fn the_page_shows_the_largest_error_that_lists_show() {
+        let largest = format!("{:.3}", content().largest_error().arcsec());
+        let listed = crate::store::Content::RotaryErrorTable(content()).summary();
+        assert!(
+            listed.contains(&format!("up to {largest} arcsec")),
+            "{listed}"
+        );
+        let html = calibration(&content());
+        assert!(html.contains(&format!("Up to {largest} ″ at the lines")));
+    }
+}

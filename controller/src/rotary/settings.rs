@@ -1,0 +1,157 @@
+//! Rotary axes, from the configuration's words to the driver's.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+
+use compensator::rotary::{
+    PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable,
+};
+use drivers::device::RotaryAxis;
+use drivers::device::cia402::{
+    Cia402Drive, Cia402Settings, Cia402Timeouts, Edge, LatchSettings, PositionRange, Turn,
+};
+use units::{Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale};
+use wire::Port;
+
+use crate::assemble::{CHECKED, home_offset, millis, node_settings, option_codes, patient_drive};
+use crate::config::{CanBus, MachineConfig};
+use crate::failure::Failure;
+use crate::rotary::{
+    EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
+    RotaryCompensationConfig, RotaryConfig, RotaryDevice,
+};
+use machine::Patience;
+use machine::Unit;
+
+pub(crate) fn rotaries(
+    config: &MachineConfig,
+    ports: &BTreeMap<String, Port>,
+    patience: Patience,
+) -> Vec<Unit<dyn RotaryAxis>> {
+    config
+        .rotary
+        .iter()
+        .map(|(name, rotary)| {
+            let device: Box<dyn RotaryAxis> = match rotary.device {
+                RotaryDevice::Cia402 => Box::new(Cia402Drive::new(rotary_settings(
+                    rotary,
+                    &config.can[&rotary.bus],
+                    patience,
+                ))),
+            };
+            Unit {
+                name: name.clone(),
+                port: ports[&rotary.bus],
+                device,
+            }
+        })
+        .collect()
+}
+
+/// The drive of a rotary axis, as its driver is told.
+///
+/// # Panics
+/// When the configuration has not been checked.
+pub fn rotary_settings(
+    rotary: &RotaryConfig,
+    bus: &CanBus,
+    patience: Patience,
+) -> Cia402Settings<Radians> {
+    let heartbeats = (
+        rotary.heartbeat_producer_ms,
+        rotary.heartbeat_consumer_ms,
+        rotary.watch_master_ms,
+    );
+    let identity = &rotary.identity;
+    let common = node_settings(rotary.node_id, bus, identity, heartbeats, patience);
+    let per_s = |deg: f64| RadiansPerSecond(deg.to_radians());
+    let per_s2 = |deg: f64| RadiansPerSecondSquared(deg.to_radians());
+    let quick_stop = per_s2(rotary.quick_stop_deceleration_deg_per_s2);
+    let acceleration = per_s2(rotary.acceleration_deg_per_s2);
+    let usual = Cia402Settings::rotary(
+        common,
+        turn(rotary),
+        per_s(rotary.speed_max_deg_per_s),
+        acceleration.max(quick_stop),
+    )
+    .expect(CHECKED);
+    let resolution = usual.scale.resolution();
+    Cia402Settings {
+        scale: Scale::new(if rotary.reverse {
+            -resolution
+        } else {
+            resolution
+        })
+        .expect(CHECKED),
+        latch: rotary.line_detector.as_ref().map(latch),
+        following_error: Some((
+            Radians::from_arcsec(rotary.following_error_limit_arcsec),
+            millis(rotary.following_error_timeout_ms),
+        )),
+        position_window: Radians::from_arcsec(rotary.position_window_arcsec),
+        position_window_time: millis(rotary.position_window_time_ms),
+        quick_stop_deceleration: Some(quick_stop),
+        homing_acceleration: acceleration,
+        stall_max: patience.beyond(usual.common.sync_period),
+        home_offset: home_offset(rotary.home_offset),
+        options: option_codes(&rotary.option_codes, usual.options),
+        timeouts: patient_drive(
+            Cia402Timeouts {
+                homing: index_limit(rotary).unwrap_or(usual.timeouts.homing),
+                ..usual.timeouts
+            },
+            patience,
+        ),
+        ..usual
+    }
+}
+
+/// How long the index mark may be looked for: it comes once in a turn.
+pub(crate) fn index_limit(rotary: &RotaryConfig) -> Option<Duration> {
+    let speed = rotary.zero.as_ref()?.index_speed_deg_per_s;
+    Some(Duration::from_secs_f64(10.0 + 2.0 * 360.0 / speed))
+}
+
+/// The compensation of a rotary axis from its table, within the limits of the configuration.
+///
+/// # Errors
+/// When it breaks a limit of size or slope.
+pub fn periodic_compensation(
+    config: &RotaryCompensationConfig,
+    axis: &str,
+    table: PeriodicTable,
+) -> Result<PeriodicCompensation, Failure> {
+    let interpolation = match config.interpolation {
+        PeriodicInterpolationName::BandLimited => PeriodicInterpolation::BandLimited,
+        PeriodicInterpolationName::Linear => PeriodicInterpolation::Linear,
+    };
+    let limits = PeriodicLimits {
+        size: Radians::from_arcsec(config.size_limit_arcsec),
+        slope: config.slope_limit,
+    };
+    PeriodicCompensation::new(table, interpolation, limits).map_err(|source| {
+        let axis = axis.to_owned();
+        Failure::RotaryCompensation { axis, source }
+    })
+}
+
+const fn turn(rotary: &RotaryConfig) -> Turn {
+    Turn {
+        counts: rotary.counts_per_turn,
+        range: match rotary.position_range {
+            PositionRangeName::CountsOn => PositionRange::CountsOn,
+            PositionRangeName::ToLastCount => PositionRange::ToLastCount,
+            PositionRangeName::ToFirstCount => PositionRange::ToFirstCount,
+        },
+    }
+}
+
+const fn latch(detector: &LineDetectorConfig) -> LatchSettings {
+    LatchSettings {
+        edge: match detector.edge {
+            EdgeName::Positive => Edge::Positive,
+            EdgeName::Negative => Edge::Negative,
+        },
+        source: detector.input,
+    }
+}

@@ -1,0 +1,338 @@
+//! One turn of a rotary axis over the lines of a plate: where each line was read.
+//!
+//! The drive latches its position at every line (its touch probe); nothing here depends on when
+//! a frame comes. Lines are told apart by where they are: each belongs to the nearest of `lines`
+//! equally spaced table positions, counted from the angle (the phase) that the lines have in
+//! common. Lines must therefore be off by less than a quarter of their spacing.
+
+use core::f64::consts::TAU;
+use core::time::Duration;
+use std::collections::BTreeSet;
+
+use drivers::device::{LatchCommand, Latched, Repeat};
+use units::portable::{atan2, cos, sin};
+use units::{Approach, Radians, RadiansPerSecond};
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::rotary::line_speed::SPACING_SHARE;
+use crate::rotary::turn::Way;
+
+/// How long the axis runs at its speed before the first line counts, and after the last.
+const STEADY: Duration = Duration::from_millis(300);
+/// How long the axis stands before the probe is armed.
+const REST: Duration = Duration::from_millis(50);
+/// The longest a sweep may take beyond twice what its speed says.
+const SWEEP_LIMIT: Duration = Duration::from_secs(10);
+/// The longest it may take to come to rest.
+const REST_LIMIT: Duration = Duration::from_secs(3);
+
+/// How a plate is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweepOptions {
+    /// How many lines the plate has.
+    pub lines: u32,
+    /// The direction of the turn.
+    pub approach: Approach,
+    /// `None`: the axis's own speed.
+    pub speed: Option<RadiansPerSecond>,
+    /// The phase of an earlier sweep of the same run. Without it the phase is taken to be less
+    /// than half a spacing; with it, to be less than half a spacing from that one.
+    pub phase: Option<Radians>,
+}
+
+/// One turn over all lines. Lists have one value for each table position, counted in line
+/// spacings from the axis's zero.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sweep {
+    /// Reading minus nominal: `None` where no single line was read.
+    pub deviations: Vec<Option<Radians>>,
+    /// What the deviations have in common, roughly.
+    pub phase: Radians,
+    /// Positions at which no line was seen: smudged?
+    pub missing: Vec<u32>,
+    /// Positions at which more than one edge came: scratched?
+    pub doubled: Vec<u32>,
+    /// Positions at which an edge was, or may have been, overwritten before it was read.
+    pub overwritten: Vec<u32>,
+    /// Readings that are near no line.
+    pub strays: Vec<Radians>,
+}
+
+impl Sweep {
+    /// How many lines were read.
+    pub fn read(&self) -> usize {
+        self.deviations.iter().flatten().count()
+    }
+}
+
+impl Machine {
+    /// Turns the rotary axis `axis` once over the plate, and a little more on both sides.
+    ///
+    /// # Errors
+    /// Before anything moves: not zeroed, or too fast for each line to be read (the error says
+    /// what would fit). Later: whatever stops the machine, and when no line is seen at all.
+    pub fn sweep(&mut self, axis: &str, options: &SweepOptions) -> Result<Sweep, Failure> {
+        let config = self.rotary_config(axis)?;
+        let usual = RadiansPerSecond(config.speed_deg_per_s.to_radians());
+        let acceleration = config.acceleration_deg_per_s2.to_radians();
+        let speed = options.speed.unwrap_or(usual);
+        let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
+        let sign = options.approach.sign();
+        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
+        self.check_latch_speed(axis, spacing, speed)?;
+        let start = self.turn_to(axis, Radians(-sign * run_up), Way::Shortest)?;
+        self.rest(axis)?;
+        let repeat = Repeat::Continuous;
+        self.latch(axis, LatchCommand::Arm { repeat, spacing })?;
+        let first = start + Radians(sign * run_up);
+        let way = TAU + 2.0 * run_up;
+        let limit = SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value());
+        self.turn(axis, start + Radians(sign * way), speed, limit)?;
+        self.rest(axis)?;
+        self.latch(axis, LatchCommand::Disarm)?;
+        let latched = self.take_latched(axis)?;
+        if latched.is_empty() {
+            return Err(Failure::NoLines {
+                axis: axis.to_owned(),
+                lines: options.lines,
+            });
+        }
+        Ok(assign(&latched, first, options))
+    }
+
+    /// Waits until the rotary axis has stood without a break, by samples that were taken since:
+    /// the host's clock alone would count old ones.
+    pub(crate) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
+        let limit = self.patience().of(REST_LIMIT);
+        let start = self.now();
+        let mut first = None;
+        loop {
+            let reading = self.rotary_reading(axis)?;
+            match reading.filter(|it| it.standing && it.at > start) {
+                Some(reading) => {
+                    let since = *first.get_or_insert(reading.at);
+                    if reading.at.since(since) >= REST {
+                        return Ok(());
+                    }
+                }
+                None => first = None,
+            }
+            let now = self.now();
+            if now.since(start) > limit {
+                return Err(Failure::Machine(machine::Failure::Overdue {
+                    device: axis.to_owned(),
+                    step: "standing still",
+                    waited: limit,
+                }));
+            }
+            self.tick(now + REST)?;
+        }
+    }
+}
+
+/// Gives each latched position of one turn, which begins at `first`, to its line.
+fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) -> Sweep {
+    let lines = i64::from(options.lines);
+    let spacing = TAU / f64::from(options.lines);
+    let phase = phase_of(latched, spacing, options.phase);
+    let from = (first.value() - phase) / spacing;
+    let window = match options.approach {
+        Approach::Forward => from.ceil() as i64..from.ceil() as i64 + lines,
+        Approach::Reverse => from.floor() as i64 + 1 - lines..from.floor() as i64 + 1,
+    };
+    let mut sweep = Sweep {
+        deviations: vec![None; options.lines as usize],
+        phase: Radians(phase),
+        ..Sweep::default()
+    };
+    let mut edges = vec![0_u32; options.lines as usize];
+    let mut unread = BTreeSet::new();
+    for edge in latched {
+        let number = ((edge.position.value() - phase) / spacing).round();
+        let off = edge.position.value() - phase - number * spacing;
+        if !window.contains(&(number as i64)) {
+            continue;
+        }
+        if off.abs() > spacing / 4.0 {
+            sweep.strays.push(edge.position);
+            continue;
+        }
+        let at = (number as i64).rem_euclid(lines) as u32;
+        edges[at as usize] += 1;
+        sweep.deviations[at as usize] = Some(edge.position - Radians(number * spacing));
+        if edge.missed > 0 {
+            // The edges before it, and perhaps the line's own by one of a scratch.
+            let before = i64::from(edge.missed.min(options.lines));
+            let back =
+                |by: i64| (number as i64 - by * options.approach.sign() as i64).rem_euclid(lines);
+            unread.extend((0..=before).map(|by| back(by) as u32));
+            sweep.overwritten.push(at);
+        }
+    }
+    for (at, count) in (0_u32..).zip(&edges) {
+        match count {
+            0 if unread.contains(&at) => sweep.overwritten.push(at),
+            0 => sweep.missing.push(at),
+            1 => {}
+            _ => sweep.doubled.push(at),
+        }
+    }
+    // Which of several edges is the line's, nobody knows.
+    for at in sweep.doubled.iter().chain(&sweep.overwritten) {
+        sweep.deviations[*at as usize] = None;
+    }
+    sweep
+}
+
+/// What all positions have in common within a spacing: the direction of their mean on a circle
+/// on which one spacing is one turn.
+fn phase_of(latched: &[Latched<Radians>], spacing: f64, near: Option<Radians>) -> f64 {
+    let (sine, cosine) = latched.iter().fold((0.0, 0.0), |(sine, cosine), edge| {
+        let angle = TAU * edge.position.value() / spacing;
+        (sine + sin(angle), cosine + cos(angle))
+    });
+    let phase = atan2(sine, cosine) / TAU * spacing;
+    let near = near.map_or(0.0, Radians::value);
+    phase + spacing * ((near - phase) / spacing).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use units::{Counts, Time};
+
+    const LINES: u32 = 360;
+
+    fn edge(degrees: f64) -> Latched<Radians> {
+        Latched {
+            at: Time::ZERO,
+            counts: Counts(0),
+            position: Radians::from_degrees(degrees),
+            missed: 0,
+        }
+    }
+
+    fn options(approach: Approach, phase_deg: Option<f64>) -> SweepOptions {
+        SweepOptions {
+            lines: LINES,
+            approach,
+            speed: None,
+            phase: phase_deg.map(Radians::from_degrees),
+        }
+    }
+
+    /// Lines from -2 to 362 degrees with an error of some arc-seconds each.
+    fn plate(phase_deg: f64) -> Vec<Latched<Radians>> {
+        let error = |line: i32| 0.008 * f64::from(line).to_radians().sin();
+        let lines = (-2..=362).map(|line| edge(f64::from(line) + phase_deg + error(line)));
+        lines.collect()
+    }
+
+    #[test]
+    fn each_line_of_a_turn_is_read_once_whatever_the_run_up_saw() {
+        let latched = plate(0.2);
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.read(), 360);
+        assert!((sweep.phase.degrees() - 0.2).abs() < 1e-4);
+        let at_90 = sweep.deviations[90].unwrap().degrees();
+        assert!((at_90 - 0.208).abs() < 1e-9, "{at_90}");
+        assert_eq!((sweep.missing.len(), sweep.doubled.len()), (0, 0));
+    }
+
+    #[test]
+    fn a_reverse_turn_gives_the_same_readings() {
+        let mut latched = plate(0.2);
+        latched.reverse();
+        let turn = Radians::TURN;
+        let sweep = assign(&latched, turn, &options(Approach::Reverse, None));
+        assert_eq!(sweep.read(), 360);
+        let at_90 = sweep.deviations[90].unwrap().degrees();
+        assert!((at_90 - 0.208).abs() < 1e-9, "{at_90}");
+    }
+
+    #[test]
+    fn smudged_lines_are_named() {
+        let mut latched = plate(-0.3);
+        latched.retain(|edge| !(99.0..101.0).contains(&edge.position.degrees()));
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.missing, [100, 101]);
+        assert_eq!(sweep.read(), 358);
+    }
+
+    #[test]
+    fn a_second_edge_makes_its_line_worthless_and_a_stray_one_nothing() {
+        let mut latched = plate(0.0);
+        latched.insert(103, edge(100.01));
+        latched.insert(204, edge(200.5));
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.doubled, [100]);
+        assert_eq!(sweep.deviations[100], None);
+        assert_eq!(sweep.strays.len(), 1);
+        assert_eq!(sweep.read(), 359);
+    }
+
+    #[test]
+    fn lines_overwritten_unread_are_not_called_unseen() {
+        let overwrite = |latched: &mut Vec<Latched<Radians>>| {
+            let place = |degrees: f64| {
+                move |it: &Latched<Radians>| it.position.degrees().round() == degrees
+            };
+            latched.retain(|it| !place(51.0)(it) && !place(52.0)(it) && !place(200.0)(it));
+        };
+        let mut latched = plate(0.0);
+        overwrite(&mut latched);
+        let mark = |latched: &mut Vec<Latched<Radians>>, degrees: f64| {
+            let at = latched
+                .iter()
+                .position(|it| it.position.degrees().round() == degrees);
+            latched[at.unwrap()].missed = 2;
+        };
+        mark(&mut latched, 53.0);
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.overwritten, [53, 51, 52]);
+        assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
+        let mut latched = plate(0.0);
+        overwrite(&mut latched);
+        latched.reverse();
+        mark(&mut latched, 50.0);
+        let sweep = assign(&latched, Radians::TURN, &options(Approach::Reverse, None));
+        assert_eq!(sweep.overwritten, [50, 51, 52]);
+        assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
+    }
+
+    #[test]
+    fn an_overwritten_edge_makes_the_one_that_was_read_worthless() {
+        let mut latched = plate(0.0);
+        let at = latched
+            .iter()
+            .position(|edge| edge.position.degrees() > 49.5);
+        latched[at.unwrap()].missed = 1;
+        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        assert_eq!(sweep.overwritten, [50]);
+        assert_eq!(sweep.deviations[50], None);
+        assert!(sweep.missing.is_empty());
+    }
+
+    #[test]
+    fn a_phase_near_half_a_spacing_is_kept_on_the_side_of_the_sweep_before() {
+        let latched = plate(0.49);
+        let sweep = assign(
+            &latched,
+            Radians::ZERO,
+            &options(Approach::Forward, Some(0.52)),
+        );
+        assert!((sweep.phase.degrees() - 0.49).abs() < 1e-3);
+        let latched = plate(-0.49);
+        let sweep = assign(
+            &latched,
+            Radians::ZERO,
+            &options(Approach::Forward, Some(0.49)),
+        );
+        assert!(
+            (sweep.phase.degrees() - 0.51).abs() < 1e-3,
+            "{:?}",
+            sweep.phase
+        );
+    }
+}

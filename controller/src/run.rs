@@ -1,0 +1,85 @@
+//! What the runs of all kinds of machine have in common: who the machine is and who measures, the
+//! time of day, and a note of what ended a run.
+
+use core::f64::consts::TAU;
+use std::path::PathBuf;
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::store::{
+    Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, RecordHead, SCHEMA_VERSION,
+};
+
+/// How a calibration is made.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CalibrateOptions {
+    /// Continue this journal instead of starting a new one.
+    pub resume: Option<PathBuf>,
+    /// Save although the closure error is above its limit.
+    pub accept_drift: bool,
+}
+
+/// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.
+pub fn utc_now() -> String {
+    let now = jiff::Timestamp::now();
+    now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}
+
+/// The failure of a verb whose section of the configuration is missing.
+pub(crate) fn missing(axis: &str, section: &'static str) -> Failure {
+    Failure::NotConfigured {
+        axis: axis.to_owned(),
+        section,
+    }
+}
+
+pub(crate) fn note_failure(journal: &mut Journal, failure: &Failure) {
+    // The failure itself is on its way to the operator; a journal that cannot take the note
+    // as well changes nothing about it.
+    let _ = journal.write(&Entry::Failed {
+        cause: failure.to_string(),
+    });
+}
+
+impl Machine {
+    /// The head of a record without measurements, which says who this machine is.
+    pub fn this_machine(&self, axis: &str) -> RecordHead {
+        let config = self.config.axis.get(axis);
+        let rotary = self.config.rotary.get(axis);
+        RecordHead {
+            schema_version: SCHEMA_VERSION,
+            machine: self.config.machine.name.clone(),
+            stage_serial: self.config.machine.stage_serial.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
+            axis: axis.to_owned(),
+            drive: self.drive_record(axis),
+            resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
+            resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
+            created: String::new(),
+            program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+            source: String::new(),
+            instrument: InstrumentRecord::default(),
+            environment: EnvironmentRecord::default(),
+        }
+    }
+
+    pub(crate) fn drive_record(&self, axis: &str) -> IdentityRecord {
+        self.identity(axis)
+            .as_ref()
+            .map(IdentityRecord::from)
+            .unwrap_or_default()
+    }
+
+    pub(crate) fn instrument_record(&self, name: &str) -> InstrumentRecord {
+        let config = &self.config.instrument[name];
+        InstrumentRecord {
+            name: name.to_owned(),
+            identity: self.identity(name).unwrap_or_default().name,
+            air_corrected: config.correct_air,
+            material_corrected: config.correct_material,
+            dead_path_corrected: config.correct_dead_path,
+            cosine_corrected: config.correct_cosine,
+            standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
+        }
+    }
+}

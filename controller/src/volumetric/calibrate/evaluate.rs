@@ -1,0 +1,281 @@
+//! The errors from what was written down, by a machine just now or by anybody at any time.
+
+use compensator::volumetric::Axis;
+use compensator::volumetric::function::Shape;
+use compensator::volumetric::identify::{
+    Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, Observation, Plan, RunSetup,
+    Scattered, SquarenessName, ThermalPlan,
+};
+use compensator::volumetric::model::{AxisErrors, ErrorName};
+use units::{Celsius, Metres};
+
+use crate::config::MachineConfig;
+use crate::failure::Failure;
+use crate::store::IdentityRecord;
+use crate::volumetric::VolumetricConfig;
+use crate::volumetric::calibrate::plan::axis_of;
+use crate::volumetric::settings::{beam_drift, bend_plans};
+use crate::volumetric::{
+    AXES, AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
+    LineEntry, UnknownRecord, VolumePlanEntry, VolumeRead, error_name, point,
+};
+use crate::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
+
+/// Places between which the uncertainty of the tool is looked for, along each axis.
+const PLACES: u32 = 4;
+
+/// What readings of lines say of three axes.
+#[derive(Clone, Debug)]
+pub struct VolumetricEvaluated {
+    /// What was found.
+    pub found: Identified,
+    /// The same as functions.
+    pub axes: [AxisErrors; 3],
+    /// At which temperatures the errors hold.
+    pub temperatures: Vec<Celsius>,
+    /// How many lines were read whole.
+    pub lines: usize,
+    /// How many readings these have.
+    pub readings: usize,
+    /// The largest standard uncertainty of the tool in use, in the volume.
+    pub u_max: Metres,
+    /// By how much the readings scatter, where that is more than they may.
+    pub scatter: Option<Scatter>,
+    drives: Vec<IdentityRecord>,
+    /// Errors that move nothing with the tools given: taken as zero.
+    without_effect: Vec<ErrorName>,
+}
+
+impl VolumetricEvaluated {
+    /// Finds the errors by the lines that are whole; between the nodes they run as `shape` says.
+    ///
+    /// # Errors
+    /// When it was not written how, or the readings do not tell all errors.
+    pub fn of(read: &VolumeRead, shape: Shape) -> Result<Self, Failure> {
+        let entry = read.plan.as_ref().ok_or(VolumetricFailure::NoPlan)?;
+        let wrong = || VolumetricFailure::NoPlan;
+        let (plan, observations) = plan_of(entry, read, shape).ok_or_else(wrong)?;
+        let found = plan.identify(&observations);
+        let found = found.map_err(VolumetricFailure::from)?;
+        let axes = found.axis_errors(shape);
+        let axes = axes.map_err(VolumetricFailure::from)?;
+        let temperatures = references(read);
+        let scattered = scattered(&plan, &found, &observations);
+        let scatter = scattered.map(|it| Scatter::of(&it, entry, read, &observations));
+        Ok(Self {
+            scatter,
+            u_max: largest_u(entry, &found, &temperatures),
+            found,
+            axes,
+            temperatures,
+            lines: plan.runs.len(),
+            readings: observations.len(),
+            drives: entry.drives.clone(),
+            without_effect: without_effect(&plan),
+        })
+    }
+
+    /// How well the readings agree, as it is stored and shown.
+    pub fn agreement(&self) -> AgreementRecord {
+        AgreementRecord {
+            lines: self.lines,
+            readings: self.readings,
+            degrees_of_freedom: self.found.degrees_of_freedom,
+            scatter_ratio: self.found.birge_ratio,
+            tool_u_max_m: self.u_max.value(),
+        }
+    }
+
+    /// As it is stored, with what stays unknown of a machine of `config`.
+    pub fn content(&self, config: &VolumetricConfig) -> GeometryContent {
+        let found = &self.found;
+        let of = |it: &BendPlan| (it.axis, it.towards);
+        let is_known = |it: &BendPlan| found.bends.iter().any(|known| of(&known.plan) == of(it));
+        let mut unknown = bend_plans(config);
+        unknown.retain(|it| !is_known(it));
+        let of = (&self.axes, &found.squareness, &self.temperatures);
+        GeometryContent {
+            bends: found.bends.iter().map(BendRecord::of).collect(),
+            expansions: found.expansions.iter().map(ExpansionRecord::of).collect(),
+            drives: self.drives.clone(),
+            agreement: Some(self.agreement()),
+            unknown: UnknownRecord::of(&unknown, &self.without_effect),
+            ..GeometryContent::new(of.0, of.1, of.2)
+        }
+    }
+
+    /// Proves that the readings agree, and that the machine of `config` can be corrected by what was
+    /// found: with what its detectors read then, or by tables alone where that is not known.
+    ///
+    /// # Errors
+    /// When they do not, or it cannot.
+    pub fn check(
+        &self,
+        config: &MachineConfig,
+        references: Option<&BeamReferencesContent>,
+    ) -> Result<(), Failure> {
+        if let Some(scatter) = &self.scatter {
+            return Err(VolumetricFailure::Scatter(scatter.clone()).into());
+        }
+        let own = config.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
+        let mut state = VolumetricState {
+            axes: self.axes.clone(),
+            squareness: self.found.squareness,
+            bends: self.found.bends.clone(),
+            expansions: self.found.expansions.clone(),
+            temperatures: self.temperatures.clone(),
+            ..VolumetricState::default()
+        };
+        let Some(references) = references else {
+            VolumetricCorrection::by_tables(config, state)?;
+            return Ok(());
+        };
+        for (axis, beam) in Axis::ALL.into_iter().zip(own.beam.each()) {
+            if let Some(drift) = beam.and_then(beam_drift) {
+                state.beams[axis.index()] = references.beam("these references", axis, drift)?;
+            }
+        }
+        state.roll = references.roll("these references")?;
+        VolumetricCorrection::new(config, state)?;
+        Ok(())
+    }
+}
+
+/// What is wrong with readings that scatter too much. Errors that straight lines or monotone cubics
+/// between the nodes cannot draw are no fault of the readings: these are judged by the curve that
+/// bends most, and the errors found are as uncertain as the curve in use leaves them.
+fn scattered(plan: &Plan, found: &Identified, observations: &[Observation]) -> Option<Scattered> {
+    let seen = found.scattered(observations)?;
+    if plan.shape == Shape::Spline {
+        return Some(seen);
+    }
+    let smooth = Plan {
+        shape: Shape::Spline,
+        ..plan.clone()
+    };
+    match smooth.identify(observations) {
+        Ok(smooth) => smooth.scattered(observations),
+        Err(_) => Some(seen),
+    }
+}
+
+/// The errors that are not looked for.
+fn without_effect(plan: &Plan) -> Vec<ErrorName> {
+    let pairs = Axis::ALL
+        .into_iter()
+        .flat_map(|axis| Axis::ALL.map(|it| (axis, it)));
+    let names =
+        pairs.flat_map(|(axis, it)| [ErrorName::Along(axis, it), ErrorName::About(axis, it)]);
+    let is_planned = |name: &ErrorName| plan.functions.iter().any(|it| it.name == *name);
+    names.filter(|it| !is_planned(it)).collect()
+}
+
+fn references(read: &VolumeRead) -> Vec<Celsius> {
+    let shown = read.references.iter().flat_map(|it| &it.temperatures_c);
+    shown.copied().map(Celsius).collect()
+}
+
+/// What is to be found, and from what; lines that are not whole are left out. `None` when something
+/// is called what it is not.
+fn plan_of(
+    entry: &VolumePlanEntry,
+    read: &VolumeRead,
+    shape: Shape,
+) -> Option<(Plan, Vec<Observation>)> {
+    let whole = read.whole.iter();
+    let whole: Vec<_> = whole.filter(|it| it.line < entry.lines.len()).collect();
+    let mut observations = Vec::new();
+    for (run, it) in whole.iter().enumerate() {
+        let own = read
+            .readings
+            .iter()
+            .filter(|reading| reading.line == it.line);
+        for reading in own {
+            observations.push(reading.observation(run)?);
+        }
+    }
+    let functions = entry.functions.iter().map(|text| {
+        let name = error_name(text)?;
+        let nodes = &entry.nodes_m[axis_of(name).index()];
+        let nodes = nodes.iter().copied().map(Metres).collect();
+        Some(FunctionPlan { name, nodes })
+    });
+    let runs = whole.iter().map(|it| setup(&entry.lines[it.line]));
+    let shown = whole
+        .iter()
+        .map(|it| it.temperatures_c.iter().copied().map(Celsius).collect());
+    let plan = Plan {
+        chain: entry.chain.parse().ok()?,
+        functions: functions.collect::<Option<_>>()?,
+        shape,
+        squarenesses: SquarenessName::ALL.to_vec(),
+        runs: runs.collect(),
+        zero: point(entry.zero_m),
+        thermal: thermal_of(entry, references(read), shown.collect())?,
+    };
+    Some((plan, observations))
+}
+
+fn setup(line: &LineEntry) -> RunSetup {
+    RunSetup {
+        offset: true,
+        alignment: line.angle.map(|angle| Alignment { angle, factor: 1.0 }),
+    }
+}
+
+fn thermal_of(
+    entry: &VolumePlanEntry,
+    references: Vec<Celsius>,
+    runs: Vec<Vec<Celsius>>,
+) -> Option<ThermalPlan> {
+    if entry.expansions.is_empty() && entry.bends.is_empty() {
+        return Some(ThermalPlan::default());
+    }
+    let axis = |letter: char| Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
+    let expansions = entry.expansions.iter().map(|it| {
+        Some(ExpansionPlan {
+            axis: axis(it.axis)?,
+            thermometers: it.thermometers.clone(),
+        })
+    });
+    let bends = entry.bends.iter().map(|it| {
+        Some(BendPlan {
+            axis: axis(it.axis)?,
+            towards: axis(it.towards)?,
+            over: it.over,
+            under: it.under,
+            low: Metres(it.low_m),
+            high: Metres(it.high_m),
+            // Films and supports shift a slide sideways too.
+            sideways: false,
+            seen_from: it.seen_from_m.map(point),
+        })
+    });
+    Some(ThermalPlan {
+        references,
+        runs,
+        u: entry.thermometer_u_k,
+        expansions: expansions.collect::<Option<_>>()?,
+        bends: bends.collect::<Option<_>>()?,
+        fixed: point(entry.fixed_m),
+    })
+}
+
+/// At the tool in use, over places all over the volume.
+fn largest_u(entry: &VolumePlanEntry, found: &Identified, shown: &[Celsius]) -> Metres {
+    let (low, high) = (entry.low_m, entry.high_m);
+    let mut largest = Metres::ZERO;
+    for n in 0..(PLACES + 1).pow(3) {
+        let steps = [
+            n % (PLACES + 1),
+            n / (PLACES + 1) % (PLACES + 1),
+            n / (PLACES + 1).pow(2),
+        ];
+        let at = core::array::from_fn(|k| {
+            low[k] + (high[k] - low[k]) * f64::from(steps[k]) / f64::from(PLACES)
+        });
+        let u = found.standard_uncertainty(point(at), point(entry.tool_m), shown);
+        largest = largest.max(u.map_or(Metres::ZERO, |it| it.distance()));
+    }
+    largest
+}

@@ -1,0 +1,332 @@
+//! Calibrate: lines by laser interferometer and by the machine's own detectors, cold and, for what
+//! warmth does, warm; one identification of all of them with its covariance.
+//!
+//! The references of the detectors are taken first: what the tables hold for is the machine as it
+//! was then. While lines are read it goes on warming up. What the detectors see of that, and what
+//! temperatures are known to do by the configuration, is taken off each reading where it is made
+//! (`known`). With warm lines expansions and bends are found with the errors, by what the thermometers
+//! showed at each line; without, expansions are those of the configuration and how guides bend stays
+//! unknown: the result says so. Straightnesses are those that the detectors read along their
+//! beams, where there are beams; a beam is straighter than what a straightedge tells.
+//!
+//! Every reading is written down when it is made. A run that was interrupted is continued at its
+//! first line that is not whole, as long as its references still hold (`resume`). What is evaluated
+//! is what was written down: the journal alone gives the same errors again.
+//!
+//! A result that cannot be applied, or whose readings scatter much more than was stated of them, is
+//! refused before it is stored (`scatter`).
+
+mod evaluate;
+mod known;
+mod own;
+mod plan;
+mod readings;
+mod resume;
+mod scatter;
+
+use core::time::Duration;
+use std::path::{Path, PathBuf};
+
+use compensator::volumetric::Axis;
+use compensator::volumetric::function::Function;
+use compensator::volumetric::identify::{Identified, StandardLine};
+use compensator::volumetric::online::BeamReference;
+use units::{Metres, Radians};
+
+pub use evaluate::VolumetricEvaluated;
+pub use plan::volume_plan;
+pub use scatter::{Off, Scatter, WorstReading};
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::run::{note_failure, utc_now};
+use crate::store::{
+    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
+    SCHEMA_VERSION, Store,
+};
+use crate::volumetric::line::LineOperator;
+use crate::volumetric::reference::References;
+use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
+use crate::volumetric::thermometers::Thermometry;
+use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeRead, VolumeReferencesEntry};
+use crate::volumetric::{GEOMETRY, VolumetricFailure};
+use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
+use machine::Stage;
+
+use known::Known;
+
+/// What it is called where progress is told.
+const WHOLE: &str = "volume";
+
+/// How the machine becomes warm between cold and warm lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WarmUp {
+    /// It is not wanted: what scales and structure do in warmth is taken from the configuration, and
+    /// how guides bend stays unknown.
+    None,
+    /// Something else warms it for so long, while the axes are switched off.
+    Idle(Duration),
+    /// All axes go to and fro for so long (ISO 230-3).
+    Travel(Duration),
+}
+
+/// A calibration of three axes that was made, stored and activated.
+#[derive(Clone, Debug)]
+pub struct VolumetricCalibrated {
+    /// The name of the errors.
+    pub id: String,
+    /// The name of the references taken with them.
+    pub references: String,
+    /// How many lines were read, cold and warm.
+    pub lines: usize,
+    /// What was found.
+    pub found: Identified,
+    /// How well the readings agree, as it was stored.
+    pub agreement: AgreementRecord,
+    /// The largest standard uncertainty of the tool in the volume.
+    pub u_max: Metres,
+    /// What stays unknown: guides that bend by the configuration, by how much nobody knows, for no
+    /// warm lines told it; errors that no line sees.
+    pub unknown: UnknownRecord,
+    /// Where every reading is.
+    pub journal: PathBuf,
+}
+
+/// What is known of the machine when its lines are read.
+struct Session<'a> {
+    config: VolumetricConfig,
+    own: VolumetricCalibrateConfig,
+    references: References,
+    beams: [Option<BeamReference>; 3],
+    roll: Option<Function<Radians>>,
+    known: Known,
+    thermometry: Thermometry,
+    operator: &'a mut dyn LineOperator,
+    /// All lines, as in the plan.
+    lines: Vec<StandardLine>,
+    /// What was read up to now.
+    read: VolumeRead,
+}
+
+impl Machine {
+    /// Takes references, reads all lines that tell this machine's errors, then (unless it is not
+    /// wanted) lets it become warm and reads those again that tell what warmth does; finds the
+    /// errors, stores and activates them with their references. With `resume` the lines that are
+    /// whole in that journal are not read again, and its references stay what everything counts
+    /// from.
+    ///
+    /// # Errors
+    /// When an axis is not zeroed, a line cannot be set up or read, the readings do not tell all
+    /// errors or scatter too much, the result cannot be applied, or anything stops the machine; when the journal is one
+    /// of another run, or its references hold no more. What was in use before stays in use then.
+    pub fn calibrate_volumetric(
+        &mut self,
+        store: &Store,
+        warm_up: WarmUp,
+        resume: Option<&Path>,
+        operator: &mut dyn LineOperator,
+    ) -> Result<VolumetricCalibrated, Failure> {
+        let config = self.volumetric_config()?.clone();
+        let drives = self.volume_drives(&config);
+        let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
+        let header = self.volume_header("calibrate", None)?;
+        let (mut journal, read) = resume::open(store, &header, plan, resume, &self.config_hash)?;
+        let made = self
+            .calibration_session(config, lines, read, &mut journal, operator)
+            .and_then(|mut session| {
+                self.read_lines(&mut session, warm_up, &mut journal)?;
+                self.conclude(store, session, &journal)
+            });
+        let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        Ok(made)
+    }
+
+    /// The first line of a journal of three axes.
+    pub(super) fn volume_header(
+        &self,
+        verb: &str,
+        calibration: Option<String>,
+    ) -> Result<JournalHeader, Failure> {
+        let section = "calibrate";
+        let own = self.volumetric_config()?.calibrate.as_ref();
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let instrument = &own.instrument;
+        if !self.config.instrument.contains_key(instrument) {
+            let instrument = instrument.clone();
+            return Err(VolumetricFailure::NoInstrument { instrument }.into());
+        }
+        let head = self.this_volume(GEOMETRY)?;
+        Ok(JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: verb.to_owned(),
+            machine: head.machine,
+            stage_serial: head.stage_serial,
+            config_hash: head.config_hash,
+            axis: head.axis,
+            drive: head.drive,
+            // It is brought along: who it is shows when it is switched on.
+            instrument: InstrumentRecord {
+                identity: String::new(),
+                ..self.instrument_record(instrument)
+            },
+            started: utc_now(),
+            calibration,
+            targets_m: Vec::new(),
+            runs: 1,
+        })
+    }
+
+    fn read_lines(
+        &mut self,
+        session: &mut Session<'_>,
+        warm_up: WarmUp,
+        journal: &mut Journal,
+    ) -> Result<(), Failure> {
+        let total = session.lines.len();
+        let mut is_warm = false;
+        for at in 0..total {
+            self.core
+                .observer()
+                .progress(Stage::Calibrate, WHOLE, at as u64, total as u64);
+            if session.read.is_whole(at) {
+                continue;
+            }
+            if session.is_warm_line(at) && !is_warm {
+                // Also in a run that is continued: it may have cooled down.
+                self.end_lines(session.operator)?;
+                self.become_warm(warm_up)?;
+                is_warm = true;
+            }
+            self.run_line(session, at, journal)?;
+        }
+        self.end_lines(session.operator)?;
+        self.core
+            .observer()
+            .progress(Stage::Calibrate, WHOLE, total as u64, total as u64);
+        Ok(())
+    }
+
+    /// Takes the references, or those of the journal if they still hold.
+    fn calibration_session<'a>(
+        &mut self,
+        config: VolumetricConfig,
+        lines: Vec<StandardLine>,
+        mut read: VolumeRead,
+        journal: &mut Journal,
+        operator: &'a mut dyn LineOperator,
+    ) -> Result<Session<'a>, Failure> {
+        let section = "calibrate";
+        let own = config.calibrate.clone();
+        let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let taken = self.take_references()?;
+        let entry = match read.references.take() {
+            Some(kept) => {
+                self.still_holds(&config, &own, &read, &kept, &taken)?;
+                kept
+            }
+            None => {
+                let entry = VolumeReferencesEntry {
+                    content: taken.content,
+                    temperatures_c: taken.temperatures.iter().map(|it| it.value()).collect(),
+                    at_s: self.now().seconds(),
+                };
+                journal.write(&Entry::VolumeReferences(entry.clone()))?;
+                journal.flush_to_disk()?;
+                entry
+            }
+        };
+        let references = References::from(&entry);
+        read.references = Some(entry);
+        let is_warm = read
+            .plan
+            .iter()
+            .any(|plan| plan.lines.iter().any(|it| it.warm));
+        let known = Known::new(&config, &references.temperatures, is_warm)?;
+        let thermometry = Thermometry::new(self.config(), &config.temperature);
+        let mut beams = [None, None, None];
+        for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
+            if let Some(drift) = beam.and_then(beam_drift) {
+                beams[axis.index()] = references.content.beam("just taken", axis, drift)?;
+            }
+        }
+        let roll = references.content.roll("just taken")?;
+        Ok(Session {
+            config,
+            own,
+            references,
+            beams,
+            roll,
+            known,
+            thermometry,
+            operator,
+            lines,
+            read,
+        })
+    }
+
+    fn become_warm(&mut self, how: WarmUp) -> Result<(), Failure> {
+        let config = self.volumetric_config()?.clone();
+        let corners = [point_of_mm(config.low_mm), point_of_mm(config.high_mm)];
+        match how {
+            WarmUp::None => {}
+            WarmUp::Idle(span) => self.idle(span)?,
+            WarmUp::Travel(span) => {
+                let until = self.now() + span;
+                while self.now() < until {
+                    for corner in corners {
+                        self.go_straight(corner)?;
+                    }
+                }
+            }
+        }
+        for axis in &config.axes {
+            self.enable(axis)?;
+        }
+        Ok(())
+    }
+
+    fn conclude(
+        &mut self,
+        store: &Store,
+        session: Session<'_>,
+        journal: &Journal,
+    ) -> Result<VolumetricCalibrated, Failure> {
+        let shape = function_shape(session.config.compensation.interpolation);
+        let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
+        // What cannot be applied must not be stored as what is in use.
+        evaluated.check(self.config(), Some(&session.references.content))?;
+        let source = journal.path().file_name().unwrap_or_default();
+        let source = source.to_string_lossy().into_owned();
+        let head = RecordHead {
+            created: utc_now(),
+            source: source.clone(),
+            instrument: self.instrument_record(&session.own.instrument),
+            ..self.this_volume(GEOMETRY)?
+        };
+        let content = evaluated.content(&session.config);
+        let unknown = content.unknown.clone();
+        let content = Content::VolumetricGeometry(content);
+        let id = store.save(&CalibrationRecord { head, content })?;
+        let references = self.keep_references(store, &id, session.references, &source)?;
+        store.activate(GEOMETRY, &id)?;
+        Ok(VolumetricCalibrated {
+            id,
+            references: references.id,
+            agreement: evaluated.agreement(),
+            lines: evaluated.lines,
+            found: evaluated.found,
+            u_max: evaluated.u_max,
+            unknown,
+            journal: journal.path().to_owned(),
+        })
+    }
+}
+
+impl Session<'_> {
+    fn is_warm_line(&self, at: usize) -> bool {
+        let plan = self.read.plan.as_ref();
+        plan.is_some_and(|it| it.lines[at].warm)
+    }
+}

@@ -1,0 +1,122 @@
+//! What the machine's own detectors tell of its lines: straightnesses by the beams, a roll.
+
+use compensator::volumetric::identify::{Observation, Purpose, Reading};
+use compensator::volumetric::{Axis, Point};
+use units::portable::hypot;
+use units::{Metres, Radians};
+
+use crate::volumetric::calibrate::Session;
+use crate::volumetric::calibrate::plan::nodes;
+use crate::volumetric::settings::point_of_mm;
+
+/// The least standard uncertainty of a straightness by a beam: the air along it.
+const BEAM_FLOOR: Metres = Metres(0.1e-6);
+/// By how much of its size such a reading may be wrong: the width of the spot.
+const BEAM_SCALE: f64 = 0.01;
+/// Likewise of a roll that the machine's own detectors read.
+const ROLL_FLOOR: Radians = Radians(0.5e-6);
+/// A stop this close to a node is at it.
+const AT_A_NODE_M: f64 = 1e-6;
+
+impl Session<'_> {
+    /// What the machine's own detectors read of this line when their references were taken;
+    /// `None` when they do not read it.
+    pub(super) fn by_own_detectors(&self, run: usize) -> Option<Vec<Observation>> {
+        match self.lines[run].purpose {
+            Purpose::Straightness(axis, along) => self.straightness_by_beam(axis, along, run),
+            Purpose::Roll(axis) => self.roll_by_detectors(axis, run),
+            Purpose::Positioning(_)
+            | Purpose::Tilt(..)
+            | Purpose::RollOnLever(_)
+            | Purpose::EvenRollOnLever(_)
+            | Purpose::Squarenesses => None,
+        }
+    }
+
+    fn straightness_by_beam(
+        &self,
+        axis: Axis,
+        along: Axis,
+        run: usize,
+    ) -> Option<Vec<Observation>> {
+        let reference = self.beams[axis.index()].as_ref()?;
+        let beam = self.config.beam.each()[axis.index()]?;
+        let record = self.references.content.beams.iter();
+        let letter = ['x', 'y', 'z'][axis.index()];
+        let record = record.clone().find(|it| it.axis == letter)?;
+        let place = axis.others().iter().position(|it| *it == along)?;
+        let direction = core::array::from_fn(|k| f64::from(u8::from(k == along.index())));
+        let u_mean = record.slider[place].standard_uncertainties_si.as_ref();
+        let stops = self.stops_at_nodes(axis, &record.slider[place].positions_m);
+        let first = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
+        let chain = self.known.chain();
+        let each = stops.into_iter().map(|(index, position)| {
+            let strayed = reference.slider(position)[place];
+            let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
+            let scale = (strayed - first).value() * BEAM_SCALE;
+            let u = hypot(hypot(BEAM_FLOOR.value(), u_mean), scale);
+            let at = self.on_axis(axis, position);
+            // The slide's tilts act on the detector's place on it alone: not on what an offset of
+            // the tool is added to.
+            let carried = chain.lever(axis, at, Point::ZERO);
+            Observation {
+                at,
+                tool: point_of_mm(beam.slider.place_mm) - carried,
+                run,
+                reading: Reading::Length {
+                    along: direction,
+                    deviation: strayed * chain.sense(axis),
+                    u: Metres(u),
+                },
+            }
+        });
+        Some(each.collect())
+    }
+
+    fn roll_by_detectors(&self, axis: Axis, run: usize) -> Option<Vec<Observation>> {
+        let reference = self.roll.as_ref()?;
+        let record = self.references.content.roll.as_ref()?;
+        let stops = self.stops_at_nodes(axis, &record.positions_m);
+        let u = record.standard_uncertainties_si.as_ref();
+        let sense = self.known.chain().sense(axis);
+        let each = stops.into_iter().map(|(index, position)| {
+            let u = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
+            Observation {
+                at: self.on_axis(axis, position),
+                tool: Point::ZERO,
+                run,
+                reading: Reading::Angle {
+                    about: axis,
+                    deviation: reference.at(position) * sense,
+                    u: Radians(hypot(ROLL_FLOOR.value(), u)),
+                },
+            }
+        });
+        Some(each.collect())
+    }
+
+    /// Stops that are at nodes, which are not drawn by straight lines; all where none is.
+    fn stops_at_nodes(&self, axis: Axis, positions_m: &[f64]) -> Vec<(usize, Metres)> {
+        let k = axis.index();
+        let low_m = self.config.low_mm[k] * 1e-3;
+        let span_m = (self.config.high_mm[k] - self.config.low_mm[k]) * 1e-3;
+        let step_m = span_m / (nodes(&self.config, &self.own)[k] - 1) as f64;
+        let is_at_node = |position: f64| {
+            let steps = (position - low_m) / step_m;
+            ((steps - steps.round()) * step_m).abs() < AT_A_NODE_M
+        };
+        let all = || positions_m.iter().copied().map(Metres).enumerate();
+        let at_nodes: Vec<_> = all().filter(|(_, it)| is_at_node(it.value())).collect();
+        if at_nodes.len() < 3 {
+            return all().collect();
+        }
+        at_nodes
+    }
+
+    /// With the other axes at the low ends of the volume.
+    fn on_axis(&self, axis: Axis, position: Metres) -> Point {
+        let low = point_of_mm(self.config.low_mm);
+        let [x, y, z] = Axis::ALL.map(|it| if it == axis { position } else { low.along(it) });
+        Point::new(x, y, z)
+    }
+}

@@ -1,0 +1,151 @@
+//! One line of a calibration: read, and written down.
+
+use core::time::Duration;
+
+use compensator::volumetric::identify::{Observation, Optics};
+use compensator::volumetric::online::MovingState;
+use compensator::volumetric::{Axis, Point};
+use units::{Celsius, Metres};
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::store::{Entry, Journal};
+use crate::volumetric::calibrate::Session;
+use crate::volumetric::correction::lever;
+use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
+use crate::volumetric::settings::volume_axis;
+use crate::volumetric::{LineReadEntry, LineReadingEntry};
+
+impl Machine {
+    /// Reads the line of this number, by whatever reads it.
+    pub(super) fn run_line(
+        &mut self,
+        session: &mut Session<'_>,
+        at: usize,
+        journal: &mut Journal,
+    ) -> Result<(), Failure> {
+        let shown = match session.by_own_detectors(at) {
+            Some(observations) => {
+                for it in &observations {
+                    let reading = LineReadingEntry::of(at, it);
+                    session.keep(reading, journal)?;
+                }
+                session.references.temperatures.clone()
+            }
+            None => self.run_line_set_up(session, at, journal)?,
+        };
+        let whole = LineReadEntry {
+            line: at,
+            temperatures_c: shown.iter().map(|it| it.value()).collect(),
+            at_s: self.now().seconds(),
+        };
+        journal.write(&Entry::LineRead(whole.clone()))?;
+        journal.flush_to_disk()?;
+        session.read.whole.push(whole);
+        Ok(())
+    }
+
+    /// Has the line set up, and reads it by interferometer. Says what the thermometers showed.
+    fn run_line_set_up(
+        &mut self,
+        session: &mut Session<'_>,
+        number: usize,
+        journal: &mut Journal,
+    ) -> Result<Vec<Celsius>, Failure> {
+        let line = session.lines[number];
+        let task = LineTask {
+            optics: match line.optics {
+                Optics::Linear => LineOptics::Linear,
+                Optics::Straightness(across) => LineOptics::Straightness { across },
+                Optics::Angle(about) => LineOptics::Angular { about },
+            },
+            start: line.from,
+            end: line.to,
+            tool: line.tool,
+            step: (number + 1, session.lines.len()),
+        };
+        let readout = LineReadout {
+            instrument: session.own.instrument.clone(),
+            settle: Duration::from_secs_f64(session.own.settle_ms * 1e-3),
+            samples: session.own.average_samples,
+        };
+        let set_up = self.set_up_line(&task, &readout, session.operator)?;
+        let mut shown = vec![Vec::new(); session.config.temperature.len()];
+        for at in line.points(session.points_of(number)) {
+            let read = self.read_line(&set_up, at)?;
+            let (state, temperatures) = self.state_now(session, at)?;
+            for (sum, celsius) in shown.iter_mut().zip(&temperatures) {
+                sum.push(celsius.value());
+            }
+            let observation = read.observation(number);
+            let reading = session.known.without(&observation, &state, &temperatures)?;
+            let beyond = Observation {
+                reading,
+                ..observation
+            };
+            let beyond = LineReadingEntry::of(number, &beyond);
+            let entry = LineReadingEntry {
+                deviation_si: beyond.read_si,
+                u_si: beyond.u_si,
+                scatter_m: Some(read.scatter.value()),
+                sideways_m: state.sideways.map(|it| it.map(Metres::value)),
+                roll_rad: state.roll.map(|it| it.value()),
+                temperatures_c: temperatures.iter().map(|it| Some(it.value())).collect(),
+                at_s: read.when.seconds(),
+                ..LineReadingEntry::of(number, &observation)
+            };
+            session.keep(entry, journal)?;
+        }
+        let mean = |it: &Vec<f64>| Celsius(it.iter().sum::<f64>() / it.len() as f64);
+        Ok(shown.iter().map(mean).collect())
+    }
+
+    /// What the detectors see beyond their references, and what the thermometers show.
+    fn state_now(
+        &mut self,
+        session: &mut Session<'_>,
+        at: Point,
+    ) -> Result<(MovingState, Vec<Celsius>), Failure> {
+        let seen = self.watch_at_rest(session.own.detector_samples)?;
+        let mut state = MovingState::default();
+        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
+            let axis = volume_axis(config.axis);
+            let position = at.along(axis);
+            let roll = self.roll_of(axis, position, config, &seen)?;
+            state.roll[axis.index()] = roll - reference.at(position);
+        }
+        for axis in Axis::ALL {
+            let beam = session.config.beam.each()[axis.index()];
+            let (Some(beam), Some(reference)) = (beam, &session.beams[axis.index()]) else {
+                continue;
+            };
+            let position = at.along(axis);
+            let places = self.places_of_beam(axis, position, beam, &seen)?;
+            let end = places.1.unwrap_or_else(|| reference.end());
+            let shift = reference.beam_shift(end);
+            // How guides bend is still to be found: what the detector sees of that is part of the
+            // unknown (`BendPlan::seen_from`).
+            let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
+            let whole = reference.displacement(position, places.0, shift);
+            state.sideways[axis.index()] = core::array::from_fn(|k| whole[k] - tilts[k]);
+        }
+        for still in &seen {
+            session.thermometry.add(still.now, &still.temperatures)?;
+        }
+        Ok((state, session.thermometry.take()))
+    }
+}
+
+impl Session<'_> {
+    /// Writes a reading down.
+    fn keep(&mut self, reading: LineReadingEntry, journal: &mut Journal) -> Result<(), Failure> {
+        journal.write(&Entry::LineReading(reading.clone()))?;
+        self.read.readings.push(reading);
+        Ok(())
+    }
+
+    fn points_of(&self, at: usize) -> usize {
+        let plan = self.read.plan.as_ref();
+        plan.map_or(2, |it| it.lines[at].points)
+    }
+}

@@ -1,0 +1,570 @@
+//! Whether three axes that are corrected throughout their volume make sense as described.
+
+mod detectors;
+
+use units::Short;
+
+use crate::config::MachineConfig;
+use crate::config::judge::{Finding, Judge};
+use crate::volumetric::check::detectors::check_detectors;
+use crate::volumetric::settings;
+use crate::volumetric::{FeedConfig, ReactionName, VolumetricConfig};
+use machine::engine::{CHANNELS_MAX, THERMOMETERS_MAX};
+
+pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    let Some(volumetric) = &config.volumetric else {
+        return;
+    };
+    let judge = &mut Judge::at("volumetric".into(), findings);
+    check_axes(judge, config, volumetric);
+    check_volume(judge, config, volumetric);
+    check_zero(judge, config, volumetric);
+    check_compensation(judge, config, volumetric);
+    check_feed(judge, volumetric);
+    check_influences(judge, volumetric);
+    check_reference(judge, volumetric);
+    check_calibrate(judge, config, volumetric);
+    check_bends(judge, volumetric);
+    check_room(judge, config);
+    check_detectors(findings, config, volumetric);
+}
+
+fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    if config.platform.is_some() {
+        judge.say(
+            "",
+            "the axes cannot move a platform too",
+            "keep either [platform] or [volumetric]",
+        );
+    }
+    let [x, y, z] = &volumetric.axes;
+    if x == y || y == z || x == z {
+        judge.say(
+            "axes",
+            "an axis is named twice",
+            "give those that move along x, y and z",
+        );
+    }
+    for name in &volumetric.axes {
+        judge.known("axes", name, &config.axis, "axis");
+        let Some(axis) = config.axis.get(name) else {
+            continue;
+        };
+        if axis.cyclic.is_none() {
+            judge.say(
+                "axes",
+                format!("axis {name} does not follow cyclic set-points"),
+                format!("add [axis.{name}.cyclic]: the correction is part of each set-point"),
+            );
+        }
+        if axis.compensation.is_some() || axis.calibrate.is_some() {
+            judge.say(
+                "axes",
+                format!("axis {name} has an error table of its own"),
+                format!(
+                    "remove [axis.{name}.compensation] and `calibrate`: its errors are part of \
+                     the volume's"
+                ),
+            );
+        }
+    }
+    if let Err(error) = settings::volumetric_chain(volumetric) {
+        judge.say("chain", error.to_string(), "");
+    }
+}
+
+fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    if let Err(error) = settings::work_volume(volumetric) {
+        judge.say(
+            "high_mm",
+            error.to_string(),
+            "raise high_mm or lower low_mm",
+        );
+    }
+    judge.within("tool_max_mm", volumetric.tool_max_mm, 0.0, 1e4);
+    let tool = volumetric.tool_offset_mm;
+    let fits = tool.iter().all(|mm| mm.abs() <= volumetric.tool_max_mm);
+    if !fits {
+        judge.say(
+            "tool_offset_mm",
+            format!("{tool:?} is longer than tool_max_mm"),
+            "raise tool_max_mm: the correction is proven for tools up to it",
+        );
+    }
+    for mm in volumetric.expansion_fixed_mm {
+        judge.within("expansion_fixed_mm", mm, -1e5, 1e5);
+    }
+    // The corrected command may lie outside the volume by the size of the correction.
+    let room_mm = volumetric.compensation.size_limit_um * 1e-3;
+    for (at, name) in volumetric.axes.iter().enumerate() {
+        let Some(axis) = config.axis.get(name) else {
+            continue;
+        };
+        let (low, high) = (volumetric.low_mm[at], volumetric.high_mm[at]);
+        let fits = low - room_mm >= axis.soft_min_mm && high + room_mm <= axis.soft_max_mm;
+        if !fits {
+            judge.say(
+                "low_mm",
+                format!(
+                    "{low} to {high} mm with corrections of {} mm leave the soft limits \
+                     of axis {name}, {} to {} mm",
+                    Short(room_mm),
+                    axis.soft_min_mm,
+                    axis.soft_max_mm
+                ),
+                "make the volume smaller, or the soft limits wider",
+            );
+        }
+    }
+}
+
+fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    let zero = &volumetric.zero;
+    let [first, second, third] = zero.order;
+    if first == second || second == third || first == third {
+        judge.say(
+            "zero.order",
+            "an axis is named twice",
+            "give all three, that which clears the workpiece first",
+        );
+    }
+    judge.within("zero.time_limit_s", zero.time_limit_s, 0.1, 1e5);
+    for (name, index_mm) in volumetric.axes.iter().zip(zero.index_mm) {
+        let Some(axis) = config.axis.get(name) else {
+            continue;
+        };
+        judge.within(
+            "zero.search_speed_mm_per_s",
+            zero.search_speed_mm_per_s,
+            1e-3,
+            axis.speed_max_mm_per_s,
+        );
+        let inside = index_mm >= axis.soft_min_mm && index_mm < axis.soft_max_mm;
+        if !inside {
+            judge.say(
+                "zero.index_mm",
+                format!("the index of axis {name} lies outside its soft limits"),
+                "give the first index pulse off the negative limit switch",
+            );
+        }
+    }
+}
+
+fn check_compensation(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+) {
+    let own = &volumetric.compensation;
+    judge.within("compensation.size_limit_um", own.size_limit_um, 1e-3, 1e4);
+    judge.within("compensation.slope_limit", own.slope_limit, 1e-9, 0.5);
+    let rate = own.rate_limit_um_per_s;
+    judge.within("compensation.rate_limit_um_per_s", rate, 1e-3, 1e6);
+    judge.within(
+        "compensation.displacement_max_um",
+        own.displacement_max_um,
+        0.0,
+        own.size_limit_um.max(0.0),
+    );
+    for name in &volumetric.axes {
+        let Some(cyclic) = config.axis.get(name).and_then(|it| it.cyclic.as_ref()) else {
+            continue;
+        };
+        let (size, rate) = (cyclic.correction_limit_um, cyclic.correction_rate_um_per_s);
+        for (key, wanted, seen, of_axis) in [
+            (
+                "compensation.size_limit_um",
+                own.size_limit_um,
+                size,
+                "correction_limit_um",
+            ),
+            (
+                "compensation.rate_limit_um_per_s",
+                own.rate_limit_um_per_s,
+                rate,
+                "correction_rate_um_per_s",
+            ),
+        ] {
+            let enough = seen >= wanted;
+            if !enough {
+                judge.say(
+                    key,
+                    format!("axis {name} takes corrections up to {seen} only ({of_axis})"),
+                    format!("raise axis.{name}.cyclic.{of_axis} to at least {wanted}"),
+                );
+            }
+        }
+    }
+}
+
+fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let detectors = volumetric.beam.each().iter().any(Option::is_some)
+        || volumetric.roll.is_some()
+        || !volumetric.temperature.is_empty();
+    let Some(feed) = &volumetric.feed else {
+        if detectors {
+            judge.say(
+                "",
+                "there are detectors, but no section `feed`",
+                "add [volumetric.feed]: what is to be done when one of them is in trouble",
+            );
+        }
+        return;
+    };
+    let FeedConfig {
+        patience_ms,
+        reaction,
+        fade_out_s,
+        blend_s,
+        confirm,
+        smoothing_s,
+    } = feed;
+    judge.within("feed.patience_ms", *patience_ms, 0.0, 6e5);
+    judge.within("feed.blend_s", *blend_s, 0.0, 3600.0);
+    judge.within("feed.confirm", (*confirm).into(), 1.0, 1e6);
+    judge.within("feed.smoothing_s", *smoothing_s, 0.0, 3600.0);
+    match (reaction, fade_out_s) {
+        (ReactionName::FadeOut, Some(fade)) => {
+            judge.within("feed.fade_out_s", *fade, 0.0, 3600.0);
+        }
+        (ReactionName::FadeOut, None) => judge.say(
+            "feed.reaction",
+            "fade_out needs `fade_out_s`",
+            "say over which time",
+        ),
+        (ReactionName::Hold | ReactionName::Stop, Some(_)) => judge.say(
+            "feed.fade_out_s",
+            "nothing fades out with this reaction",
+            "remove it, or set reaction = \"fade_out\"",
+        ),
+        (ReactionName::Hold | ReactionName::Stop, None) => {}
+    }
+}
+
+fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    if let Some(own) = &volumetric.calibrate {
+        let instruments = &config.instrument;
+        judge.known(
+            "calibrate.instrument",
+            &own.instrument,
+            instruments,
+            "instrument",
+        );
+        judge.within("calibrate.step_mm", own.step_mm, 0.1, 1e3);
+        judge.within("calibrate.settle_ms", own.settle_ms, 0.0, 1e5);
+        let samples = f64::from(own.average_samples);
+        judge.within("calibrate.average_samples", samples, 1.0, 1e5);
+        let samples = f64::from(own.detector_samples);
+        judge.within("calibrate.detector_samples", samples, 1.0, 1e4);
+        let limit = own.resume_limit_um;
+        judge.within("calibrate.resume_limit_um", limit, 0.01, 1e3);
+        let second = own.second_tool_offset_mm.unwrap_or_default();
+        for mm in second {
+            let most = volumetric.tool_max_mm;
+            judge.within("calibrate.second_tool_offset_mm", mm, -most, most);
+        }
+        if volumetric.reference.is_none() {
+            judge.say(
+                "calibrate",
+                "the detectors' references are taken with the errors, but nothing says how",
+                "add [volumetric.reference]",
+            );
+        }
+    }
+    if let Some(own) = &volumetric.verify {
+        judge.within("verify.points", f64::from(own.points), 2.0, 1e4);
+        judge.within("verify.limit_um", own.limit_um, 1e-3, 1e5);
+        for k in 0..3 {
+            let (low, high) = (volumetric.low_mm[k], volumetric.high_mm[k]);
+            judge.within("verify.from_mm", own.from_mm[k], low, high);
+            judge.within("verify.to_mm", own.to_mm[k], low, high);
+        }
+        if volumetric.calibrate.is_none() {
+            judge.say(
+                "verify",
+                "nothing says how lines are read",
+                "add [volumetric.calibrate]",
+            );
+        }
+    }
+}
+
+fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let known = volumetric.temperature.len();
+    for (at, bend) in volumetric.bend.iter().enumerate() {
+        let key = |key: &str| format!("bend.{at}.{key}");
+        let missing = |it: usize| it >= known;
+        if missing(bend.over) || bend.under.is_some_and(missing) || bend.under == Some(bend.over) {
+            judge.say(
+                &key("over"),
+                format!(
+                    "thermometers {} and {:?} are not two of the {known}",
+                    bend.over, bend.under
+                ),
+                "count [[volumetric.temperature]] from 0",
+            );
+        }
+        if bend.axis == bend.towards {
+            judge.say(
+                &key("towards"),
+                "a guide bends across its axis",
+                "name another axis",
+            );
+        }
+        let mut before = volumetric.bend[..at].iter();
+        if before.any(|it| (it.axis, it.towards) == (bend.axis, bend.towards)) {
+            judge.say(
+                &key("axis"),
+                "this guide bends in this direction twice",
+                "keep one",
+            );
+        }
+        judge.below(
+            (&key("low_mm"), bend.low_mm),
+            (&key("high_mm"), bend.high_mm),
+        );
+        judge.within(&key("gradient_max_k"), bend.gradient_max_k, 1e-3, 100.0);
+    }
+}
+
+fn check_reference(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let Some(reference) = &volumetric.reference else {
+        return;
+    };
+    judge.within("reference.step_mm", reference.step_mm, 0.1, 1e3);
+    let samples = f64::from(reference.samples);
+    judge.within("reference.samples", samples, 1.0, 1e4);
+    if let Some(kelvin) = reference.warmth_tolerance_k {
+        judge.within("reference.warmth_tolerance_k", kelvin, 1e-3, 100.0);
+    }
+}
+
+fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
+    let mut seen = Vec::new();
+    for it in &volumetric.influence {
+        let key = (it.axis, it.direction, it.along);
+        if it.axis == it.direction {
+            judge.say(
+                "influence",
+                "a detector sees its axis from the side only",
+                "give a `direction` other than `axis`",
+            );
+        }
+        if seen.contains(&key) {
+            judge.say("influence", "is given twice", "keep one of them");
+        }
+        seen.push(key);
+    }
+    if let Err(error) = settings::influences(&volumetric.influence) {
+        judge.say("influence", error.to_string(), "");
+    }
+}
+
+/// The engine hands a limited number of channels to a correction.
+fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
+    let modules = config.analog.values();
+    let voltages: usize = modules.clone().map(|it| it.channels.len()).sum();
+    let sensors: usize = modules.map(|it| it.temperature_channels.len()).sum();
+    for (what, seen, limit) in [
+        ("voltages", voltages, CHANNELS_MAX),
+        ("thermometers", sensors, THERMOMETERS_MAX),
+    ] {
+        if seen > limit {
+            judge.say(
+                "",
+                format!("all modules have {seen} {what}, the correction sees {limit}"),
+                "list the channels that are used only",
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::parse;
+    use crate::config::validate::told;
+
+    const VOLUMETRIC: &str = include_str!("../../../configs/machines/volumetric.toml");
+
+    /// The finding at `volumetric` and `key` after `from`, once, has become `to`.
+    #[track_caller]
+    fn check(from: &str, to: &str, key: &str, says: &str) {
+        told::check(VOLUMETRIC, from, to, &format!("volumetric{key}"), says);
+    }
+
+    #[test]
+    fn the_shipped_three_axes_are_sound() {
+        parse(VOLUMETRIC, "volumetric.toml").unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    #[test]
+    fn axes_and_volume_that_cannot_be_are_found_where_they_stand() {
+        let axes = "axes = [\"x\", \"y\", \"z\"]";
+        check(axes, "axes = [\"x\", \"x\", \"z\"]", ".axes", "twice");
+        check(axes, "axes = [\"x\", \"y\", \"w\"]", ".axes", "no axis `w`");
+        let cyclic = "[axis.x.cyclic]\njerk_mm_per_s3 = 20000.0\ndeviation_limit_um = 500.0\n\
+                      correction_limit_um = 300.0\ncorrection_rate_um_per_s = 2000.0\n";
+        check(cyclic, "", ".axes", "does not follow cyclic");
+        check("\"FXYZ\"", "\"FXYX\"", ".chain", "`FXYX`");
+        let high = "high_mm = [500.0,";
+        check(high, "high_mm = [-1.0,", ".high_mm", "no range");
+        check(
+            high,
+            "high_mm = [502.9,",
+            ".low_mm",
+            "leave the soft limits",
+        );
+        let tool = "tool_offset_mm = [0.0, 0.0, -100.0]";
+        check(
+            tool,
+            "tool_offset_mm = [0.0, 0.0, nan]",
+            ".tool_offset_mm",
+            "tool_max_mm",
+        );
+        let order = "order = [\"z\", \"y\", \"x\"]";
+        check(
+            order,
+            "order = [\"z\", \"y\", \"z\"]",
+            ".zero.order",
+            "twice",
+        );
+        let speed = "search_speed_mm_per_s = 20.0";
+        let key = ".zero.search_speed_mm_per_s";
+        check(speed, "search_speed_mm_per_s = 900.0", key, "900");
+        let key = ".compensation.size_limit_um";
+        check(
+            "size_limit_um = 250.0",
+            "size_limit_um = 301.0",
+            key,
+            "axis x",
+        );
+        let key = ".compensation.rate_limit_um_per_s";
+        let from = "\nrate_limit_um_per_s = 2000.0";
+        check(from, "\nrate_limit_um_per_s = 2001.0", key, "axis x");
+    }
+
+    #[test]
+    fn detectors_that_cannot_be_are_found_where_they_stand() {
+        let (from, slider) = ("channels = [0, 1, 2, 3]\n", ".beam.x.slider");
+        let key = format!("{slider}.channels");
+        check(from, "channels = [0, 1, 2, 9]\n", &key, "has no 9");
+        check(from, "channels = [0, 1, 2, 2]\n", &key, "another detector");
+        let end = ".beam.x.end.channels";
+        check(
+            "channels = [4, 5, 6, 7]\n",
+            "channels = [3, 5, 6, 7]\n",
+            end,
+            "another",
+        );
+        check(
+            "ratio_max = 0.3\n",
+            "",
+            slider,
+            "`um_per_one` with `ratio_max`",
+        );
+        check(
+            "intensity_max_v = 11.0",
+            "intensity_max_v = 4.0",
+            slider,
+            "intensity",
+        );
+        let key = format!("{slider}.age_max_ms");
+        check(
+            "age_max_ms = 100.0",
+            "age_max_ms = 30.0",
+            &key,
+            "every 20 ms",
+        );
+        check("end_mm = 600.0\n", "", ".beam.x.drift", "`end_mm`");
+        let (from, to) = ("drift = \"pivoting\"", "drift = \"translating\"");
+        check(from, to, ".beam.x.source_mm", "no such key");
+        let key = format!("{slider}.saturation_v");
+        check(
+            "saturation_v = 3.2",
+            "saturation_v = 4.0",
+            &key,
+            "up to 3.2 V",
+        );
+        check(
+            "base_mm = 300.0",
+            "base_mm = 40.0",
+            ".roll",
+            "do not determine",
+        );
+        check(
+            "channel = 3\n",
+            "channel = 2\n",
+            ".temperature[1].channel",
+            "another",
+        );
+        check(
+            "channel = 3\n",
+            "channel = 1\n",
+            ".temperature[1].channel",
+            "has no 1",
+        );
+    }
+
+    #[test]
+    fn guides_bend_by_thermometers_that_there_are_and_across_their_axes() {
+        check(
+            "over = 0\n",
+            "over = 6\n",
+            ".bend.0.over",
+            "not two of the 6",
+        );
+        check("under = 1\n", "under = 0\n", ".bend.0.over", "not two");
+        check(
+            "towards = \"z\"",
+            "towards = \"x\"",
+            ".bend.0.towards",
+            "across",
+        );
+        check(
+            "gradient_max_k = 4.0",
+            "gradient_max_k = 0.0",
+            ".bend.0.gradient_max_k",
+            "0",
+        );
+    }
+
+    #[test]
+    fn lines_are_read_by_an_instrument_that_there_is_within_the_volume() {
+        let key = ".calibrate.instrument";
+        check(
+            "instrument = \"laser\"",
+            "instrument = \"ruler\"",
+            key,
+            "ruler",
+        );
+        check("step_mm = 50.0", "step_mm = 0.0", ".calibrate.step_mm", "0");
+        check("to_mm = [500.0,", "to_mm = [501.0,", ".verify.to_mm", "501");
+    }
+
+    #[test]
+    fn references_need_stops_and_samples() {
+        let key = ".reference.step_mm";
+        check("step_mm = 25.0", "step_mm = 0.0", key, "0");
+        let key = ".reference.samples";
+        check("samples = 50", "samples = 0", key, "0");
+    }
+
+    #[test]
+    fn what_a_feed_does_must_be_said_and_nothing_else() {
+        let from = "fade_out_s = 60.0\n";
+        check(from, "", ".feed.reaction", "needs `fade_out_s`");
+        let (from, to) = ("reaction = \"fade_out\"", "reaction = \"hold\"");
+        check(from, to, ".feed.fade_out_s", "nothing fades");
+        check(
+            "confirm = 10",
+            "confirm = 0",
+            ".feed.confirm",
+            "0 is impossible",
+        );
+        let begin = VOLUMETRIC.find("[volumetric.feed]").expect("it has a feed");
+        let end = VOLUMETRIC
+            .find("[volumetric.compensation]")
+            .expect("it comes next");
+        check(&VOLUMETRIC[begin..end], "", "", "no section `feed`");
+    }
+}

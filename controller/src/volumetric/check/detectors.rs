@@ -1,0 +1,277 @@
+//! Whether the detectors of three axes make sense: wiring, curves, limits.
+
+use core::num::NonZeroU32;
+use std::collections::BTreeSet;
+
+use crate::config::judge::{Finding, Judge};
+use crate::config::{AnalogConfig, AnalogDevice, MachineConfig};
+use crate::volumetric::settings;
+use crate::volumetric::{
+    BeamConfig, BeamDetectorConfig, BeamDriftName, RollConfig, TemperatureConfig, VolumetricConfig,
+};
+
+/// An analog input, by the names of module and quantity and its channel.
+type Input<'a> = (&'a str, &'static str, u8);
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// How the inputs of a module are called in findings.
+const VOLTAGE: &str = "channels";
+const TEMPERATURE: &str = "temperature_channels";
+
+pub(crate) fn check_detectors(
+    findings: &mut Vec<Finding>,
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+) {
+    let mut taken = BTreeSet::new();
+    check_beams(findings, config, volumetric, &mut taken);
+    if let Some(roll) = &volumetric.roll {
+        let judge = &mut Judge::at("volumetric.roll".into(), findings);
+        check_roll(judge, config, roll, &mut taken);
+    }
+    for (at, temperature) in volumetric.temperature.iter().enumerate() {
+        let judge = &mut Judge::at(format!("volumetric.temperature[{at}]"), findings);
+        check_temperature(judge, config, temperature, &mut taken);
+    }
+}
+
+fn check_beams<'a>(
+    findings: &mut Vec<Finding>,
+    config: &'a MachineConfig,
+    volumetric: &'a VolumetricConfig,
+    taken: &mut BTreeSet<Input<'a>>,
+) {
+    for (axis, beam) in AXES.iter().zip(volumetric.beam.each()) {
+        let Some(beam) = beam else {
+            continue;
+        };
+        let at = format!("volumetric.beam.{axis}");
+        check_drift(&mut Judge::at(at.clone(), findings), beam);
+        let judge = &mut Judge::at(format!("{at}.slider"), findings);
+        check_detector(judge, config, &beam.slider, taken);
+        if let Some(end) = &beam.end {
+            let judge = &mut Judge::at(format!("{at}.end"), findings);
+            check_detector(judge, config, end, taken);
+        }
+    }
+}
+
+fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
+    let places = beam.drift != BeamDriftName::Translating;
+    let share = beam.drift == BeamDriftName::Mixed;
+    if let Some(um) = beam.standard_uncertainty_um {
+        judge.within("standard_uncertainty_um", um, 0.0, 1e3);
+    }
+    for (key, is_there, needed) in [
+        ("source_mm", beam.source_mm.is_some(), places),
+        ("end_mm", beam.end_mm.is_some(), places),
+        ("translation_share", beam.translation_share.is_some(), share),
+    ] {
+        match (is_there, needed) {
+            (false, true) => judge.say(
+                "drift",
+                format!("a beam that drifts like this needs `{key}`"),
+                "add it",
+            ),
+            (true, false) => judge.say(
+                key,
+                "a beam that drifts like this has no such key",
+                "remove it",
+            ),
+            (true, true) | (false, false) => {}
+        }
+    }
+    if let (true, Some(source), Some(end)) = (places, beam.source_mm, beam.end_mm) {
+        let apart = (end - source).abs();
+        judge.within("end_mm", apart, 1e-3, 1e6);
+    }
+    if let (true, Some(translation)) = (share, beam.translation_share) {
+        judge.within("translation_share", translation, 0.0, 1.0);
+    }
+}
+
+fn check_detector<'a>(
+    judge: &mut Judge<'_>,
+    config: &'a MachineConfig,
+    detector: &'a BeamDetectorConfig,
+    taken: &mut BTreeSet<Input<'a>>,
+) {
+    let channels = &detector.channels;
+    if let Some(analog) = module(judge, config, &detector.analog) {
+        for channel in channels {
+            claim(judge, (&detector.analog, VOLTAGE, *channel), analog, taken);
+            check_saturation(judge, detector, analog, *channel);
+        }
+        check_age(judge, config, analog, detector.age_max_ms);
+    }
+    check_stuck(judge, detector.stuck_samples);
+    for mv in detector.dark_mv {
+        judge.within("dark_mv", mv, -1e5, 1e5);
+    }
+    if let Err(error) = settings::beam_detector(detector) {
+        let help = "configs/README.md describes every key of a beam detector";
+        judge.say("", error.to_string(), help);
+    }
+}
+
+/// Two or three equal samples are a coincidence that comes every minute.
+fn check_stuck(judge: &mut Judge<'_>, samples: Option<NonZeroU32>) {
+    if let Some(samples) = samples {
+        judge.within("stuck_samples", samples.get().into(), 10.0, 1e6);
+    }
+}
+
+/// A converter at its end must count as saturated.
+fn check_saturation(
+    judge: &mut Judge<'_>,
+    detector: &BeamDetectorConfig,
+    analog: &AnalogConfig,
+    channel: u8,
+) {
+    let place = analog.channels.iter().position(|it| *it == channel);
+    let range_v = place.and_then(|it| analog.full_scale_v.get(it));
+    let Some(range_v) = range_v.filter(|it| detector.saturation_v > **it) else {
+        return;
+    };
+    judge.say(
+        "saturation_v",
+        format!(
+            "channel {channel} of {} is read up to {range_v} V only",
+            detector.analog
+        ),
+        format!("give at most {range_v}"),
+    );
+}
+
+/// The module called `name`, if it samples at SYNC: that alone tells when something was.
+fn module<'a>(
+    judge: &mut Judge<'_>,
+    config: &'a MachineConfig,
+    name: &str,
+) -> Option<&'a AnalogConfig> {
+    judge.known("analog", name, &config.analog, "analog module");
+    let analog = config.analog.get(name)?;
+    match analog.device {
+        AnalogDevice::Cia401 | AnalogDevice::Cia404 => Some(analog),
+        AnalogDevice::Dcon => {
+            judge.say(
+                "analog",
+                "a dcon module does not sample at SYNC",
+                "use a module on CAN",
+            );
+            None
+        }
+    }
+}
+
+/// An input must be there, and belongs to one detector.
+fn claim<'a>(
+    judge: &mut Judge<'_>,
+    input: Input<'a>,
+    analog: &AnalogConfig,
+    taken: &mut BTreeSet<Input<'a>>,
+) {
+    let (module, quantity, channel) = input;
+    let (key, known) = if quantity == TEMPERATURE {
+        ("channel", &analog.temperature_channels)
+    } else {
+        ("channels", &analog.channels)
+    };
+    if !known.contains(&channel) {
+        judge.say(
+            key,
+            format!("analog.{module}.{quantity} has no {channel}"),
+            format!("known: {known:?}"),
+        );
+    } else if !taken.insert(input) {
+        judge.say(
+            key,
+            format!("channel {channel} of {module} belongs to another detector already"),
+            "each input is one detector's",
+        );
+    }
+}
+
+/// A sample must be accepted for at least as long as the next one takes.
+fn check_age(judge: &mut Judge<'_>, config: &MachineConfig, analog: &AnalogConfig, age_ms: f64) {
+    let bus = analog.bus.as_ref().and_then(|bus| config.can.get(bus));
+    let Some(bus) = bus else {
+        return;
+    };
+    let every = f64::from(analog.every_syncs.unwrap_or(1).max(1));
+    let least = 2.0 * every * bus.sync_period_ms;
+    let enough = age_ms >= least;
+    if !enough {
+        judge.say(
+            "age_max_ms",
+            format!(
+                "{age_ms} ms, but the module samples every {} ms",
+                every * bus.sync_period_ms
+            ),
+            format!("give at least {least}"),
+        );
+    }
+}
+
+fn check_roll<'a>(
+    judge: &mut Judge<'_>,
+    config: &'a MachineConfig,
+    roll: &'a RollConfig,
+    taken: &mut BTreeSet<Input<'a>>,
+) {
+    if let Some(analog) = module(judge, config, &roll.analog) {
+        for channel in roll.channels {
+            claim(judge, (&roll.analog, VOLTAGE, channel), analog, taken);
+        }
+        check_age(judge, config, analog, roll.age_max_ms);
+    }
+    for mm in roll.mm_per_v {
+        judge.within("mm_per_v", mm.abs(), 1e-9, 1e3);
+    }
+    let speed = roll.speed_max_arcsec_per_s;
+    judge.within("speed_max_arcsec_per_s", speed, 1e-6, 1e6);
+    judge.within("noise_max_arcsec", roll.noise_max_arcsec, 1e-6, 1e6);
+    check_stuck(judge, roll.stuck_samples);
+    if let Some(arcsec) = roll.standard_uncertainty_arcsec {
+        judge.within("standard_uncertainty_arcsec", arcsec, 0.0, 1e3);
+    }
+    if let Err(error) = settings::roll_optics(roll) {
+        let help = "2 × height_mm must differ from base_mm × tan(inclination_deg)";
+        judge.say("", error.to_string(), help);
+    }
+}
+
+fn check_temperature<'a>(
+    judge: &mut Judge<'_>,
+    config: &'a MachineConfig,
+    temperature: &'a TemperatureConfig,
+    taken: &mut BTreeSet<Input<'a>>,
+) {
+    if let Some(analog) = module(judge, config, &temperature.analog) {
+        let input = (&*temperature.analog, TEMPERATURE, temperature.channel);
+        claim(judge, input, analog, taken);
+        check_age(judge, config, analog, temperature.age_max_ms);
+    }
+    judge.below(("low_c", temperature.low_c), ("high_c", temperature.high_c));
+    judge.within("low_c", temperature.low_c, -273.15, 1e3);
+    judge.within("high_c", temperature.high_c, -273.15, 1e3);
+    let rate = temperature.rate_max_k_per_min;
+    judge.within("rate_max_k_per_min", rate, 1e-6, 1e4);
+    judge.within("noise_max_k", temperature.noise_max_k, 1e-6, 1e3);
+    check_stuck(judge, temperature.stuck_samples);
+    let uncertainty = temperature.standard_uncertainty_k;
+    judge.within("standard_uncertainty_k", uncertainty, 0.0, 1e3);
+    for (key, limit, values) in [
+        ("expansion_ppm_per_k", 1e3, temperature.expansion_ppm_per_k),
+        ("growth_um_per_k", 1e4, temperature.growth_um_per_k),
+        (
+            "squareness_arcsec_per_k",
+            1e4,
+            temperature.squareness_arcsec_per_k,
+        ),
+    ] {
+        for value in values {
+            judge.within(key, value, -limit, limit);
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! All that a correction is computed from: how it stands, how one correction goes on with what
+//! another has seen, and what is seen without being corrected.
+
+use core::any::Any;
+use core::time::Duration;
+
+use compensator::volumetric::online::{FeedStatus, StateRecorder};
+use compensator::volumetric::{Axis, Point};
+use units::Time;
+
+use crate::volumetric::correction::VolumetricCorrection;
+use crate::volumetric::thermometers::Thermometers;
+use machine::engine::Source;
+
+impl VolumetricCorrection {
+    /// Watches displacements without compensating them from now on: the machine is made to be as it
+    /// is this hour. Tables, roll and temperatures go on. To be said before it is in use.
+    #[must_use]
+    pub fn leaving_displacements(mut self) -> Self {
+        for beam in self.beams.iter_mut().flatten() {
+            let now = Time::ZERO;
+            beam.monitor.feed_mut().disable(now, Duration::ZERO);
+        }
+        self
+    }
+
+    /// Tells `recorder` what displacements the machine was left with in the last period at
+    /// `actual`, beyond what the first memory keeps. Allocates nothing.
+    pub(in crate::volumetric) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
+        for axis in Axis::ALL {
+            let beam = self.beams[axis.index()].as_ref();
+            let Some(left) = beam.and_then(|it| it.monitor.uncompensated()) else {
+                continue;
+            };
+            let position = actual.along(axis);
+            let beyond = self.memories.beyond_first(axis, position, left);
+            recorder.record(axis, position, beyond);
+        }
+    }
+
+    /// What stands behind each value that is used.
+    pub(super) fn statuses(&self) -> impl Iterator<Item = (Source, FeedStatus)> {
+        let beams = Axis::ALL.into_iter().zip(&self.beams);
+        let beams = beams.filter_map(|(axis, it)| Some((axis, it.as_ref()?)));
+        let beams = beams.flat_map(|(axis, it)| {
+            let (slider, end) = it.monitor.status();
+            let end = end.map(|it| (Source::EndOfTravel(axis), it));
+            core::iter::once((Source::Slide(axis), slider)).chain(end)
+        });
+        let roll = self.roll.iter();
+        let roll = roll.map(|it| (Source::Roll(it.axis), it.feed.status()));
+        let thermometers = self.thermometers.iter().flat_map(Thermometers::statuses);
+        let thermometers = thermometers.enumerate();
+        let thermometers = thermometers.map(|(at, it)| (Source::Thermometer(at), it));
+        beams.chain(roll).chain(thermometers)
+    }
+
+    /// Every source that both know goes on where it was. References and memories may be others:
+    /// what is wanted now is blended to from what was given out last.
+    pub(super) fn go_on_from(&mut self, before: &dyn Any) {
+        let Some(before) = before.downcast_ref::<Self>() else {
+            return;
+        };
+        for (own, before) in self.beams.iter_mut().zip(&before.beams) {
+            if let (Some(own), Some(before)) = (own, before) {
+                own.monitor.take_over(&before.monitor);
+            }
+        }
+        if let (Some(own), Some(before)) = (&mut self.roll, &before.roll)
+            && own.axis == before.axis
+        {
+            own.feed.take_over(&before.feed);
+        }
+        if let (Some(own), Some(before)) = (&mut self.thermometers, &before.thermometers) {
+            own.take_over(before);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! How sure the correction is: by what stands behind each value that is used.
+
+use compensator::volumetric::Point;
+use compensator::volumetric::model::Conditions;
+use compensator::volumetric::online::FeedStatus;
+use units::portable::hypot;
+use units::{Metres, Quantity, Radians};
+
+use crate::volumetric::correction::{VolumetricCorrection, per_axis};
+use crate::volumetric::thermometers::Thermometers;
+use machine::engine::{AXES_MAX, PerAxis};
+
+impl VolumetricCorrection {
+    /// Of a displacement that nobody sees nothing is known but that it is no larger than the
+    /// largest permitted; one that blends in is off by what is left of that.
+    fn u_displacement(&self) -> Metres {
+        let largest = self.model.machine().displacement_max / 3.0_f64.sqrt();
+        let beams = self.beams.iter().flatten();
+        let each = beams.map(|it| {
+            let (slider, end) = it.monitor.status();
+            if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
+                let left = it.monitor.left().value();
+                Metres(hypot(self.u_displacement.value(), left))
+            } else {
+                largest
+            }
+        });
+        each.fold(self.u_displacement, Quantity::max)
+    }
+
+    /// Likewise of a roll.
+    fn u_roll(&self) -> Radians {
+        match &self.roll {
+            Some(roll) if roll.feed.status() == FeedStatus::Good => {
+                Radians(hypot(self.u_roll.value(), roll.feed.left().value()))
+            }
+            Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
+            None => self.u_roll,
+        }
+    }
+
+    /// The standard uncertainties at `command`.
+    pub(super) fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
+        let (u_displacement, u_roll) = (self.u_displacement(), self.u_roll());
+        let temperatures = self.thermometers.as_ref();
+        let u_temperatures = temperatures.map_or(&[][..], Thermometers::u_kelvin);
+        let u =
+            self.model
+                .standard_uncertainty(command, now, u_displacement, u_roll, u_temperatures);
+        u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
+    }
+}

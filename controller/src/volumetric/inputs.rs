@@ -1,0 +1,132 @@
+//! Where in the engine's channels each detector stands, and whether it is to be believed.
+
+use core::time::Duration;
+
+use compensator::volumetric::online::{RollOptics, Sample, StuckWatch, Trouble};
+use units::{Metres, Quantity, Radians, Time, Volts};
+
+use crate::config::{AnalogConfig, MachineConfig};
+use crate::volumetric::settings::roll_optics;
+use crate::volumetric::{FeedConfig, RollConfig};
+use machine::engine::{Channel, Observed};
+
+use crate::volumetric::VolumetricFailure;
+
+/// Where the voltage `channel` of `module` stands among all modules' channels.
+pub(super) fn place_of_voltage(config: &MachineConfig, module: &str, channel: u8) -> usize {
+    place(config, module, channel, |it| &it.channels)
+}
+
+/// Likewise of a thermometer.
+pub(super) fn place_of_temperature(config: &MachineConfig, module: &str, channel: u8) -> usize {
+    place(config, module, channel, |it| &it.temperature_channels)
+}
+
+/// The engine lists the modules in the order of their names.
+fn place(
+    config: &MachineConfig,
+    module: &str,
+    channel: u8,
+    channels: fn(&AnalogConfig) -> &Vec<u8>,
+) -> usize {
+    let modules = config.analog.iter();
+    let before = modules.take_while(|(name, _)| **name != module);
+    let before: usize = before.map(|(_, it)| channels(it).len()).sum();
+    let own = channels(&config.analog[module]);
+    let within = own.iter().position(|it| *it == channel);
+    before + within.unwrap_or(own.len())
+}
+
+/// Four voltages of one moment; `None` before the first sample.
+pub(super) fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Option<Sample> {
+    let mut sample = Sample {
+        channels: [Volts::ZERO; 4],
+        at: Time::NEVER,
+    };
+    for (volts, place) in sample.channels.iter_mut().zip(places) {
+        let channel = channels.get(*place).copied().flatten()?;
+        *volts = channel.volts;
+        sample.at = sample.at.min(channel.at);
+    }
+    Some(sample)
+}
+
+/// A feed counts what it is given: a module that samples every n SYNCs gives the same n times.
+pub(super) fn confirmed_by_samples(
+    config: &MachineConfig,
+    feed: &FeedConfig,
+    module: &str,
+) -> FeedConfig {
+    let every = config.analog.get(module).and_then(|it| it.every_syncs);
+    FeedConfig {
+        confirm: feed.confirm.saturating_mul(every.unwrap_or(1).into()),
+        ..feed.clone()
+    }
+}
+
+/// Two voltages that tell the roll of a slide.
+#[derive(Clone, Debug)]
+pub(super) struct RollReader {
+    places: [usize; 2],
+    per_volt: [f64; 2],
+    optics: RollOptics,
+    age_max: Duration,
+    /// Radians per second.
+    speed_max: f64,
+    noise_max: Radians,
+    last: Option<(Time, Radians)>,
+    stuck: StuckWatch<2>,
+}
+
+impl RollReader {
+    pub(super) fn new(
+        config: &MachineConfig,
+        roll: &RollConfig,
+    ) -> Result<Self, VolumetricFailure> {
+        let place = |channel: u8| place_of_voltage(config, &roll.analog, channel);
+        Ok(Self {
+            places: roll.channels.map(place),
+            per_volt: roll.mm_per_v.map(|mm| mm * 1e-3),
+            optics: roll_optics(roll)?,
+            age_max: Duration::from_secs_f64(roll.age_max_ms * 1e-3),
+            speed_max: Radians::from_arcsec(roll.speed_max_arcsec_per_s).value(),
+            noise_max: Radians::from_arcsec(roll.noise_max_arcsec),
+            last: None,
+            stuck: StuckWatch::new(roll.stuck_samples),
+        })
+    }
+
+    /// The roll by the newest samples.
+    pub(super) fn read(&mut self, observed: &Observed<'_>) -> Result<Radians, Trouble> {
+        let mut volts = [Volts::ZERO; 2];
+        let mut at = Time::NEVER;
+        for (volts, place) in volts.iter_mut().zip(&self.places) {
+            let channel = observed.channels.get(*place).copied().flatten();
+            let seen = channel.map_or(Duration::MAX, |it| observed.now.since(it.at));
+            let limit = self.age_max;
+            let Some(channel) = channel.filter(|_| seen <= limit) else {
+                return Err(Trouble::Stale { seen, limit });
+            };
+            if channel.saturated {
+                return Err(Trouble::AtEnd {
+                    seen: channel.volts,
+                });
+            }
+            *volts = channel.volts;
+            at = at.min(channel.at);
+        }
+        self.stuck.check(at, volts.map(Quantity::value))?;
+        let reading = |k: usize| Metres(volts[k].value() * self.per_volt[k]);
+        let roll = self.optics.solve(reading(0), reading(1))?.angle;
+        if let Some((before, last)) = self.last {
+            let passed = at.since(before).as_secs_f64();
+            let limit = self.noise_max.value() + self.speed_max * passed;
+            let seen = (roll - last).value().abs();
+            if seen > limit {
+                return Err(Trouble::Jumped { seen, limit });
+            }
+        }
+        self.last = Some((at, roll));
+        Ok(roll)
+    }
+}

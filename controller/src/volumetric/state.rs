@@ -1,0 +1,250 @@
+//! What is stored of three axes, put together for the correction.
+//!
+//! Three kinds of records, each with its own pointer in the store: the errors, what the detectors
+//! read when the machine was as these errors say, and displacements that are to be kept. Each
+//! names the one it counts from; what does not belong together is refused.
+
+use compensator::volumetric::Axis;
+use compensator::volumetric::online::{BeamReference, Memories};
+
+use crate::config::ConfigHash;
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::store::{CalibrationRecord, IdentityRecord, RecordHead, Store, StoreError, short};
+use crate::volumetric::VolumetricConfig;
+use crate::volumetric::settings::beam_drift;
+use crate::volumetric::{BeamReferencesContent, GeometryContent, MemoryName, StateMemoryContent};
+use crate::volumetric::{VolumetricFailure, VolumetricState};
+
+/// What the errors of three axes are called where an axis is named.
+pub const GEOMETRY: &str = "volume";
+/// Likewise what their detectors read.
+pub const REFERENCES: &str = "volume-references";
+
+/// Likewise the displacements that are kept.
+pub const fn memory_pointer(memory: MemoryName) -> &'static str {
+    match memory {
+        MemoryName::First => "volume-first-memory",
+        MemoryName::Second => "volume-second-memory",
+    }
+}
+
+/// The names of the records that a state was made of.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VolumetricRecords {
+    /// The errors.
+    pub geometry: String,
+    /// What the detectors read.
+    pub references: Option<String>,
+    /// What the machine was built with.
+    pub first_memory: Option<String>,
+    /// What the first part was made with.
+    pub second_memory: Option<String>,
+}
+
+/// Reads records of one machine, and refuses those of others.
+struct Reader<'a> {
+    store: &'a Store,
+    here: RecordHead,
+    hash: &'a ConfigHash,
+}
+
+impl Reader<'_> {
+    /// The record that is in use under `pointer`, with its name.
+    fn active(&self, pointer: &str) -> Result<Option<(String, CalibrationRecord)>, StoreError> {
+        let Some(id) = self.store.active(pointer)?.current else {
+            return Ok(None);
+        };
+        let record = self.store.load(&id)?;
+        let here = RecordHead {
+            axis: pointer.to_owned(),
+            ..self.here.clone()
+        };
+        record.head.belongs_to(&id, &here, self.hash)?;
+        Ok(Some((id, record)))
+    }
+}
+
+impl Machine {
+    /// What `store` says is in use for these three axes, with the names of the records; `None`
+    /// when their errors were never measured. What is not measured with the errors in use is no
+    /// part of it and refused.
+    ///
+    /// # Errors
+    /// When a record is damaged, belongs to another machine, configuration, drive or calibration,
+    /// or holds no functions.
+    pub fn volumetric_state(
+        &self,
+        store: &Store,
+    ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
+        self.state_with(store, &[MemoryName::First, MemoryName::Second])
+    }
+
+    /// Likewise, with no other memories than `wanted`, the first before the second.
+    pub(super) fn state_with(
+        &self,
+        store: &Store,
+        wanted: &[MemoryName],
+    ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
+        let config = self.volumetric_config()?;
+        let here = self.this_volume(GEOMETRY)?;
+        let reader = Reader {
+            store,
+            here,
+            hash: &self.config_hash,
+        };
+        let Some((id, record)) = reader.active(GEOMETRY)? else {
+            return Ok(None);
+        };
+        let geometry = record.geometry(&id)?;
+        self.check_drives(&id, geometry, config)?;
+        check_thermometers(geometry, config)?;
+        let mut state = VolumetricState {
+            axes: geometry.errors(&id)?,
+            squareness: geometry.squareness(),
+            bends: geometry.bends(&id)?,
+            expansions: geometry.expansions(&id)?,
+            temperatures: geometry.temperatures(),
+            ..VolumetricState::default()
+        };
+        let mut records = VolumetricRecords {
+            geometry: id,
+            ..VolumetricRecords::default()
+        };
+        if let Some((id, record)) = reader.active(REFERENCES)? {
+            let references = record.beam_references(&id)?;
+            if references.geometry != records.geometry {
+                let (references, measured_with) = (short(&id), short(&references.geometry));
+                let geometry = short(&records.geometry);
+                return Err(VolumetricFailure::OtherGeometry {
+                    references,
+                    measured_with,
+                    geometry,
+                }
+                .into());
+            }
+            state.beams = beams(&id, references, config)?;
+            state.roll = references.roll(&id)?;
+            records.references = Some(id);
+        }
+        state.memories = memories(&reader, &mut records, wanted)?;
+        Ok(Some((state, records)))
+    }
+
+    /// What a record of these three axes says of the machine it was made on.
+    ///
+    /// # Errors
+    /// When there are no three axes.
+    pub(super) fn this_volume(&self, pointer: &str) -> Result<RecordHead, VolumetricFailure> {
+        let config = self.config().volumetric.as_ref();
+        let [first, ..] = &config.ok_or(VolumetricFailure::None)?.axes;
+        Ok(RecordHead {
+            axis: pointer.to_owned(),
+            ..self.this_machine(first)
+        })
+    }
+
+    /// Who the drives of x, y and z are.
+    pub(super) fn volume_drives(&self, config: &VolumetricConfig) -> Vec<IdentityRecord> {
+        let each = config.axes.iter().map(|it| self.drive_record(it));
+        each.collect()
+    }
+
+    fn check_drives(
+        &self,
+        id: &str,
+        geometry: &GeometryContent,
+        config: &VolumetricConfig,
+    ) -> Result<(), StoreError> {
+        let here = self.volume_drives(config);
+        for (expected, seen) in geometry.drives.iter().zip(&here) {
+            if expected.serial != seen.serial || expected.product != seen.product {
+                let text = |it: &IdentityRecord| format!("{:#X} serial {}", it.product, it.serial);
+                return Err(StoreError::Foreign {
+                    id: short(id),
+                    what: "a drive of the three axes",
+                    expected: text(expected),
+                    seen: text(seen),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Before the detectors are: the correction would only say so much later.
+fn check_thermometers(
+    geometry: &GeometryContent,
+    config: &VolumetricConfig,
+) -> Result<(), VolumetricFailure> {
+    let (seen, expected) = (geometry.temperatures_c.len(), config.temperature.len());
+    if seen == expected {
+        return Ok(());
+    }
+    Err(VolumetricFailure::Temperatures { seen, expected })
+}
+
+fn beams(
+    id: &str,
+    references: &BeamReferencesContent,
+    config: &VolumetricConfig,
+) -> Result<[Option<BeamReference>; 3], Failure> {
+    let mut beams = [None, None, None];
+    for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
+        let Some(beam) = beam else {
+            continue;
+        };
+        let section = "beam";
+        let drift = beam_drift(beam).ok_or(VolumetricFailure::NotConfigured { section })?;
+        beams[axis.index()] = references.beam(id, axis, drift)?;
+    }
+    Ok(beams)
+}
+
+fn memories(
+    reader: &Reader<'_>,
+    records: &mut VolumetricRecords,
+    wanted: &[MemoryName],
+) -> Result<Memories, Failure> {
+    let mut memories = Memories::default();
+    for memory in wanted {
+        let Some((id, record)) = reader.active(memory_pointer(*memory))? else {
+            continue;
+        };
+        let content = record.state_memory(&id)?;
+        check_memory(&id, content, records)?;
+        let map = Some(content.map(&id)?);
+        match memory {
+            MemoryName::First => (memories.first, records.first_memory) = (map, Some(id)),
+            MemoryName::Second => (memories.second, records.second_memory) = (map, Some(id)),
+        }
+    }
+    Ok(memories)
+}
+
+/// What does not count from what is in use keeps something else than it should.
+fn check_memory(
+    id: &str,
+    content: &StateMemoryContent,
+    records: &VolumetricRecords,
+) -> Result<(), VolumetricFailure> {
+    let name = |id: Option<&str>| id.map_or_else(|| "none".to_owned(), short);
+    let references = records.references.as_deref();
+    if Some(&*content.references) != references {
+        return Err(VolumetricFailure::OtherReferences {
+            which: content.memory.name(),
+            memory: short(id),
+            measured_with: short(&content.references),
+            references: name(references),
+        });
+    }
+    let first = records.first_memory.as_deref();
+    if content.memory == MemoryName::Second && content.first.as_deref() != first {
+        return Err(VolumetricFailure::OtherFirstMemory {
+            memory: short(id),
+            measured_with: name(content.first.as_deref()),
+            first: name(first),
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,266 @@
+//! Verify: a line that no calibration uses, read with the correction on, and written down.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use compensator::volumetric::Point;
+use compensator::volumetric::identify::Reading;
+use units::Metres;
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::run::note_failure;
+use crate::store::{Entry, Journal, Store};
+use crate::volumetric::inputs::place_of_temperature;
+use crate::volumetric::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
+use crate::volumetric::settings::point_of_mm;
+use crate::volumetric::{LineReadingEntry, VolumeCheckEntry, metres};
+use crate::volumetric::{Mover, VolumetricCorrection, VolumetricFailure};
+use crate::volumetric::{VolumetricConfig, VolumetricVerifyConfig};
+use machine::Stage;
+use machine::engine::THERMOMETERS_MAX;
+
+/// What it is called where progress is told.
+const WHOLE: &str = "volume";
+
+/// What corrects the machine while it is verified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VerifyBy {
+    /// Nothing: the machine as found.
+    AsFound,
+    /// Its tables alone, without detectors and thermometers.
+    Tables,
+    /// Everything that is stored and seen.
+    Everything,
+}
+
+impl VerifyBy {
+    /// As it is called on the page.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::AsFound => "as found",
+            Self::Tables => "by tables alone",
+            Self::Everything => "as left",
+        }
+    }
+}
+
+/// One place of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumetricVerifiedPoint {
+    /// Where the tool was sent.
+    pub at: Point,
+    /// Deviation along the line from that at its beginning.
+    pub deviation: Metres,
+    /// Standard uncertainty of the reading.
+    pub u: Metres,
+}
+
+/// What the line showed.
+#[derive(Clone, Debug)]
+pub struct VolumetricVerified {
+    /// Place by place.
+    pub points: Vec<VolumetricVerifiedPoint>,
+    /// Largest minus smallest deviation.
+    pub range: Metres,
+    /// What the range may be.
+    pub limit: Metres,
+    /// Where every reading is.
+    pub journal: PathBuf,
+}
+
+impl VolumetricVerified {
+    /// Whether it may be.
+    pub fn is_within_tolerance(&self) -> bool {
+        self.range <= self.limit
+    }
+}
+
+impl Machine {
+    /// Everything that is stored of the three axes, ready to correct them; `None` without a
+    /// calibration.
+    ///
+    /// # Errors
+    /// When what is stored does not belong to this machine, or cannot be applied.
+    pub fn stored_mover(&self, store: &Store) -> Result<Option<Mover>, Failure> {
+        let Some((state, _)) = self.volumetric_state(store)? else {
+            return Ok(None);
+        };
+        let correction = VolumetricCorrection::new(self.config(), state)?;
+        self.volumetric_mover(Box::new(correction)).map(Some)
+    }
+
+    /// What moves the machine, corrected as `by` says, and the name of the errors it uses.
+    fn mover_by(
+        &self,
+        store: &Store,
+        by: VerifyBy,
+    ) -> Result<(Option<Mover>, Option<String>), Failure> {
+        if by == VerifyBy::AsFound {
+            return Ok((None, None));
+        }
+        let stored = self.volumetric_state(store)?;
+        let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
+        let correction = match by {
+            VerifyBy::Tables => VolumetricCorrection::by_tables(self.config(), state)?,
+            VerifyBy::AsFound | VerifyBy::Everything => {
+                VolumetricCorrection::new(self.config(), state)?
+            }
+        };
+        let mover = self.volumetric_mover(Box::new(correction))?;
+        Ok((Some(mover), Some(records.geometry)))
+    }
+
+    /// Whether [`Machine::verify_volumetric`] has what it needs, before anything moves.
+    ///
+    /// # Errors
+    /// When it is not configured, or nothing that can be applied is stored.
+    pub fn check_verify(&self, store: &Store, by: VerifyBy) -> Result<(), Failure> {
+        self.verify_config()?;
+        self.mover_by(store, by).map(|_| ())
+    }
+
+    fn verify_config(&self) -> Result<VolumetricVerifyConfig, Failure> {
+        let section = "verify";
+        let own = self.volumetric_config()?.verify.clone();
+        Ok(own.ok_or(VolumetricFailure::NotConfigured { section })?)
+    }
+
+    /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
+    ///
+    /// # Errors
+    /// When nothing is stored, the line cannot be set up or read, or anything stops the machine.
+    pub fn verify_volumetric(
+        &mut self,
+        store: &Store,
+        by: VerifyBy,
+        operator: &mut dyn LineOperator,
+    ) -> Result<VolumetricVerified, Failure> {
+        let config = self.volumetric_config()?.clone();
+        let own = self.verify_config()?;
+        let (mover, geometry) = self.mover_by(store, by)?;
+        let header = self.volume_header("verify", geometry)?;
+        let mut journal = Journal::create(&store.runs(), &header)?;
+        journal.write(&Entry::VolumeCheck(VolumeCheckEntry {
+            state: by.text().to_owned(),
+            from_m: metres(point_of_mm(own.from_mm)),
+            to_m: metres(point_of_mm(own.to_mm)),
+            tool_m: metres(point_of_mm(config.tool_offset_mm)),
+            limit_m: Metres::from_um(own.limit_um).value(),
+        }))?;
+        let points = self
+            .read_verified(&config, &own, mover, operator, &mut journal)
+            .inspect_err(|it| note_failure(&mut journal, it))?;
+        journal.write(&Entry::Complete)?;
+        journal.flush_to_disk()?;
+        let path = journal.path().to_owned();
+        Ok(judged(points, Metres::from_um(own.limit_um), path))
+    }
+
+    fn read_verified(
+        &mut self,
+        config: &VolumetricConfig,
+        own: &VolumetricVerifyConfig,
+        mut mover: Option<Mover>,
+        operator: &mut dyn LineOperator,
+        journal: &mut Journal,
+    ) -> Result<Vec<VolumetricVerifiedPoint>, Failure> {
+        let section = "calibrate";
+        let calibrate = config.calibrate.as_ref();
+        let calibrate = calibrate.ok_or(VolumetricFailure::NotConfigured { section })?;
+        let (from, to) = (point_of_mm(own.from_mm), point_of_mm(own.to_mm));
+        let task = LineTask {
+            optics: LineOptics::Linear,
+            start: from,
+            end: to,
+            tool: point_of_mm(config.tool_offset_mm),
+            step: (1, 1),
+        };
+        let readout = LineReadout {
+            instrument: calibrate.instrument.clone(),
+            settle: Duration::from_secs_f64(calibrate.settle_ms * 1e-3),
+            samples: calibrate.average_samples,
+        };
+        let line = self.set_up_line(&task, &readout, operator)?;
+        if let Some(mover) = &mut mover {
+            self.correct_volume(mover, true)?;
+        }
+        let last = own.points - 1;
+        let mut points = Vec::new();
+        for n in 0..=last {
+            let (done, total) = (u64::from(n), u64::from(own.points));
+            self.core
+                .observer()
+                .progress(Stage::Verify, WHOLE, done, total);
+            let share = f64::from(n) / f64::from(last);
+            let way = to - from;
+            let at = from + Point::new(way.x * share, way.y * share, way.z * share);
+            let correction = match &mut mover {
+                Some(mover) => Some(self.drive_to(mover, at, readout.settle)?.offset),
+                None => {
+                    self.go_straight(at)?;
+                    None
+                }
+            };
+            let correction_m = correction.map(|it| core::array::from_fn(|k| it[k].value()));
+            points.push(self.verified_point(config, &line, at, correction_m, journal)?);
+        }
+        self.end_lines(operator)?;
+        Ok(points)
+    }
+
+    /// Reads the line where the machine stands.
+    fn verified_point(
+        &mut self,
+        config: &VolumetricConfig,
+        line: &Line,
+        at: Point,
+        correction_m: Option<[f64; 3]>,
+        journal: &mut Journal,
+    ) -> Result<VolumetricVerifiedPoint, Failure> {
+        let read = self.read_line_here(line, at)?;
+        let Reading::Length { deviation, u, .. } = read.reading else {
+            return Err(VolumetricFailure::NotALine.into());
+        };
+        journal.write(&Entry::LineReading(LineReadingEntry {
+            scatter_m: Some(read.scatter.value()),
+            temperatures_c: self.thermometers_now(config),
+            correction_m,
+            at_s: read.when.seconds(),
+            ..LineReadingEntry::of(0, &read.observation(0))
+        }))?;
+        Ok(VolumetricVerifiedPoint { at, deviation, u })
+    }
+
+    /// What the thermometers showed last, °C; a verification does not depend on them.
+    fn thermometers_now(&self, config: &VolumetricConfig) -> Vec<Option<f64>> {
+        let mut shown = [None; THERMOMETERS_MAX];
+        self.hear_temperatures(&mut shown);
+        let each = config.temperature.iter().map(|it| {
+            let place = place_of_temperature(self.config(), &it.analog, it.channel);
+            let sample = shown.get(place).copied().flatten()?;
+            sample.celsius.map(|it| it.value())
+        });
+        each.collect()
+    }
+}
+
+/// Deviations count from the first place: the line began before the correction did.
+fn judged(
+    mut points: Vec<VolumetricVerifiedPoint>,
+    limit: Metres,
+    journal: PathBuf,
+) -> VolumetricVerified {
+    let first = points.first().map_or(Metres(0.0), |it| it.deviation);
+    let (mut low, mut high) = (Metres(0.0), Metres(0.0));
+    for it in &mut points {
+        it.deviation -= first;
+        (low, high) = (low.min(it.deviation), high.max(it.deviation));
+    }
+    VolumetricVerified {
+        points,
+        range: high - low,
+        limit,
+        journal,
+    }
+}
