@@ -22,7 +22,7 @@
 
 use units::{Approach, Metres};
 
-use crate::measurement::LinearSeries;
+use crate::error_table::LinearSeries;
 use crate::uncertainty::{mean, standard_deviation};
 
 /// Coverage factor of ISO 230-2's figures.
@@ -307,7 +307,7 @@ impl Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::Measurement;
+    use crate::error_table::Measurement;
 
     /// A series from (target mm, deviations forward µm, deviations reverse µm).
     fn series(points: &[(f64, &[f64], &[f64])]) -> LinearSeries {

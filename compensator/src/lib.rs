@@ -6,7 +6,7 @@
 //!
 //! | module | what it answers |
 //! |---|---|
-//! | [`measurement`] | are these measured data complete and in order? |
+//! | [`data`] | are these measured data complete and in order? |
 //! | [`error_table`] | what is the deviation of a linear axis, and which command undoes it (system S3)? |
 //! | [`rotary`] | what is the error of a rotary table, by a plate worse than it (system S2)? |
 //! | [`hall_zero`] | where is the drift-free origin (system S5)? |
@@ -25,13 +25,13 @@
 
 pub mod air;
 pub mod apply;
+pub mod data;
 pub mod error_table;
 pub mod hall_zero;
 pub mod interpolation;
 pub mod iso230;
 pub mod least_squares;
 pub mod length_correction;
-pub mod measurement;
 pub mod platform;
 pub mod rotary;
 pub mod screw;

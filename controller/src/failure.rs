@@ -5,6 +5,7 @@ mod exit_code;
 
 use std::path::PathBuf;
 
+use compensator::data::DataError;
 use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
 use machine::{EngineFailure, Layered};
@@ -91,7 +92,7 @@ pub enum Failure {
     },
     /// Measurements do not make a series.
     #[error(transparent)]
-    Series(#[from] compensator::measurement::SeriesError),
+    Series(#[from] compensator::error_table::SeriesError),
     /// The regression of the zero failed.
     #[error("axis {axis}: hall zero, refinement: {source}")]
     Refine {
@@ -259,7 +260,7 @@ pub enum Failure {
     Figures(#[from] compensator::iso230::EvaluationError),
     /// A data file is not what it should be.
     #[error(transparent)]
-    Data(#[from] compensator::measurement::DataError),
+    Data(Box<dyn std::error::Error + Send + Sync>),
     /// Calibrations or journals cannot be stored or read.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -327,6 +328,12 @@ fn in_use_text(in_use: Option<&str>) -> String {
         || "the axis has no calibration now".into(),
         |id| format!("calibration {id}, used before, is in use again"),
     )
+}
+
+impl<K: std::error::Error + Send + Sync + 'static> From<DataError<K>> for Failure {
+    fn from(failure: DataError<K>) -> Self {
+        Self::Data(Box::new(failure))
+    }
 }
 
 impl From<EngineFailure> for Failure {

@@ -180,7 +180,7 @@ mod tests {
             rows.extend((1..=targets).map(|it| row('+', it * 10)));
             rows.extend((1..=targets).rev().map(|it| row('-', it * 10)));
         }
-        let series = compensator::measurement::LinearSeries::from_csv(&rows, "rows").unwrap();
+        let series = compensator::error_table::LinearSeries::from_csv(&rows, "rows").unwrap();
         compensator::iso230::evaluate(&series).unwrap()
     }
 

@@ -8,11 +8,11 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use compensator::measurement::{Placement, RotarySeries};
 use compensator::rotary::{
     Criterion, PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable,
     SolveOptions, plan, solve,
 };
+use compensator::rotary::{Placement, RotarySeries};
 use serde_json::{Value, json};
 use tests::random;
 use units::Radians;

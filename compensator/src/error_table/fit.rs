@@ -11,7 +11,7 @@ use units::{Approach, Metres};
 
 use super::robust::{self, MeasuredPoint, Robust};
 use super::{ErrorTable, Node, TableError};
-use crate::measurement::LinearSeries;
+use crate::error_table::LinearSeries;
 use crate::uncertainty::{combine, mean};
 
 /// How the scatter behind a node's uncertainty is taken.

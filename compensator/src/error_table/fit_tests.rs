@@ -1,5 +1,5 @@
 use super::*;
-use crate::measurement::Measurement;
+use crate::error_table::Measurement;
 
 /// A small generator of the test's own: repeatable noise of standard deviation 1.
 struct Noise(u64);

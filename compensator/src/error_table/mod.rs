@@ -23,6 +23,7 @@ mod compensation;
 mod curve;
 mod fit;
 mod robust;
+mod series;
 mod stand_off;
 
 use units::{Approach, Metres};
@@ -33,6 +34,7 @@ pub(crate) use curve::Curve;
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};
 pub use robust::{MeasuredPoint, Robust};
+pub use series::{LinearFault, LinearSeries, Measurement, SeriesError};
 pub use stand_off::{FALSE_ALARMS, StandOff};
 
 /// One position of the table. Plain data, so that a store can write its own form of it.

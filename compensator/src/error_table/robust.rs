@@ -7,7 +7,7 @@
 
 use units::{Approach, Metres};
 
-use crate::measurement::LinearSeries;
+use crate::error_table::LinearSeries;
 use crate::uncertainty::{median, robust_sigma};
 
 /// Sweeps of the median polish; it has settled after two when outliers are few.
@@ -78,7 +78,7 @@ pub(super) fn polish(series: &LinearSeries) -> Polished {
 
 fn indices(
     series: &LinearSeries,
-    belongs: impl Fn(&crate::measurement::Measurement) -> bool,
+    belongs: impl Fn(&crate::error_table::Measurement) -> bool,
 ) -> Vec<usize> {
     let all = series.measurements().iter().enumerate();
     all.filter(|(_, m)| belongs(m)).map(|(i, _)| i).collect()

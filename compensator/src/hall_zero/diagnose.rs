@@ -11,7 +11,7 @@ use units::{Metres, Volts};
 
 use super::profile::{profile, slopes};
 use super::{Sensor, Settings};
-use crate::measurement::HallPoint;
+use crate::hall_zero::HallPoint;
 
 /// Samples at a rail before it counts: one may be a disturbance.
 const RAIL_SAMPLES: usize = 3;

@@ -32,9 +32,9 @@ mod profile;
 mod refine;
 mod search;
 mod sensor;
+mod series;
 mod settings;
 
-pub use crate::measurement::{HallPoint, HallSeries};
 pub use diagnose::{SensorFault, diagnose};
 pub use failure::{Reason, SearchFailure, Step};
 pub use refine::{
@@ -43,6 +43,7 @@ pub use refine::{
 };
 pub use search::{Held, Outcome, Progress, Sample, Search};
 pub use sensor::Sensor;
+pub use series::{HallPoint, HallSeries, HallSeriesError};
 pub use settings::{Settings, SettingsError};
 
 #[cfg(test)]

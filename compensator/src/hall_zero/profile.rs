@@ -1,6 +1,6 @@
 //! Both curves as means over equal bins of position: what a person sees in a plot.
 
-use crate::measurement::HallPoint;
+use crate::hall_zero::HallPoint;
 
 /// Means of the points in one bin; bins without points are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]

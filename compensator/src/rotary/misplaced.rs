@@ -16,7 +16,7 @@ use realfft::RealFftPlanner;
 use units::Radians;
 
 use super::solve::{Solution, SolveOptions, solve_what_is_seen};
-use crate::measurement::{Placement, RotarySeries};
+use crate::rotary::{Placement, RotarySeries};
 use crate::uncertainty::rms;
 
 /// How much better another turn must fit.

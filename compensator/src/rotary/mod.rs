@@ -13,8 +13,8 @@
 //! | symbol | name here |
 //! |---|---|
 //! | N, P | lines, placements |
-//! | s_j | [`Placement::offset`](crate::measurement::Placement) |
-//! | V_j\[n\] | [`Placement::readings`](crate::measurement::Placement): reading − nominal angle |
+//! | s_j | [`Placement::offset`](crate::rotary::Placement) |
+//! | V_j\[n\] | [`Placement::readings`](crate::rotary::Placement): reading − nominal angle |
 //! | G\[n\] | [`Solution::table_error`]: reading − true angle of the table |
 //! | A\[n\] | [`Solution::plate_error`] |
 //! | c_j (Δθ_j) | the constant of a placement: how exactly it was turned |
@@ -54,6 +54,7 @@ mod periodic;
 mod plan;
 #[cfg(test)]
 mod rig;
+mod series;
 mod solve;
 
 pub(crate) use design::gcd;
@@ -64,4 +65,5 @@ pub use periodic::{
     PeriodicTable,
 };
 pub use plan::{Criterion, PlanError, plan};
+pub use series::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
 pub use solve::{Outlier, Reading, Solution, SolveError, SolveOptions, solve};

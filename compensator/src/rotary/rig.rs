@@ -2,7 +2,7 @@
 
 use units::Radians;
 
-use crate::measurement::{Placement, RotarySeries};
+use crate::rotary::{Placement, RotarySeries};
 
 /// A small generator: repeatable noise.
 pub(super) struct Noise(pub(super) u64);

@@ -9,7 +9,7 @@ use super::design::{Design, DesignError};
 use super::lanes::sum;
 use super::missing::{Gaps, UNKNOWNS_MAX, Unbridged};
 use super::outliers::{Judge, Scan};
-use crate::measurement::RotarySeries;
+use crate::rotary::RotarySeries;
 use crate::uncertainty::rms;
 
 /// Rounds of the search for outliers; each takes out many at once.

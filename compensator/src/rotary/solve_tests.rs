@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::super::plan::{Criterion, plan};
 use super::super::rig::{Noise, Truth, centred};
 use super::*;
-use crate::measurement::Placement;
+use crate::rotary::Placement;
 use crate::uncertainty::reduced_chi_square_limit;
 
 fn whole(_: usize, _: usize, reading: f64) -> Option<f64> {

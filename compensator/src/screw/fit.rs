@@ -24,7 +24,7 @@ use super::outliers::{self, StrokeOutlier};
 use super::problem::{HarmonicTest, LackOfFit, Problem};
 use super::{BASE, Harmonic, ScrewModel};
 use crate::least_squares::LeastSquaresError;
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 
 /// A model and how it came about.
 #[derive(Clone, Debug, PartialEq)]

@@ -42,6 +42,7 @@ mod options;
 mod outliers;
 pub mod patent;
 mod problem;
+mod series;
 
 use core::f64::consts::TAU;
 
@@ -58,6 +59,7 @@ pub use limits::{LimitName, Limits, ScrewError};
 pub use options::FitOptions;
 pub use outliers::StrokeOutlier;
 pub use problem::{HarmonicTest, LackOfFit};
+pub use series::{AxisStrokes, ScrewFault, Stroke, StrokeError, StrokeSeries};
 
 /// Offset, slope and lost motion come before the harmonics' sines and cosines.
 const BASE: usize = 3;

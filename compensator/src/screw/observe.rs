@@ -3,7 +3,7 @@
 
 use super::error::FitError;
 use super::{BASE, design_row};
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 use units::portable::hypot;
 use units::{Approach, Metres};
 

@@ -18,7 +18,7 @@ use super::error::FitError;
 use super::options::FitOptions;
 use super::problem::{Problem, SCATTER_FLOOR_M};
 use super::{BASE, design_row};
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 use crate::uncertainty::{median, propagate, robust_sigma};
 
 /// From so many repetitions on, the others of a cell say which one is wrong.

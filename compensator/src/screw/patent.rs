@@ -16,7 +16,7 @@ use units::portable::hypot;
 use units::{Approach, Metres};
 
 use super::{FitError, ScrewModel};
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 
 /// The patent's means of the deviations, in the deviations' own sign.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use units::{Approach, Metres};
 use super::error::FitError;
 use super::{BASE, design_row};
 use crate::least_squares::{self, LeastSquaresError};
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 use crate::significance::f_tail;
 
 /// The level at which the strokes' own scatter counts as larger than their repeatability.

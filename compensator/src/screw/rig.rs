@@ -3,7 +3,7 @@
 use units::{Approach, Metres};
 
 use super::FitOptions;
-use crate::measurement::Stroke;
+use crate::screw::Stroke;
 
 pub(super) const UM: f64 = 1e-6;
 

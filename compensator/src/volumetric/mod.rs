@@ -26,8 +26,10 @@ mod inverse;
 pub mod model;
 pub mod online;
 mod point;
+mod series;
 
 pub use point::{Axis, Point, Volume, VolumeError};
+pub use series::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
 
 use units::Metres;
 

@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
+use compensator::error_table::{LinearSeries, Measurement};
 use compensator::length_correction::EnvironmentWatch;
-use compensator::measurement::{LinearSeries, Measurement};
 use drivers::device::Environment;
 use units::{Approach, Metres};
 

@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
-use compensator::measurement::Stroke;
 use compensator::platform::Pose;
+use compensator::screw::Stroke;
 use compensator::screw::{
     self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier, patent,
 };

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
+use compensator::error_table::LinearSeries;
 use compensator::error_table::{self, FitOptions, Fitted};
+use compensator::hall_zero::HallSeries;
 use compensator::hall_zero::fit_hall;
 use compensator::iso230;
-use compensator::measurement::{HallSeries, LinearSeries};
 use serde_json::json;
 use truestage::config::MachineConfig;
 use truestage::linear::LinearContent;

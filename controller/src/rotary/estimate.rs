@@ -5,11 +5,11 @@
 //! matters where it is steep. Once it is known roughly, each reading is brought to its nominal
 //! position, and the whole evaluated again.
 
-use compensator::measurement::{Placement, RotarySeries};
 use compensator::rotary::{
     self, PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable, Solution,
     SolveOptions,
 };
+use compensator::rotary::{Placement, RotarySeries};
 use core::f64::consts::TAU;
 use units::Radians;
 

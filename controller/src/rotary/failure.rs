@@ -1,6 +1,6 @@
 //! What can go wrong with a rotary table beyond what can go wrong with its drive.
 
-use compensator::measurement::RotarySeriesError;
+use compensator::rotary::RotarySeriesError;
 use compensator::rotary::{Misplaced, NotAnAngle, SolveError};
 use units::Radians;
 

@@ -3,8 +3,8 @@
 use units::Volts;
 
 use super::{Level, RefineError, RefineOptions, Side};
+use crate::hall_zero::HallPoint;
 use crate::hall_zero::profile::{Bin, profile, slopes};
-use crate::measurement::HallPoint;
 use crate::uncertainty::median;
 
 /// Windows reach this share of the half distance between the flanks, when not given.

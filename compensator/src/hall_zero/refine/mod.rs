@@ -33,7 +33,7 @@ use units::{Metres, Volts};
 
 use super::profile::profile;
 use super::{Sensor, Settings};
-use crate::measurement::{HallPoint, HallSeries};
+use crate::hall_zero::{HallPoint, HallSeries};
 use crate::uncertainty::{combine, rms};
 
 use coarse::{Coarse, bin_count, crossing};

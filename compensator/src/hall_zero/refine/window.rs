@@ -3,8 +3,8 @@
 use units::{Metres, Volts};
 
 use super::{RefineError, RefineOptions, Sensor};
+use crate::hall_zero::HallPoint;
 use crate::least_squares::{self, LeastSquaresError, powers};
-use crate::measurement::HallPoint;
 use crate::uncertainty::{reduced_chi_square_limit, robust_sigma};
 
 /// Points a window must have beyond the coefficients of its polynomial.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use compensator::measurement::{AxisStrokes, StrokeSeries};
 use compensator::screw::{
     self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
+use compensator::screw::{AxisStrokes, StrokeSeries};
 use serde_json::{Value, json};
 use truestage::platform::PlatformConfig;
 use truestage::platform::json as to_json;

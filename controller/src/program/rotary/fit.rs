@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use compensator::measurement::RotarySeries;
+use compensator::rotary::RotarySeries;
 use compensator::rotary::{
     self, Criterion, Design, PlanError, Reading, Solution, SolveOptions,
     rms_amplification_of_a_pair, rms_amplification_of_all,

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use compensator::measurement::{VolumeLine, VolumeSeries};
 use compensator::volumetric::identify::{IdentifyError, Observation, Optics};
+use compensator::volumetric::{VolumeLine, VolumeSeries};
 use serde_json::json;
 use truestage::Failure;
 use truestage::config;

@@ -233,7 +233,7 @@ fn a_table_measured_elsewhere_fits_the_drive_whose_serial_number_nobody_wrote_do
 
 /// Three lines with table errors 2, −1, −1″ and plate errors 1, 0, −1″, placed at 0 and 1.
 fn solution() -> compensator::rotary::Solution {
-    use compensator::measurement::{Placement, RotarySeries};
+    use compensator::rotary::{Placement, RotarySeries};
     use units::Radians;
 
     let placement = |offset, readings: [f64; 3]| Placement {

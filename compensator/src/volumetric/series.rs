@@ -13,10 +13,25 @@
 
 use units::{Metres, Radians};
 
-use super::fault::DataError;
-use super::table::{Format, Table};
+use crate::data::{DataError, Format, Table};
 use crate::volumetric::identify::{Optics, Reading, direction};
 use crate::volumetric::{Axis, Point};
+
+const FORMAT: Format = Format {
+    columns: &[
+        "line",
+        "reads",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "tool_x_mm",
+        "tool_y_mm",
+        "tool_z_mm",
+        "deviation",
+        "u",
+    ],
+    header: "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u",
+};
 
 /// What `reads` can be.
 const READS: [(&str, Optics); 7] = [
@@ -125,8 +140,8 @@ impl VolumeSeries {
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
-    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError> {
-        let table = Table::read(text, source_name, &Format::VOLUME)?;
+    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError<VolumeFault>> {
+        let table = Table::read(text, source_name, &FORMAT)?;
         let mut groups: Vec<(usize, Vec<Row>)> = Vec::new();
         for at in 0..table.rows() {
             let row = read_row(&table, at)?;
@@ -155,7 +170,7 @@ impl VolumeSeries {
     }
 }
 
-fn read_row(table: &Table, row: usize) -> Result<Row, DataError> {
+fn read_row(table: &Table<VolumeFault>, row: usize) -> Result<Row, DataError<VolumeFault>> {
     let mm = |column: usize| table.number(row, column).map(Metres::from_mm);
     let seen = table.text(row, 1);
     let optics = READS.iter().find(|(name, _)| *name == seen);
@@ -226,7 +241,7 @@ mod tests {
 
     const HEADER: &str = "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u\n";
 
-    fn read(rows: &str) -> Result<VolumeSeries, DataError> {
+    fn read(rows: &str) -> Result<VolumeSeries, DataError<VolumeFault>> {
         VolumeSeries::from_csv(&format!("{HEADER}{rows}"), "v.csv")
     }
 

@@ -1,15 +1,7 @@
-//! Measured series as data files and calibration runs bring them in: checked once, here.
+//! What an instrument measured at targets of a linear axis: checked once, here.
 //!
-//! A [`LinearSeries`] is what an external instrument measured at targets of a linear axis; a
-//! [`HallSeries`] is a sweep of the two Hall sensors of system S5; a [`StrokeSeries`] is what the
-//! screws of a platform (system S1) really did when told to make strokes; a [`RotarySeries`] is
-//! what a rotary table read of a plate's lines in several placements of the plate (system S2); a
-//! [`VolumeSeries`] is what lines of three axes read (system S4).
-//! Whoever holds one knows that every number is finite and every point in its place; nothing is
-//! guessed or repaired.
-//!
-//! Source: the data file formats of the project's design; ISO 230-2:2014 4.3 for the order of a
-//! series (every run passes the targets in the sense of its approach).
+//! Source: ISO 230-2:2014 4.3 for the order of a series (every run passes the targets in the sense of
+//! its approach).
 //!
 //! | symbol | name here |
 //! |---|---|
@@ -17,25 +9,20 @@
 //! | ↑, ↓ | [`Measurement::approach`] |
 //! | P_i, P_ij | [`Measurement::target`], [`Measurement::measured`] |
 //! | x_ij | [`Measurement::deviation`] |
-//!
-//! Absent: files (text comes in, text goes out), unit conversion of foreign formats.
 
-mod fault;
-mod rotary;
-mod stroke;
-mod table;
 mod units_of;
-mod volume;
 
 use std::collections::BTreeSet;
 
-use units::{Approach, Metres, Volts};
+use units::{Approach, Metres};
 
-pub use fault::{DataError, Fault};
-pub use rotary::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
-pub use stroke::{AxisStrokes, Stroke, StrokeError, StrokeSeries};
-use table::{Format, Table};
-pub use volume::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
+use self::units_of::Unbelievable;
+use crate::data::{DataError, Fault, Format, Table};
+
+const FORMAT: Format = Format {
+    columns: &["run", "approach", "target_mm", "measured_mm"],
+    header: "run,approach,target_mm,measured_mm",
+};
 
 /// One target reached once, and where the instrument saw the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +92,78 @@ pub enum SeriesError {
         /// The target before it in the same run and approach.
         previous: Metres,
     },
+}
+
+/// What only data of a linear axis can have wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LinearFault {
+    /// The same point twice.
+    #[error("target {} mm of run {run} ({approach}) is already in the file; keep one",
+        units::Short(*target_mm))]
+    Duplicate {
+        /// Its run.
+        run: u32,
+        /// `+` or `-`.
+        approach: char,
+        /// Its target.
+        target_mm: f64,
+    },
+    /// Runs out of order.
+    #[error("run {seen} comes after run {previous}; keep the rows in the order measured")]
+    RunOrder {
+        /// This row's run.
+        seen: u32,
+        /// The row before's.
+        previous: u32,
+    },
+    /// Targets against the approach.
+    #[error(
+        "target {} mm comes after {} mm, which is not approach `{approach}`; \
+         keep the rows in the order measured",
+        units::Short(*seen_mm), units::Short(*previous_mm)
+    )]
+    TargetOrder {
+        /// `+` or `-`.
+        approach: char,
+        /// This row's target.
+        seen_mm: f64,
+        /// The target before it.
+        previous_mm: f64,
+    },
+    /// Positions that grow otherwise than their targets, by more than any stage does.
+    #[error(
+        "`measured_mm` grows by {} mm for each millimetre of `target_mm`, which no stage does: {cause}",
+        digits(*slope)
+    )]
+    OtherUnit {
+        /// Measured over target.
+        slope: f64,
+        /// What it looks like.
+        cause: &'static str,
+    },
+    /// Positions that do not follow their targets.
+    #[error(
+        "`measured_mm` lies {:.0} % of the range off a line with `target_mm`, which no stage does: are \
+         the columns what their names say?", share * 100.0
+    )]
+    Scattered {
+        /// The scatter about the line, as a share of the range.
+        share: f64,
+    },
+}
+
+/// Three significant digits: a slope is a hint, not a result.
+fn digits(value: f64) -> units::Short {
+    units::Short(format!("{value:.2e}").parse().unwrap_or(value))
+}
+
+impl From<Unbelievable> for LinearFault {
+    fn from(reason: Unbelievable) -> Self {
+        match reason {
+            Unbelievable::Slope { slope, cause } => Self::OtherUnit { slope, cause },
+            Unbelievable::Scatter { share } => Self::Scattered { share },
+        }
+    }
 }
 
 /// Measurements of a linear axis: finite, no point twice, runs in order, and within one run and
@@ -185,8 +244,8 @@ impl LinearSeries {
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
-    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError> {
-        let table = Table::read(text, source_name, &Format::LINEAR)?;
+    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError<LinearFault>> {
+        let table = Table::read(text, source_name, &FORMAT)?;
         let mut measurements = Vec::with_capacity(table.rows());
         for row in 0..table.rows() {
             measurements.push(Measurement {
@@ -196,10 +255,10 @@ impl LinearSeries {
                 measured: Metres::from_mm(table.number(row, 3)?),
             });
         }
-        let series = Self::new(measurements).map_err(|error| table.series_error(error))?;
+        let series = Self::new(measurements).map_err(|error| placed(&table, error))?;
         match units_of::judge(&series) {
             Ok(()) => Ok(series),
-            Err(reason) => Err(table.fail(0, 3, reason.into())),
+            Err(reason) => Err(table.fail(0, 3, LinearFault::from(reason).into())),
         }
     }
 
@@ -257,71 +316,63 @@ fn check_order(before: &[Measurement], index: usize, m: &Measurement) -> Result<
     }
 }
 
-/// Both Hall voltages at one position.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HallPoint {
-    /// Raw encoder position.
-    pub position: Metres,
-    /// Sensor 1, over the N-S-N group: even, with its maximum at the zero.
-    pub peak: Volts,
-    /// Sensor 2, over the S-N group: odd, steep at the zero.
-    pub slope: Volts,
-}
-
-/// A sweep of the two Hall sensors in the order taken; positions may go back and forth.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HallSeries {
-    points: Vec<HallPoint>,
-}
-
-impl HallSeries {
-    /// Checks `points`, in the order they were taken.
-    ///
-    /// # Errors
-    /// When there is none, or one is not finite.
-    pub fn new(points: Vec<HallPoint>) -> Result<Self, SeriesError> {
-        if points.is_empty() {
-            return Err(SeriesError::Empty);
+/// Puts the place of the offending row on an error of the whole series.
+fn placed(table: &Table<LinearFault>, error: SeriesError) -> DataError<LinearFault> {
+    match error {
+        SeriesError::Empty => table.fail(0, 0, Fault::NoRows),
+        SeriesError::NotFinite { index } => {
+            let seen = table.text(index, 0).to_owned();
+            table.fail(
+                index,
+                0,
+                Fault::NotFinite {
+                    column: FORMAT.columns[0],
+                    seen,
+                },
+            )
         }
-        let finite =
-            |p: &HallPoint| p.position.is_finite() && p.peak.is_finite() && p.slope.is_finite();
-        match points.iter().position(|p| !finite(p)) {
-            Some(index) => Err(SeriesError::NotFinite { index }),
-            None => Ok(Self { points }),
+        SeriesError::Duplicate {
+            index,
+            run,
+            approach,
+            target,
+        } => {
+            let (approach, target_mm) = (approach.symbol(), target.mm());
+            table.fail(
+                index,
+                2,
+                LinearFault::Duplicate {
+                    run,
+                    approach,
+                    target_mm,
+                }
+                .into(),
+            )
         }
-    }
-
-    /// Every point, in the order taken.
-    pub fn points(&self) -> &[HallPoint] {
-        &self.points
-    }
-
-    /// Reads the CSV format `position_um,peak_v,slope_v` (columns in any order, `#` comment
-    /// lines, decimal points).
-    ///
-    /// # Errors
-    /// The first thing that is not as it should be, with `source_name`, line and column.
-    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError> {
-        let table = Table::read(text, source_name, &Format::HALL)?;
-        let mut points = Vec::with_capacity(table.rows());
-        for row in 0..table.rows() {
-            points.push(HallPoint {
-                position: Metres::from_um(table.number(row, 0)?),
-                peak: Volts(table.number(row, 1)?),
-                slope: Volts(table.number(row, 2)?),
-            });
+        SeriesError::RunOrder {
+            index,
+            seen,
+            previous,
+        } => table.fail(index, 0, LinearFault::RunOrder { seen, previous }.into()),
+        SeriesError::TargetOrder {
+            index,
+            approach,
+            seen,
+            previous,
+        } => {
+            let (seen_mm, previous_mm) = (seen.mm(), previous.mm());
+            let approach = approach.symbol();
+            table.fail(
+                index,
+                2,
+                LinearFault::TargetOrder {
+                    approach,
+                    seen_mm,
+                    previous_mm,
+                }
+                .into(),
+            )
         }
-        Self::new(points).map_err(|error| table.series_error(error))
-    }
-
-    /// The series in the format [`Self::from_csv`] reads.
-    pub fn to_csv(&self) -> String {
-        let mut text = String::from("position_um,peak_v,slope_v\n");
-        for p in &self.points {
-            let (peak, slope) = (p.peak.value(), p.slope.value());
-            text.push_str(&format!("{},{peak},{slope}\n", p.position.um()));
-        }
-        text
     }
 }
 

@@ -139,24 +139,6 @@ fn measurements_from_a_run_are_held_to_the_same_rules() {
     ));
 }
 
-#[test]
-fn a_hall_sweep_may_go_back_and_forth() {
-    let text = "position_um,peak_v,slope_v\n-10,1.5,2.4\n10,1.5,2.6\n-10,1.5,2.4\n";
-    let series = HallSeries::from_csv(text, "hall.csv").unwrap();
-    assert_eq!(series.points().len(), 3);
-    assert_eq!(
-        HallSeries::from_csv(&series.to_csv(), "again").unwrap(),
-        series
-    );
-    let error = HallSeries::from_csv("position_mm,peak_v,slope_v\n1,1,1\n", "hall.csv");
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("name it `position_um`")
-    );
-}
-
 proptest! {
     #[test]
     fn a_series_survives_its_own_csv_bit_for_bit(

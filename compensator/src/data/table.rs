@@ -4,45 +4,17 @@
 //! spreadsheet does to data (decimal commas, semicolons, `nan`, other units) is recognised and
 //! named, because "invalid float" helps nobody at a machine.
 
+use core::error::Error;
+use core::marker::PhantomData;
+
 use units::Approach;
 
-use super::SeriesError;
 use super::fault::{DataError, Fault};
 
 /// The columns of one file format.
-pub(super) struct Format {
-    pub(super) columns: &'static [&'static str],
-    pub(super) header: &'static str,
-}
-
-impl Format {
-    pub(super) const LINEAR: Self = Self {
-        columns: &["run", "approach", "target_mm", "measured_mm"],
-        header: "run,approach,target_mm,measured_mm",
-    };
-    pub(super) const HALL: Self = Self {
-        columns: &["position_um", "peak_v", "slope_v"],
-        header: "position_um,peak_v,slope_v",
-    };
-    pub(super) const SCREW: Self = Self {
-        columns: &["axis", "approach", "stroke_um", "deviation_um"],
-        header: "axis,approach,stroke_um,deviation_um",
-    };
-    pub(super) const VOLUME: Self = Self {
-        columns: &[
-            "line",
-            "reads",
-            "x_mm",
-            "y_mm",
-            "z_mm",
-            "tool_x_mm",
-            "tool_y_mm",
-            "tool_z_mm",
-            "deviation",
-            "u",
-        ],
-        header: "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u",
-    };
+pub(crate) struct Format {
+    pub(crate) columns: &'static [&'static str],
+    pub(crate) header: &'static str,
 }
 
 struct Cell {
@@ -50,16 +22,18 @@ struct Cell {
     column: usize,
 }
 
-/// A file's cells in the format's own column order, with the place of each.
-pub(super) struct Table {
+/// A file's cells in the format's own column order, with the place of each. `K` is what only data of
+/// its kind can have wrong.
+pub(crate) struct Table<K> {
     file: String,
     format: &'static [&'static str],
     rows: Vec<(usize, Vec<Cell>)>,
+    kind: PhantomData<K>,
 }
 
-impl Table {
-    pub(super) fn read(text: &str, file: &str, format: &Format) -> Result<Self, DataError> {
-        let fail = |line: usize, column: usize, fault: Fault| DataError {
+impl<K: Error + 'static> Table<K> {
+    pub(crate) fn read(text: &str, file: &str, format: &Format) -> Result<Self, DataError<K>> {
+        let fail = |line: usize, column: usize, fault: Fault<K>| DataError {
             file: file.to_owned(),
             line,
             column,
@@ -106,14 +80,15 @@ impl Table {
             file: file.to_owned(),
             format: format.columns,
             rows,
+            kind: PhantomData,
         })
     }
 
-    pub(super) fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows.len()
     }
 
-    pub(super) fn fail(&self, row: usize, column: usize, fault: Fault) -> DataError {
+    pub(crate) fn fail(&self, row: usize, column: usize, fault: Fault<K>) -> DataError<K> {
         let (line, cells) = &self.rows[row];
         DataError {
             file: self.file.clone(),
@@ -123,7 +98,7 @@ impl Table {
         }
     }
 
-    pub(super) fn number(&self, row: usize, column: usize) -> Result<f64, DataError> {
+    pub(crate) fn number(&self, row: usize, column: usize) -> Result<f64, DataError<K>> {
         let seen = self.rows[row].1[column].text.as_str();
         let name = self.format[column];
         let fault = match parse_number(seen) {
@@ -145,7 +120,7 @@ impl Table {
         Err(self.fail(row, column, fault))
     }
 
-    pub(super) fn run(&self, row: usize, column: usize) -> Result<u32, DataError> {
+    pub(crate) fn run(&self, row: usize, column: usize) -> Result<u32, DataError<K>> {
         let seen = self.rows[row].1[column].text.as_str();
         let digits = !seen.is_empty() && seen.bytes().all(|b| b.is_ascii_digit());
         seen.parse().ok().filter(|_| digits).ok_or_else(|| {
@@ -161,7 +136,7 @@ impl Table {
         })
     }
 
-    pub(super) fn approach(&self, row: usize, column: usize) -> Result<Approach, DataError> {
+    pub(crate) fn approach(&self, row: usize, column: usize) -> Result<Approach, DataError<K>> {
         let fault = match self.rows[row].1[column].text.as_str() {
             "+" => return Ok(Approach::Forward),
             "-" => return Ok(Approach::Reverse),
@@ -176,17 +151,17 @@ impl Table {
     }
 
     /// The line of a row in the file, counted from 1.
-    pub(super) fn line(&self, row: usize) -> usize {
+    pub(crate) fn line(&self, row: usize) -> usize {
         self.rows[row].0
     }
 
     /// A cell as it was written.
-    pub(super) fn text(&self, row: usize, column: usize) -> &str {
+    pub(crate) fn text(&self, row: usize, column: usize) -> &str {
         &self.rows[row].1[column].text
     }
 
     /// The name of an axis: letters, digits, `_` and `-`.
-    pub(super) fn axis(&self, row: usize, column: usize) -> Result<String, DataError> {
+    pub(crate) fn axis(&self, row: usize, column: usize) -> Result<String, DataError<K>> {
         let seen = self.rows[row].1[column].text.as_str();
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         let fault = match seen {
@@ -199,64 +174,6 @@ impl Table {
             },
         };
         Err(self.fail(row, column, fault))
-    }
-
-    /// Puts the place of the offending row on an error of the whole series.
-    pub(super) fn series_error(&self, error: SeriesError) -> DataError {
-        match error {
-            SeriesError::Empty => self.fail(0, 0, Fault::NoRows),
-            SeriesError::NotFinite { index } => {
-                let seen = self.rows[index].1[0].text.clone();
-                self.fail(
-                    index,
-                    0,
-                    Fault::NotFinite {
-                        column: self.format[0],
-                        seen,
-                    },
-                )
-            }
-            SeriesError::Duplicate {
-                index,
-                run,
-                approach,
-                target,
-            } => {
-                let (approach, target_mm) = (approach.symbol(), target.mm());
-                self.fail(
-                    index,
-                    2,
-                    Fault::Duplicate {
-                        run,
-                        approach,
-                        target_mm,
-                    },
-                )
-            }
-            SeriesError::RunOrder {
-                index,
-                seen,
-                previous,
-            } => self.fail(index, 0, Fault::RunOrder { seen, previous }),
-            SeriesError::TargetOrder {
-                index,
-                approach,
-                seen,
-                previous,
-            } => {
-                let (seen_mm, previous_mm) = (seen.mm(), previous.mm());
-                let approach = approach.symbol();
-                self.fail(
-                    index,
-                    2,
-                    Fault::TargetOrder {
-                        approach,
-                        seen_mm,
-                        previous_mm,
-                    },
-                )
-            }
-        }
     }
 }
 
@@ -295,7 +212,10 @@ fn split(line: &str) -> Option<Vec<Cell>> {
 }
 
 /// For each column of the format, the place of its cell in a row of the file.
-fn read_header(cells: &[Cell], format: &Format) -> Result<Vec<usize>, (usize, Fault)> {
+fn read_header<K: Error + 'static>(
+    cells: &[Cell],
+    format: &Format,
+) -> Result<Vec<usize>, (usize, Fault<K>)> {
     let expected = format.header;
     let mut order = vec![None; format.columns.len()];
     for (place, cell) in cells.iter().enumerate() {
@@ -319,7 +239,7 @@ fn read_header(cells: &[Cell], format: &Format) -> Result<Vec<usize>, (usize, Fa
     Ok(places)
 }
 
-fn unknown_column(seen: &str, format: &Format) -> Fault {
+fn unknown_column<K: Error + 'static>(seen: &str, format: &Format) -> Fault<K> {
     if let Some(separator) = seen.chars().find(|c| matches!(c, ';' | '\t' | '|')) {
         return Fault::Separator { seen: separator };
     }

@@ -78,8 +78,9 @@ fn likely_cause(slope: f64) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{DataError, Fault};
+    use super::super::LinearFault;
     use super::*;
+    use crate::data::{DataError, Fault};
 
     /// Three runs over 60 mm with deviations of micrometres, each column times its factor.
     fn csv(target_factor: f64, measured: impl Fn(f64, f64) -> f64) -> String {
@@ -101,7 +102,7 @@ mod tests {
         let DataError { line, fault, .. } = &error;
         assert!(matches!(
             fault,
-            Fault::OtherUnit { .. } | Fault::Scattered { .. }
+            Fault::Own(LinearFault::OtherUnit { .. } | LinearFault::Scattered { .. })
         ));
         assert_eq!(*line, 2);
         assert!(error.to_string().contains(said), "{error}");

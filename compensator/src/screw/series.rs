@@ -2,8 +2,58 @@
 
 use units::{Approach, Metres};
 
-use super::fault::{DataError, Fault};
-use super::table::{Format, Table};
+use crate::data::{DataError, Fault, Format, Table};
+
+const FORMAT: Format = Format {
+    columns: &["axis", "approach", "stroke_um", "deviation_um"],
+    header: "axis,approach,stroke_um,deviation_um",
+};
+
+/// What only data of screws can have wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScrewFault {
+    /// Nothing can be said about a screw that made one stroke only.
+    #[error(
+        "axis {axis} has no other stroke than {} um; measure at least two different \
+         strokes, better five and more", units::Short(*stroke_um)
+    )]
+    OneStroke {
+        /// Which axis.
+        axis: String,
+        /// The only stroke.
+        stroke_um: f64,
+    },
+    /// A stroke a thousand times shorter than the others.
+    #[error(
+        "axis {axis}: a stroke of {} um stands beside strokes from {} to {} um; \
+         are micrometres and millimetres mixed?",
+        units::Short(*stroke_um), units::Short(*least_um), units::Short(*most_um)
+    )]
+    MixedUnits {
+        /// Which axis.
+        axis: String,
+        /// The stroke.
+        stroke_um: f64,
+        /// The shortest of the others.
+        least_um: f64,
+        /// The longest of the others.
+        most_um: f64,
+    },
+    /// A deviation larger than any stroke of its axis.
+    #[error(
+        "axis {axis}: the deviation of {} um is larger than its longest stroke, \
+         {} um; are micrometres and millimetres mixed?",
+        units::Short(*deviation_um), units::Short(*stroke_um)
+    )]
+    Implausible {
+        /// Which axis.
+        axis: String,
+        /// The deviation.
+        deviation_um: f64,
+        /// The longest stroke.
+        stroke_um: f64,
+    },
+}
 
 /// One stroke made once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,8 +194,8 @@ impl StrokeSeries {
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
-    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError> {
-        let table = Table::read(text, source_name, &Format::SCREW)?;
+    pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError<ScrewFault>> {
+        let table = Table::read(text, source_name, &FORMAT)?;
         let mut strokes = Vec::with_capacity(table.rows());
         for row in 0..table.rows() {
             let stroke = Stroke {
@@ -234,7 +284,7 @@ fn mixed_units(strokes: &[Stroke]) -> Option<(usize, (Metres, Metres))> {
 }
 
 /// Puts the place of the offending row on an error of the whole series.
-fn placed(table: &Table, error: StrokeError) -> DataError {
+fn placed(table: &Table<ScrewFault>, error: StrokeError) -> DataError<ScrewFault> {
     match error {
         StrokeError::Empty => table.fail(0, 0, Fault::NoRows),
         StrokeError::NotFinite { index, .. } => table.fail(
@@ -251,7 +301,7 @@ fn placed(table: &Table, error: StrokeError) -> DataError {
             stroke,
         } => {
             let stroke_um = stroke.um();
-            table.fail(index, 2, Fault::OneStroke { axis, stroke_um })
+            table.fail(index, 2, ScrewFault::OneStroke { axis, stroke_um }.into())
         }
         StrokeError::MixedUnits {
             index,
@@ -259,13 +309,13 @@ fn placed(table: &Table, error: StrokeError) -> DataError {
             stroke,
             others: (least, most),
         } => {
-            let fault = Fault::MixedUnits {
+            let fault = ScrewFault::MixedUnits {
                 axis,
                 stroke_um: stroke.um(),
                 least_um: least.um(),
                 most_um: most.um(),
             };
-            table.fail(index, 2, fault)
+            table.fail(index, 2, fault.into())
         }
         StrokeError::Implausible {
             index,
@@ -274,12 +324,12 @@ fn placed(table: &Table, error: StrokeError) -> DataError {
             longest,
         } => {
             let (deviation_um, stroke_um) = (deviation.um(), longest.um());
-            let fault = Fault::Implausible {
+            let fault = ScrewFault::Implausible {
                 axis,
                 deviation_um,
                 stroke_um,
             };
-            table.fail(index, 3, fault)
+            table.fail(index, 3, fault.into())
         }
     }
 }

@@ -8,9 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use units::Radians;
 
-use super::table::{Format, Table};
-use super::{DataError, Fault};
-use crate::rotary::gcd;
+use super::gcd;
+use crate::data::{DataError, Fault, Format, Table};
 
 /// More lines than any plate has; a number above it is a misprint.
 const LINES_MAX: usize = 100_000;
@@ -244,7 +243,7 @@ impl RotarySeries {
         text: &str,
         source_name: &str,
         lines: Option<usize>,
-    ) -> Result<Self, DataError> {
+    ) -> Result<Self, DataError<RotaryFault>> {
         let table = Table::read(text, source_name, &FORMAT)?;
         let blocks = read_blocks(&table)?;
         let lines = count_lines(&table, &blocks, lines)?;
@@ -304,7 +303,7 @@ struct Block {
     readings: BTreeMap<usize, (usize, Radians)>,
 }
 
-fn read_blocks(table: &Table) -> Result<Vec<Block>, DataError> {
+fn read_blocks(table: &Table<RotaryFault>) -> Result<Vec<Block>, DataError<RotaryFault>> {
     let mut blocks: Vec<Block> = Vec::new();
     for row in 0..table.rows() {
         let offset = whole(table, row, OFFSET)?;
@@ -345,7 +344,11 @@ fn read_blocks(table: &Table) -> Result<Vec<Block>, DataError> {
 /// How many lines the plate has: as given, or one more than the largest in the file. Then the
 /// first and the last line must stand in most placements, or else a line numbered from 1, or
 /// one too many by a slip, would silently make another plate of it.
-fn count_lines(table: &Table, blocks: &[Block], given: Option<usize>) -> Result<usize, DataError> {
+fn count_lines(
+    table: &Table<RotaryFault>,
+    blocks: &[Block],
+    given: Option<usize>,
+) -> Result<usize, DataError<RotaryFault>> {
     let last = |block: &Block| {
         block
             .readings
@@ -383,7 +386,11 @@ fn count_lines(table: &Table, blocks: &[Block], given: Option<usize>) -> Result<
 }
 
 /// The rule of [`Design`](crate::rotary::Design), with the place of the last offset.
-fn check_step(table: &Table, blocks: &[Block], lines: usize) -> Result<(), DataError> {
+fn check_step(
+    table: &Table<RotaryFault>,
+    blocks: &[Block],
+    lines: usize,
+) -> Result<(), DataError<RotaryFault>> {
     let (first, last) = (&blocks[0], &blocks[blocks.len() - 1]);
     let apart = blocks.iter().map(|it| it.offset.abs_diff(first.offset));
     let step = apart.fold(lines, gcd);
@@ -400,7 +407,11 @@ fn check_step(table: &Table, blocks: &[Block], lines: usize) -> Result<(), DataE
 }
 
 impl Block {
-    fn placement(&self, table: &Table, lines: usize) -> Result<Placement, DataError> {
+    fn placement(
+        &self,
+        table: &Table<RotaryFault>,
+        lines: usize,
+    ) -> Result<Placement, DataError<RotaryFault>> {
         let (offset, seen) = (self.offset, self.readings.len());
         if offset >= lines {
             let fault = RotaryFault::TooLarge {
@@ -427,7 +438,11 @@ impl Block {
     }
 }
 
-fn whole(table: &Table, row: usize, column: usize) -> Result<usize, DataError> {
+fn whole(
+    table: &Table<RotaryFault>,
+    row: usize,
+    column: usize,
+) -> Result<usize, DataError<RotaryFault>> {
     let seen = table.text(row, column);
     let name = FORMAT.columns[column];
     let digits = !seen.is_empty() && seen.bytes().all(|byte| byte.is_ascii_digit());
@@ -449,5 +464,5 @@ fn whole(table: &Table, row: usize, column: usize) -> Result<usize, DataError> {
 }
 
 #[cfg(test)]
-#[path = "rotary_tests.rs"]
+#[path = "series_tests.rs"]
 mod tests;
