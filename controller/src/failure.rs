@@ -12,6 +12,7 @@ use machine::{EngineFailure, Layered};
 use units::Metres;
 
 use crate::config::ConfigError;
+#[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
 use crate::platform::PlatformFailure;
 use crate::rotary::RotaryFailure;
@@ -319,6 +320,7 @@ pub enum Failure {
         help: String,
     },
     /// The emulated machine cannot be brought up.
+    #[cfg(feature = "emulator")]
     #[error("emulated machine: {0}")]
     Emulator(#[from] EmulatedError),
 }

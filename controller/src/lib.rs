@@ -25,6 +25,12 @@
 //! }
 //! ```
 //!
+//! # Features
+//!
+//! `program` (on by default) is the command `truestage` with all that only it needs; `emulator`, which
+//! comes with it, is the module `emulated` alone: machines without hardware, for tests.
+//! With `default-features = false` the library links neither.
+//!
 //! This is not a safety controller: wire STO.
 
 pub mod assemble;
@@ -34,6 +40,7 @@ pub mod config;
 mod connected;
 mod correction;
 mod edit;
+#[cfg(feature = "emulator")]
 pub mod emulated;
 pub mod failure;
 pub mod json;

@@ -157,6 +157,22 @@ fn packages_depend_only_on_those_below_them() {
     }
 }
 
+/// Whoever drives a stage from a program of his own asks for neither.
+#[test]
+fn the_library_alone_links_no_command_line_and_no_emulator() {
+    let tree = std::process::Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
+        .args(["--package", "truestage", "--no-default-features"])
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    let tree = String::from_utf8(tree.stdout).expect("names are text");
+    assert!(tree.contains("machine v"), "no tree: {tree}");
+    for absent in ["clap v", "indicatif v", "signal-hook v", "mock-bus v"] {
+        assert!(!tree.contains(absent), "{absent}:\n{tree}");
+    }
+}
+
 #[test]
 fn only_the_demonstration_knows_the_emulator() {
     let offences: Vec<String> = sources("controller")

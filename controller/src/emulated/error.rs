@@ -21,3 +21,13 @@ pub enum EmulatedError {
     #[error(transparent)]
     Run(#[from] RunError),
 }
+
+impl EmulatedError {
+    /// As [`crate::Failure::exit_code`].
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Config(_) | Self::NoPort { .. } => 2,
+            Self::Run(_) => 4,
+        }
+    }
+}

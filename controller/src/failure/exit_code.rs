@@ -1,6 +1,6 @@
 //! What a shell script learns of a failure.
 
-use super::{EmulatedError, Failure};
+use super::Failure;
 use crate::store::StoreError;
 
 impl Failure {
@@ -14,6 +14,8 @@ impl Failure {
             Self::Table(failure) => failure.exit_code(),
             Self::Resumable { source, .. } => source.exit_code(),
             Self::Volumetric(failure) => failure.exit_code(),
+            #[cfg(feature = "emulator")]
+            Self::Emulator(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
             | Self::Figures(_)
@@ -32,8 +34,7 @@ impl Failure {
                 | StoreError::Ambiguous { .. }
                 | StoreError::NoEarlier { .. }
                 | StoreError::AlreadyComplete { .. },
-            )
-            | Self::Emulator(EmulatedError::Config(_) | EmulatedError::NoPort { .. }) => 2,
+            ) => 2,
             Self::Path { .. }
             | Self::Store(_)
             | Self::Compensation { .. }
@@ -47,8 +48,7 @@ impl Failure {
             | Self::Search { .. }
             | Self::NoLines { .. }
             | Self::Correction { .. }
-            | Self::ScanMismatch { .. }
-            | Self::Emulator(_) => 4,
+            | Self::ScanMismatch { .. } => 4,
             Self::ZeroUncertain { .. }
             | Self::Refine { .. }
             | Self::Closure { .. }
