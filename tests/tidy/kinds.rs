@@ -17,7 +17,6 @@ const OF_DATA: &[&str] = &[
     "entries",
     "line_speed",
     "record",
-    "screw_record",
     "settings",
     "state",
 ];

@@ -17,7 +17,7 @@ pub(crate) enum Kind {
     /// Rotary axes.
     Rotary,
     /// Three axes corrected throughout their volume.
-    Volume,
+    Volumetric,
 }
 
 impl Kind {
@@ -27,7 +27,7 @@ impl Kind {
             Self::Linear => &super::linear::VERBS,
             Self::Rotary => &super::rotary::VERBS,
             Self::Platform => &super::platform::VERBS,
-            Self::Volume => &super::volumetric::VERBS,
+            Self::Volumetric => &super::volumetric::VERBS,
         }
     }
 }
@@ -55,7 +55,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
         });
     }
     if config.volumetric.is_some() {
-        return Ok(Kind::Volume);
+        return Ok(Kind::Volumetric);
     }
     if config.platform.is_some() {
         return Ok(Kind::Platform);
@@ -97,7 +97,7 @@ mod tests {
         check(ROTARY, &["c"], Some(Kind::Rotary));
         check(UVW, &[], Some(Kind::Platform));
         check(UVW, &["x", "theta"], Some(Kind::Platform));
-        check(VOLUME, &["x", "z"], Some(Kind::Volume));
+        check(VOLUME, &["x", "z"], Some(Kind::Volumetric));
     }
 
     #[test]

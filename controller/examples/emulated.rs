@@ -1,0 +1,41 @@
+//! The whole cycle on an emulated stage in virtual time: what a test of your own program can do on
+//! any computer, with no hardware.
+//!
+//! `cargo run --release --example emulated`
+#![expect(clippy::print_stdout, reason = "an example shows what it measured")]
+use truestage::emulated::Emulated;
+use truestage::linear::VerifyOptions;
+use truestage::run::CalibrateOptions;
+use truestage::{Machine, Store, config};
+
+const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
+const STAGE: &str = include_str!("../../configs/emulated/linear.toml");
+/// The same seed is the same stage, on every computer.
+const SEED: u64 = 7;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let loaded = config::parse(MACHINE, "linear.toml")?;
+    let store = Store::new(folder.path(), &loaded.config.machine.name);
+    let emulated = Emulated::new(STAGE, SEED, &loaded.config)?;
+    let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
+    let verified = machine.guarded(|machine| {
+        machine.start()?;
+        machine.zero("x", &store)?;
+        let made = machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        let as_left = VerifyOptions {
+            compensated: true,
+            calibration: Some(made.id),
+            resume: None,
+        };
+        let verified = machine.verify("x", &store, &as_left)?;
+        machine.shut_down()?;
+        Ok(verified)
+    })?;
+    let accuracy = verified.figures.accuracy.bidirectional;
+    let (seen_um, limit_um) = (accuracy.um(), verified.tolerance.um());
+    println!("A = {seen_um:.3} um as left, the tolerance is {limit_um:.3} um");
+    println!("the stage lived {:.0} s", machine.now().seconds());
+    assert!(verified.is_within_tolerance());
+    Ok(())
+}

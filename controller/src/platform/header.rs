@@ -1,0 +1,74 @@
+//! What a platform's runs write down before anything is measured.
+
+use units::Metres;
+
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::platform::ArrangementEntry;
+use crate::run::utc_now;
+use crate::store::{
+    Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store,
+};
+
+impl Machine {
+    /// A journal of the platform with its first two lines.
+    pub(crate) fn platform_journal(
+        &self,
+        store: &Store,
+        verb: &str,
+        runs: u32,
+        calibration: Option<String>,
+        tolerance: Option<Metres>,
+    ) -> Result<Journal, Failure> {
+        let header = self.platform_header(verb, runs, calibration)?;
+        let mut journal = Journal::create(&store.runs(), &header)?;
+        let screws = &self.platform_state()?.screws;
+        journal.write(&Entry::Arrangement(ArrangementEntry {
+            axes: screws.iter().map(|it| it.axis.clone()).collect(),
+            edge_m: Metres::from_mm(self.platform_config()?.edge_mm).value(),
+            tolerance_m: tolerance.map(Metres::value),
+        }))?;
+        Ok(journal)
+    }
+
+    fn platform_header(
+        &self,
+        verb: &str,
+        runs: u32,
+        calibration: Option<String>,
+    ) -> Result<JournalHeader, Failure> {
+        Ok(JournalHeader {
+            schema_version: SCHEMA_VERSION,
+            verb: verb.to_owned(),
+            machine: self.config.machine.name.clone(),
+            stage_serial: self.config.machine.stage_serial.clone(),
+            config_hash: self.config_hash.as_str().to_owned(),
+            axis: "platform".into(),
+            drive: IdentityRecord::default(),
+            instrument: self.camera_record()?,
+            started: utc_now(),
+            calibration,
+            targets_m: Vec::new(),
+            runs,
+        })
+    }
+
+    pub(crate) fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
+        let name = self.platform_config()?.camera.clone();
+        let identity = self.identities().remove(&name);
+        Ok(InstrumentRecord {
+            identity: identity.unwrap_or_default().name,
+            name,
+            ..InstrumentRecord::default()
+        })
+    }
+
+    /// The calibrations in use, as `AXIS=NAME` for each screw that has one.
+    pub(crate) fn calibrations_in_use(&self) -> Result<Option<String>, Failure> {
+        let screws = self.platform_state()?.screws.iter();
+        let named =
+            screws.filter_map(|it| Some(format!("{}={}", it.axis, it.calibration.as_ref()?)));
+        let names = named.collect::<Vec<_>>().join(" ");
+        Ok(Some(names).filter(|it| !it.is_empty()))
+    }
+}
