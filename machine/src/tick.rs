@@ -236,15 +236,19 @@ impl Machine {
     }
 
     pub(crate) fn judge_alarms(&mut self) -> Result<(), Failure> {
-        let mut first = None;
-        for at in 0..self.device_count() {
-            while let Some(alarm) = self.device_mut(at).device.poll_alarm() {
-                self.forget_reference(at, &alarm);
-                if self.alarm_counts(at) {
-                    first = first.or(Some((at, alarm)));
-                }
+        // Allocates nothing as long as nobody raises one, which is nearly always.
+        let mut raised = Vec::new();
+        let mut at = 0;
+        self.each_device(|_, device| {
+            while let Some(alarm) = device.poll_alarm() {
+                raised.push((at, alarm));
             }
+            at += 1;
+        });
+        for (at, alarm) in &raised {
+            self.forget_reference(*at, alarm);
         }
+        let first = raised.into_iter().find(|(at, _)| self.alarm_counts(*at));
         match first {
             Some((at, alarm)) if self.supervision == Supervision::On => Err(Failure::Alarm {
                 device: self.device_name(at),
