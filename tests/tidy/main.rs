@@ -4,6 +4,7 @@ mod circles;
 mod documents;
 mod imports;
 mod kinds;
+mod licences;
 
 use std::collections::BTreeMap;
 use std::fs;
