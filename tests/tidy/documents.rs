@@ -8,6 +8,7 @@ use crate::root;
 /// What tells where things are; decisions tell where they were.
 const DOCUMENTS: &[&str] = &[
     "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
     "README.md",
     "STYLE.md",
     "configs/README.md",
