@@ -52,6 +52,7 @@ const EMULATOR_USERS: &[&str] = &[
 /// What may use an emulated machine: who shows it, and who tells its failures.
 const EMULATED_MACHINE_USERS: &[&str] = &[
     "controller/src/emulated.rs",
+    "controller/examples/emulated.rs",
     "controller/src/failure.rs",
     "controller/src/program/demo/",
     "controller/src/program/linear/demo.rs",
