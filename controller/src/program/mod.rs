@@ -72,7 +72,7 @@ enum Command {
     Verify(VerifyArgs),
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
-    /// Zero, then take down what the detectors of three axes read, for the errors in use.
+    /// Zero, then record the references of the detectors of three axes, for the calibration in use.
     Reference(MachineArgs),
     /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
     ///
@@ -81,7 +81,7 @@ enum Command {
     /// most, and where, is said before anything moves. Everything that will be driven is judged
     /// first (soft limits, speed, acceleration, jerk, calibrated volume), not only the rows.
     Run(RunArgs),
-    /// What three axes are to keep although it deviates.
+    /// Deviations of three axes that are kept on purpose, so that all parts are alike.
     #[command(subcommand)]
     Memory(MemoryCommand),
     /// Stored calibrations.
@@ -203,7 +203,7 @@ enum MemoryCommand {
     /// parts from now on are made with the state of this hour. Nothing is corrected meanwhile, so
     /// it is not the state of a part that was made before; `run --first-part` records that.
     Record(MemoryArgs),
-    /// Keep nothing by it any more; nothing moves.
+    /// Forget a recorded state; parts are no longer made with it. Nothing moves.
     Clear(MemoryArgs),
 }
 
