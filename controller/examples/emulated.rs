@@ -21,14 +21,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
     let verified = machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)?;
-        let made = machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        machine.linear("x")?.zero(&store)?;
+        let made = machine
+            .linear("x")?
+            .calibrate(&store, &CalibrateOptions::default())?;
         let as_left = VerifyOptions {
             compensated: true,
             calibration: Some(made.id),
             resume: None,
         };
-        let verified = machine.verify("x", &store, &as_left)?;
+        let verified = machine.linear("x")?.verify(&store, &as_left)?;
         machine.shut_down()?;
         Ok(verified)
     })?;

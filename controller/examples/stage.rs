@@ -21,9 +21,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Whatever fails in here, every axis is stopped and switched off before the failure comes out.
     let moved = machine.guarded(|machine| {
         machine.start()?;
-        machine.zero(axis, &store)?;
-        machine.load_active(axis, &store)?;
-        let moved = machine.move_and_read(axis, target)?;
+        machine.linear(axis)?.zero(&store)?;
+        machine.linear(axis)?.load_active(&store)?;
+        let moved = machine.linear(axis)?.move_and_read(target)?;
         machine.shut_down()?;
         Ok(moved)
     })?;

@@ -15,8 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::fs::read_to_string(&words[2])?;
     Ok(machine.guarded(|machine| -> Result<(), Failure> {
         machine.start()?;
-        machine.load_active("x", &store)?;
-        machine.zero("x", &store)?;
+        machine.linear("x")?.load_active(&store)?;
+        machine.linear("x")?.zero(&store)?;
         let correction = Box::new(machine.table_correction(&["x"])?);
         let (mut engine, mut desk) = Engine::new(machine, &["x"], correction)?;
         engine.in_real_time();

@@ -3,43 +3,30 @@
 use core::ops::{Deref, DerefMut};
 use std::collections::BTreeMap;
 
-use compensator::error_table::Compensation;
 use drivers::transport::Transport;
+use machine::engine::TableCorrection;
 
 use crate::assemble;
-use crate::config::{AxisConfig, ConfigHash, Loaded, MachineConfig};
+use crate::config::{ConfigHash, Loaded, MachineConfig};
 use crate::failure::Failure;
-use crate::linear::{Datum, RunPlan};
-use crate::platform::PlatformState;
-use crate::rotary::TableInUse;
+use crate::handle::Core;
+use crate::linear::{self, AxisMemory, LinearStage};
+use crate::platform::{AlignmentPlatform, PlatformFailure, PlatformState};
+use crate::rotary::{RotaryMemory, RotaryTable};
+use crate::run;
+use crate::store::RecordHead;
+use crate::volumetric::{VolumetricFailure, WorkVolume};
 
-/// What is known about a linear axis beyond what its drive says.
-#[derive(Default)]
-pub(crate) struct AxisMemory {
-    /// The calibration in use.
-    pub(crate) compensation: Option<Compensation>,
-    /// What was measured last, and how lengths were corrected since its datum.
-    pub(crate) datum: Option<(RunPlan, Datum)>,
-}
-
-/// What is known about a rotary axis beyond what its drive says.
-#[derive(Default)]
-pub(crate) struct RotaryMemory {
-    /// The calibration in use.
-    pub(crate) calibration: Option<TableInUse>,
-    /// Where the plate was read last, in lines; `None` when somebody may have turned it since.
-    pub(crate) plate_at: Option<f64>,
-}
-
-/// A machine that is connected. What every machine can do, [`machine::Machine`] does; the
-/// procedures of each kind are methods of this one.
+/// A machine that is connected. What every machine can do, [`machine::Machine`] does; what a kind
+/// can do, its handle does, which lives no longer than one procedure: [`Machine::linear`],
+/// [`Machine::rotary`], [`Machine::platform`], [`Machine::volumetric`].
 pub struct Machine {
-    pub(crate) core: machine::Machine,
-    pub(crate) config: MachineConfig,
-    pub(crate) config_hash: ConfigHash,
-    pub(crate) memory: BTreeMap<String, AxisMemory>,
-    pub(crate) rotary_memory: BTreeMap<String, RotaryMemory>,
-    pub(crate) platform: Option<PlatformState>,
+    core: machine::Machine,
+    config: MachineConfig,
+    config_hash: ConfigHash,
+    linear: BTreeMap<String, AxisMemory>,
+    rotary: BTreeMap<String, RotaryMemory>,
+    platform: Option<PlatformState>,
 }
 
 impl Deref for Machine {
@@ -63,8 +50,8 @@ impl Machine {
         let config = loaded.config.clone();
         Self {
             core: machine::Machine::new(assemble::parts(loaded), transport),
-            memory: BTreeMap::new(),
-            rotary_memory: BTreeMap::new(),
+            linear: BTreeMap::new(),
+            rotary: BTreeMap::new(),
             platform: PlatformState::of(&config),
             config_hash: loaded.hash.clone(),
             config,
@@ -127,40 +114,91 @@ impl Machine {
         &self.config_hash
     }
 
-    /// The configuration of `axis`.
+    /// The linear axis `axis`, calibrated by itself.
     ///
     /// # Errors
     /// When there is no such axis.
-    pub fn axis_config(&self, axis: &str) -> Result<&AxisConfig, Failure> {
-        let config = self.config.axis.get(axis);
-        config.ok_or_else(|| {
-            Failure::Machine(machine::Failure::NoSuchAxis {
-                axis: axis.to_owned(),
-                known: self.axis_names().join(", "),
-            })
+    pub fn linear(&mut self, axis: &str) -> Result<LinearStage<'_>, Failure> {
+        let Some((axis, config)) = self.config.axis.get_key_value(axis) else {
+            return Err(no_such_axis(axis, &self.core.axis_names()));
+        };
+        let memory = self.linear.entry(axis.clone()).or_default();
+        Ok(LinearStage {
+            core: Core::new(&mut self.core, &self.config, &self.config_hash),
+            axis,
+            config,
+            memory,
         })
     }
 
-    /// The calibration `axis` uses now.
-    pub fn compensation(&self, axis: &str) -> Option<&Compensation> {
-        self.memory.get(axis)?.compensation.as_ref()
-    }
-
-    /// Uses `compensation` (or none) for every move of `axis` from now on.
+    /// The rotary axis `axis`.
     ///
     /// # Errors
     /// When there is no such axis.
-    pub fn set_compensation(
-        &mut self,
-        axis: &str,
-        compensation: Option<Compensation>,
-    ) -> Result<(), Failure> {
-        self.axis_config(axis)?;
-        self.remember(axis).compensation = compensation;
-        Ok(())
+    pub fn rotary(&mut self, axis: &str) -> Result<RotaryTable<'_>, Failure> {
+        let Some((axis, config)) = self.config.rotary.get_key_value(axis) else {
+            return Err(no_such_axis(axis, &self.core.rotary_names()));
+        };
+        let memory = self.rotary.entry(axis.clone()).or_default();
+        Ok(RotaryTable {
+            core: Core::new(&mut self.core, &self.config, &self.config_hash),
+            axis,
+            config,
+            memory,
+        })
     }
 
-    pub(crate) fn remember(&mut self, axis: &str) -> &mut AxisMemory {
-        self.memory.entry(axis.to_owned()).or_default()
+    /// The alignment platform that the axes move.
+    ///
+    /// # Errors
+    /// When they move none.
+    pub fn platform(&mut self) -> Result<AlignmentPlatform<'_>, Failure> {
+        let (config, state) = (self.config.platform.as_ref())
+            .zip(self.platform.as_mut())
+            .ok_or(PlatformFailure::None)?;
+        Ok(AlignmentPlatform {
+            core: Core::new(&mut self.core, &self.config, &self.config_hash),
+            config,
+            state,
+        })
     }
+
+    /// The work volume of the three axes.
+    ///
+    /// # Errors
+    /// When its errors are not corrected.
+    pub fn volumetric(&mut self) -> Result<WorkVolume<'_>, Failure> {
+        let config = self
+            .config
+            .volumetric
+            .as_ref()
+            .ok_or(VolumetricFailure::None)?;
+        Ok(WorkVolume {
+            core: Core::new(&mut self.core, &self.config, &self.config_hash),
+            config,
+        })
+    }
+
+    /// What the calibrations that linear `axes` use ([`LinearStage::load_active`]) say, for an engine
+    /// of these axes in this order.
+    ///
+    /// # Errors
+    /// When there is no such axis, it is not configured for the engine, or its correction at full
+    /// speed would change faster than `correction_rate_um_per_s`, or be larger than
+    /// `correction_limit_um`: it would be cut off on the way.
+    pub fn table_correction(&self, axes: &[&str]) -> Result<TableCorrection, Failure> {
+        linear::table_correction(&self.core, &self.linear, axes)
+    }
+
+    /// The head of a record without measurements, which says who this machine is.
+    pub fn this_machine(&self, axis: &str) -> RecordHead {
+        run::this_machine(&self.core, (&self.config, &self.config_hash), axis)
+    }
+}
+
+fn no_such_axis(axis: &str, known: &[String]) -> Failure {
+    Failure::Machine(machine::Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: known.join(", "),
+    })
 }

@@ -17,9 +17,9 @@
 //!     let store = Store::of(&loaded.config.machine);
 //!     machine.guarded(|machine| {
 //!         machine.start()?;
-//!         machine.zero("x", &store)?;
-//!         machine.load_active("x", &store)?;
-//!         machine.move_to("x", Metres::from_mm(12.5))?;
+//!         machine.linear("x")?.zero(&store)?;
+//!         machine.linear("x")?.load_active(&store)?;
+//!         machine.linear("x")?.move_to(Metres::from_mm(12.5))?;
 //!         machine.shut_down()
 //!     })
 //! }
@@ -43,6 +43,7 @@ mod edit;
 #[cfg(feature = "emulator")]
 pub mod emulated;
 pub mod failure;
+mod handle;
 pub mod json;
 pub mod linear;
 pub mod page;

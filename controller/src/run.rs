@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 use std::path::PathBuf;
 
-use crate::connected::Machine;
+use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
 use crate::store::{
     Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, RecordHead, SCHEMA_VERSION,
@@ -41,45 +41,35 @@ pub(crate) fn note_failure(journal: &mut Journal, failure: &Failure) {
     });
 }
 
-impl Machine {
-    /// The head of a record without measurements, which says who this machine is.
-    pub fn this_machine(&self, axis: &str) -> RecordHead {
-        let config = self.config.axis.get(axis);
-        let rotary = self.config.rotary.get(axis);
-        RecordHead {
-            schema_version: SCHEMA_VERSION,
-            machine: self.config.machine.name.clone(),
-            stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.as_str().to_owned(),
-            axis: axis.to_owned(),
-            drive: self.drive_record(axis),
-            resolution_m: config.map(|axis| axis.resolution_nm * 1e-9),
-            resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
-            created: String::new(),
-            program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
-            source: String::new(),
-            instrument: InstrumentRecord::default(),
-            environment: EnvironmentRecord::default(),
-        }
+/// The head of a record without measurements, which says who `machine` is.
+pub(crate) fn this_machine(
+    machine: &machine::Machine,
+    (config, hash): (&MachineConfig, &ConfigHash),
+    axis: &str,
+) -> RecordHead {
+    let linear = config.axis.get(axis);
+    let rotary = config.rotary.get(axis);
+    RecordHead {
+        schema_version: SCHEMA_VERSION,
+        machine: config.machine.name.clone(),
+        stage_serial: config.machine.stage_serial.clone(),
+        config_hash: hash.as_str().to_owned(),
+        axis: axis.to_owned(),
+        drive: drive_record(machine, axis),
+        resolution_m: linear.map(|axis| axis.resolution_nm * 1e-9),
+        resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
+        created: String::new(),
+        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+        source: String::new(),
+        instrument: InstrumentRecord::default(),
+        environment: EnvironmentRecord::default(),
     }
+}
 
-    pub(crate) fn drive_record(&self, axis: &str) -> IdentityRecord {
-        self.identity(axis)
-            .as_ref()
-            .map(IdentityRecord::from)
-            .unwrap_or_default()
-    }
-
-    pub(crate) fn instrument_record(&self, name: &str) -> InstrumentRecord {
-        let config = &self.config.instrument[name];
-        InstrumentRecord {
-            name: name.to_owned(),
-            identity: self.identity(name).unwrap_or_default().name,
-            air_corrected: config.correct_air,
-            material_corrected: config.correct_material,
-            dead_path_corrected: config.correct_dead_path,
-            cosine_corrected: config.correct_cosine,
-            standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
-        }
-    }
+pub(crate) fn drive_record(machine: &machine::Machine, axis: &str) -> IdentityRecord {
+    let identity = machine.identity(axis);
+    identity
+        .as_ref()
+        .map(IdentityRecord::from)
+        .unwrap_or_default()
 }

@@ -64,9 +64,9 @@ fn check(setup: &Setup, axes: &[&str], part: Part) {
     let machine = &mut stand.machine;
     machine.start().unwrap_or_else(|it| panic!("{it}"));
     let zeroed = if config.volumetric.is_some() {
-        machine.zero_volumetric()
+        machine.volumetric().unwrap().zero()
     } else {
-        machine.zero_platform(&store).map(drop)
+        machine.platform().unwrap().zero(&store).map(drop)
     };
     zeroed.unwrap_or_else(|it| panic!("{it}"));
     let correction: Box<dyn Correction> = match &config.volumetric {

@@ -208,9 +208,9 @@ fn zero(stand: &mut Stand) -> Result<(), Failure> {
     let store = stand.store.clone();
     stand.machine.start()?;
     if stand.machine.config().volumetric.is_some() {
-        stand.machine.zero_volumetric()
+        stand.machine.volumetric()?.zero()
     } else {
-        stand.machine.zero_platform(&store).map(drop)
+        stand.machine.platform()?.zero(&store).map(drop)
     }
 }
 

@@ -26,13 +26,21 @@ fn runs() -> Runs {
     let store = bench.store.clone();
     let machine = &mut bench.machine;
     machine.start().unwrap();
-    let zeroed = machine.zero_platform(&store).unwrap();
-    let found = machine.verify_platform(&store, false).unwrap();
-    machine.move_pose(Pose::default()).unwrap();
-    machine.calibrate_platform(&store).unwrap();
-    machine.move_pose(Pose::default()).unwrap();
-    let calibrated = machine.calibrate_platform(&store).unwrap();
-    let left = machine.verify_platform(&store, true).unwrap();
+    let zeroed = machine.platform().unwrap().zero(&store).unwrap();
+    let found = machine.platform().unwrap().verify(&store, false).unwrap();
+    machine
+        .platform()
+        .unwrap()
+        .move_to(Pose::default())
+        .unwrap();
+    machine.platform().unwrap().calibrate(&store).unwrap();
+    machine
+        .platform()
+        .unwrap()
+        .move_to(Pose::default())
+        .unwrap();
+    let calibrated = machine.platform().unwrap().calibrate(&store).unwrap();
+    let left = machine.platform().unwrap().verify(&store, true).unwrap();
     machine.shut_down().unwrap();
     let folder = bench.folder.path().display().to_string();
     let text = UVW.machine.edit("machine-data", &folder);

@@ -38,12 +38,15 @@ fn runs() -> Runs {
     let machine = &mut volume.bench.machine;
     let place = |path: &Path| path.display().to_string();
     let mut calibrated = || {
-        let made = machine.calibrate_volumetric(&store, WarmUp::None, None, &mut hand);
+        let made = machine
+            .volumetric()
+            .unwrap()
+            .calibrate(&store, WarmUp::None, None, &mut hand);
         let made = good(made);
         (made.id, place(&made.journal))
     };
     let both = [calibrated(), calibrated()];
-    let mut verified = |by| good(machine.verify_volumetric(&store, by, &mut hand));
+    let mut verified = |by| good(machine.volumetric().unwrap().verify(&store, by, &mut hand));
     let found = place(&verified(VerifyBy::AsFound).journal);
     let left = place(&verified(VerifyBy::Everything).journal);
     good(machine.shut_down());

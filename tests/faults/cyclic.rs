@@ -365,7 +365,7 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
     let machine = &mut played.bench.machine;
     assert!(!machine.is_zeroed("x"));
     machine.start().unwrap();
-    let refused = machine.move_to("x", units::Metres::ZERO);
+    let refused = machine.linear("x").unwrap().move_to(units::Metres::ZERO);
     assert!(
         matches!(
             refused,

@@ -26,7 +26,12 @@ fn text(text: String) -> String {
 fn zeroed() -> Bench {
     let mut bench = Bench::with(1, text, |text| text);
     bench.machine.start().unwrap();
-    bench.machine.zero("x", &bench.store).unwrap();
+    bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .zero(&bench.store)
+        .unwrap();
     bench
 }
 
@@ -63,7 +68,7 @@ fn orders_and_points_of_a_motion_that_failed_are_never_driven_later() {
         matches!(refused, Err(machine::Failure::NotZeroed { .. })),
         "{refused:?}"
     );
-    machine.zero("x", &bench.store).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
     let before = here(&bench);
     hold(&mut bench.machine, &mut engine, &mut desk);
     let moved = (here(&bench) - before).abs();
@@ -110,11 +115,17 @@ fn after_a_quick_stop_nothing_moves_until_the_machine_is_started_again() {
         assert_eq!(failure.exit_code(), 3);
     };
     refused(follow(machine).map(drop));
-    refused(machine.move_to("x", Metres::from_mm(10.0)).map(drop));
-    refused(machine.zero("x", &bench.store).map(drop));
+    refused(
+        machine
+            .linear("x")
+            .unwrap()
+            .move_to(Metres::from_mm(10.0))
+            .map(drop),
+    );
+    refused(machine.linear("x").unwrap().zero(&bench.store).map(drop));
     refused(machine.enable("x").map_err(Failure::from));
     machine.start().unwrap();
-    machine.zero("x", &bench.store).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
     assert_eq!(follow(machine).unwrap(), Cause::PathDone);
 }
 
@@ -132,12 +143,12 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     let mut bench = Bench::wrapped(1, text, slippery, wrap);
     let machine = &mut bench.machine;
     machine.start().unwrap();
-    machine.zero("x", &bench.store).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
     let request = machine.stop_request();
     let soon = machine.now() + Duration::from_millis(290);
     seen.borrow_mut()
         .plan(soon, Box::new(move |_| request.stop()));
-    let moved = machine.move_to("x", Metres::from_mm(62.0));
+    let moved = machine.linear("x").unwrap().move_to(Metres::from_mm(62.0));
     assert!(
         matches!(moved, Err(Failure::Machine(machine::Failure::Interrupted))),
         "{moved:?}"
@@ -171,8 +182,12 @@ fn an_axis_outside_its_soft_limits_is_not_jerked_back() {
     // What it advises.
     let machine = &mut bench.machine;
     machine.reset_fault("x").unwrap();
-    machine.zero("x", &bench.store).unwrap();
-    machine.move_to("x", Metres::from_mm(50.0)).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
+    machine
+        .linear("x")
+        .unwrap()
+        .move_to(Metres::from_mm(50.0))
+        .unwrap();
     assert_eq!(follow(machine).unwrap(), Cause::PathDone);
 }
 
@@ -228,7 +243,7 @@ fn memory_is_locked_before_the_loop_takes_over_sync_and_let_go_after_it() {
     let mut bench = Bench::wrapped(1, text, |text| text, wrap);
     let machine = &mut bench.machine;
     machine.start().unwrap();
-    machine.zero("x", &bench.store).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
     let (mut engine, mut desk) = Engine::new(machine, &["x"], Box::new(NoCorrection)).unwrap();
     engine.in_real_time();
     hold(machine, &mut engine, &mut desk);

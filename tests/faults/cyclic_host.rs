@@ -118,12 +118,12 @@ fn under_way(target: Metres) -> Bench {
     let mut bench = Bench::wrapped(1, slow, |text| text, wrap);
     let machine = &mut bench.machine;
     machine.start().unwrap();
-    machine.zero("x", &bench.store).unwrap();
+    machine.linear("x").unwrap().zero(&bench.store).unwrap();
     let request = machine.stop_request();
     let soon = machine.now() + Duration::from_millis(300);
     seen.borrow_mut()
         .plan(soon, Box::new(move |_| request.stop()));
-    let moved = machine.move_to("x", target);
+    let moved = machine.linear("x").unwrap().move_to(target);
     assert!(
         matches!(moved, Err(Failure::Machine(machine::Failure::Interrupted))),
         "{moved:?}"

@@ -63,7 +63,7 @@ fn standing(reaction: &'static str) -> (Bench, Seen) {
     };
     let mut bench = Bench::shaped(&VOLUMETRIC, 7, quick, |text| text);
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));
-    let zeroed = bench.machine.zero_volumetric();
+    let zeroed = bench.machine.volumetric().unwrap().zero();
     zeroed.unwrap_or_else(|it| panic!("{it}"));
     let seen = Arc::new(Mutex::new((Vec::new(), Vec::new())));
     let watcher = Box::new(Watcher(Arc::clone(&seen)));
@@ -335,9 +335,13 @@ fn switched_on_blind(reaction: &'static str) -> (Result<Live, Failure>, Vec<Stri
     let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
     let told = Arc::new(Mutex::new(Vec::new()));
     bench.machine.observe(Box::new(Told(Arc::clone(&told))));
-    let mover = bench.machine.volumetric_mover(correction);
+    let mover = bench.machine.volumetric().unwrap().mover(correction);
     let mut mover = mover.unwrap_or_else(|it| panic!("{it}"));
-    let outcome = bench.machine.correct_volume(&mut mover, true);
+    let outcome = bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .correct(&mut mover, true);
     assert!(bench.emulated.simulation().fault_deliveries(id) > 0);
     let told = told.lock().expect("nobody panics with it").clone();
     (outcome, told)
@@ -421,7 +425,7 @@ fn a_module_that_falls_silent_is_an_alarm_whatever_its_detectors_do() {
     let state = risen(&bench, &seen);
     let correction = VolumetricCorrection::new(&bench.loaded.config, state);
     let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
-    let mover = bench.machine.volumetric_mover(correction);
+    let mover = bench.machine.volumetric().unwrap().mover(correction);
     let mut mover = mover.unwrap_or_else(|it| panic!("{it}"));
     let silent = Fault::StopPdos {
         node: "beams_x".into(),
@@ -429,7 +433,11 @@ fn a_module_that_falls_silent_is_an_alarm_whatever_its_detectors_do() {
     let silent = FaultConfig::permanent(silent);
     let id = bench.emulated.simulation_mut().inject(silent);
     let id = id.expect("it is there");
-    let failure = bench.machine.correct_volume(&mut mover, true);
+    let failure = bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .correct(&mut mover, true);
     let failure = failure.map(drop).unwrap_err();
     assert!(bench.emulated.simulation().fault_deliveries(id) > 0);
     assert!(
@@ -456,7 +464,7 @@ fn a_module_of_thermometers_alone_is_heard() {
     good(volume.bench.machine.idle(Duration::from_secs(2)));
     volume.know_errors();
     let store = volume.bench.store.clone();
-    let taken = good(volume.bench.machine.reference_volumetric(&store));
+    let taken = good(volume.work().reference(&store));
     assert_eq!(taken.references.temperatures.len(), 6);
 }
 

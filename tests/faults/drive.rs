@@ -109,7 +109,12 @@ fn a_drive_that_resets_while_it_moves_is_not_zeroed_any_more() {
     };
     let mut played = check(scene, &wanted);
     assert!(!played.bench.machine.is_zeroed("x"));
-    let refused = played.bench.machine.move_to("x", units::Metres::ZERO);
+    let refused = played
+        .bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .move_to(units::Metres::ZERO);
     assert!(
         matches!(
             refused,

@@ -24,10 +24,21 @@ impl Shelf {
         let mut bench = Bench::with(1, shortened, |text| text);
         let store = bench.store.clone();
         bench.machine.start().unwrap();
-        bench.machine.zero("x", &store).unwrap();
+        bench.machine.linear("x").unwrap().zero(&store).unwrap();
         let options = CalibrateOptions::default();
-        let older = bench.machine.calibrate("x", &store, &options).unwrap().id;
-        let newer = bench.machine.calibrate("x", &store, &options).unwrap();
+        let older = bench
+            .machine
+            .linear("x")
+            .unwrap()
+            .calibrate(&store, &options)
+            .unwrap()
+            .id;
+        let newer = bench
+            .machine
+            .linear("x")
+            .unwrap()
+            .calibrate(&store, &options)
+            .unwrap();
         bench.machine.shut_down().unwrap();
         Self {
             bench,
@@ -39,7 +50,7 @@ impl Shelf {
 
     fn load(&mut self) -> Result<Option<String>, Failure> {
         let store = self.bench.store.clone();
-        self.bench.machine.load_active("x", &store)
+        self.bench.machine.linear("x")?.load_active(&store)
     }
 
     fn store(&self) -> &Store {
@@ -166,12 +177,17 @@ fn a_run_whose_journal_cannot_be_written_is_not_begun() {
     let mut bench = Bench::with(1, shortened, |text| text);
     let store = bench.store.clone();
     bench.machine.start().unwrap();
-    bench.machine.zero("x", &store).unwrap();
+    bench.machine.linear("x").unwrap().zero(&store).unwrap();
     let before = bench.true_position();
     let full = Store::new(&bench.folder.path().join("file"), "m");
     fs::write(bench.folder.path().join("file"), b"").unwrap();
     let options = CalibrateOptions::default();
-    let failure = bench.machine.calibrate("x", &full, &options).unwrap_err();
+    let failure = bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .calibrate(&full, &options)
+        .unwrap_err();
     assert!(
         matches!(failure, Failure::Store(StoreError::Io { .. })),
         "{failure:?}"
@@ -268,12 +284,12 @@ fn a_killed_run_goes_on_where_it_stopped() {
     bench.machine.observe(Box::new(StopAt { left: 30, stop }));
     let run = |machine: &mut Machine, resume| {
         machine.start()?;
-        machine.zero("x", &store)?;
+        machine.linear("x")?.zero(&store)?;
         let options = CalibrateOptions {
             resume,
             accept_drift: false,
         };
-        machine.calibrate("x", &store, &options)
+        machine.linear("x")?.calibrate(&store, &options)
     };
     let failure = bench
         .machine

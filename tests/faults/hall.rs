@@ -19,7 +19,7 @@ fn check_named(fault: Fault, words: &[&str]) {
     let mut played = check(Scene::during(Phase::Zero).fault(fault), &wanted);
     let machine = &mut played.bench.machine;
     assert!(!machine.is_zeroed("x"));
-    let refused = machine.move_to("x", units::Metres::ZERO);
+    let refused = machine.linear("x").unwrap().move_to(units::Metres::ZERO);
     assert!(
         matches!(
             refused,

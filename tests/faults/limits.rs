@@ -14,7 +14,7 @@ fn zeroed(seed: u64) -> Bench {
     let mut bench = Bench::with(seed, shortened, |text| text);
     bench.machine.start().unwrap();
     let store = bench.store.clone();
-    bench.machine.zero("x", &store).unwrap();
+    bench.machine.linear("x").unwrap().zero(&store).unwrap();
     bench
 }
 
@@ -22,7 +22,12 @@ fn calibrated(seed: u64) -> (Bench, CalibrationRecord, String) {
     let mut bench = zeroed(seed);
     let store = bench.store.clone();
     let options = CalibrateOptions::default();
-    let made = bench.machine.calibrate("x", &store, &options).unwrap();
+    let made = bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .calibrate(&store, &options)
+        .unwrap();
     (bench, made.record, made.id)
 }
 
@@ -33,7 +38,7 @@ fn verify(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
         calibration,
         resume: None,
     };
-    machine.verify("x", store, &options).map(|_| ())
+    machine.linear("x")?.verify(store, &options).map(|_| ())
 }
 
 #[test]
@@ -41,7 +46,11 @@ fn a_target_beyond_the_soft_limits_moves_nothing() {
     let mut bench = zeroed(1);
     let before = bench.true_position();
     for target_mm in [63.001, -3.001, 1e6, -1e6, f64::NAN, f64::INFINITY] {
-        let refused = bench.machine.move_to("x", Metres::from_mm(target_mm));
+        let refused = bench
+            .machine
+            .linear("x")
+            .unwrap()
+            .move_to(Metres::from_mm(target_mm));
         match refused {
             Err(failure @ Failure::Machine(machine::Failure::SoftLimit { .. })) => {
                 assert!(
@@ -60,7 +69,12 @@ fn a_target_beyond_the_soft_limits_moves_nothing() {
             moved.nm()
         );
     }
-    bench.machine.move_to("x", Metres::from_mm(62.9)).unwrap();
+    bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .move_to(Metres::from_mm(62.9))
+        .unwrap();
 }
 
 #[test]
@@ -68,7 +82,11 @@ fn an_axis_that_is_not_zeroed_moves_nothing() {
     let mut bench = Bench::new(1);
     bench.machine.start().unwrap();
     let before = bench.true_position();
-    let refused = bench.machine.move_to("x", Metres::from_mm(1.0));
+    let refused = bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .move_to(Metres::from_mm(1.0));
     assert!(
         matches!(
             refused,
@@ -105,14 +123,27 @@ fn check_refused_at_load(change: impl Fn(usize, f64) -> f64, words: &[&str]) {
     let (mut bench, record, good) = calibrated(1);
     let store = bench.store.clone();
     activate(&store, &record, change);
-    let failure = bench.machine.load_active("x", &store).unwrap_err();
+    let failure = bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .load_active(&store)
+        .unwrap_err();
     let text = failure.to_string();
     for word in words {
         assert!(text.contains(word), "`{word}` is not in: {text}");
     }
     assert_eq!(failure.exit_code(), 3, "{failure:?}");
     assert_eq!(store.rollback("x").unwrap(), good);
-    assert_eq!(bench.machine.load_active("x", &store).unwrap(), Some(good));
+    assert_eq!(
+        bench
+            .machine
+            .linear("x")
+            .unwrap()
+            .load_active(&store)
+            .unwrap(),
+        Some(good)
+    );
 }
 
 #[test]
@@ -141,7 +172,12 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
         let (mut bench, record, good) = calibrated(seed);
         let store = bench.store.clone();
         let wrong = activate(&store, &record, |_, deviation| -deviation);
-        bench.machine.load_active("x", &store).unwrap();
+        bench
+            .machine
+            .linear("x")
+            .unwrap()
+            .load_active(&store)
+            .unwrap();
         let failure = bench
             .machine
             .guarded(|machine| verify(machine, &store))
@@ -169,7 +205,7 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
             "not {wrong}"
         );
         bench.machine.start().unwrap();
-        bench.machine.zero("x", &store).unwrap();
+        bench.machine.linear("x").unwrap().zero(&store).unwrap();
         verify(&mut bench.machine, &store).unwrap();
     }
 }
@@ -179,7 +215,12 @@ fn a_first_calibration_that_makes_it_worse_leaves_none_behind() {
     let (mut bench, record, _) = calibrated(2);
     let fresh = Store::new(bench.folder.path(), "fresh");
     activate(&fresh, &record, |_, deviation| -deviation);
-    bench.machine.load_active("x", &fresh).unwrap();
+    bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .load_active(&fresh)
+        .unwrap();
     let failure = bench
         .machine
         .guarded(|machine| verify(machine, &fresh))
@@ -193,7 +234,7 @@ fn a_first_calibration_that_makes_it_worse_leaves_none_behind() {
         "{failure}"
     );
     assert_eq!(fresh.active("x").unwrap().current, None);
-    assert!(bench.machine.compensation("x").is_none());
+    assert!(bench.machine.linear("x").unwrap().compensation().is_none());
 }
 
 #[test]

@@ -358,7 +358,7 @@ fn prepare(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Fai
     if matches!(phase, Phase::Zero) {
         return Ok(());
     }
-    machine.zero("x", store)?;
+    machine.linear("x")?.zero(store)?;
     Ok(())
 }
 
@@ -372,24 +372,26 @@ fn perform(
     match phase {
         Phase::Start => machine.start()?,
         Phase::Zero => {
-            machine.zero("x", store)?;
+            machine.linear("x")?.zero(store)?;
         }
         Phase::Move => {
-            machine.move_to("x", Metres::from_mm(60.0))?;
+            machine.linear("x")?.move_to(Metres::from_mm(60.0))?;
         }
         Phase::Restart => {
             machine.disable("x")?;
             let until = machine.now() + Duration::from_millis(100);
             machine.run_until(until)?;
             machine.enable("x")?;
-            machine.move_to("x", Metres::from_mm(60.0))?;
+            machine.linear("x")?.move_to(Metres::from_mm(60.0))?;
         }
         Phase::Stand => {
             let until = machine.now() + Duration::from_secs(3);
             machine.run_until(until)?;
         }
         Phase::Calibrate => {
-            let done = machine.calibrate("x", store, &CalibrateOptions::default())?;
+            let done = machine
+                .linear("x")?
+                .calibrate(store, &CalibrateOptions::default())?;
             *calibrated.borrow_mut() = Some(done);
         }
         Phase::Follow => cause.set(Some(follow(machine)?)),
@@ -399,7 +401,7 @@ fn perform(
                 calibration: None,
                 resume: None,
             };
-            machine.verify("x", store, &options)?;
+            machine.linear("x")?.verify(store, &options)?;
         }
     }
     Ok(())

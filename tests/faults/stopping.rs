@@ -57,14 +57,14 @@ fn killed_in_motion(watch: &'static str) -> (Bench, Time) {
     );
     let store = bench.store.clone();
     bench.machine.start().unwrap();
-    bench.machine.zero("x", &store).unwrap();
+    bench.machine.linear("x").unwrap().zero(&store).unwrap();
     let end = bench.machine.now() + Duration::from_millis(100);
     // As SIGKILL does: nothing is tidied up on the way out.
     seen.borrow_mut()
         .plan(end, Box::new(|_| resume_unwind(Box::new("killed"))));
     let machine = &mut bench.machine;
     let moved = catch_unwind(AssertUnwindSafe(|| {
-        machine.move_to("x", Metres::from_mm(60.0))
+        machine.linear("x")?.move_to(Metres::from_mm(60.0))
     }));
     assert!(moved.is_err(), "the move ended before: {moved:?}");
     (bench, end)

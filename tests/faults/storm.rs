@@ -223,11 +223,15 @@ fn cycle(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
         resume: None,
     };
     machine.start()?;
-    machine.zero("x", store)?;
-    machine.verify("x", store, &options(None))?;
-    let made = machine.calibrate("x", store, &CalibrateOptions::default())?;
-    machine.verify("x", store, &options(Some(made.id)))?;
-    machine.move_to("x", Metres::from_mm(31.4))?;
+    machine.linear("x")?.zero(store)?;
+    machine.linear("x")?.verify(store, &options(None))?;
+    let made = machine
+        .linear("x")?
+        .calibrate(store, &CalibrateOptions::default())?;
+    machine
+        .linear("x")?
+        .verify(store, &options(Some(made.id)))?;
+    machine.linear("x")?.move_to(Metres::from_mm(31.4))?;
     machine.shut_down()
 }
 
@@ -334,8 +338,8 @@ fn take_up_work(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
     machine.guarded(|machine| {
         machine.start()?;
         machine.reset_fault("x")?;
-        machine.zero("x", store)?;
-        machine.move_to("x", Metres::from_mm(5.0))?;
+        machine.linear("x")?.zero(store)?;
+        machine.linear("x")?.move_to(Metres::from_mm(5.0))?;
         machine.shut_down()
     })
 }

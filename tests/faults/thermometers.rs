@@ -61,7 +61,7 @@ fn warm(reaction: &str) -> Volume {
     let mut volume = Volume::zeroed(3, machine, emulated);
     volume.know_errors();
     let store = volume.bench.store.clone();
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     assert!(volume.bench.machine.now() < Time::from_seconds(WARMS_S));
     let cold = volume.truth(|truth| truth.scale_temperature(0));
     let pause = Time::from_seconds(WARM_S).since(volume.bench.machine.now());
@@ -132,7 +132,7 @@ fn stand(volume: &mut Volume, fault: Fault, lasting: u64) -> Stood {
     let target: Point = point_mm(PLACE);
     let (mut mover, state) = volume.corrected();
     let rest = Duration::from_millis(100);
-    good(volume.bench.machine.drive_to(&mut mover, target, rest));
+    good(volume.work().drive_to(&mut mover, target, rest));
     let tables = by_tables(volume, &state);
     let fault = FaultConfig::lasting(fault, Duration::from_millis(2) * lasting as u32);
     let emulated = volume.bench.emulated.clone();
@@ -154,7 +154,10 @@ fn stand(volume: &mut Volume, fault: Fault, lasting: u64) -> Stood {
         }
     };
     let machine = &mut volume.bench.machine;
-    let result = machine.drive_watched(&mut mover, target, STAND, &mut watch);
+    let result = machine
+        .volumetric()
+        .unwrap()
+        .drive_watched(&mut mover, target, STAND, &mut watch);
     let id = id.expect("it came");
     let delivered = volume.bench.emulated.simulation().fault_deliveries(id);
     assert!(delivered > 0, "{text}: it never struck");
@@ -314,7 +317,7 @@ fn references_are_not_taken_of_a_machine_that_is_warmer_than_it_was() {
     let store = volume.bench.store.clone();
     let before = store.active(REFERENCES).expect("it can be read").current;
     let here = volume.truth(|truth| truth.scales());
-    let refused = volume.bench.machine.reference_volumetric(&store);
+    let refused = volume.work().reference(&store);
     let refused = refused.expect_err("it is warmer");
     let text = refused.to_string();
     assert!(

@@ -112,7 +112,7 @@ impl Talk {
     /// Follows the path; whether the engine came to its end.
     fn follow(&mut self, points: &[Vec<Metres>]) -> bool {
         let machine = &mut self.machine;
-        let zeroed = machine.start().and_then(|()| machine.zero_volumetric());
+        let zeroed = machine.start().and_then(|()| machine.volumetric()?.zero());
         zeroed.unwrap_or_else(|failure| panic!("{failure}"));
         let (mut engine, desk) = Engine::new(machine, &AXES, Box::new(NoCorrection))
             .unwrap_or_else(|failure| panic!("{failure}"));

@@ -66,13 +66,13 @@ fn bits(point: &PointEntry) -> [u64; 6] {
 /// Zero, and the points.
 fn procedure(machine: &mut Machine, store: &Store) -> Result<(Zeroed, Verified), Failure> {
     machine.start()?;
-    let zeroed = machine.zero("x", store)?;
+    let zeroed = machine.linear("x")?.zero(store)?;
     let options = VerifyOptions {
         compensated: false,
         calibration: None,
         resume: None,
     };
-    let verified = machine.verify("x", store, &options)?;
+    let verified = machine.linear("x")?.verify(store, &options)?;
     machine.shut_down()?;
     Ok((zeroed, verified))
 }

@@ -127,20 +127,26 @@ fn linear(bench: Bench) -> Result<Bench, Failure> {
         resume: None,
     };
     started(bench, |machine, store| {
-        machine.zero("x", store)?;
-        machine.verify("x", store, &verify(None))?;
-        let calibrated = machine.calibrate("x", store, &CalibrateOptions::default())?;
-        machine.verify("x", store, &verify(Some(calibrated.id)))?;
+        machine.linear("x")?.zero(store)?;
+        machine.linear("x")?.verify(store, &verify(None))?;
+        let calibrated = machine
+            .linear("x")?
+            .calibrate(store, &CalibrateOptions::default())?;
+        machine
+            .linear("x")?
+            .verify(store, &verify(Some(calibrated.id)))?;
         Ok(())
     })
 }
 
 fn part_of_linear(bench: Bench) -> Result<Bench, Failure> {
     started(bench, |machine, store| {
-        machine.zero("x", store)?;
-        machine.calibrate("x", store, &CalibrateOptions::default())?;
+        machine.linear("x")?.zero(store)?;
+        machine
+            .linear("x")?
+            .calibrate(store, &CalibrateOptions::default())?;
         for mm in [12.5, 44.4, 31.0] {
-            machine.move_to("x", Metres::from_mm(mm))?;
+            machine.linear("x")?.move_to(Metres::from_mm(mm))?;
         }
         Ok(())
     })
@@ -156,22 +162,22 @@ fn somewhere() -> Pose {
 
 fn platform(bench: Bench) -> Result<Bench, Failure> {
     started(bench, |machine, store| {
-        machine.zero_platform(store)?;
-        machine.verify_platform(store, false)?;
-        machine.move_pose(Pose::default())?;
-        machine.calibrate_platform(store)?;
-        machine.verify_platform(store, true)?;
-        machine.align_pose(somewhere())?;
+        machine.platform()?.zero(store)?;
+        machine.platform()?.verify(store, false)?;
+        machine.platform()?.move_to(Pose::default())?;
+        machine.platform()?.calibrate(store)?;
+        machine.platform()?.verify(store, true)?;
+        machine.platform()?.align(somewhere())?;
         Ok(())
     })
 }
 
 fn part_of_platform(bench: Bench) -> Result<Bench, Failure> {
     started(bench, |machine, store| {
-        machine.zero_platform(store)?;
-        machine.calibrate_platform(store)?;
-        machine.move_pose(somewhere())?;
-        machine.move_pose(Pose::default())?;
+        machine.platform()?.zero(store)?;
+        machine.platform()?.calibrate(store)?;
+        machine.platform()?.move_to(somewhere())?;
+        machine.platform()?.move_to(Pose::default())?;
         Ok(())
     })
 }
@@ -184,9 +190,11 @@ fn hand_of(bench: &Bench) -> Hand<'static> {
 fn rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
     started(bench, |machine, store| {
-        machine.zero_rotary("c")?;
-        machine.calibrate_rotary("c", store, &CalibrateOptions::default(), &mut hand)?;
-        machine.verify_rotary("c", store, true, &mut hand)?;
+        machine.rotary("c")?.zero()?;
+        machine
+            .rotary("c")?
+            .calibrate(store, &CalibrateOptions::default(), &mut hand)?;
+        machine.rotary("c")?.verify(store, true, &mut hand)?;
         Ok(())
     })
 }
@@ -194,9 +202,13 @@ fn rotary(bench: Bench) -> Result<Bench, Failure> {
 fn part_of_rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
     started(bench, |machine, store| {
-        machine.zero_rotary("c")?;
-        machine.calibrate_rotary("c", store, &CalibrateOptions::default(), &mut hand)?;
-        machine.move_rotary("c", Radians::from_degrees(123.4), Way::Shortest)?;
+        machine.rotary("c")?.zero()?;
+        machine
+            .rotary("c")?
+            .calibrate(store, &CalibrateOptions::default(), &mut hand)?;
+        machine
+            .rotary("c")?
+            .move_to(Radians::from_degrees(123.4), Way::Shortest)?;
         Ok(())
     })
 }
@@ -204,8 +216,10 @@ fn part_of_rotary(bench: Bench) -> Result<Bench, Failure> {
 fn volumetric(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = bench.emulated.clone();
     started(bench, |machine, store| {
-        machine.zero_volumetric()?;
-        machine.calibrate_volumetric(store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
+        machine.volumetric()?.zero()?;
+        machine
+            .volumetric()?
+            .calibrate(store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
         Ok(())
     })
 }
@@ -213,11 +227,11 @@ fn volumetric(bench: Bench) -> Result<Bench, Failure> {
 /// Corrected by errors that are known: finding them takes hours.
 fn part_of_volumetric(mut bench: Bench) -> Result<Bench, Failure> {
     bench.machine.start()?;
-    bench.machine.zero_volumetric()?;
+    bench.machine.volumetric()?.zero()?;
     let mut volume = Volume { bench };
     volume.know_errors();
     let store = volume.bench.store.clone();
-    volume.bench.machine.reference_volumetric(&store)?;
+    volume.bench.machine.volumetric()?.reference(&store)?;
     let (mut mover, _) = volume.corrected();
     volume.visit(&mut mover, &spread(0, 3), &mut Vec::new());
     volume.bench.machine.shut_down()?;

@@ -12,7 +12,9 @@ use mock_bus::plant::VolumetricTruth;
 use truestage::emulated::with_rare_heartbeats;
 use truestage::engine::{Live, Observed};
 use truestage::store::{CalibrationRecord, Content, RecordHead};
-use truestage::volumetric::{BendRecord, GeometryContent, MemoryName, StateMemoryContent};
+use truestage::volumetric::{
+    BendRecord, GeometryContent, MemoryName, StateMemoryContent, WorkVolume,
+};
 use truestage::volumetric::{
     GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
 };
@@ -165,7 +167,7 @@ impl Volume {
     ) -> Self {
         let mut bench = Bench::shaped(&VOLUMETRIC, seed, machine, emulated);
         good(bench.machine.start());
-        good(bench.machine.zero_volumetric());
+        good(bench.machine.volumetric().unwrap().zero());
         Self { bench }
     }
 
@@ -223,11 +225,11 @@ impl Volume {
     /// When it cannot be stored.
     pub fn know_errors(&self) -> String {
         let (axes, squareness) = self.true_errors();
-        let machine = &self.bench.machine;
-        let config = good(machine.volumetric_config());
+        let config = &self.bench.loaded.config.volumetric;
+        let thermometers = config.as_ref().expect("a volume").temperature.len();
         // The sensors' own offsets are nobody's business: nothing but their change counts.
         let temperatures = self.truth(|truth| {
-            let each = (0..config.temperature.len()).map(|it| {
+            let each = (0..thermometers).map(|it| {
                 let side = if it % 2 == 0 { 0.5 } else { -0.5 };
                 let scale = truth.scale_temperature(it / 2);
                 Celsius(scale.value() + side * truth.gradient_k(it / 2))
@@ -238,7 +240,7 @@ impl Volume {
         content.bends = self.true_bends();
         let head = RecordHead {
             axis: GEOMETRY.into(),
-            ..machine.this_machine("x")
+            ..self.bench.machine.this_machine("x")
         };
         let content = Content::VolumetricGeometry(content);
         let record = CalibrationRecord { head, content };
@@ -357,12 +359,21 @@ impl Volume {
         activated.expect("it was just stored");
     }
 
+    /// What its three axes do.
+    ///
+    /// # Panics
+    /// Never: the machine that ships has them.
+    pub fn work(&mut self) -> WorkVolume<'_> {
+        self.bench.machine.volumetric().expect("it ships with them")
+    }
+
     /// The machine corrected by all that is stored, and that state.
     ///
     /// # Panics
     /// When nothing is stored, or it cannot be applied.
     pub fn corrected(&mut self) -> (Mover, VolumetricState) {
-        let stored = good(self.bench.machine.volumetric_state(&self.bench.store));
+        let store = self.bench.store.clone();
+        let stored = good(self.work().state(&store));
         let (state, _) = stored.expect("it was stored");
         self.corrected_by(state)
     }
@@ -374,9 +385,9 @@ impl Volume {
     pub fn corrected_by(&mut self, state: VolumetricState) -> (Mover, VolumetricState) {
         let correction = VolumetricCorrection::new(&self.bench.loaded.config, state.clone());
         let correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
-        let mover = self.bench.machine.volumetric_mover(Box::new(correction));
+        let mover = self.work().mover(Box::new(correction));
         let mut mover = good(mover);
-        good(self.bench.machine.correct_volume(&mut mover, true));
+        good(self.work().correct(&mut mover, true));
         (mover, state)
     }
 
@@ -415,7 +426,12 @@ impl Volume {
         let stand = |mm: &[f64; 3]| {
             let target = point_mm(*mm);
             let machine = &mut self.bench.machine;
-            let live = good(machine.drive_watched(mover, target, STAND, &mut watch));
+            let live = good(
+                machine
+                    .volumetric()
+                    .unwrap()
+                    .drive_watched(mover, target, STAND, &mut watch),
+            );
             Stood {
                 off: self.off(target),
                 stated: core::array::from_fn(|k| live.uncertainty[k]),

@@ -140,9 +140,9 @@ fn zero(stand: &mut Stand) -> Result<(), Failure> {
     let machine = &mut stand.machine;
     machine.start()?;
     if machine.config().volumetric.is_some() {
-        machine.zero_volumetric()
+        machine.volumetric()?.zero()
     } else {
-        machine.zero_platform(&store).map(drop)
+        machine.platform()?.zero(&store).map(drop)
     }
 }
 

@@ -23,7 +23,7 @@ fn verify(stand: &mut Stand, calibration: Option<&str>) -> Result<Verified, Fail
         calibration: calibration.map(str::to_owned),
         resume: None,
     };
-    stand.machine.verify("x", &stand.store, &options)
+    stand.machine.linear("x")?.verify(&stand.store, &options)
 }
 
 #[track_caller]
@@ -39,16 +39,16 @@ fn assert_within_tolerance(verified: &Verified) {
 /// Zero, as found, calibrate, as left, power cycle, zero, verify.
 fn cycle(stand: &mut Stand) -> Result<(), Failure> {
     let store = stand.store.clone();
-    stand.machine.zero("x", &store)?;
+    stand.machine.linear("x")?.zero(&store)?;
     let found = verify(stand, None)?;
     let largest = largest_deviation(&found.figures);
     assert!(largest >= Metres::from_um(8.0), "only {} µm", largest.um());
     let options = CalibrateOptions::default();
-    let calibrated = stand.machine.calibrate("x", &store, &options)?;
+    let calibrated = stand.machine.linear("x")?.calibrate(&store, &options)?;
     assert_within_tolerance(&verify(stand, Some(&calibrated.id))?);
     stand.power_cycle(HallDrift::random(SEED, 1, DRIFT))?;
-    stand.machine.zero("x", &store)?;
-    let shift = stand.machine.displacement_at_zero("x")?;
+    stand.machine.linear("x")?.zero(&store)?;
+    let shift = stand.machine.linear("x")?.displacement_at_zero()?;
     assert!(shift.abs() <= Metres::from_um(0.5), "{} nm", shift.nm());
     assert_within_tolerance(&verify(stand, Some(&calibrated.id))?);
     Ok(())

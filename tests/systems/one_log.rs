@@ -86,9 +86,9 @@ fn a_linear_stage_has_one_log_on_every_bus_of_a_busy_computer() {
     let _busy = BusyComputer::new();
     check(&Setup::new(7), |stand| {
         let store = stand.store.clone();
-        stand.machine.zero("x", &store)?;
+        stand.machine.linear("x")?.zero(&store)?;
         let target = Metres::from_mm(12.5);
-        stand.machine.move_to("x", target).map(drop)
+        stand.machine.linear("x")?.move_to(target).map(drop)
     });
 }
 
@@ -98,8 +98,8 @@ fn a_platform_has_one_log_on_every_bus_of_a_busy_computer() {
     for setup in [Setup::uvw(7), Setup::uvw_copley(7)] {
         check(&setup, |stand| {
             let store = stand.store.clone();
-            stand.machine.zero_platform(&store)?;
-            stand.machine.move_pose(Pose::default()).map(drop)
+            stand.machine.platform()?.zero(&store)?;
+            stand.machine.platform()?.move_to(Pose::default()).map(drop)
         });
     }
 }
@@ -108,10 +108,10 @@ fn a_platform_has_one_log_on_every_bus_of_a_busy_computer() {
 fn a_rotary_table_has_one_log_on_every_bus_of_a_busy_computer() {
     let _busy = BusyComputer::new();
     check(&Setup::rotary(7), |stand| {
-        stand.machine.zero_rotary("c")?;
+        stand.machine.rotary("c")?.zero()?;
         let target = Radians::from_degrees(123.4);
         let way = Way::Shortest;
-        stand.machine.move_rotary("c", target, way).map(drop)
+        stand.machine.rotary("c")?.move_to(target, way).map(drop)
     });
 }
 
@@ -119,6 +119,6 @@ fn a_rotary_table_has_one_log_on_every_bus_of_a_busy_computer() {
 fn three_axes_have_one_log_on_every_bus_of_a_busy_computer() {
     let _busy = BusyComputer::new();
     check(&Setup::volumetric(7), |stand| {
-        stand.machine.zero_volumetric()
+        stand.machine.volumetric()?.zero()
     });
 }

@@ -10,22 +10,22 @@ use units::{Metres, Radians};
 fn cycle(stand: &mut Stand) -> Result<(), Failure> {
     let store = stand.store.clone();
     let machine = &mut stand.machine;
-    machine.zero_platform(&store)?;
+    machine.platform()?.zero(&store)?;
     let judge = stand.simulation(|it| PoseJudge::here(it));
     let machine = &mut stand.machine;
-    let found = machine.verify_platform(&store, false)?;
-    machine.move_pose(Pose::default())?;
-    machine.calibrate_platform(&store)?;
-    let left = machine.verify_platform(&store, true)?;
+    let found = machine.platform()?.verify(&store, false)?;
+    machine.platform()?.move_to(Pose::default())?;
+    machine.platform()?.calibrate(&store)?;
+    let left = machine.platform()?.verify(&store, true)?;
     assert!(left.is_within_tolerance(), "{} µm", left.largest.um());
     assert!(left.largest < found.largest);
     let truly = true_errors(stand, judge)?;
     stand.power_cycle(HallDrift::default())?;
     let machine = &mut stand.machine;
-    machine.zero_platform(&store)?;
-    let after = machine.verify_platform(&store, true)?;
+    machine.platform()?.zero(&store)?;
+    let after = machine.platform()?.verify(&store, true)?;
     assert!(after.is_within_tolerance(), "{} µm", after.largest.um());
-    let aligned = machine.align_pose(Pose {
+    let aligned = machine.platform()?.align(Pose {
         x: Metres::from_mm(0.7),
         y: Metres::from_mm(-1.1),
         angle: Radians::from_arcsec(600.0),
@@ -50,8 +50,8 @@ const POSES: u32 = 8;
 /// The largest true error of compensated moves, which must be within a micrometre.
 fn true_errors(stand: &mut Stand, judge: PoseJudge) -> Result<Metres, Failure> {
     let mut worst = Metres::ZERO;
-    for pose in stand.machine.verification_poses(POSES, 77)? {
-        stand.machine.move_pose(pose)?;
+    for pose in stand.machine.platform()?.verification_poses(POSES, 77)? {
+        stand.machine.platform()?.move_to(pose)?;
         worst = worst.max(stand.simulation(move |it| judge.error(it, pose)));
     }
     assert!(worst <= Metres::from_um(1.0), "in truth {} µm", worst.um());

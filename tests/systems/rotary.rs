@@ -23,11 +23,13 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
         emulator,
     } = stand;
     let mut hand = hand_of(emulator);
-    machine.zero_rotary(AXIS)?;
+    machine.rotary(AXIS)?.zero()?;
     let options = CalibrateOptions::default();
-    let calibrated = machine.calibrate_rotary(AXIS, store, &options, &mut hand)?;
+    let calibrated = machine
+        .rotary(AXIS)?
+        .calibrate(store, &options, &mut hand)?;
     let missing = calibrated.solution.missing.len();
-    let left = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+    let left = machine.rotary(AXIS)?.verify(store, true, &mut hand)?;
     let figures = left.left.clone().expect("it was compensated");
     println!(
         "as found {:.3}, as left {:.3} arcsec at most; {missing} readings missing, table error {:.3}",
@@ -45,12 +47,14 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
         emulator,
     } = stand;
     let mut hand = hand_of(emulator).lies_at(200.5);
-    machine.load_active_rotary(AXIS, store)?;
-    machine.zero_rotary(AXIS)?;
-    let after = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+    machine.rotary(AXIS)?.load_active(store)?;
+    machine.rotary(AXIS)?.zero()?;
+    let after = machine.rotary(AXIS)?.verify(store, true, &mut hand)?;
     assert!(after.is_within_tolerance());
     for (degrees, way) in [(123.4, Way::Shortest), (-400.0, Way::Turns)] {
-        let moved = machine.move_rotary(AXIS, Radians::from_degrees(degrees), way)?;
+        let moved = machine
+            .rotary(AXIS)?
+            .move_to(Radians::from_degrees(degrees), way)?;
         assert!((moved.expected - moved.target).abs().arcsec() < 0.3);
     }
     Ok(())

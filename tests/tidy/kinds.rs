@@ -74,6 +74,28 @@ fn the_command_of_a_kind_knows_the_library_of_that_kind_only() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// A procedure of a kind belongs to that kind's handle.
+#[test]
+fn no_kind_adds_methods_to_the_machine() {
+    let mut found = Vec::new();
+    for kind in KINDS {
+        for (name, text) in sources(&format!("controller/src/{kind}")) {
+            let lines = code_lines(&text).filter(|(_, code)| is_impl_of_machine(code));
+            found.extend(lines.map(|(line, code)| format!("{name}:{line}: `{code}`")));
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+    assert!(is_impl_of_machine("impl Machine {"));
+    assert!(is_impl_of_machine("impl crate::connected::Machine {"));
+    assert!(!is_impl_of_machine("impl RotaryTable<'_> {"));
+}
+
+fn is_impl_of_machine(code: &str) -> bool {
+    let words: Vec<_> = code.split_whitespace().collect();
+    let of = |word: &&str| *word == "Machine" || word.ends_with("::Machine");
+    words.first() == Some(&"impl") && words.iter().any(of)
+}
+
 #[test]
 fn what_can_be_configured_and_stored_needs_no_procedure() {
     let imports = Imports::of(&root().join("controller/src/lib.rs"));

@@ -72,10 +72,16 @@ fn check(name: &'static str, what: fn(&Interface), wanted: LinkState) {
     let machine = &mut stand.machine;
     machine.start().unwrap();
     machine
-        .zero("x", &store)
+        .linear("x")
+        .unwrap()
+        .zero(&store)
         .unwrap_or_else(|it| panic!("{it}"));
     at.set(machine.now() + Duration::from_secs(2));
-    let failure = machine.move_to("x", Metres::from_mm(40.0)).unwrap_err();
+    let failure = machine
+        .linear("x")
+        .unwrap()
+        .move_to(Metres::from_mm(40.0))
+        .unwrap_err();
     assert_eq!(at.get(), Time::NEVER, "{failure}");
     let Failure::Machine(machine::Failure::Link { port, state }) = &failure else {
         panic!("{failure}")

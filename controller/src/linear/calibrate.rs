@@ -7,12 +7,12 @@ use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
 use crate::config::{CalibrateConfig, ConfigHash};
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::linear::LinearContent;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
 use crate::linear::run_plan::RunPlan;
 use crate::linear::settings;
+use crate::linear::stage::LinearStage;
 use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
 use crate::store::{
     CalibrationRecord, Content, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
@@ -38,8 +38,8 @@ pub struct Calibrated {
     pub noticed: Option<Metres>,
 }
 
-impl Machine {
-    /// Measures `axis` with its instrument, fits the table, stores and activates it, and
+impl LinearStage<'_> {
+    /// Measures the axis with its instrument, fits the table, stores and activates it, and
     /// uses it from now on.
     ///
     /// # Errors
@@ -47,37 +47,40 @@ impl Machine {
     /// the table breaks a limit. The calibration in use before stays in use then.
     pub fn calibrate(
         &mut self,
-        axis: &str,
         store: &Store,
         options: &CalibrateOptions,
     ) -> Result<Calibrated, Failure> {
-        let config = self.axis_config(axis)?.calibrate.clone();
-        let config = config.ok_or_else(|| missing(axis, "calibrate"))?;
-        self.require_zeroed(axis)?;
+        let config = self.config.calibrate.clone();
+        let config = config.ok_or_else(|| missing(self.axis, "calibrate"))?;
+        self.core.require_zeroed(self.axis)?;
         let plan = RunPlan {
             closure_limit: (!options.accept_drift)
                 .then(|| Metres::from_um(config.closure_limit_um)),
             ..run_plan(&config)
         };
         // Before the header, which says who measures.
-        self.use_instrument(&plan.instrument)?;
-        let header = self.journal_header("calibrate", axis, &plan, None);
-        let (mut journal, earlier) =
-            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
+        self.core.use_instrument(&plan.instrument)?;
+        let header = self.journal_header("calibrate", &plan, None);
+        let (mut journal, earlier) = open_journal(
+            store,
+            &header,
+            options.resume.as_ref(),
+            self.core.config_hash,
+        )?;
         let measuring = MeasureOptions {
             stage: Stage::Calibrate,
             compensated: false,
         };
-        let measured = self.measure_runs(axis, &plan, measuring, &mut journal, earlier);
+        let measured = self.measure_runs(&plan, measuring, &mut journal, earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let fitted = self.fit_table(axis, &plan, &measured)?;
-        let compensation = self.prepare(axis, fitted.table.clone())?;
-        let harmless = settings::harmless(&self.config, axis);
+        let fitted = self.fit_table(&plan, &measured)?;
+        let compensation = self.prepare(fitted.table.clone())?;
+        let harmless = settings::harmless(self.core.config, self.axis);
         let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
-        let record = self.calibration_record(axis, &plan, &journal, &measured, &fitted);
+        let record = self.calibration_record(&plan, &journal, &measured, &fitted);
         let id = store.save(&record)?;
-        store.activate(axis, &id)?;
-        self.set_compensation(axis, Some(compensation))?;
+        store.activate(self.axis, &id)?;
+        self.set_compensation(Some(compensation));
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -89,53 +92,45 @@ impl Machine {
         })
     }
 
-    /// Loads the calibration that `store` says is active for `axis`, after checking that it
+    /// Loads the calibration that `store` says is active for the axis, after checking that it
     /// belongs to this machine; returns its name, `None` when there is none.
     ///
     /// # Errors
     /// When it is damaged, belongs to another machine or set-up, or breaks a limit.
-    pub fn load_active(&mut self, axis: &str, store: &Store) -> Result<Option<String>, Failure> {
-        let Some(id) = store.active(axis)?.current else {
+    pub fn load_active(&mut self, store: &Store) -> Result<Option<String>, Failure> {
+        let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record
-            .head
-            .belongs_to(&id, &self.this_machine(axis), &self.config_hash)?;
-        let compensation = self.prepare(axis, record.linear(&id)?.table(&id)?)?;
-        self.set_compensation(axis, Some(compensation))?;
+        record.head.belongs_to(
+            &id,
+            &self.core.this_machine(self.axis),
+            self.core.config_hash,
+        )?;
+        let compensation = self.prepare(record.linear(&id)?.table(&id)?)?;
+        self.set_compensation(Some(compensation));
         Ok(Some(id))
     }
 
-    fn fit_table(
-        &self,
-        axis: &str,
-        plan: &RunPlan,
-        measured: &Measured,
-    ) -> Result<Fitted, Failure> {
-        let instrument = &self.config.instrument[&plan.instrument];
+    fn fit_table(&self, plan: &RunPlan, measured: &Measured) -> Result<Fitted, Failure> {
+        let instrument = &self.core.config.instrument[&plan.instrument];
         let options = FitOptions {
             u_instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
             ..FitOptions::default()
         };
         error_table::analyse(&measured.series()?, &options).map_err(|source| Failure::Fit {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             source,
         })
     }
 
     /// Proves that a table can be applied within the limits of the configuration.
-    pub(crate) fn prepare(
-        &self,
-        axis: &str,
-        table: error_table::ErrorTable,
-    ) -> Result<Compensation, Failure> {
-        settings::compensation(&self.config, axis, table)
+    pub(crate) fn prepare(&self, table: error_table::ErrorTable) -> Result<Compensation, Failure> {
+        settings::compensation(self.core.config, self.axis, table)
     }
 
     fn calibration_record(
         &self,
-        axis: &str,
         plan: &RunPlan,
         journal: &Journal,
         measured: &Measured,
@@ -149,9 +144,9 @@ impl Machine {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned(),
-            instrument: self.instrument_record(&plan.instrument),
+            instrument: self.core.instrument_record(&plan.instrument),
             environment: measured.environment,
-            ..self.this_machine(axis)
+            ..self.core.this_machine(self.axis)
         };
         let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
         CalibrationRecord {
@@ -163,19 +158,18 @@ impl Machine {
     pub(super) fn journal_header(
         &self,
         verb: &str,
-        axis: &str,
         plan: &RunPlan,
         calibration: Option<String>,
     ) -> JournalHeader {
         JournalHeader {
             schema_version: SCHEMA_VERSION,
             verb: verb.to_owned(),
-            machine: self.config.machine.name.clone(),
-            stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.as_str().to_owned(),
-            axis: axis.to_owned(),
-            drive: self.drive_record(axis),
-            instrument: self.instrument_record(&plan.instrument),
+            machine: self.core.config.machine.name.clone(),
+            stage_serial: self.core.config.machine.stage_serial.clone(),
+            config_hash: self.core.config_hash.as_str().to_owned(),
+            axis: self.axis.to_owned(),
+            drive: self.core.drive_record(self.axis),
+            instrument: self.core.instrument_record(&plan.instrument),
             started: utc_now(),
             calibration,
             targets_m: plan.targets.iter().map(|target| target.value()).collect(),

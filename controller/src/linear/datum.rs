@@ -7,49 +7,46 @@ use drivers::device::{DisplacementReading, Environment};
 use units::Metres;
 
 use crate::assemble;
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::cross_check::is_shaken;
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
+use crate::linear::stage::LinearStage;
 
 /// What is shaken at the datum would shift everything: it is read again, so often at most …
 const ATTEMPTS: u32 = 10;
 /// … and so long after.
 const CALM: Duration = Duration::from_millis(200);
 
-impl Machine {
+impl LinearStage<'_> {
     /// What the instrument of the last measurement reads at the axis's zero, approached
     /// forward, against its datum: by how much the zero has moved since.
     ///
     /// # Errors
     /// Whatever stops the machine; [`Failure::Usage`] when nothing was measured before.
-    pub fn displacement_at_zero(&mut self, axis: &str) -> Result<Metres, Failure> {
-        let (plan, datum) = self
-            .remember(axis)
-            .datum
-            .clone()
-            .ok_or_else(|| Failure::Usage {
-                what: format!("axis {axis} has no datum"),
-                help: "calibrate or verify first".into(),
-            })?;
-        self.use_instrument(&plan.instrument)?;
-        self.go_to_datum(axis, &plan)?;
-        let reading = self.read_displacement(axis, &plan)?;
-        let environment = self.instrument_environment(&plan.instrument)?;
-        self.leave_instrument();
+    pub fn displacement_at_zero(&mut self) -> Result<Metres, Failure> {
+        let axis = self.axis;
+        let (plan, datum) = self.memory.datum.clone().ok_or_else(|| Failure::Usage {
+            what: format!("axis {axis} has no datum"),
+            help: "calibrate or verify first".into(),
+        })?;
+        self.core.use_instrument(&plan.instrument)?;
+        self.go_to_datum(&plan)?;
+        let reading = self.read_displacement(&plan)?;
+        let environment = self.core.instrument(&plan.instrument)?.environment();
+        self.core.leave_instrument();
         self.correct(&plan, &reading, &environment, &datum)
     }
 
     /// Goes to the axis's zero, forward, and makes the instrument read zero there.
-    pub(super) fn set_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<Datum, Failure> {
-        self.go_to_datum(axis, plan)?;
-        self.stand_still(axis, plan.settle)?;
-        self.set_instrument_datum(&plan.instrument)?;
-        let offset = self.read_calm(axis, plan)?.vacuum;
-        let environment = self.instrument_environment(&plan.instrument)?;
-        let config = &self.config.instrument[&plan.instrument];
+    pub(super) fn set_datum(&mut self, plan: &RunPlan) -> Result<Datum, Failure> {
+        self.go_to_datum(plan)?;
+        self.core.stand_still(self.axis, plan.settle)?;
+        self.core.set_instrument_datum(&plan.instrument)?;
+        let offset = self.read_calm(plan)?.vacuum;
+        let environment = self.core.instrument(&plan.instrument)?.environment();
+        let config = &self.core.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(assemble::correction_settings(config), &environment)
             .map_err(|source| Failure::Correction {
@@ -59,25 +56,21 @@ impl Machine {
         Ok(Datum { length, offset })
     }
 
-    pub(super) fn go_to_datum(&mut self, axis: &str, plan: &RunPlan) -> Result<(), Failure> {
-        self.travel(axis, Metres::ZERO - plan.overrun, Correction::Off)?;
-        self.travel(axis, Metres::ZERO, Correction::Off)?;
+    pub(super) fn go_to_datum(&mut self, plan: &RunPlan) -> Result<(), Failure> {
+        self.travel(Metres::ZERO - plan.overrun, Correction::Off)?;
+        self.travel(Metres::ZERO, Correction::Off)?;
         Ok(())
     }
 
     /// A reading of an axis that is not shaken, or the last one of many that are.
-    pub(super) fn read_calm(
-        &mut self,
-        axis: &str,
-        plan: &RunPlan,
-    ) -> Result<DisplacementReading, Failure> {
-        let mut reading = self.read_displacement(axis, plan)?;
+    pub(super) fn read_calm(&mut self, plan: &RunPlan) -> Result<DisplacementReading, Failure> {
+        let mut reading = self.read_displacement(plan)?;
         for _ in 1..ATTEMPTS {
             if !is_shaken(reading.standard_deviation) {
                 break;
             }
-            self.stand_still(axis, CALM)?;
-            reading = self.read_displacement(axis, plan)?;
+            self.core.stand_still(self.axis, CALM)?;
+            reading = self.read_displacement(plan)?;
         }
         Ok(reading)
     }
@@ -85,16 +78,13 @@ impl Machine {
     /// Lets the stage stand, then averages.
     pub(crate) fn read_displacement(
         &mut self,
-        axis: &str,
         plan: &RunPlan,
     ) -> Result<DisplacementReading, Failure> {
-        self.stand_still(axis, plan.settle)?;
-        let rate_hz = self.config.instrument[&plan.instrument].sample_rate_hz;
-        Ok(self.average(&plan.instrument, plan.average_samples, rate_hz)?)
-    }
-
-    pub(crate) fn instrument_environment(&self, instrument: &str) -> Result<Environment, Failure> {
-        Ok(self.instrument(instrument)?.environment())
+        self.core.stand_still(self.axis, plan.settle)?;
+        let rate_hz = self.core.config.instrument[&plan.instrument].sample_rate_hz;
+        Ok(self
+            .core
+            .average(&plan.instrument, plan.average_samples, rate_hz)?)
     }
 
     /// A reading as a displacement from the datum.

@@ -8,13 +8,13 @@ use drivers::device::Environment;
 use units::{Approach, Metres};
 
 use crate::assemble;
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::PointEntry;
 use crate::linear::cross_check::{CrossCheck, Plausible, Run, judge_scale};
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
+use crate::linear::stage::LinearStage;
 use crate::store::ClosureEntry;
 use crate::store::{Entry, EnvironmentRecord, Journal};
 use machine::Stage;
@@ -114,8 +114,8 @@ const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
 const SLOPE_MAX: f64 = 0.01;
 const SIZE_MAX: Metres = Metres(50e-6);
 
-impl Machine {
-    /// Measures `plan` on `axis`; every point is in `journal` when it has been measured.
+impl LinearStage<'_> {
+    /// Measures `plan` on the axis; every point is in `journal` when it has been measured.
     /// The runs of an interrupted measurement are kept (`earlier`).
     ///
     /// The datum is the axis's zero, approached forward; the same place is measured again at
@@ -126,7 +126,6 @@ impl Machine {
     /// with the encoder beyond reason.
     pub(crate) fn measure_runs(
         &mut self,
-        axis: &str,
         plan: &RunPlan,
         options: MeasureOptions,
         journal: &mut Journal,
@@ -135,12 +134,12 @@ impl Machine {
         let per_run = plan.targets.len() * 2;
         // A run that was whole but wrong ended the measurement that is continued here.
         for run in runs.points.chunk_by(|a, b| a.run == b.run) {
-            judge_scale(axis, plan.scale_limit_ppm, run)?;
+            judge_scale(self.axis, plan.scale_limit_ppm, run)?;
         }
-        self.use_instrument(&plan.instrument)?;
-        let plausible = self.plausible(axis, plan)?;
-        let datum = self.set_datum(axis, plan)?;
-        self.remember(axis).datum = Some((plan.clone(), datum));
+        self.core.use_instrument(&plan.instrument)?;
+        let plausible = self.plausible(plan)?;
+        let datum = self.set_datum(plan)?;
+        self.memory.datum = Some((plan.clone(), datum));
         let counter = Counter {
             stage: options.stage,
             done: runs.points.len() as u64,
@@ -152,13 +151,13 @@ impl Machine {
             Correction::Off
         };
         let mut session = Session {
-            axis,
+            axis: self.axis,
             plan,
             correction,
             datum,
             journal,
             counter,
-            check: CrossCheck::new(axis, plausible),
+            check: CrossCheck::new(self.axis, plausible),
             watch: self.environment_watch(plan),
         };
         let first = runs.points.last().map_or(1, |point| point.run + 1);
@@ -172,7 +171,7 @@ impl Machine {
         }
         session.journal.write(&Entry::Complete)?;
         session.journal.flush_to_disk()?;
-        self.leave_instrument();
+        self.core.leave_instrument();
         let environment = mean_environment(&runs.points);
         Ok(Measured {
             closure: largest(&runs.closures),
@@ -189,11 +188,11 @@ impl Machine {
         let plan = session.plan;
         let mut points = Vec::new();
         let (first, last) = (plan.targets[0], plan.targets[plan.targets.len() - 1]);
-        self.travel(session.axis, first - plan.overrun, Correction::Off)?;
+        self.travel(first - plan.overrun, Correction::Off)?;
         for target in &plan.targets {
             points.push(self.measure_point(session, run, Approach::Forward, *target)?);
         }
-        self.travel(session.axis, last + plan.overrun, Correction::Off)?;
+        self.travel(last + plan.overrun, Correction::Off)?;
         for target in plan.targets.iter().rev() {
             points.push(self.measure_point(session, run, Approach::Reverse, *target)?);
         }
@@ -209,11 +208,12 @@ impl Machine {
         target: Metres,
     ) -> Result<PointEntry, Failure> {
         let axis = session.axis;
-        let set_point = self.travel(axis, target, session.correction)?;
-        let reading = self.read_displacement(session.axis, session.plan)?;
+        let set_point = self.travel(target, session.correction)?;
+        let reading = self.read_displacement(session.plan)?;
         let environment = self.watched_environment(session)?;
         let measured = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let encoder = self
+            .core
             .reading(axis)?
             .expect("an axis that moved has been read")
             .position;
@@ -245,8 +245,8 @@ impl Machine {
         earlier: &EarlierRuns,
         points: &[PointEntry],
     ) -> Result<ClosureEntry, Failure> {
-        self.go_to_datum(session.axis, session.plan)?;
-        let reading = self.read_calm(session.axis, session.plan)?;
+        self.go_to_datum(session.plan)?;
+        let reading = self.read_calm(session.plan)?;
         let environment = self.watched_environment(session)?;
         let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
         let closure = ClosureEntry {
@@ -271,18 +271,20 @@ impl Machine {
     }
 
     /// What a stage like this can do from one point to the next.
-    fn plausible(&self, axis: &str, plan: &RunPlan) -> Result<Plausible, Failure> {
-        let limits = self.axis_config(axis)?.compensation.as_ref();
+    fn plausible(&self, plan: &RunPlan) -> Result<Plausible, Failure> {
+        let limits = self.config.compensation.as_ref();
         Ok(Plausible {
             slope: limits.map_or(SLOPE_MAX, |it| it.slope_limit),
             step: limits.map_or(SIZE_MAX, |it| Metres::from_um(it.size_limit_um)),
             scale_limit_ppm: plan.scale_limit_ppm,
-            half_wavelength: assemble::half_wavelength(&self.config.instrument[&plan.instrument]),
+            half_wavelength: assemble::half_wavelength(
+                &self.core.config.instrument[&plan.instrument],
+            ),
         })
     }
 
     fn environment_watch(&self, plan: &RunPlan) -> EnvironmentWatch {
-        let config = &self.config.instrument[&plan.instrument];
+        let config = &self.core.config.instrument[&plan.instrument];
         let frozen = Duration::from_secs_f64(config.environment_frozen_s);
         EnvironmentWatch::new(frozen, ENVIRONMENT_STALE)
     }
@@ -290,9 +292,9 @@ impl Machine {
     /// The environment, as long as its sensors can be believed.
     fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
         let instrument = &session.plan.instrument;
-        let environment = self.instrument_environment(instrument)?;
+        let environment = self.core.instrument(instrument)?.environment();
         let reading = assemble::correction_environment(&environment);
-        match session.watch.observe(self.now(), reading) {
+        match session.watch.observe(self.core.now(), reading) {
             Ok(()) => Ok(environment),
             Err(source) => Err(Failure::Correction {
                 instrument: instrument.clone(),

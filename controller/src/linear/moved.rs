@@ -3,8 +3,8 @@
 use compensator::error_table::{Compensation, EndPolicy};
 use units::Metres;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
+use crate::linear::stage::LinearStage;
 
 /// What corrected a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,18 +45,18 @@ pub struct Moved {
     pub corrected: Corrected,
 }
 
-impl Machine {
+impl LinearStage<'_> {
     /// [`Self::move_to`], then the encoder's place once the axis stands, and what corrected the move.
     ///
     /// # Errors
     /// As [`Self::move_to`]; an axis that does not come to rest.
-    pub fn move_and_read(&mut self, axis: &str, target: Metres) -> Result<Moved, Failure> {
+    pub fn move_and_read(&mut self, target: Metres) -> Result<Moved, Failure> {
         let corrected = self
-            .compensation(axis)
+            .compensation()
             .map_or(Corrected::No, |table| corrected_at(table, target));
-        let set_point = self.move_to(axis, target)?;
-        self.stand_still(axis, STAND)?;
-        let reading = self.reading(axis)?;
+        let set_point = self.move_to(target)?;
+        self.core.stand_still(self.axis, STAND)?;
+        let reading = self.core.reading(self.axis)?;
         let encoder = reading.expect("an axis that moved has been read").position;
         Ok(Moved {
             target,

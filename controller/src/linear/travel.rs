@@ -4,38 +4,40 @@ use compensator::apply::ApproachTracker;
 use compensator::error_table::{Compensation, OutOfRange};
 use units::{Approach, Metres};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::linear::stage::LinearStage;
 
-impl Machine {
-    /// Moves the point of `axis` to `target` (machine coordinates), compensated when a
+impl LinearStage<'_> {
+    /// Moves the point of the axis to `target` (machine coordinates), compensated when a
     /// calibration is in use, and returns the set-point the drive was sent.
     ///
     /// # Errors
     /// Before anything moves: not zeroed, outside the soft limits, outside the calibrated
     /// range. While moving: whatever stops the machine.
-    pub fn move_to(&mut self, axis: &str, target: Metres) -> Result<Metres, Failure> {
-        self.require_zeroed(axis)?;
-        self.travel(axis, target, Correction::On)
+    pub fn move_to(&mut self, target: Metres) -> Result<Metres, Failure> {
+        self.core.require_zeroed(self.axis)?;
+        self.travel(target, Correction::On)
     }
 
     /// The set-point that brings the point to `target` from where the axis is now.
     pub(crate) fn set_point(
         &self,
-        axis: &str,
         target: Metres,
         correction: Correction,
     ) -> Result<Metres, Failure> {
-        let compensation = self.compensation(axis);
+        let compensation = self.compensation();
         let (Correction::On, Some(compensation)) = (correction, compensation) else {
             return Ok(target);
         };
-        let tracker = self.approach(axis)?;
-        let here = self.reading(axis)?.map(|reading| reading.position);
+        let tracker = self.core.approach(self.axis)?;
+        let here = self
+            .core
+            .reading(self.axis)?
+            .map(|reading| reading.position);
         set_point_of(compensation, &tracker, here, target).map_err(|source| {
             Failure::OutOfCalibration {
-                axis: axis.to_owned(),
+                axis: self.axis.to_owned(),
                 source,
             }
         })
@@ -44,20 +46,19 @@ impl Machine {
     /// Moves without asking for a zero: procedures that make the zero use it too.
     pub(crate) fn travel(
         &mut self,
-        axis: &str,
         target: Metres,
         correction: Correction,
     ) -> Result<Metres, Failure> {
-        self.check_soft_limits(axis, target)?;
-        let set_point = self.set_point(axis, target, correction)?;
-        self.check_soft_limits(axis, set_point)?;
-        let own_speed = self.axis_settings(axis)?.speed;
-        let speed = match (correction, self.compensation(axis)) {
+        self.core.check_soft_limits(self.axis, target)?;
+        let set_point = self.set_point(target, correction)?;
+        self.core.check_soft_limits(self.axis, set_point)?;
+        let own_speed = self.core.axis_settings(self.axis)?.speed;
+        let speed = match (correction, self.compensation()) {
             // So fast that the correction changes no faster than its limit.
             (Correction::On, Some(table)) => own_speed.min(table.speed_max()),
             _ => own_speed,
         };
-        self.profile_move(axis, set_point, speed)?;
+        self.core.profile_move(self.axis, set_point, speed)?;
         Ok(set_point)
     }
 }

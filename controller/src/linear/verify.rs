@@ -8,11 +8,11 @@ use compensator::iso230::{self, Figures};
 use units::Metres;
 
 use crate::config::VerifyConfig;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured};
 use crate::linear::run_plan::RunPlan;
+use crate::linear::stage::LinearStage;
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
 use machine::Stage;
@@ -51,29 +51,25 @@ impl Verified {
     }
 }
 
-impl Machine {
-    /// Measures `axis` at the configuration's verification targets and evaluates ISO 230-2.
+impl LinearStage<'_> {
+    /// Measures the axis at the configuration's verification targets and evaluates ISO 230-2.
     /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
     /// than without the calibration is one, and takes the calibration out of use.
     ///
     /// # Errors
     /// When the axis is not zeroed or anything stops the machine.
-    pub fn verify(
-        &mut self,
-        axis: &str,
-        store: &Store,
-        options: &VerifyOptions,
-    ) -> Result<Verified, Failure> {
-        let of_axis = self.axis_config(axis)?;
+    pub fn verify(&mut self, store: &Store, options: &VerifyOptions) -> Result<Verified, Failure> {
+        let axis = self.axis;
+        let of_axis = self.config;
         // One figure for both runs: the scale is the same.
         let scale_limit_ppm = of_axis
             .calibrate
             .as_ref()
             .map_or(SCALE_LIMIT_PPM, |it| it.scale_limit_ppm);
         let config = of_axis.verify.clone();
-        let config = config.ok_or_else(|| missing(axis, "verify"))?;
-        self.require_zeroed(axis)?;
-        if options.compensated && self.compensation(axis).is_none() {
+        let config = config.ok_or_else(|| missing(self.axis, "verify"))?;
+        self.core.require_zeroed(self.axis)?;
+        if options.compensated && self.compensation().is_none() {
             return Err(Failure::Usage {
                 what: format!("axis {axis} uses no calibration"),
                 help: "load or make one, or verify uncompensated".into(),
@@ -81,16 +77,20 @@ impl Machine {
         }
         let plan = run_plan(&config, scale_limit_ppm);
         // Before the header, which says who measures.
-        self.use_instrument(&plan.instrument)?;
-        let header = self.journal_header("verify", axis, &plan, options.calibration.clone());
-        let (mut journal, earlier) =
-            open_journal(store, &header, options.resume.as_ref(), &self.config_hash)?;
+        self.core.use_instrument(&plan.instrument)?;
+        let header = self.journal_header("verify", &plan, options.calibration.clone());
+        let (mut journal, earlier) = open_journal(
+            store,
+            &header,
+            options.resume.as_ref(),
+            self.core.config_hash,
+        )?;
         let measuring = MeasureOptions {
             stage: Stage::Verify,
             compensated: options.compensated,
         };
         let measured = self
-            .measure_runs(axis, &plan, measuring, &mut journal, earlier)
+            .measure_runs(&plan, measuring, &mut journal, earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         let verified = Verified {
             figures: iso230::evaluate(&measured.series()?)?,
@@ -99,7 +99,7 @@ impl Machine {
             tolerance: Metres::from_um(config.accuracy_tolerance_um),
         };
         if options.compensated {
-            self.judge_benefit(axis, store, &verified, options.calibration.as_deref())
+            self.judge_benefit(store, &verified, options.calibration.as_deref())
                 .inspect_err(|failure| note_failure(&mut journal, failure))?;
         }
         Ok(verified)
@@ -109,12 +109,11 @@ impl Machine {
     /// taken out of use (fault class 48: sign, axis or index exchanged).
     fn judge_benefit(
         &mut self,
-        axis: &str,
         store: &Store,
         verified: &Verified,
         calibration: Option<&str>,
     ) -> Result<(), Failure> {
-        let Some(compensation) = self.compensation(axis) else {
+        let Some(compensation) = self.compensation() else {
             return Ok(());
         };
         let before = systematic_deviation(compensation.table());
@@ -122,9 +121,9 @@ impl Machine {
         if verified.is_within_tolerance() || after <= before {
             return Ok(());
         }
-        let in_use = self.fall_back(axis, store, calibration)?;
+        let in_use = self.fall_back(store, calibration)?;
         Err(Failure::MadeWorse {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             calibration: calibration.map_or_else(|| "in use".to_owned(), short),
             before,
             after,
@@ -136,17 +135,16 @@ impl Machine {
     /// none.
     fn fall_back(
         &mut self,
-        axis: &str,
         store: &Store,
         calibration: Option<&str>,
     ) -> Result<Option<String>, Failure> {
-        self.set_compensation(axis, None)?;
+        self.set_compensation(None);
         // One that is not the active one is only forgotten here.
-        if calibration.is_none() || store.active(axis)?.current.as_deref() != calibration {
+        if calibration.is_none() || store.active(self.axis)?.current.as_deref() != calibration {
             return Ok(None);
         }
-        while store.retire(axis)?.is_some() {
-            if let Ok(loaded) = self.load_active(axis, store) {
+        while store.retire(self.axis)?.is_some() {
+            if let Ok(loaded) = self.load_active(store) {
                 return Ok(loaded);
             }
         }

@@ -15,10 +15,10 @@ use units::{Metres, MetresPerSecond, Time, Volts};
 
 use crate::assemble;
 use crate::config::ZeroConfig;
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::ZeroEntry;
+use crate::linear::stage::LinearStage;
 use crate::run::missing;
 use crate::run::utc_now;
 use crate::store::{
@@ -57,20 +57,20 @@ const REST: Duration = Duration::from_millis(30);
 /// The steps of zeroing that progress counts.
 const STEPS: u64 = 4;
 
-impl Machine {
-    /// Finds the origin of `axis` and makes it the drive's zero; the axis is enabled and
+impl LinearStage<'_> {
+    /// Finds the origin of the axis and makes it the drive's zero; the axis is enabled and
     /// stands at its origin afterwards.
     ///
     /// # Errors
     /// Whatever stops the machine; a search or a regression that fails, with step and
     /// values; an origin that is not certain enough. The axis is not zeroed then.
-    pub fn zero(&mut self, axis: &str, store: &Store) -> Result<Zeroed, Failure> {
-        let config = self.axis_config(axis)?.zero.clone();
-        let config = config.ok_or_else(|| missing(axis, "zero"))?;
-        self.set_zeroed(axis, false)?;
-        let previous = previous_zero(store, axis);
-        let mut journal = Journal::create(&store.runs(), &self.zero_header(axis))?;
-        let found = self.find_zero(axis, &config, &mut journal);
+    pub fn zero(&mut self, store: &Store) -> Result<Zeroed, Failure> {
+        let config = self.config.zero.clone();
+        let config = config.ok_or_else(|| missing(self.axis, "zero"))?;
+        self.core.set_zeroed(self.axis, false)?;
+        let previous = previous_zero(store, self.axis);
+        let mut journal = Journal::create(&store.runs(), &self.zero_header())?;
+        let found = self.find_zero(&config, &mut journal);
         if let Err(failure) = &found {
             // The cause is on its way to the operator; the journal is only a second place.
             let _ = journal.write(&Entry::Failed {
@@ -91,80 +91,83 @@ impl Machine {
 
     fn find_zero(
         &mut self,
-        axis: &str,
         config: &ZeroConfig,
         journal: &mut Journal,
     ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
-        self.core.observer().progress(Stage::Zero, axis, 0, STEPS);
-        self.enable(axis)?;
-        self.reference(axis, config)?;
-        self.core.observer().progress(Stage::Zero, axis, 1, STEPS);
-        self.travel(axis, Metres::ZERO, Correction::Off)?;
-        self.core.observer().progress(Stage::Zero, axis, 2, STEPS);
-        let usual = assemble::hall_settings(config, self.axis_config(axis)?);
-        let settings = assemble::patient_search(usual, self.patience());
-        let outcome = self.search(axis, config, settings)?;
-        self.core.observer().progress(Stage::Zero, axis, 3, STEPS);
-        let estimate = self.estimate(axis, config, &settings, &outcome)?;
-        let entry = self.zero_entry(&estimate);
-        journal.write(&Entry::Zero(entry))?;
-        self.adopt_zero(axis, estimate.origin)?;
         self.core
             .observer()
-            .progress(Stage::Zero, axis, STEPS, STEPS);
+            .progress(Stage::Zero, self.axis, 0, STEPS);
+        self.core.enable(self.axis)?;
+        self.reference(config)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, self.axis, 1, STEPS);
+        self.travel(Metres::ZERO, Correction::Off)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, self.axis, 2, STEPS);
+        let usual = assemble::hall_settings(config, self.config);
+        let settings = assemble::patient_search(usual, self.core.patience());
+        let outcome = self.search(config, settings)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, self.axis, 3, STEPS);
+        let estimate = self.estimate(config, &settings, &outcome)?;
+        let entry = self.zero_entry(&estimate);
+        journal.write(&Entry::Zero(entry))?;
+        self.adopt_zero(estimate.origin)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, self.axis, STEPS, STEPS);
         Ok((outcome, estimate, entry))
     }
 
     /// Coarse reference on the negative limit switch.
-    fn reference(&mut self, axis: &str, config: &ZeroConfig) -> Result<(), Failure> {
+    fn reference(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
-        let limit = assemble::reference_limit(config, self.axis_config(axis)?);
+        let limit = assemble::reference_limit(config, self.config);
         let position = Metres::from_mm(config.negative_limit_mm);
-        self.command(
-            axis,
+        self.core.command(
+            self.axis,
             AxisCommand::HomeNegativeLimit { position, speed },
             "reference",
             limit,
         )?;
-        self.forget_approach(axis)?;
+        self.core.forget_approach(self.axis)?;
         Ok(())
     }
 
     /// Runs the patent's search, one step a sample.
-    fn search(
-        &mut self,
-        axis: &str,
-        config: &ZeroConfig,
-        settings: Settings,
-    ) -> Result<Outcome, Failure> {
+    fn search(&mut self, config: &ZeroConfig, settings: Settings) -> Result<Outcome, Failure> {
         let failed = |source| Failure::SearchSettings {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             source,
         };
-        let mut search = Search::new(settings, Metres::ZERO, self.now()).map_err(failed)?;
-        let mut pairing = self.pairing(axis, config)?;
+        let mut search = Search::new(settings, Metres::ZERO, self.core.now()).map_err(failed)?;
+        let mut pairing = self.pairing(config)?;
         let mut motion = None;
         loop {
             let deadline = search
                 .poll_timeout()
-                .min(self.now() + Duration::from_millis(100));
-            self.tick(deadline)?;
-            self.check_motion(axis)?;
-            let progress = match self.paired_sample(axis, config, &mut pairing)? {
+                .min(self.core.now() + Duration::from_millis(100));
+            self.core.tick(deadline)?;
+            self.check_motion()?;
+            let progress = match self.paired_sample(config, &mut pairing)? {
                 Some(sample) => Some(search.handle_sample(&sample)),
-                None => search.handle_timeout(self.now()),
+                None => search.handle_timeout(self.core.now()),
             };
             match progress {
                 None => {}
                 Some(Progress::Found(outcome)) => return Ok(*outcome),
                 Some(Progress::Failed(source)) => {
-                    self.command(axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
+                    self.core
+                        .command(self.axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
                     return Err(Failure::Search {
-                        axis: axis.to_owned(),
+                        axis: self.axis.to_owned(),
                         source,
                     });
                 }
-                Some(step) => self.obey(axis, &step, &mut motion)?,
+                Some(step) => self.obey(&step, &mut motion)?,
             }
         }
     }
@@ -172,13 +175,12 @@ impl Machine {
     /// Turns the search's wish into a profile move or a halt, when it differs from the last.
     fn obey(
         &mut self,
-        axis: &str,
         progress: &Progress,
         motion: &mut Option<AxisCommand>,
     ) -> Result<(), Failure> {
         let command = match *progress {
             Progress::Move { to, speed } => {
-                let acceleration = self.axis_settings(axis)?.acceleration;
+                let acceleration = self.core.axis_settings(self.axis)?.acceleration;
                 AxisCommand::MoveTo {
                     target: to,
                     speed,
@@ -188,33 +190,32 @@ impl Machine {
             _ => DriveCommand::Halt.into(),
         };
         if *motion != Some(command) {
-            self.begin(axis, command)?;
+            self.core.begin(self.axis, command)?;
             *motion = Some(command);
         }
         Ok(())
     }
 
     /// A move of the search that failed ends the search.
-    fn check_motion(&mut self, axis: &str) -> Result<(), Failure> {
-        Ok(self.outcome(axis)?.unwrap_or(Ok(()))?)
+    fn check_motion(&mut self) -> Result<(), Failure> {
+        Ok(self.core.outcome(self.axis)?.unwrap_or(Ok(()))?)
     }
 
     fn estimate(
         &self,
-        axis: &str,
         config: &ZeroConfig,
         settings: &Settings,
         outcome: &Outcome,
     ) -> Result<ZeroEstimate, Failure> {
         let estimate = outcome.refine(settings).map_err(|source| Failure::Refine {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             source,
         })?;
         let limit = Metres::from_um(config.standard_uncertainty_limit_um);
         if estimate.standard_uncertainty > limit {
             let seen = estimate.standard_uncertainty;
             return Err(Failure::ZeroUncertain {
-                axis: axis.to_owned(),
+                axis: self.axis.to_owned(),
                 seen,
                 limit,
             });
@@ -223,21 +224,22 @@ impl Machine {
     }
 
     /// Goes to the origin and makes it the drive's zero.
-    fn adopt_zero(&mut self, axis: &str, origin: Metres) -> Result<(), Failure> {
-        self.travel(axis, origin, Correction::Off)?;
-        self.stand_still(axis, REST)?;
+    fn adopt_zero(&mut self, origin: Metres) -> Result<(), Failure> {
+        self.travel(origin, Correction::Off)?;
+        self.core.stand_still(self.axis, REST)?;
         let reading = self
-            .reading(axis)?
+            .core
+            .reading(self.axis)?
             .expect("an axis that moved has been read");
         let position = reading.position - origin;
-        self.command(
-            axis,
+        self.core.command(
+            self.axis,
             AxisCommand::HomeHere { position },
             "set origin",
             Duration::from_secs(5),
         )?;
-        self.set_zeroed(axis, true)?;
-        Ok(self.forget_approach(axis)?)
+        self.core.set_zeroed(self.axis, true)?;
+        Ok(self.core.forget_approach(self.axis)?)
     }
 
     fn zero_entry(&self, estimate: &ZeroEstimate) -> ZeroEntry {
@@ -247,12 +249,12 @@ impl Machine {
             patent_p0_m: estimate.p0_patent.unwrap_or(estimate.origin).value(),
             peak_max_v: estimate.peak_max.value(),
             mid_v: estimate.mid_voltage.value(),
-            at_s: self.now().seconds(),
+            at_s: self.core.now().seconds(),
         }
     }
 
-    fn zero_header(&self, axis: &str) -> JournalHeader {
-        let here = self.this_machine(axis);
+    fn zero_header(&self) -> JournalHeader {
+        let here = self.core.this_machine(self.axis);
         JournalHeader {
             schema_version: SCHEMA_VERSION,
             verb: "zero".into(),
@@ -269,11 +271,11 @@ impl Machine {
         }
     }
 
-    fn pairing(&self, axis: &str, config: &ZeroConfig) -> Result<Pairing, Failure> {
-        let can = self.axis_config(axis)?.can();
+    fn pairing(&self, config: &ZeroConfig) -> Result<Pairing, Failure> {
+        let can = self.config.can();
         let bus = can.expect("the check asks for a drive on CAN").bus;
-        let sync_s = self.config.can[bus].sync_period_ms * 1e-3;
-        let poll_s = self.config.analog[&config.analog]
+        let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
+        let poll_s = self.core.config.analog[&config.analog]
             .poll_period_ms
             .map_or(0.0, |ms| ms * 1e-3);
         let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
@@ -290,12 +292,12 @@ impl Machine {
     /// periods lie further apart than the window and are never paired.
     fn paired_sample(
         &self,
-        axis: &str,
         config: &ZeroConfig,
         pairing: &mut Pairing,
     ) -> Result<Option<Sample>, Failure> {
-        let analog = self.analog(&config.analog)?;
-        let (Some(position), Some(voltages)) = (self.reading(axis)?, analog.reading()) else {
+        let analog = self.core.analog(&config.analog)?;
+        let (Some(position), Some(voltages)) = (self.core.reading(self.axis)?, analog.reading())
+        else {
             return Ok(None);
         };
         if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {

@@ -4,15 +4,15 @@ use compensator::platform::{Platform, Pose};
 use compensator::screw::ScrewMemory;
 use units::Metres;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::platform::failure::{Contradiction, PlatformFailure};
+use crate::platform::handle::AlignmentPlatform;
 use crate::platform::state::Screw;
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Refuses screws that would stand, by their models, where no pose has them together.
     pub(super) fn check_planned(&self, near: Pose, after: &[ScrewMemory]) -> Result<(), Failure> {
-        let screws = &self.platform_state()?.screws;
+        let screws = &self.state.screws;
         let nuts = screws.iter().zip(after).map(|(screw, it)| nut(screw, it));
         self.check_agreement(near, &nuts.collect::<Vec<_>>(), "; nothing was moved")
     }
@@ -20,9 +20,9 @@ impl Machine {
     /// Refuses what the encoders say after a move in the same way.
     pub(super) fn check_standing(&self, near: Pose) -> Result<(), Failure> {
         let mut nuts = Vec::new();
-        for screw in &self.platform_state()?.screws {
+        for screw in &self.state.screws {
             let memory = screw.memory.unwrap_or_default();
-            let here = self.reading(&screw.axis)?.map(|it| it.position);
+            let here = self.core.reading(&screw.axis)?.map(|it| it.position);
             let off = here.map_or(Metres::ZERO, |here| here - memory.set_point);
             nuts.push(nut(screw, &memory) + off);
         }
@@ -36,10 +36,10 @@ impl Machine {
         strokes: &[Metres],
         consequence: &'static str,
     ) -> Result<(), Failure> {
-        let Some(limit_um) = self.platform_config()?.inconsistency_limit_um else {
+        let Some(limit_um) = self.config.inconsistency_limit_um else {
             return Ok(());
         };
-        let kinematics = &self.platform_state()?.kinematics;
+        let kinematics = &self.state.kinematics;
         agreed(
             kinematics,
             near,

@@ -10,11 +10,11 @@ use compensator::screw::{
 };
 use units::{Approach, Metres};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::platform::config::ScrewMethodName as Method;
 use crate::platform::failure::PlatformFailure;
+use crate::platform::handle::AlignmentPlatform;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
 use crate::run::{note_failure, utc_now};
@@ -48,24 +48,24 @@ pub struct PlatformCalibrated {
     pub closure: Metres,
 }
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Measures every screw, fits its model, stores and activates all of them, and uses them
     /// from now on.
     ///
     /// # Errors
     /// Not zeroed, whatever stops the machine, a datum that drifted, strokes that give no
     /// model, or a model beyond the limits. Nothing is activated then.
-    pub fn calibrate_platform(&mut self, store: &Store) -> Result<PlatformCalibrated, Failure> {
-        self.require_platform_zeroed()?;
+    pub fn calibrate(&mut self, store: &Store) -> Result<PlatformCalibrated, Failure> {
+        self.require_zeroed()?;
         let missing = |section| PlatformFailure::NotConfigured { section };
-        let config = self.platform_config()?;
+        let config = self.config;
         let plan = config.calibrate.clone().ok_or(missing("calibrate"))?;
         config
             .compensation
             .as_ref()
             .ok_or(missing("compensation"))?;
         self.check_single_screws(&plan)?;
-        let mut journal = self.platform_journal(store, "calibrate", plan.runs, None, None)?;
+        let mut journal = self.journal_header(store, "calibrate", plan.runs, None, None)?;
         let measured = self.measure_screws(&plan, &mut journal);
         let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
         let stored = self.fit_and_store(store, &journal, &plan, &strokes);
@@ -82,7 +82,7 @@ impl Machine {
     /// One screw moves while the others stand: three bear that, four contradict each other.
     /// Refused before the first of them moves, not in the middle of its run.
     fn check_single_screws(&self, plan: &PlatformCalibrateConfig) -> Result<(), Failure> {
-        let count = self.platform_state()?.screws.len();
+        let count = self.state.screws.len();
         let stops = round(&targets(plan), plan);
         for at in 0..count {
             for (stroke, _) in &stops {
@@ -98,7 +98,7 @@ impl Machine {
         plan: &PlatformCalibrateConfig,
         journal: &mut Journal,
     ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
-        let count = self.platform_state()?.screws.len();
+        let count = self.state.screws.len();
         let targets = targets(plan);
         let total = (count * targets.len() * 2) as u64 * u64::from(plan.runs);
         let mut all = vec![Vec::new(); count];
@@ -116,7 +116,7 @@ impl Machine {
             }
             self.approach_zero()?;
         }
-        let closure = self.platform_closure(plan)?;
+        let closure = self.closure(plan)?;
         journal.write(&Entry::Closed(ClosureEntry {
             run: plan.runs,
             start_m: 0.0,
@@ -134,8 +134,8 @@ impl Machine {
         journal: &mut Journal,
     ) -> Result<Stroke, Failure> {
         let pose = self.measure_pose()?;
-        let measured = self.platform_state()?.kinematics.strokes(pose)[at];
-        let axis = self.platform_state()?.screws[at].axis.clone();
+        let measured = self.state.kinematics.strokes(pose)[at];
+        let axis = self.state.screws[at].axis.clone();
         journal.write(&Entry::Stroke(StrokeEntry {
             axis,
             run,
@@ -143,7 +143,7 @@ impl Machine {
             stroke_m: stroke.value(),
             measured_m: measured.value(),
             pose: pose.into(),
-            at_s: self.now().seconds(),
+            at_s: self.core.now().seconds(),
         }))?;
         Ok(Stroke {
             approach,
@@ -153,9 +153,9 @@ impl Machine {
     }
 
     /// The pose zero looked at again: it must still be there.
-    fn platform_closure(&mut self, plan: &PlatformCalibrateConfig) -> Result<Metres, Failure> {
+    fn closure(&mut self, plan: &PlatformCalibrateConfig) -> Result<Metres, Failure> {
         let pose = self.measure_pose()?;
-        let strokes = self.platform_state()?.kinematics.strokes(pose);
+        let strokes = self.state.kinematics.strokes(pose);
         let seen = strokes.into_iter().map(Metres::abs);
         let seen = seen.fold(Metres::ZERO, Metres::max);
         let limit = Metres::from_um(plan.closure_limit_um);
@@ -177,7 +177,7 @@ impl Machine {
         plan: &PlatformCalibrateConfig,
         strokes: &[Stroke],
     ) -> Result<(ScrewModel, Vec<StrokeOutlier>), Failure> {
-        let config = self.platform_config()?;
+        let config = self.config;
         let axis = config.actuator[at].axis.clone();
         let (model, outliers) = match plan.method {
             Method::LeastSquares => {
@@ -207,12 +207,12 @@ impl Machine {
 
     /// Proves that a model can be applied within the limits of the configuration.
     fn prepare_screw(&self, at: usize, model: ScrewModel) -> Result<ScrewCompensation, Failure> {
-        let config = self.platform_config()?;
+        let config = self.config;
         let axis = &config.actuator[at].axis;
         let section = "compensation";
         let limits = config.compensation.as_ref();
         let limits = limits.ok_or(PlatformFailure::NotConfigured { section })?;
-        let resolution = Metres(self.axis_config(axis)?.resolution_nm.abs() * 1e-9);
+        let resolution = Metres(self.core.config.axis[axis].resolution_nm.abs() * 1e-9);
         ScrewCompensation::new(model, limits_of(limits, resolution), rule_of(limits)).map_err(
             |source| {
                 let axis = axis.clone();
@@ -250,12 +250,12 @@ impl Machine {
         let source = journal.path().file_name().unwrap_or_default();
         let mut calibrated = Vec::new();
         for (at, (model, outliers)) in fitted.iter().enumerate() {
-            let axis = self.platform_state()?.screws[at].axis.clone();
+            let axis = self.state.screws[at].axis.clone();
             let head = RecordHead {
                 created: utc_now(),
                 source: source.to_string_lossy().into_owned(),
                 instrument: self.camera_record()?,
-                ..self.this_machine(&axis)
+                ..self.core.this_machine(&axis)
             };
             let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
             let content = ScrewContent::new(model, method, rows).without(outliers);
@@ -273,7 +273,7 @@ impl Machine {
         for (at, screw) in calibrated.iter().enumerate() {
             store.activate(&screw.axis, &screw.id)?;
             let compensation = self.prepare_screw(at, screw.model.clone())?;
-            let state = &mut self.platform_state_mut()?.screws[at];
+            let state = &mut self.state.screws[at];
             state.compensation = Some(compensation);
             state.calibration = Some(screw.id.clone());
         }
@@ -285,27 +285,21 @@ impl Machine {
     ///
     /// # Errors
     /// When one is damaged, of another kind, belongs to another machine or breaks a limit.
-    pub fn load_active_screws(
-        &mut self,
-        store: &Store,
-    ) -> Result<Vec<(String, Option<String>)>, Failure> {
-        let axes: Vec<_> = self
-            .platform_state()?
-            .screws
-            .iter()
-            .map(|it| it.axis.clone())
-            .collect();
+    pub fn load_active(&mut self, store: &Store) -> Result<Vec<(String, Option<String>)>, Failure> {
+        let axes: Vec<_> = self.state.screws.iter().map(|it| it.axis.clone()).collect();
         let mut loaded = Vec::new();
         for (at, axis) in axes.into_iter().enumerate() {
             let id = store.active(&axis)?.current;
             if let Some(id) = &id {
                 let record = store.load(id)?;
-                record
-                    .head
-                    .belongs_to(id, &self.this_machine(&axis), &self.config_hash)?;
+                record.head.belongs_to(
+                    id,
+                    &self.core.this_machine(&axis),
+                    self.core.config_hash,
+                )?;
                 let model = record.screw(id)?.model();
                 let compensation = self.prepare_screw(at, model)?;
-                let state = &mut self.platform_state_mut()?.screws[at];
+                let state = &mut self.state.screws[at];
                 state.compensation = Some(compensation);
                 state.calibration = Some(id.clone());
             }

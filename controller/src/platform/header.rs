@@ -2,17 +2,17 @@
 
 use units::Metres;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::platform::ArrangementEntry;
+use crate::platform::handle::AlignmentPlatform;
 use crate::run::utc_now;
 use crate::store::{
     Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store,
 };
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// A journal of the platform with its first two lines.
-    pub(crate) fn platform_journal(
+    pub(crate) fn journal_header(
         &self,
         store: &Store,
         verb: &str,
@@ -20,18 +20,18 @@ impl Machine {
         calibration: Option<String>,
         tolerance: Option<Metres>,
     ) -> Result<Journal, Failure> {
-        let header = self.platform_header(verb, runs, calibration)?;
+        let header = self.header(verb, runs, calibration)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
-        let screws = &self.platform_state()?.screws;
+        let screws = &self.state.screws;
         journal.write(&Entry::Arrangement(ArrangementEntry {
             axes: screws.iter().map(|it| it.axis.clone()).collect(),
-            edge_m: Metres::from_mm(self.platform_config()?.edge_mm).value(),
+            edge_m: Metres::from_mm(self.config.edge_mm).value(),
             tolerance_m: tolerance.map(Metres::value),
         }))?;
         Ok(journal)
     }
 
-    fn platform_header(
+    fn header(
         &self,
         verb: &str,
         runs: u32,
@@ -40,9 +40,9 @@ impl Machine {
         Ok(JournalHeader {
             schema_version: SCHEMA_VERSION,
             verb: verb.to_owned(),
-            machine: self.config.machine.name.clone(),
-            stage_serial: self.config.machine.stage_serial.clone(),
-            config_hash: self.config_hash.as_str().to_owned(),
+            machine: self.core.config.machine.name.clone(),
+            stage_serial: self.core.config.machine.stage_serial.clone(),
+            config_hash: self.core.config_hash.as_str().to_owned(),
             axis: "platform".into(),
             drive: IdentityRecord::default(),
             instrument: self.camera_record()?,
@@ -54,8 +54,8 @@ impl Machine {
     }
 
     pub(crate) fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
-        let name = self.platform_config()?.camera.clone();
-        let identity = self.identities().remove(&name);
+        let name = self.config.camera.clone();
+        let identity = self.core.identities().remove(&name);
         Ok(InstrumentRecord {
             identity: identity.unwrap_or_default().name,
             name,
@@ -65,7 +65,7 @@ impl Machine {
 
     /// The calibrations in use, as `AXIS=NAME` for each screw that has one.
     pub(crate) fn calibrations_in_use(&self) -> Result<Option<String>, Failure> {
-        let screws = self.platform_state()?.screws.iter();
+        let screws = self.state.screws.iter();
         let named =
             screws.filter_map(|it| Some(format!("{}={}", it.axis, it.calibration.as_ref()?)));
         let names = named.collect::<Vec<_>>().join(" ");

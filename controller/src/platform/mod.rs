@@ -11,6 +11,7 @@ pub(crate) mod check;
 pub(crate) mod config;
 mod entries;
 mod failure;
+mod handle;
 mod header;
 pub mod json;
 mod look;
@@ -30,6 +31,7 @@ pub use config::{
 };
 pub use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub use failure::{Contradiction, PlatformFailure};
+pub use handle::AlignmentPlatform;
 pub use moves::PoseMoved;
 pub use record::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
 pub use take_up::TakenUp;

@@ -7,12 +7,12 @@ use compensator::screw::ScrewMemory;
 use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::platform::PlatformConfig;
 use crate::platform::failure::PlatformFailure;
-use crate::platform::state::{PlatformState, engaged_by};
+use crate::platform::handle::AlignmentPlatform;
+use crate::platform::state::engaged_by;
 use crate::platform::take_up::TakenUp;
 
 /// Travels below this are none: the drives would not even count them.
@@ -42,19 +42,19 @@ struct Planned {
     standard_uncertainty: Option<Metres>,
 }
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Whether the platform may be told to be at `target`: by its work range and its screws'
     /// reach, without their calibrations. Asks no device.
     ///
     /// # Errors
     /// When it may not.
     pub fn check_pose(&self, target: Pose) -> Result<(), Failure> {
-        check_work_range(self.platform_config()?, target)?;
+        check_work_range(self.config, target)?;
         self.strokes_to(target).map(drop)
     }
 
     fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
-        let strokes = self.platform_state()?.kinematics.check(target);
+        let strokes = self.state.kinematics.check(target);
         Ok(strokes.map_err(PlatformFailure::from)?)
     }
 
@@ -63,8 +63,8 @@ impl Machine {
     /// # Errors
     /// Before anything moves: not zeroed, outside the work range, a screw's reach or
     /// calibration, or a way there that leaves them. While moving: whatever stops the machine.
-    pub fn move_pose(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
-        self.require_platform_zeroed()?;
+    pub fn move_to(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
+        self.require_zeroed()?;
         self.check_pose(target)?;
         self.plan(&self.strokes_to(target)?, Correction::On)?;
         let taken_up = self.take_up()?;
@@ -78,14 +78,14 @@ impl Machine {
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
         let strokes = self.strokes_to(target)?;
-        let state = self.platform_state()?;
+        let state = &self.state;
         if let Some(from) = state.pose {
             let path = state.kinematics.check_path(from, target);
             path.map_err(PlatformFailure::from)?;
         }
         let planned = self.plan(&strokes, correction)?;
         let moved = self.go_agreed(&planned, target)?;
-        self.platform_state_mut()?.pose = Some(target);
+        self.state.pose = Some(target);
         Ok(PoseMoved { target, ..moved })
     }
 
@@ -100,7 +100,7 @@ impl Machine {
         strokes: &[Metres],
         correction: Correction,
     ) -> Result<PoseMoved, Failure> {
-        let near = self.platform_state()?.pose.unwrap_or_default();
+        let near = self.state.pose.unwrap_or_default();
         let planned = self.plan(strokes, correction)?;
         self.go_agreed(&planned, near)
     }
@@ -115,9 +115,9 @@ impl Machine {
     }
 
     fn go(&mut self, planned: &[Planned]) -> Result<PoseMoved, Failure> {
-        let target = self.platform_state()?.pose.unwrap_or_default();
+        let target = self.state.pose.unwrap_or_default();
         let skew = self.launch(planned)?;
-        let state = self.platform_state_mut()?;
+        let state = &mut *self.state;
         state.pose = None;
         for (screw, planned) in state.screws.iter_mut().zip(planned) {
             screw.memory = Some(planned.after);
@@ -136,7 +136,7 @@ impl Machine {
     }
 
     fn plan(&self, strokes: &[Metres], correction: Correction) -> Result<Vec<Planned>, Failure> {
-        let state = self.platform_state()?;
+        let state = &self.state;
         let lost_motion_max = self.lost_motion_max()?;
         let mut planned = Vec::new();
         for (screw, stroke) in state.screws.iter().zip(strokes) {
@@ -157,7 +157,7 @@ impl Machine {
                 (None, _) => None,
             };
             let set_point = expected.map_or(*stroke, |it| it.set_point);
-            self.check_soft_limits(&screw.axis, set_point)?;
+            self.core.check_soft_limits(&screw.axis, set_point)?;
             let travel = set_point - memory.set_point;
             let engagement = engaged_by(travel, lost_motion_max, memory.engagement);
             let uncalibrated = ScrewMemory {
@@ -183,7 +183,7 @@ impl Machine {
         if let Some(memory) = memory {
             return Ok(memory);
         }
-        let here = self.reading(axis)?.map(|reading| reading.position);
+        let here = self.core.reading(axis)?.map(|reading| reading.position);
         Ok(ScrewMemory::unknown_at(here.unwrap_or(Metres::ZERO)))
     }
 
@@ -197,14 +197,14 @@ impl Machine {
         if longest < TRAVEL_MIN {
             return Ok(None);
         }
-        let config = self.platform_config()?;
+        let config = self.config;
         let (speed, acceleration, settle) = (
             MetresPerSecond(config.speed_mm_per_s * 1e-3),
             MetresPerSecondSquared(config.acceleration_mm_per_s2 * 1e-3),
             Duration::from_millis(config.settle_ms.into()),
         );
         let moving = self.moving_axes(planned)?;
-        self.platform_state_mut()?.interrupted_before_it_ends();
+        self.state.interrupted_before_it_ends();
         for (axis, at) in &moving {
             let planned = &planned[*at];
             let share = planned.travel.abs() / longest;
@@ -214,18 +214,18 @@ impl Machine {
                 acceleration: acceleration * share,
             };
             let limit = self.move_limit(axis)?;
-            self.command(axis, command, "prepare", limit)?;
+            self.core.command(axis, command, "prepare", limit)?;
         }
         self.start_together(&moving)?;
         let skew = self.start_skew(&moving)?;
         for (axis, _) in &moving {
-            self.stand_still(axis, settle)?;
+            self.core.stand_still(axis, settle)?;
         }
         Ok(skew)
     }
 
     fn moving_axes(&self, planned: &[Planned]) -> Result<Vec<(String, usize)>, Failure> {
-        let screws = &self.platform_state()?.screws;
+        let screws = &self.state.screws;
         Ok(planned
             .iter()
             .zip(screws)
@@ -248,29 +248,29 @@ impl Machine {
         let Some(period) = self.sync_period(axis)? else {
             return Ok(());
         };
-        let deadline = self.now() + self.move_limit(axis)?;
-        let before = self.reading(axis)?.map(|reading| reading.at);
+        let deadline = self.core.now() + self.move_limit(axis)?;
+        let before = self.core.reading(axis)?.map(|reading| reading.at);
         loop {
-            let sample = self.reading(axis)?.map(|reading| reading.at);
+            let sample = self.core.reading(axis)?.map(|reading| reading.at);
             let is_new = sample != before;
-            let is_fresh = sample.is_some_and(|at| self.now().since(at) * 2 <= period);
-            if is_new && is_fresh || self.now() >= deadline {
+            let is_fresh = sample.is_some_and(|at| self.core.now().since(at) * 2 <= period);
+            if is_new && is_fresh || self.core.now() >= deadline {
                 return Ok(());
             }
-            self.tick(deadline)?;
+            self.core.tick(deadline)?;
         }
     }
 
     fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
-        let bus = self.axis_config(axis)?.bus.as_ref();
-        let bus = bus.and_then(|bus| self.config.can.get(bus));
+        let bus = self.core.config.axis[axis].bus.as_ref();
+        let bus = bus.and_then(|bus| self.core.config.can.get(bus));
         Ok(bus.map(|bus| Duration::from_secs_f64(bus.sync_period_ms * 1e-3)))
     }
 
     fn start_skew(&self, moving: &[(String, usize)]) -> Result<Option<Duration>, Failure> {
         let mut times = Vec::new();
         for (axis, _) in moving {
-            times.extend(self.started_at(axis)?);
+            times.extend(self.core.started_at(axis)?);
         }
         let (first, last) = (times.iter().min(), times.iter().max());
         Ok(match (first, last) {
@@ -280,31 +280,18 @@ impl Machine {
     }
 
     fn move_limit(&self, axis: &str) -> Result<Duration, Failure> {
-        Ok(self.axis_settings(axis)?.move_timeout)
+        Ok(self.core.axis_settings(axis)?.move_timeout)
     }
 
     /// The travel after which a screw is engaged whatever it was before.
     pub(super) fn lost_motion_max(&self) -> Result<Metres, Failure> {
-        let compensation = self.platform_config()?.compensation.as_ref();
+        let compensation = self.config.compensation.as_ref();
         Ok(compensation.map_or(LOST_MOTION_MAX, |it| Metres::from_um(it.lost_motion_max_um)))
     }
 
-    pub(super) fn platform_config(&self) -> Result<&PlatformConfig, Failure> {
-        let config = self.config.platform.as_ref();
-        Ok(config.ok_or(PlatformFailure::None)?)
-    }
-
-    pub(super) fn platform_state(&self) -> Result<&PlatformState, Failure> {
-        Ok(self.platform.as_ref().ok_or(PlatformFailure::None)?)
-    }
-
-    pub(super) fn platform_state_mut(&mut self) -> Result<&mut PlatformState, Failure> {
-        Ok(self.platform.as_mut().ok_or(PlatformFailure::None)?)
-    }
-
-    pub(super) fn require_platform_zeroed(&self) -> Result<(), Failure> {
-        let state = self.platform_state()?;
-        let zeroed = state.screws.iter().all(|it| self.is_zeroed(&it.axis));
+    pub(super) fn require_zeroed(&self) -> Result<(), Failure> {
+        let state = &self.state;
+        let zeroed = state.screws.iter().all(|it| self.core.is_zeroed(&it.axis));
         if zeroed && state.datum.is_some() {
             return Ok(());
         }

@@ -3,9 +3,9 @@
 use compensator::screw::{Engagement, ScrewCompensation, ScrewMemory};
 use units::{Approach, Metres};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::platform::handle::AlignmentPlatform;
 use crate::platform::state::Screw;
 
 /// A screw whose play was taken up.
@@ -17,12 +17,12 @@ pub struct TakenUp {
     pub standard_uncertainty: Option<Metres>,
 }
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Settles the engagement of every calibrated screw of which it is not known, and says which
     /// these were. Where the soft limits leave no room for it the doubt stays, in the uncertainty
     /// of the moves that follow.
     pub(super) fn take_up(&mut self) -> Result<Vec<TakenUp>, Failure> {
-        let screws = self.platform_state()?.screws.clone();
+        let screws = self.state.screws.clone();
         let mut goals = Vec::new();
         let mut taken_up = Vec::new();
         for screw in screws {
@@ -56,7 +56,7 @@ impl Machine {
         [Approach::Forward, Approach::Reverse]
             .into_iter()
             .filter_map(|towards| compensation.take_up_move(memory, towards))
-            .find(|goal| self.check_soft_limits(&screw.axis, *goal).is_ok())
+            .find(|goal| self.core.check_soft_limits(&screw.axis, *goal).is_ok())
     }
 }
 

@@ -7,12 +7,12 @@ use compensator::platform::Pose;
 use units::portable::powi;
 use units::{Metres, Radians};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::platform::AlignConfig;
 use crate::platform::PoseEntry;
 use crate::platform::failure::PlatformFailure;
+use crate::platform::handle::AlignmentPlatform;
 use crate::platform::state::{difference, largest_error};
 use crate::run::note_failure;
 use crate::store::{Entry, Journal, Store};
@@ -66,20 +66,20 @@ pub struct Aligned {
     pub moves: u32,
 }
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Visits the configuration's verification poses, moving open loop, and looks at each.
     /// Being out of tolerance is a result here, not an error.
     ///
     /// # Errors
     /// Not zeroed, `compensated` without a calibration, and whatever stops the machine.
-    pub fn verify_platform(
+    pub fn verify(
         &mut self,
         store: &Store,
         compensated: bool,
     ) -> Result<PlatformVerified, Failure> {
-        self.require_platform_zeroed()?;
+        self.require_zeroed()?;
         let section = "verify";
-        let config = self.platform_config()?;
+        let config = self.config;
         let plan = config.verify.clone();
         let plan = plan.ok_or(PlatformFailure::NotConfigured { section })?;
         if compensated {
@@ -92,8 +92,7 @@ impl Machine {
             None
         };
         let tolerance = Metres::from_um(plan.tolerance_um);
-        let mut journal =
-            self.platform_journal(store, "verify", 1, calibrations, Some(tolerance))?;
+        let mut journal = self.journal_header(store, "verify", 1, calibrations, Some(tolerance))?;
         let checked = self
             .check_poses(&targets, compensated, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
@@ -115,11 +114,11 @@ impl Machine {
         compensated: bool,
         journal: &mut Journal,
     ) -> Result<Vec<PoseChecked>, Failure> {
-        let edge = Metres::from_mm(self.platform_config()?.edge_mm);
+        let edge = Metres::from_mm(self.config.edge_mm);
         let mut checked = Vec::new();
         for (done, target) in (1..).zip(targets) {
             let moved = if compensated {
-                self.move_pose(*target)?
+                self.move_to(*target)?
             } else {
                 self.go_to_pose(*target, Correction::Off)?
             };
@@ -130,7 +129,7 @@ impl Machine {
                 set_points_m: moved.set_points.iter().map(|(_, at)| at.value()).collect(),
                 seen: seen.into(),
                 skew_s,
-                at_s: self.now().seconds(),
+                at_s: self.core.now().seconds(),
             }))?;
             checked.push(PoseChecked {
                 target: *target,
@@ -157,23 +156,23 @@ impl Machine {
     }
 
     fn alignment(&self) -> Result<&AlignConfig, Failure> {
-        let align = self.platform_config()?.align.as_ref();
+        let align = self.config.align.as_ref();
         Ok(align.ok_or(PlatformFailure::NotConfigured { section: "align" })?)
     }
 
     /// Moves to `target`, then on until the image agrees with it.
     ///
     /// # Errors
-    /// As [`Machine::move_pose`], and when it does not agree after the moves allowed.
-    pub fn align_pose(&mut self, target: Pose) -> Result<Aligned, Failure> {
+    /// As [`Self::move_to`], and when it does not agree after the moves allowed.
+    pub fn align(&mut self, target: Pose) -> Result<Aligned, Failure> {
         let align = self.alignment()?.clone();
-        let edge = Metres::from_mm(self.platform_config()?.edge_mm);
+        let edge = Metres::from_mm(self.config.edge_mm);
         let limit = Metres::from_um(align.tolerance_um);
         let mut told = target;
         let mut open_loop = None;
         let mut left = Metres::ZERO;
         for moves in 1..=align.iterations_max {
-            self.move_pose(told)?;
+            self.move_to(told)?;
             let error = difference(self.measure_pose()?, target);
             left = largest_error(error, edge);
             let open_loop = *open_loop.get_or_insert(left);
@@ -195,7 +194,7 @@ impl Machine {
     }
 
     fn require_calibrated_screws(&self) -> Result<(), Failure> {
-        let screws = &self.platform_state()?.screws;
+        let screws = &self.state.screws;
         match screws.iter().find(|it| it.compensation.is_none()) {
             None => Ok(()),
             Some(screw) => Err(Failure::Usage {
@@ -210,8 +209,8 @@ impl Machine {
     /// # Errors
     /// When there is no platform, or hardly a pose of its work range is within reach.
     pub fn verification_poses(&self, count: u32, seed: u64) -> Result<Vec<Pose>, Failure> {
-        let config = self.platform_config()?;
-        let kinematics = &self.platform_state()?.kinematics;
+        let config = self.config;
+        let kinematics = &self.state.kinematics;
         let ranges = [
             config.x_max_mm * 1e-3,
             config.y_max_mm * 1e-3,

@@ -8,10 +8,10 @@ use compensator::platform::Pose;
 use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond};
 
-use crate::connected::Machine;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::platform::PoseEntry;
+use crate::platform::handle::AlignmentPlatform;
 use crate::store::{Entry, Store};
 use machine::Stage;
 
@@ -27,19 +27,19 @@ pub struct PlatformZeroed {
     pub journal: PathBuf,
 }
 
-impl Machine {
+impl AlignmentPlatform<'_> {
     /// Finds the screws' index pulses, one after the other, brings all of them to their zero
     /// from below, and takes what the camera sees there for the pose zero.
     ///
     /// # Errors
     /// Whatever stops the machine; the platform is not zeroed then.
-    pub fn zero_platform(&mut self, store: &Store) -> Result<PlatformZeroed, Failure> {
-        self.platform_state_mut()?.forget();
-        let mut journal = self.platform_journal(store, "zero", 0, None, None)?;
+    pub fn zero(&mut self, store: &Store) -> Result<PlatformZeroed, Failure> {
+        self.state.forget();
+        let mut journal = self.journal_header(store, "zero", 0, None, None)?;
         let datum = self
-            .find_platform_zero()
+            .find_zero()
             .inspect_err(|failure| crate::run::note_failure(&mut journal, failure))?;
-        let at_s = self.now().seconds();
+        let at_s = self.core.now().seconds();
         journal.write(&Entry::Pose(PoseEntry::looked(datum, at_s)))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
@@ -49,24 +49,24 @@ impl Machine {
         })
     }
 
-    fn find_platform_zero(&mut self) -> Result<Pose, Failure> {
-        let screws = self.platform_state()?.screws.clone();
+    fn find_zero(&mut self) -> Result<Pose, Failure> {
+        let screws = self.state.screws.clone();
         let steps = screws.len() as u64 + 1;
         for screw in &screws {
-            self.set_zeroed(&screw.axis, false)?;
-            self.enable(&screw.axis)?;
+            self.core.set_zeroed(&screw.axis, false)?;
+            self.core.enable(&screw.axis)?;
         }
         for (done, screw) in (0..).zip(&screws) {
             self.core
                 .observer()
                 .progress(Stage::Zero, "platform", done, steps);
             self.home_on_index(&screw.axis, screw.index)?;
-            self.set_zeroed(&screw.axis, true)?;
+            self.core.set_zeroed(&screw.axis, true)?;
         }
         self.approach_zero()?;
-        let exposures = self.platform_config()?.exposures * DATUM_LOOKS;
+        let exposures = self.config.exposures * DATUM_LOOKS;
         let datum = self.camera_pose(exposures)?;
-        self.platform_state_mut()?.datum = Some(datum);
+        self.state.datum = Some(datum);
         self.core
             .observer()
             .progress(Stage::Zero, "platform", steps, steps);
@@ -74,20 +74,22 @@ impl Machine {
     }
 
     fn home_on_index(&mut self, axis: &str, position: Metres) -> Result<(), Failure> {
-        let zero = &self.platform_config()?.zero;
+        let zero = &self.config.zero;
         let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
         let limit = Duration::from_secs_f64(zero.time_limit_s);
         let command = AxisCommand::HomeIndex { position, speed };
-        Ok(self.command(axis, command, "home on the index", limit)?)
+        Ok(self
+            .core
+            .command(axis, command, "home on the index", limit)?)
     }
 
     /// All screws to their zero from below, so that all lean on the same flank as ever.
     pub(super) fn approach_zero(&mut self) -> Result<(), Failure> {
-        let count = self.platform_state()?.screws.len();
+        let count = self.state.screws.len();
         let below = Metres::ZERO - self.lost_motion_max()? * 2.0;
         self.go_to_strokes(&vec![below; count], Correction::Off)?;
         self.go_to_strokes(&vec![Metres::ZERO; count], Correction::Off)?;
-        self.platform_state_mut()?.pose = Some(Pose::default());
+        self.state.pose = Some(Pose::default());
         Ok(())
     }
 }

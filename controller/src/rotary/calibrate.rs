@@ -6,13 +6,13 @@ use compensator::rotary::{self, Solution, SolveOptions};
 use units::Radians;
 
 use crate::config::ConfigHash;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::rotary::estimate::{evaluate, series};
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
 use crate::rotary::placement::{Placed, PlateRun};
+use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlatePlanEntry, RotaryContent};
 use crate::run::{CalibrateOptions, note_failure, utc_now};
 use crate::store::{
@@ -42,7 +42,7 @@ pub struct RotaryCalibrated {
     pub content: RotaryContent,
 }
 
-impl Machine {
+impl RotaryTable<'_> {
     /// Reads the plate in every placement, which `operator` brings about, evaluates the table's
     /// error, stores and activates it, and uses it from now on.
     ///
@@ -50,47 +50,46 @@ impl Machine {
     /// Not zeroed; whatever stops the machine; a plate that slipped or lies elsewhere; readings
     /// that scatter too much or determine nothing; a table beyond the limits. The calibration in
     /// use before stays in use then.
-    pub fn calibrate_rotary(
+    pub fn calibrate(
         &mut self,
-        axis: &str,
         store: &Store,
         options: &CalibrateOptions,
         operator: &mut dyn Operator,
     ) -> Result<RotaryCalibrated, Failure> {
-        let (mut run, config) = self.plate_run(axis)?;
+        let (mut run, config) = self.plate_run()?;
         if options.accept_drift {
             run.closure_limit = None;
         }
-        self.require_zeroed(axis)?;
+        self.core.require_zeroed(self.axis)?;
         let offsets: Vec<f64> = config
             .design()?
             .offsets()
             .iter()
             .map(|it| *it as f64)
             .collect();
-        let header = self.rotary_header("calibrate", axis, &run, None);
+        let header = self.header("calibrate", &run, None);
         let plan = run.plan(offsets.clone());
         let (mut journal, kept) = open(
             store,
             &header,
             &plan,
             options.resume.as_ref(),
-            &self.config_hash,
+            self.core.config_hash,
         )?;
         let limit = config.amplification_limit;
         let evaluated = self
-            .read_placements(axis, &run, &offsets, kept, &mut journal, operator)
-            .and_then(|placed| Ok((evaluate(axis, &run, limit, &placed)?, placed)));
+            .read_placements(&run, &offsets, kept, &mut journal, operator)
+            .and_then(|placed| Ok((evaluate(self.axis, &run, limit, &placed)?, placed)));
         let (solution, placed) = evaluated.inspect_err(|it| {
             note_failure(&mut journal, it);
             // Offsets of a run without a calibration mean nothing to a verification.
-            self.remember_table(axis).plate_at = None;
+            self.memory.plate_at = None;
         })?;
         let content = RotaryContent {
             plate_phase_rad: placed.first().map(|it| it.phase.value()),
             ..RotaryContent::new(&solution)
         };
-        let stored = self.store_table(axis, store, &run, &journal, content.clone());
+        let stored = self.store_table(store, &run, &journal, content.clone());
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
@@ -111,7 +110,6 @@ impl Machine {
 
     fn read_placements(
         &mut self,
-        axis: &str,
         run: &PlateRun,
         offsets: &[f64],
         mut placed: Vec<Placed>,
@@ -119,7 +117,7 @@ impl Machine {
         operator: &mut dyn Operator,
     ) -> Result<Vec<Placed>, Failure> {
         // A run that was continued may have been killed between a placement and its judgement.
-        doubt(axis, run, &placed, journal)?;
+        doubt(self.axis, run, &placed, journal)?;
         let total = run.sweeps() * offsets.len() as u32;
         for (number, offset) in (1..).zip(offsets) {
             if placed.iter().any(|it| it.offset == *offset) {
@@ -127,11 +125,11 @@ impl Machine {
             }
             let step = (number, offsets.len());
             let known = placed.last().map(|it| it.offset);
-            self.place_plate(axis, run, *offset, step, known, operator)?;
+            self.place_plate(run, *offset, step, known, operator)?;
             let done = (run.sweeps() * placed.len() as u32, total);
             let phase = placed.first().map(|it| it.phase);
-            placed.push(self.read_placement(axis, run, (*offset, phase), done, journal)?);
-            doubt(axis, run, &placed, journal)?;
+            placed.push(self.read_placement(run, (*offset, phase), done, journal)?);
+            doubt(self.axis, run, &placed, journal)?;
         }
         placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
         Ok(placed)
@@ -139,7 +137,6 @@ impl Machine {
 
     fn store_table(
         &mut self,
-        axis: &str,
         store: &Store,
         run: &PlateRun,
         journal: &Journal,
@@ -150,34 +147,33 @@ impl Machine {
             created: utc_now(),
             source: source.to_string_lossy().into_owned(),
             instrument: plate_record(run),
-            ..self.this_machine(axis)
+            ..self.core.this_machine(self.axis)
         };
         // Nothing is stored that cannot be applied.
-        let compensation = self.prepare_table(axis, &content, "just made")?;
+        let compensation = self.prepare(&content, "just made")?;
         let content = Content::RotaryErrorTable(content);
         let record = CalibrationRecord { head, content };
         let id = store.save(&record)?;
-        store.activate(axis, &id)?;
+        store.activate(self.axis, &id)?;
         let in_use = TableInUse::new(&id, &record, compensation)?;
-        self.remember_table(axis).calibration = Some(in_use);
+        self.memory.calibration = Some(in_use);
         Ok(id)
     }
 
-    pub(super) fn rotary_header(
+    pub(super) fn header(
         &self,
         verb: &str,
-        axis: &str,
         run: &PlateRun,
         calibration: Option<String>,
     ) -> JournalHeader {
-        let machine = self.this_machine(axis);
+        let machine = self.core.this_machine(self.axis);
         JournalHeader {
             schema_version: SCHEMA_VERSION,
             verb: verb.to_owned(),
             machine: machine.machine,
             stage_serial: machine.stage_serial,
             config_hash: machine.config_hash,
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             drive: machine.drive,
             instrument: plate_record(run),
             started: utc_now(),

@@ -27,6 +27,7 @@ mod record;
 pub mod report;
 pub mod settings;
 mod sweep;
+mod table;
 mod turn;
 mod verify;
 
@@ -43,7 +44,9 @@ pub use moves::RotaryMoved;
 pub use operator::{Operator, PlateMove, PlateTask};
 pub use record::{ReadingName, RotaryContent};
 pub use sweep::{Sweep, SweepOptions};
+pub use table::RotaryTable;
 pub use turn::Way;
 pub use verify::{RotaryFigures, RotaryVerified};
 
 pub(crate) use in_use::TableInUse;
+pub(crate) use table::RotaryMemory;

@@ -3,13 +3,13 @@
 use compensator::rotary::PeriodicCompensation;
 use units::Radians;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::rotary::RotaryContent;
 use crate::rotary::Way;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::settings;
+use crate::rotary::table::RotaryTable;
 use crate::run::missing;
 use crate::store::Store;
 
@@ -27,39 +27,34 @@ pub struct RotaryMoved {
     pub standard_uncertainty: Option<Radians>,
 }
 
-impl Machine {
-    /// Turns the rotary axis `axis` to `angle`, compensated where it has a calibration.
+impl RotaryTable<'_> {
+    /// Turns the table to `angle`, compensated where it has a calibration.
     ///
     /// # Errors
     /// Before anything moves: not zeroed, no angle. While moving: whatever stops the machine.
-    pub fn move_rotary(
-        &mut self,
-        axis: &str,
-        angle: Radians,
-        way: Way,
-    ) -> Result<RotaryMoved, Failure> {
-        self.require_zeroed(axis)?;
+    pub fn move_to(&mut self, angle: Radians, way: Way) -> Result<RotaryMoved, Failure> {
+        self.core.require_zeroed(self.axis)?;
         let not_an_angle = |source| RotaryFailure::NotAnAngle {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             source,
         };
-        let Some(compensation) = self.rotary_compensation(axis).cloned() else {
-            let target = self.turn_to(axis, angle, way)?;
+        let Some(compensation) = self.compensation().cloned() else {
+            let target = self.turn_to(angle, way)?;
             return Ok(RotaryMoved {
                 target,
                 set_point: target,
-                expected: self.table_reading(axis)?,
+                expected: self.reading()?,
                 standard_uncertainty: None,
             });
         };
-        let near = Radians::from_arcsec(self.rotary_config(axis)?.position_window_arcsec);
-        let reading = self.table_reading(axis)?;
+        let near = Radians::from_arcsec(self.config.position_window_arcsec);
+        let reading = self.reading()?;
         // Turns are counted and ways are chosen by where the table is, not by what it reads.
         let here = reading + compensation.deviation(reading).map_err(not_an_angle)?;
         let target = way.target(here, angle, near);
         let set_point = compensation.set_point(target).map_err(not_an_angle)?;
-        self.turn_to(axis, set_point, Way::Turns)?;
-        let reading = self.table_reading(axis)?;
+        self.turn_to(set_point, Way::Turns)?;
+        let reading = self.reading()?;
         let deviation = compensation.deviation(reading).map_err(not_an_angle)?;
         let uncertainty = compensation.standard_uncertainty(set_point);
         Ok(RotaryMoved {
@@ -70,50 +65,46 @@ impl Machine {
         })
     }
 
-    /// Loads the calibration that `store` says is active for the rotary axis `axis`, after
+    /// Loads the calibration that `store` says is active for the table, after
     /// checking that it belongs to this machine; returns its name, `None` when there is none.
     ///
     /// # Errors
     /// When it is damaged, of another kind, belongs to another machine or breaks a limit.
-    pub fn load_active_rotary(
-        &mut self,
-        axis: &str,
-        store: &Store,
-    ) -> Result<Option<String>, Failure> {
-        self.rotary_config(axis)?;
-        let Some(id) = store.active(axis)?.current else {
+    pub fn load_active(&mut self, store: &Store) -> Result<Option<String>, Failure> {
+        let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
         let record = store.load(&id)?;
-        record
-            .head
-            .belongs_to(&id, &self.this_machine(axis), &self.config_hash)?;
-        let compensation = self.prepare_table(axis, record.rotary(&id)?, &id)?;
+        record.head.belongs_to(
+            &id,
+            &self.core.this_machine(self.axis),
+            self.core.config_hash,
+        )?;
+        let compensation = self.prepare(record.rotary(&id)?, &id)?;
         let in_use = TableInUse::new(&id, &record, compensation)?;
-        self.remember_table(axis).calibration = Some(in_use);
+        self.memory.calibration = Some(in_use);
         Ok(Some(id))
     }
 
-    /// The calibration that the rotary axis `axis` uses now.
-    pub fn rotary_compensation(&self, axis: &str) -> Option<&PeriodicCompensation> {
-        let calibration = self.rotary_memory.get(axis)?.calibration.as_ref()?;
+    /// The calibration in use.
+    pub fn compensation(&self) -> Option<&PeriodicCompensation> {
+        let calibration = self.memory.calibration.as_ref()?;
         Some(&calibration.compensation)
     }
 
-    /// Uses no calibration for the rotary axis `axis` any more.
-    pub fn forget_rotary_calibration(&mut self, axis: &str) {
-        self.remember_table(axis).calibration = None;
+    /// Uses no calibration any more.
+    pub fn forget_calibration(&mut self) {
+        self.memory.calibration = None;
     }
 
     /// Proves that a table error can be undone within the limits of the configuration.
-    pub(super) fn prepare_table(
+    pub(super) fn prepare(
         &self,
-        axis: &str,
         content: &RotaryContent,
         id: &str,
     ) -> Result<PeriodicCompensation, Failure> {
-        let config = self.rotary_config(axis)?.compensation.as_ref();
-        let config = config.ok_or_else(|| missing(axis, "compensation"))?;
-        settings::periodic_compensation(config, axis, content.table(id)?)
+        let config = self.config.compensation.as_ref();
+        let config = config.ok_or_else(|| missing(self.axis, "compensation"))?;
+        settings::periodic_compensation(config, self.axis, content.table(id)?)
     }
 }

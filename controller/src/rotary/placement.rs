@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use compensator::uncertainty::{median, robust_sigma, standard_deviation};
 use units::{Approach, Radians, RadiansPerSecond};
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::rotary::RotaryCalibrateConfig;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::operator::{Operator, PlateMove, PlateTask};
+use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlacementEntry, PlatePlanEntry, SweepEntry};
 use crate::rotary::{Sweep, SweepOptions};
 use crate::run::missing;
@@ -182,15 +182,12 @@ fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
         .fold(0.0, |a, b| if b.abs() > f64::abs(a) { b } else { a })
 }
 
-impl Machine {
+impl RotaryTable<'_> {
     /// The plate and how it is read, as configured.
-    pub(super) fn plate_run(
-        &self,
-        axis: &str,
-    ) -> Result<(PlateRun, RotaryCalibrateConfig), Failure> {
-        let config = self.rotary_config(axis)?;
+    pub(super) fn plate_run(&self) -> Result<(PlateRun, RotaryCalibrateConfig), Failure> {
+        let config = self.config;
         let run = config.calibrate.clone();
-        let run = run.ok_or_else(|| missing(axis, "calibrate"))?;
+        let run = run.ok_or_else(|| missing(self.axis, "calibrate"))?;
         let speed = run.speed_deg_per_s.unwrap_or(config.speed_deg_per_s);
         let plate = PlateRun {
             plate: run.plate.clone(),
@@ -209,18 +206,17 @@ impl Machine {
     /// this is the placement that all others are counted from.
     pub(super) fn place_plate(
         &mut self,
-        axis: &str,
         run: &PlateRun,
         offset: f64,
         step: (usize, usize),
         known: Option<f64>,
         operator: &mut dyn Operator,
     ) -> Result<(), Failure> {
-        self.rest(axis)?;
-        self.disable(axis)?;
-        let lies_at = self.remember_table(axis).plate_at.take();
+        self.rest()?;
+        self.core.disable(self.axis)?;
+        let lies_at = self.memory.plate_at.take();
         operator.ask(&PlateTask {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             plate: run.plate.clone(),
             lines: run.lines,
             step,
@@ -235,10 +231,10 @@ impl Machine {
             },
         })?;
         while !operator.is_done()? {
-            let look = self.now() + LOOK_EVERY;
-            self.tick(look)?;
+            let look = self.core.now() + LOOK_EVERY;
+            self.core.tick(look)?;
         }
-        Ok(self.enable(axis)?)
+        Ok(self.core.enable(self.axis)?)
     }
 
     /// Reads the plate as it lies, `done` passes of `total` being read already. `phase` is that of
@@ -246,7 +242,6 @@ impl Machine {
     /// spacing, and every further one is off by about as much. `None` for that placement itself.
     pub(super) fn read_placement(
         &mut self,
-        axis: &str,
         run: &PlateRun,
         (offset, phase): (f64, Option<Radians>),
         (done, total): (u32, u32),
@@ -270,7 +265,7 @@ impl Machine {
                 speed: Some(run.speed),
                 phase: phase.map(Radians),
             };
-            let sweep = self.full_sweep(axis, &options)?;
+            let sweep = self.full_sweep(&options)?;
             // A placement lies somewhere; its passes must agree about where.
             phase = phase.or(Some(sweep.phase.value()));
             let entry = entry_of(
@@ -278,29 +273,29 @@ impl Machine {
                 offset,
                 number / 2 + 1,
                 approach,
-                self.now().seconds(),
+                self.core.now().seconds(),
             );
             journal.write(&Entry::Sweep(entry.clone()))?;
             sweeps.push(entry);
             let done = u64::from(done + number + 1);
             let observer = self.core.observer();
-            observer.progress(run.stage, axis, done, total.into());
+            observer.progress(run.stage, self.axis, done, total.into());
         }
-        self.warn_of_lines(axis, &sweeps);
-        let placement = self.closed(axis, run, offset, &sweeps)?;
+        self.warn_of_lines(&sweeps);
+        let placement = self.closed(run, offset, &sweeps)?;
         journal.write(&Entry::Placed(placement))?;
         journal.flush_to_disk()?;
-        self.remember_table(axis).plate_at = Some(offset);
+        self.memory.plate_at = Some(offset);
         Ok(Placed::of(&placement, &sweeps, run.passes))
     }
 
     /// A pass in which most lines were read. One that a busy computer spoilt is made again; dirt
     /// would only be the same again.
-    fn full_sweep(&mut self, axis: &str, options: &SweepOptions) -> Result<Sweep, Failure> {
+    fn full_sweep(&mut self, options: &SweepOptions) -> Result<Sweep, Failure> {
         let lines = options.lines;
         let mut again = 0;
         loop {
-            let sweep = self.sweep(axis, options)?;
+            let sweep = self.sweep(options)?;
             let seen = sweep.read();
             let busy = sweep.overwritten.len() > sweep.missing.len();
             let share = if busy { UNREAD_SHARE } else { MISSING_SHARE };
@@ -310,7 +305,7 @@ impl Machine {
             }
             if !busy || again == AGAIN_MAX {
                 return Err(RotaryFailure::TooFewLines {
-                    axis: axis.to_owned(),
+                    axis: self.axis.to_owned(),
                     seen,
                     wanted,
                     overwritten: if busy { sweep.overwritten.len() } else { 0 },
@@ -320,8 +315,9 @@ impl Machine {
             }
             again += 1;
             self.core.observer().warning(&format!(
-                "axis {axis}: {} of {lines} lines were overwritten before they were read; the pass is \
+                "axis {}: {} of {lines} lines were overwritten before they were read; the pass is \
                  made again",
+                self.axis,
                 sweep.overwritten.len()
             ));
         }
@@ -329,7 +325,6 @@ impl Machine {
 
     fn closed(
         &self,
-        axis: &str,
         run: &PlateRun,
         offset: f64,
         sweeps: &[SweepEntry],
@@ -339,12 +334,12 @@ impl Machine {
         let placement = PlacementEntry {
             offset,
             closure_rad,
-            at_s: self.now().seconds(),
+            at_s: self.core.now().seconds(),
         };
         let seen = Radians(closure_rad);
         match run.closure_limit {
             Some(limit) if seen.abs() > limit => Err(RotaryFailure::Slipped {
-                axis: axis.to_owned(),
+                axis: self.axis.to_owned(),
                 offset,
                 seen,
                 limit,
@@ -354,7 +349,8 @@ impl Machine {
     }
 
     /// Lines that were not read are no reason to stop, but to clean the plate.
-    fn warn_of_lines(&mut self, axis: &str, sweeps: &[SweepEntry]) {
+    fn warn_of_lines(&mut self, sweeps: &[SweepEntry]) {
+        let axis = self.axis;
         let first = &sweeps[0];
         let seldom = |list: fn(&SweepEntry) -> &Vec<u32>, times: usize| {
             let mut counts = BTreeMap::new();

@@ -13,9 +13,9 @@ use drivers::device::{LatchCommand, Latched, Repeat};
 use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::rotary::line_speed::SPACING_SHARE;
+use crate::rotary::table::RotaryTable;
 use crate::rotary::turn::Way;
 
 /// How long the axis runs at its speed before the first line counts, and after the last.
@@ -66,35 +66,36 @@ impl Sweep {
     }
 }
 
-impl Machine {
-    /// Turns the rotary axis `axis` once over the plate, and a little more on both sides.
+impl RotaryTable<'_> {
+    /// Turns the table once over the plate, and a little more on both sides.
     ///
     /// # Errors
     /// Before anything moves: not zeroed, or too fast for each line to be read (the error says
     /// what would fit). Later: whatever stops the machine, and when no line is seen at all.
-    pub fn sweep(&mut self, axis: &str, options: &SweepOptions) -> Result<Sweep, Failure> {
-        let config = self.rotary_config(axis)?;
+    pub fn sweep(&mut self, options: &SweepOptions) -> Result<Sweep, Failure> {
+        let config = self.config;
         let usual = RadiansPerSecond(config.speed_deg_per_s.to_radians());
         let acceleration = config.acceleration_deg_per_s2.to_radians();
         let speed = options.speed.unwrap_or(usual);
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
         let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
-        self.check_latch_speed(axis, spacing, speed)?;
-        let start = self.turn_to(axis, Radians(-sign * run_up), Way::Shortest)?;
-        self.rest(axis)?;
+        self.core.check_latch_speed(self.axis, spacing, speed)?;
+        let start = self.turn_to(Radians(-sign * run_up), Way::Shortest)?;
+        self.rest()?;
         let repeat = Repeat::Continuous;
-        self.latch(axis, LatchCommand::Arm { repeat, spacing })?;
+        self.core
+            .latch(self.axis, LatchCommand::Arm { repeat, spacing })?;
         let first = start + Radians(sign * run_up);
         let way = TAU + 2.0 * run_up;
         let limit = SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value());
-        self.turn(axis, start + Radians(sign * way), speed, limit)?;
-        self.rest(axis)?;
-        self.latch(axis, LatchCommand::Disarm)?;
-        let latched = self.take_latched(axis)?;
+        self.turn(start + Radians(sign * way), speed, limit)?;
+        self.rest()?;
+        self.core.latch(self.axis, LatchCommand::Disarm)?;
+        let latched = self.core.take_latched(self.axis)?;
         if latched.is_empty() {
             return Err(Failure::NoLines {
-                axis: axis.to_owned(),
+                axis: self.axis.to_owned(),
                 lines: options.lines,
             });
         }
@@ -103,12 +104,12 @@ impl Machine {
 
     /// Waits until the rotary axis has stood without a break, by samples that were taken since:
     /// the host's clock alone would count old ones.
-    pub(crate) fn rest(&mut self, axis: &str) -> Result<(), Failure> {
-        let limit = self.patience().of(REST_LIMIT);
-        let start = self.now();
+    pub(crate) fn rest(&mut self) -> Result<(), Failure> {
+        let limit = self.core.patience().of(REST_LIMIT);
+        let start = self.core.now();
         let mut first = None;
         loop {
-            let reading = self.rotary_reading(axis)?;
+            let reading = self.core.rotary_reading(self.axis)?;
             match reading.filter(|it| it.standing && it.at > start) {
                 Some(reading) => {
                     let since = *first.get_or_insert(reading.at);
@@ -118,15 +119,15 @@ impl Machine {
                 }
                 None => first = None,
             }
-            let now = self.now();
+            let now = self.core.now();
             if now.since(start) > limit {
                 return Err(Failure::Machine(machine::Failure::Overdue {
-                    device: axis.to_owned(),
+                    device: self.axis.to_owned(),
                     step: "standing still",
                     waited: limit,
                 }));
             }
-            self.tick(now + REST)?;
+            self.core.tick(now + REST)?;
         }
     }
 }

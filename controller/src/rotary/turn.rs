@@ -5,10 +5,10 @@ use core::time::Duration;
 use drivers::device::AxisCommand;
 use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared};
 
-use crate::connected::{Machine, RotaryMemory};
 use crate::failure::Failure;
+use crate::rotary::DirectionName;
 use crate::rotary::settings;
-use crate::rotary::{DirectionName, RotaryConfig};
+use crate::rotary::table::RotaryTable;
 
 /// Which way round to an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,25 +40,16 @@ impl Way {
     }
 }
 
-impl Machine {
-    /// The configuration of the rotary axis `axis`.
-    ///
-    /// # Errors
-    /// When there is no such axis.
-    pub fn rotary_config(&self, axis: &str) -> Result<&RotaryConfig, Failure> {
-        let config = self.config.rotary.get(axis);
-        config.ok_or_else(|| self.no_such_rotary(axis))
-    }
-
-    /// Turns the rotary axis `axis` to the encoder's index mark and makes that its zero.
+impl RotaryTable<'_> {
+    /// Turns the table to the encoder's index mark and makes that its zero.
     ///
     /// # Errors
     /// Without a `zero` section; when the drive finds no mark.
-    pub fn zero_rotary(&mut self, axis: &str) -> Result<(), Failure> {
-        let config = self.rotary_config(axis)?;
+    pub fn zero(&mut self) -> Result<(), Failure> {
+        let config = self.config;
         let Some(zero) = &config.zero else {
             return Err(Failure::NotConfigured {
-                axis: axis.to_owned(),
+                axis: self.axis.to_owned(),
                 section: "zero",
             });
         };
@@ -71,63 +62,50 @@ impl Machine {
             },
         };
         let limit = settings::index_limit(config).unwrap_or_default() + Duration::from_secs(5);
-        self.enable(axis)?;
-        self.turn_command(axis, command, "zero", limit)?;
-        self.set_zeroed(axis, true)?;
+        self.core.enable(self.axis)?;
+        self.core.turn_command(self.axis, command, "zero", limit)?;
+        self.core.set_zeroed(self.axis, true)?;
         Ok(())
     }
 
-    /// Turns the rotary axis `axis` to `angle`, uncorrected, and returns the target that
+    /// Turns the table to `angle`, uncorrected, and returns the target that
     /// counts on over the turns.
     ///
     /// # Errors
     /// Before anything moves: not zeroed. While moving: whatever stops the machine.
-    pub fn turn_to(&mut self, axis: &str, angle: Radians, way: Way) -> Result<Radians, Failure> {
-        self.require_zeroed(axis)?;
-        let config = self.rotary_config(axis)?;
+    pub fn turn_to(&mut self, angle: Radians, way: Way) -> Result<Radians, Failure> {
+        self.core.require_zeroed(self.axis)?;
+        let config = self.config;
         let near = Radians::from_arcsec(config.position_window_arcsec);
         let speed = RadiansPerSecond(config.speed_deg_per_s.to_radians());
-        let here = self.table_reading(axis)?;
+        let here = self.reading()?;
         let target = way.target(here, angle, near);
         let limit = Duration::from_secs_f64(config.move_timeout_s);
-        self.turn(axis, target, speed, limit)?;
+        self.turn(target, speed, limit)?;
         Ok(target)
     }
 
     /// One profile position move, awaited for as long as `limit`.
     pub(crate) fn turn(
         &mut self,
-        axis: &str,
         target: Radians,
         speed: RadiansPerSecond,
         limit: Duration,
     ) -> Result<(), Failure> {
-        let config = self.rotary_config(axis)?;
+        let config = self.config;
         let command = AxisCommand::MoveTo {
             target,
             speed,
             acceleration: RadiansPerSecondSquared(config.acceleration_deg_per_s2.to_radians()),
         };
-        Ok(self.turn_command(axis, command, "move", limit)?)
+        Ok(self.core.turn_command(self.axis, command, "move", limit)?)
     }
 
-    /// Where the drive says that the zeroed rotary axis `axis` is.
-    pub(crate) fn table_reading(&self, axis: &str) -> Result<Radians, Failure> {
-        let reading = self.rotary_reading(axis)?;
+    /// Where the drive says that the zeroed table is.
+    pub(crate) fn reading(&self) -> Result<Radians, Failure> {
+        let reading = self.core.rotary_reading(self.axis)?;
         let reading = reading.expect("an axis that was zeroed has been read");
         Ok(reading.position)
-    }
-
-    /// What is known about the rotary axis `axis`.
-    pub(crate) fn remember_table(&mut self, axis: &str) -> &mut RotaryMemory {
-        self.rotary_memory.entry(axis.to_owned()).or_default()
-    }
-
-    fn no_such_rotary(&self, axis: &str) -> Failure {
-        Failure::Machine(machine::Failure::NoSuchAxis {
-            axis: axis.to_owned(),
-            known: self.rotary_names().join(", "),
-        })
     }
 }
 

@@ -17,13 +17,13 @@ use compensator::uncertainty::rms;
 use core::f64::consts::TAU;
 use units::Radians;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::rotary::JudgedEntry;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
 use crate::rotary::placement::{Placed, PlateRun};
+use crate::rotary::table::RotaryTable;
 use crate::run::missing;
 use crate::run::note_failure;
 use crate::store::{Entry, Journal, Store, short};
@@ -86,7 +86,7 @@ impl RotaryVerified {
     }
 }
 
-impl Machine {
+impl RotaryTable<'_> {
     /// Has the plate placed at the configuration's verification offset, reads it, and judges.
     /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
     /// than without the calibration is one, and takes the calibration out of use.
@@ -94,38 +94,37 @@ impl Machine {
     /// # Errors
     /// Not zeroed; `compensated` without a calibration; another plate than the calibration's, or
     /// one that lies elsewhere; whatever stops the machine.
-    pub fn verify_rotary(
+    pub fn verify(
         &mut self,
-        axis: &str,
         store: &Store,
         compensated: bool,
         operator: &mut dyn Operator,
     ) -> Result<RotaryVerified, Failure> {
-        self.require_zeroed(axis)?;
-        let config = self.rotary_config(axis)?.verify.clone();
-        let config = config.ok_or_else(|| missing(axis, "verify"))?;
-        let (run, _) = self.plate_run(axis)?;
+        self.core.require_zeroed(self.axis)?;
+        let config = self.config.verify.clone();
+        let config = config.ok_or_else(|| missing(self.axis, "verify"))?;
+        let (run, _) = self.plate_run()?;
         let run = PlateRun {
             passes: config.passes,
             stage: Stage::Verify,
             ..run
         };
-        let known = self.known_plate(axis, &run, compensated)?;
+        let known = self.known_plate(&run, compensated)?;
         let id = known
             .as_ref()
             .map(|it| it.id.clone())
             .filter(|_| compensated);
-        let header = self.rotary_header("verify", axis, &run, id);
+        let header = self.header("verify", &run, id);
         let mut journal = Journal::create(&store.runs(), &header)?;
         let offset = config.offset_lines;
         // Without a calibration any placement is as good as another.
         let lay_at = known.as_ref().and_then(|it| it.content.offsets.first());
         let phase = known.as_ref().and_then(|it| it.content.plate_phase_rad);
         let places = (offset, lay_at.map(|it| f64::from(*it)), phase.map(Radians));
-        let read = self.read_verification(axis, &run, places, &mut journal, operator);
+        let read = self.read_verification(&run, places, &mut journal, operator);
         let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
         if let Some(known) = &known {
-            lies_there(axis, known, &placed)
+            lies_there(self.axis, known, &placed)
                 .inspect_err(|failure| note_failure(&mut journal, failure))?;
         }
         let verified = RotaryVerified {
@@ -144,7 +143,7 @@ impl Machine {
             journal: journal.path().to_owned(),
         };
         journal.write(&Entry::Judged(verified.entry()))?;
-        self.judge_table(axis, store, &verified)
+        self.judge_table(store, &verified)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.write(&Entry::Complete)?;
         journal.flush_to_disk()?;
@@ -153,27 +152,24 @@ impl Machine {
 
     fn read_verification(
         &mut self,
-        axis: &str,
         run: &PlateRun,
         (offset, lay_at, phase): (f64, Option<f64>, Option<Radians>),
         journal: &mut Journal,
         operator: &mut dyn Operator,
     ) -> Result<Placed, Failure> {
         journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
-        self.place_plate(axis, run, offset, (1, 1), lay_at, operator)?;
-        self.read_placement(axis, run, (offset, phase), (0, run.sweeps()), journal)
+        self.place_plate(run, offset, (1, 1), lay_at, operator)?;
+        self.read_placement(run, (offset, phase), (0, run.sweeps()), journal)
     }
 
     /// What the calibration in use says of the plate.
     fn known_plate(
         &self,
-        axis: &str,
         run: &PlateRun,
         compensated: bool,
     ) -> Result<Option<TableInUse>, Failure> {
-        let memory = self.rotary_memory.get(axis);
-        let known = memory.and_then(|it| it.calibration.clone());
-        match known {
+        let axis = self.axis;
+        match self.memory.calibration.clone() {
             None if compensated => Err(Failure::Usage {
                 what: format!("axis {axis} uses no calibration"),
                 help: "load or make one, or verify uncompensated".into(),
@@ -183,7 +179,7 @@ impl Machine {
             Some(known) if !is_of(&known, run) => {
                 let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
                 Err(RotaryFailure::OtherPlate {
-                    axis: axis.to_owned(),
+                    axis: self.axis.to_owned(),
                     expected: lines(&known.plate, known.content.lines),
                     seen: lines(&run.plate, run.lines),
                 }
@@ -193,25 +189,19 @@ impl Machine {
         }
     }
 
-    fn judge_table(
-        &mut self,
-        axis: &str,
-        store: &Store,
-        verified: &RotaryVerified,
-    ) -> Result<(), Failure> {
+    fn judge_table(&mut self, store: &Store, verified: &RotaryVerified) -> Result<(), Failure> {
         let Some(left) = &verified.left else {
             return Ok(());
         };
         if verified.is_within_tolerance() || left.rms <= verified.found.rms {
             return Ok(());
         }
-        let memory = self.remember_table(axis);
-        let id = memory.calibration.take().map(|it| it.id);
-        if id.is_some() && store.active(axis)?.current == id {
-            store.retire(axis)?;
+        let id = self.memory.calibration.take().map(|it| it.id);
+        if id.is_some() && store.active(self.axis)?.current == id {
+            store.retire(self.axis)?;
         }
         Err(RotaryFailure::MadeWorse {
-            axis: axis.to_owned(),
+            axis: self.axis.to_owned(),
             calibration: id.as_deref().map(short).unwrap_or_default(),
             before: verified.found.rms,
             after: left.rms,

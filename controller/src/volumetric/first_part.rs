@@ -16,10 +16,10 @@ use compensator::volumetric::online::{
 use units::Metres;
 
 use crate::config::MachineConfig;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::store::Store;
 use crate::volumetric::MemoryName;
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::settings::work_volume;
 use crate::volumetric::{
     Mover, Remembered, VolumetricCorrection, VolumetricFailure, VolumetricRecords, VolumetricState,
@@ -128,7 +128,7 @@ impl PartRecorder {
     }
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Makes ready for a first part: corrected by all that is stored but for displacements, which
     /// stay as they are. The second memory in use counts for nothing: another is recorded.
     ///
@@ -136,8 +136,8 @@ impl Machine {
     /// When there are no references to count from, or what is stored cannot be applied.
     pub fn first_part(&self, store: &Store) -> Result<(Mover, FirstPart), Failure> {
         let (state, records) = self.state_beneath(store, MemoryName::Second)?;
-        let (correction, recorder) = FirstPartCorrection::new(self.config(), state)?;
-        let mover = self.volumetric_mover(Box::new(correction))?;
+        let (correction, recorder) = FirstPartCorrection::new(self.core.config, state)?;
+        let mover = self.mover(Box::new(correction))?;
         Ok((mover, FirstPart { recorder, records }))
     }
 

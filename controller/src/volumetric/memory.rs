@@ -10,11 +10,11 @@ use compensator::volumetric::function::{Function, FunctionError, Shape};
 use compensator::volumetric::online::{Coverage, Displacement, StateMap};
 use units::{Metres, Radians};
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::run::utc_now;
 use crate::store::{CalibrationRecord, Content, RecordHead, Store};
 use crate::volumetric::correction::{bends, lever};
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::References;
 use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{AXES, MemoryName, StateMemoryContent};
@@ -37,7 +37,7 @@ pub struct Remembered {
     pub foreign: Option<String>,
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Records the present state along each watched axis as `memory`, stores and activates it: what
     /// is made from now on is made with it.
     ///
@@ -53,7 +53,7 @@ impl Machine {
     ) -> Result<Remembered, Failure> {
         let (state, records) = self.state_beneath(store, memory)?;
         let now = self.take_references()?;
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         let (mut map, mut covers) = (StateMap::default(), Coverage::default());
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             let Some(beam) = beam else {
@@ -73,7 +73,7 @@ impl Machine {
         self.keep_memory(store, memory, &records, (map, covers), "memory record")
     }
 
-    /// Whether [`Machine::record_memory`] has what it needs, before anything moves.
+    /// Whether [`Self::record_memory`] has what it needs, before anything moves.
     ///
     /// # Errors
     /// When there are no references.
@@ -97,7 +97,7 @@ impl Machine {
         };
         let stored = self.state_with(store, needed)?;
         let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
-        let config = self.volumetric_config()?;
+        let config = self.config;
         let section = "beam";
         let mut watched = Axis::ALL
             .into_iter()

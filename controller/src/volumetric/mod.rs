@@ -22,6 +22,7 @@ mod correction;
 mod entries;
 mod failure;
 mod first_part;
+mod handle;
 mod inputs;
 mod line;
 mod memory;
@@ -52,6 +53,7 @@ pub use entries::{
 };
 pub use failure::VolumetricFailure;
 pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};
+pub use handle::WorkVolume;
 pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};
 pub use memory::Remembered;
 pub use moves::Mover;

@@ -6,10 +6,11 @@ use std::collections::VecDeque;
 use compensator::volumetric::{Axis, Point};
 use units::Metres;
 
-use crate::connected::Machine;
+use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::VolumetricFailure;
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::settings::work_volume;
 use machine::engine::{
     Cause, Correction, Desk, Engine, Live, NoCorrection, PushError, State, Validity,
@@ -39,7 +40,7 @@ impl Mover {
         Ok(())
     }
 
-    /// Whether [`Machine::drive_along`] can drive `points` to their end, before anything moves.
+    /// Whether [`WorkVolume::drive_along`] can drive `points` to their end, before anything moves.
     ///
     /// # Errors
     /// The first that cannot be driven.
@@ -52,24 +53,24 @@ fn per_axis(point: Point) -> [Metres; 3] {
     Axis::ALL.map(|axis| point.along(axis))
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Moves the axes of the volume, with `correction` switched off to begin with.
     ///
     /// # Errors
     /// When an axis is not made for it.
-    pub fn volumetric_mover(&self, correction: Box<dyn Correction>) -> Result<Mover, Failure> {
-        let config = self.volumetric_config()?;
+    pub fn mover(&self, correction: Box<dyn Correction>) -> Result<Mover, Failure> {
+        let config = self.config;
         let axes = config.axes.each_ref().map(String::as_str);
-        let (engine, desk) = Engine::new(self, &axes, correction)?;
+        let (engine, desk) = Engine::new(self.core.machine, &axes, correction)?;
         Ok(Mover { engine, desk })
     }
 
     /// Likewise, for set-points that nothing is added to.
     ///
     /// # Errors
-    /// As [`Machine::volumetric_mover`].
+    /// As [`Self::mover`].
     pub fn uncorrected_mover(&self) -> Result<Mover, Failure> {
-        self.volumetric_mover(Box::new(NoCorrection))
+        self.mover(Box::new(NoCorrection))
     }
 
     /// Switches the correction on or off at standstill, and waits until it is all there: each
@@ -83,11 +84,11 @@ impl Machine {
     /// Whatever stops the machine, also a correction that must not be done without; a detector or
     /// thermometer that nothing makes up for, such as one that is to be held and never said
     /// anything.
-    pub fn correct_volume(&mut self, mover: &mut Mover, on: bool) -> Result<Live, Failure> {
+    pub fn correct(&mut self, mover: &mut Mover, on: bool) -> Result<Live, Failure> {
         if on {
             self.enter_volume()?;
         }
-        let rest = settling(self.volumetric_config()?, self);
+        let rest = settling(self.config, self.core.config);
         mover.desk.correct(on)?;
         let live = self.hold(mover, None, rest, &mut |_| {})?;
         if on {
@@ -119,8 +120,8 @@ impl Machine {
     ///
     /// # Errors
     /// When it is outside.
-    pub fn check_volume(&self, point: Point) -> Result<(), VolumetricFailure> {
-        let config = self.config().volumetric.as_ref();
+    pub fn check(&self, point: Point) -> Result<(), VolumetricFailure> {
+        let config = self.core.config.volumetric.as_ref();
         let config = config.ok_or(VolumetricFailure::None)?;
         let volume = work_volume(config)?;
         let reach = Metres::from_um(config.compensation.size_limit_um);
@@ -129,13 +130,13 @@ impl Machine {
     }
 
     fn enter_volume(&mut self) -> Result<(), Failure> {
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         let mut here = [Metres::ZERO; 3];
         for (position, axis) in here.iter_mut().zip(&config.axes) {
-            *position = self.reading(axis)?.map_or(*position, |it| it.position);
+            *position = self.core.reading(axis)?.map_or(*position, |it| it.position);
         }
         let here = Point::new(here[0], here[1], here[2]);
-        if self.check_volume(here).is_err() {
+        if self.check(here).is_err() {
             let volume = work_volume(&config).map_err(VolumetricFailure::from)?;
             self.go_straight(volume.nearest(here))?;
         }
@@ -160,7 +161,7 @@ impl Machine {
     /// The same, with `watch` told every period.
     ///
     /// # Errors
-    /// As [`Machine::drive_to`].
+    /// As [`Self::drive_to`].
     pub fn drive_watched(
         &mut self,
         mover: &mut Mover,
@@ -207,7 +208,7 @@ impl Machine {
             finished = finished || desk.path.finish().is_ok();
         };
         feed();
-        let cause = self.follow_with(engine, &mut feed)?;
+        let cause = self.core.follow_with(engine, &mut feed)?;
         match refused {
             Some(source) => Err(VolumetricFailure::Path { source }.into()),
             None => expect_cause(cause, Cause::PathDone),
@@ -228,7 +229,7 @@ impl Machine {
         let mut since = None;
         let mut last = None;
         let mut trouble = None;
-        let cause = self.follow_with(engine, &mut || {
+        let cause = self.core.follow_with(engine, &mut || {
             let Some(live) = desk.live() else {
                 return;
             };
@@ -259,12 +260,12 @@ fn expect_cause(cause: Cause, expected: Cause) -> Result<(), Failure> {
 }
 
 /// From the first sample until a detector's value is given out as it is.
-fn settling(config: &VolumetricConfig, machine: &Machine) -> Duration {
+fn settling(config: &VolumetricConfig, machine: &MachineConfig) -> Duration {
     let Some(feed) = &config.feed else {
         return Duration::ZERO;
     };
-    let period_ms = machine.config().can.values().map(|it| it.sync_period_ms);
-    let every = machine.config().analog.values();
+    let period_ms = machine.can.values().map(|it| it.sync_period_ms);
+    let every = machine.analog.values();
     let every = every.filter_map(|it| it.every_syncs).max().unwrap_or(1);
     let sample_s = period_ms.fold(0.0, f64::max) * 1e-3 * f64::from(every);
     let confirmed_s = f64::from(feed.confirm) * sample_s;

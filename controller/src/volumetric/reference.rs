@@ -13,10 +13,10 @@ use compensator::volumetric::online::{BeamDetector, Displacement, Trouble};
 use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use crate::config::MachineConfig;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::run::utc_now;
 use crate::store::{CalibrationRecord, Content, RecordHead, Store, short};
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
 use crate::volumetric::settings::{beam_detector, beam_drift, volume_axis};
 use crate::volumetric::thermometers::Thermometry;
@@ -130,7 +130,7 @@ pub fn measured_geometry(store: &Store) -> Result<String, Failure> {
     Ok(geometry.ok_or(VolumetricFailure::NoGeometry)?)
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Takes the references of all detectors against the errors in use, stores and activates
     /// them: from now on a displacement is what has changed since now. The machine must be as
     /// warm as it was when its errors were measured.
@@ -139,14 +139,14 @@ impl Machine {
     /// When an axis is not zeroed, the errors were never measured, the machine is warmer or colder
     /// than they were measured at by more than is permitted, a detector is in trouble, or anything
     /// stops the machine. What was in use before stays in use then.
-    pub fn reference_volumetric(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
+    pub fn reference(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
         let geometry = measured_geometry(store)?;
         let then = store.load(&geometry)?.geometry(&geometry)?.temperatures();
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         if !config.temperature.is_empty() {
             // Before anything moves, and again by what it was while they were taken.
             let seen = self.watch_at_rest(WARMTH_SAMPLES)?;
-            let mut thermometry = Thermometry::new(self.config(), &config.temperature);
+            let mut thermometry = Thermometry::new(self.core.config, &config.temperature);
             for still in &seen {
                 thermometry.add(still.now, &still.temperatures)?;
             }
@@ -180,12 +180,12 @@ impl Machine {
 
     /// Drives each watched axis along the work volume and takes down what its detectors read.
     pub(super) fn take_references(&mut self) -> Result<References, Failure> {
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         for axis in &config.axes {
-            self.require_zeroed(axis)?;
-            self.enable(axis)?;
+            self.core.require_zeroed(axis)?;
+            self.core.enable(axis)?;
         }
-        let mut thermometry = Thermometry::new(self.config(), &config.temperature);
+        let mut thermometry = Thermometry::new(self.core.config, &config.temperature);
         let mut content = BeamReferencesContent::default();
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             let roll = config.roll.as_ref();
@@ -230,10 +230,10 @@ impl Machine {
         for (done, node) in (0..).zip(nodes) {
             let observer = self.core.observer();
             observer.progress(Stage::Reference, &name, done, total);
-            self.move_to(&name, node)?;
-            self.stand_still(&name, REST)?;
+            self.go(&name, node)?;
+            self.core.stand_still(&name, REST)?;
             let seen = self.watch_at_rest(own.samples)?;
-            let machine = self.config();
+            let machine = self.core.config;
             let blind = |what, source| VolumetricFailure::Blind {
                 axis,
                 at: node,
@@ -279,7 +279,7 @@ impl Machine {
                 what,
                 source,
             };
-            let means = place_of_beam(self.config(), axis, it, seen, blind)?;
+            let means = place_of_beam(self.core.config, axis, it, seen, blind)?;
             Ok::<_, VolumetricFailure>(means.map(|it| Metres(it.mean())))
         };
         let slider = place(&beam.slider, ON_THE_SLIDE)?;
@@ -302,19 +302,19 @@ impl Machine {
             what,
             source,
         };
-        let mean = mean_roll(self.config(), config, seen, blind)?;
+        let mean = mean_roll(self.core.config, config, seen, blind)?;
         Ok(Radians(mean.mean()))
     }
 
     /// So many samples of all modules, each newer than the one before, while nothing moves.
     pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
         let expected = samples as usize;
-        let started = self.now();
-        let limit = self.patience().of(SAMPLE_LIMIT);
+        let started = self.core.now();
+        let limit = self.core.patience().of(SAMPLE_LIMIT);
         let mut seen: Vec<Still> = Vec::with_capacity(expected);
         let (mut last, mut deadline) = (started, started + limit);
         while seen.len() < expected {
-            let now = self.now();
+            let now = self.core.now();
             if now >= deadline {
                 let (seen, waited) = (seen.len(), now.since(started));
                 return Err(VolumetricFailure::NoSamples {
@@ -324,20 +324,20 @@ impl Machine {
                 }
                 .into());
             }
-            self.tick(deadline)?;
-            let newest = self.analogs().map(|it| it.last_sample());
+            self.core.tick(deadline)?;
+            let newest = self.core.analogs().map(|it| it.last_sample());
             let oldest = newest.map(|at| at.unwrap_or(Time::ZERO)).min();
             if oldest.unwrap_or(Time::ZERO) <= last {
                 continue;
             }
-            (last, deadline) = (self.now(), self.now() + limit);
+            (last, deadline) = (self.core.now(), self.core.now() + limit);
             let mut still = Still {
                 now: last,
                 channels: [None; CHANNELS_MAX],
                 temperatures: [None; THERMOMETERS_MAX],
             };
-            self.hear_channels(&mut still.channels);
-            self.hear_temperatures(&mut still.temperatures);
+            self.core.hear_channels(&mut still.channels);
+            self.core.hear_temperatures(&mut still.temperatures);
             seen.push(still);
         }
         Ok(seen)

@@ -8,10 +8,10 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::online::{BeamReference, Memories};
 
 use crate::config::ConfigHash;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::store::{CalibrationRecord, IdentityRecord, RecordHead, Store, StoreError, short};
 use crate::volumetric::VolumetricConfig;
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::settings::beam_drift;
 use crate::volumetric::{BeamReferencesContent, GeometryContent, MemoryName, StateMemoryContent};
 use crate::volumetric::{VolumetricFailure, VolumetricState};
@@ -65,7 +65,7 @@ impl Reader<'_> {
     }
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// What `store` says is in use for these three axes, with the names of the records; `None`
     /// when their errors were never measured. What is not measured with the errors in use is no
     /// part of it and refused.
@@ -73,7 +73,7 @@ impl Machine {
     /// # Errors
     /// When a record is damaged, belongs to another machine, configuration, drive or calibration,
     /// or holds no functions.
-    pub fn volumetric_state(
+    pub fn state(
         &self,
         store: &Store,
     ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
@@ -86,12 +86,12 @@ impl Machine {
         store: &Store,
         wanted: &[MemoryName],
     ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
-        let config = self.volumetric_config()?;
+        let config = self.config;
         let here = self.this_volume(GEOMETRY)?;
         let reader = Reader {
             store,
             here,
-            hash: &self.config_hash,
+            hash: self.core.config_hash,
         };
         let Some((id, record)) = reader.active(GEOMETRY)? else {
             return Ok(None);
@@ -136,17 +136,17 @@ impl Machine {
     /// # Errors
     /// When there are no three axes.
     pub(super) fn this_volume(&self, pointer: &str) -> Result<RecordHead, VolumetricFailure> {
-        let config = self.config().volumetric.as_ref();
+        let config = self.core.config.volumetric.as_ref();
         let [first, ..] = &config.ok_or(VolumetricFailure::None)?.axes;
         Ok(RecordHead {
             axis: pointer.to_owned(),
-            ..self.this_machine(first)
+            ..self.core.this_machine(first)
         })
     }
 
     /// Who the drives of x, y and z are.
     pub(super) fn volume_drives(&self, config: &VolumetricConfig) -> Vec<IdentityRecord> {
-        let each = config.axes.iter().map(|it| self.drive_record(it));
+        let each = config.axes.iter().map(|it| self.core.drive_record(it));
         each.collect()
     }
 

@@ -7,10 +7,10 @@ use compensator::volumetric::Point;
 use compensator::volumetric::identify::Reading;
 use units::Metres;
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::run::note_failure;
 use crate::store::{Entry, Journal, Store};
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::place_of_temperature;
 use crate::volumetric::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
 use crate::volumetric::settings::point_of_mm;
@@ -76,18 +76,18 @@ impl VolumetricVerified {
     }
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Everything that is stored of the three axes, ready to correct them; `None` without a
     /// calibration.
     ///
     /// # Errors
     /// When what is stored does not belong to this machine, or cannot be applied.
     pub fn stored_mover(&self, store: &Store) -> Result<Option<Mover>, Failure> {
-        let Some((state, _)) = self.volumetric_state(store)? else {
+        let Some((state, _)) = self.state(store)? else {
             return Ok(None);
         };
-        let correction = VolumetricCorrection::new(self.config(), state)?;
-        self.volumetric_mover(Box::new(correction)).map(Some)
+        let correction = VolumetricCorrection::new(self.core.config, state)?;
+        self.mover(Box::new(correction)).map(Some)
     }
 
     /// What moves the machine, corrected as `by` says, and the name of the errors it uses.
@@ -99,19 +99,19 @@ impl Machine {
         if by == VerifyBy::AsFound {
             return Ok((None, None));
         }
-        let stored = self.volumetric_state(store)?;
+        let stored = self.state(store)?;
         let (state, records) = stored.ok_or(VolumetricFailure::NoGeometry)?;
         let correction = match by {
-            VerifyBy::Tables => VolumetricCorrection::by_tables(self.config(), state)?,
+            VerifyBy::Tables => VolumetricCorrection::by_tables(self.core.config, state)?,
             VerifyBy::AsFound | VerifyBy::Everything => {
-                VolumetricCorrection::new(self.config(), state)?
+                VolumetricCorrection::new(self.core.config, state)?
             }
         };
-        let mover = self.volumetric_mover(Box::new(correction))?;
+        let mover = self.mover(Box::new(correction))?;
         Ok((Some(mover), Some(records.geometry)))
     }
 
-    /// Whether [`Machine::verify_volumetric`] has what it needs, before anything moves.
+    /// Whether [`Self::verify`] has what it needs, before anything moves.
     ///
     /// # Errors
     /// When it is not configured, or nothing that can be applied is stored.
@@ -122,7 +122,7 @@ impl Machine {
 
     fn verify_config(&self) -> Result<VolumetricVerifyConfig, Failure> {
         let section = "verify";
-        let own = self.volumetric_config()?.verify.clone();
+        let own = self.config.verify.clone();
         Ok(own.ok_or(VolumetricFailure::NotConfigured { section })?)
     }
 
@@ -130,16 +130,16 @@ impl Machine {
     ///
     /// # Errors
     /// When nothing is stored, the line cannot be set up or read, or anything stops the machine.
-    pub fn verify_volumetric(
+    pub fn verify(
         &mut self,
         store: &Store,
         by: VerifyBy,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricVerified, Failure> {
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         let own = self.verify_config()?;
         let (mover, geometry) = self.mover_by(store, by)?;
-        let header = self.volume_header("verify", geometry)?;
+        let header = self.header("verify", geometry)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
         journal.write(&Entry::VolumeCheck(VolumeCheckEntry {
             state: by.text().to_owned(),
@@ -183,7 +183,7 @@ impl Machine {
         };
         let line = self.set_up_line(&task, &readout, operator)?;
         if let Some(mover) = &mut mover {
-            self.correct_volume(mover, true)?;
+            self.correct(mover, true)?;
         }
         let last = own.points - 1;
         let mut points = Vec::new();
@@ -235,9 +235,9 @@ impl Machine {
     /// What the thermometers showed last, °C; a verification does not depend on them.
     fn thermometers_now(&self, config: &VolumetricConfig) -> Vec<Option<f64>> {
         let mut shown = [None; THERMOMETERS_MAX];
-        self.hear_temperatures(&mut shown);
+        self.core.hear_temperatures(&mut shown);
         let each = config.temperature.iter().map(|it| {
-            let place = place_of_temperature(self.config(), &it.analog, it.channel);
+            let place = place_of_temperature(self.core.config, &it.analog, it.channel);
             let sample = shown.get(place).copied().flatten()?;
             sample.celsius.map(|it| it.value())
         });

@@ -22,10 +22,14 @@ fn cycle(seed: u64) -> (Figures, Figures) {
     let store = bench.store.clone();
     let result = bench.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)?;
-        let found = machine.verify("x", &store, &options(None))?;
-        let calibrated = machine.calibrate("x", &store, &CalibrateOptions::default())?;
-        let left = machine.verify("x", &store, &options(Some(calibrated.id)))?;
+        machine.linear("x")?.zero(&store)?;
+        let found = machine.linear("x")?.verify(&store, &options(None))?;
+        let calibrated = machine
+            .linear("x")?
+            .calibrate(&store, &CalibrateOptions::default())?;
+        let left = machine
+            .linear("x")?
+            .verify(&store, &options(Some(calibrated.id)))?;
         machine.shut_down()?;
         Ok((found.figures, left.figures))
     });
@@ -69,19 +73,28 @@ fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
     let mut bench = Bench::with(3, calibrated_to_30, |text| text);
     let store = bench.store.clone();
     let go = |machine: &mut truestage::Machine, mm: f64| {
-        let moved = machine.move_and_read("x", Metres::from_mm(mm)).unwrap();
+        let moved = machine
+            .linear("x")
+            .unwrap()
+            .move_and_read(Metres::from_mm(mm))
+            .unwrap();
         let off = moved.encoder - moved.set_point;
         assert!(off.abs() < Metres::from_um(0.1), "{} µm", off.um());
         assert_ne!(moved.encoder, moved.target);
         moved
     };
     bench.machine.start().unwrap();
-    bench.machine.zero("x", &store).unwrap();
+    bench.machine.linear("x").unwrap().zero(&store).unwrap();
     let moved = go(&mut bench.machine, 12.345_678_9);
     assert_eq!(moved.corrected, Corrected::No);
     assert_eq!(moved.set_point, moved.target);
     let options = CalibrateOptions::default();
-    bench.machine.calibrate("x", &store, &options).unwrap();
+    bench
+        .machine
+        .linear("x")
+        .unwrap()
+        .calibrate(&store, &options)
+        .unwrap();
     assert_eq!(go(&mut bench.machine, 20.0).corrected, Corrected::Within);
     let (first, last) = (Metres::ZERO, Metres::from_mm(30.0));
     let moved = go(&mut bench.machine, 45.0);
@@ -96,9 +109,11 @@ fn a_compensated_move_brings_the_point_itself_to_its_target() {
         .machine
         .guarded(|machine| {
             machine.start()?;
-            machine.zero("x", &store)?;
-            machine.calibrate("x", &store, &CalibrateOptions::default())?;
-            machine.move_to("x", Metres::from_mm(50.0))
+            machine.linear("x")?.zero(&store)?;
+            machine
+                .linear("x")?
+                .calibrate(&store, &CalibrateOptions::default())?;
+            machine.linear("x")?.move_to(Metres::from_mm(50.0))
         })
         .unwrap_or_else(|failure| panic!("{failure}"));
     for (mm, seed) in [
@@ -108,7 +123,7 @@ fn a_compensated_move_brings_the_point_itself_to_its_target() {
         (3.3, "reverse"),
     ] {
         let target = Metres::from_mm(mm);
-        bench.machine.move_to("x", target).unwrap();
+        bench.machine.linear("x").unwrap().move_to(target).unwrap();
         let now: Time = bench.machine.now();
         bench
             .machine

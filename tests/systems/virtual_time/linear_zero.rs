@@ -39,7 +39,7 @@ fn zeros(seed: u64, limits: DriftLimits) -> Zeros {
             .machine
             .guarded(|machine| {
                 machine.start()?;
-                machine.zero("x", &store)
+                machine.linear("x")?.zero(&store)
             })
             .unwrap_or_else(|failure| panic!("power cycle {number}: {failure}"));
         let voltage = *threshold.get_or_insert(zeroed.estimate.mid_voltage);

@@ -22,7 +22,7 @@ fn told_after(fault: &Fault, speed: f64) -> Duration {
     let store = Store::of(&loaded.config.machine);
     let ready = machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)
+        machine.linear("x")?.zero(&store)
     });
     ready.unwrap_or_else(|failure| panic!("before the fault: {failure}"));
     let begun = machine.now();
@@ -30,7 +30,7 @@ fn told_after(fault: &Fault, speed: f64) -> Duration {
     let id = emulated.simulation_mut().inject(fault);
     let id = id.unwrap_or_else(|error| panic!("{error}"));
     let options = CalibrateOptions::default();
-    let failed = machine.guarded(|machine| machine.calibrate("x", &store, &options));
+    let failed = machine.guarded(|machine| machine.linear("x")?.calibrate(&store, &options));
     let Err(failure) = failed else {
         panic!("nothing was noticed")
     };

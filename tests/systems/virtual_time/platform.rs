@@ -54,12 +54,12 @@ fn cycle(case: Case, seed: u64) -> Cycle {
 fn run(bench: &mut Bench, seed: u64, shipped: &Shipped) -> Result<Cycle, Failure> {
     let store = bench.store.clone();
     bench.machine.start()?;
-    bench.machine.zero_platform(&store)?;
+    bench.machine.platform()?.zero(&store)?;
     let judge = PoseJudge::here(&bench.emulated.simulation());
     let random = Random::of(bench, shipped);
     let found = visit(bench, &judge, seed, FOUND)?;
-    bench.machine.move_pose(Pose::default())?;
-    bench.machine.calibrate_platform(&store)?;
+    bench.machine.platform()?.move_to(Pose::default())?;
+    bench.machine.platform()?.calibrate(&store)?;
     let left = visit(bench, &judge, seed + 1000, LEFT)?;
     bench.machine.shut_down()?;
     Ok(Cycle {
@@ -71,9 +71,9 @@ fn run(bench: &mut Bench, seed: u64, shipped: &Shipped) -> Result<Cycle, Failure
 
 fn visit(bench: &mut Bench, judge: &PoseJudge, seed: u64, poses: u32) -> Result<Visit, Failure> {
     let mut seen = Visit::default();
-    for pose in bench.machine.verification_poses(poses, seed)? {
+    for pose in bench.machine.platform()?.verification_poses(poses, seed)? {
         let begin = bench.machine.now();
-        let moved = bench.machine.move_pose(pose)?;
+        let moved = bench.machine.platform()?.move_to(pose)?;
         let error = judge.error(&bench.emulated.simulation(), pose);
         seen.largest = seen.largest.max(error);
         seen.stops.push(stops(bench, &moved));
@@ -291,11 +291,16 @@ fn what_cannot_be_reached_is_refused_before_anything_moves() {
         x: Metres::from_mm(9.0),
         ..Pose::default()
     };
-    let error = machine.move_pose(far).unwrap_err().to_string();
+    let error = machine
+        .platform()
+        .unwrap()
+        .move_to(far)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("not zeroed"), "{error}");
-    machine.zero_platform(&store).unwrap();
+    machine.platform().unwrap().zero(&store).unwrap();
     let before = true_pose(&bench.emulated.simulation());
-    let error = bench.machine.move_pose(far).unwrap_err();
+    let error = bench.machine.platform().unwrap().move_to(far).unwrap_err();
     assert_eq!(error.exit_code(), 3);
     assert!(error.to_string().contains("nothing was moved"), "{error}");
     let after = true_pose(&bench.emulated.simulation());

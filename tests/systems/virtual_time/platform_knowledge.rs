@@ -24,7 +24,12 @@ fn shortened(text: String) -> String {
 /// A platform that was zeroed, with a judge of its poses.
 fn zeroed(bench: &mut Bench) -> PoseJudge {
     bench.machine.start().unwrap();
-    bench.machine.zero_platform(&bench.store).unwrap();
+    bench
+        .machine
+        .platform()
+        .unwrap()
+        .zero(&bench.store)
+        .unwrap();
     PoseJudge::here(&bench.emulated.simulation())
 }
 
@@ -32,13 +37,22 @@ fn zeroed(bench: &mut Bench) -> PoseJudge {
 fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
     let mut bench = Bench::of(&UVW, 5, shortened);
     let judge = zeroed(&mut bench);
-    bench.machine.calibrate_platform(&bench.store).unwrap();
+    bench
+        .machine
+        .platform()
+        .unwrap()
+        .calibrate(&bench.store)
+        .unwrap();
     let machine = &mut bench.machine;
-    let known = machine.move_pose(pose(0.5, 0.3, 200.0)).unwrap();
+    let known = machine
+        .platform()
+        .unwrap()
+        .move_to(pose(0.5, 0.3, 200.0))
+        .unwrap();
     assert_eq!(known.taken_up, []);
 
     machine.stop_request().stop();
-    let stopped = machine.move_pose(pose(0.4, 0.35, -100.0));
+    let stopped = machine.platform().unwrap().move_to(pose(0.4, 0.35, -100.0));
     assert!(
         matches!(
             stopped,
@@ -49,7 +63,7 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
     machine.share_stop_request(&StopRequest::default());
 
     let target = pose(0.45, 0.2, 0.0);
-    let moved = machine.move_pose(target).unwrap();
+    let moved = machine.platform().unwrap().move_to(target).unwrap();
     let axes: Vec<&str> = moved.taken_up.iter().map(|it| it.axis.as_str()).collect();
     assert_eq!(axes, ["u", "v", "w"]);
     let after = moved.standard_uncertainty.expect("it is calibrated");
@@ -61,7 +75,12 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
     }
     let error = judge.error(&bench.emulated.simulation(), target);
     assert!(error < Metres::from_um(1.0), "{} µm", error.um());
-    let next = bench.machine.move_pose(pose(0.1, 0.1, 0.0)).unwrap();
+    let next = bench
+        .machine
+        .platform()
+        .unwrap()
+        .move_to(pose(0.1, 0.1, 0.0))
+        .unwrap();
     assert_eq!(next.taken_up, []);
 }
 
@@ -80,19 +99,32 @@ fn where_the_soft_limits_leave_no_room_forward_play_is_taken_up_in_reverse() {
     };
     let mut bench = Bench::of(&UVW, 5, narrow);
     let judge = zeroed(&mut bench);
-    bench.machine.calibrate_platform(&bench.store).unwrap();
+    bench
+        .machine
+        .platform()
+        .unwrap()
+        .calibrate(&bench.store)
+        .unwrap();
     let machine = &mut bench.machine;
-    machine.move_pose(pose(1.4965, 0.3, 0.0)).unwrap();
+    machine
+        .platform()
+        .unwrap()
+        .move_to(pose(1.4965, 0.3, 0.0))
+        .unwrap();
     let soft_max = Metres::from_mm(1.5);
     let here = machine.reading("u").unwrap().unwrap().position;
     let play = Metres::from_um(1.6);
     assert!(here + play > soft_max, "{} mm: there is room", here.mm());
 
     machine.stop_request().stop();
-    machine.move_pose(pose(1.2, 0.3, 0.0)).unwrap_err();
+    machine
+        .platform()
+        .unwrap()
+        .move_to(pose(1.2, 0.3, 0.0))
+        .unwrap_err();
     machine.share_stop_request(&StopRequest::default());
     let target = pose(1.4, 0.2, 0.0);
-    let moved = machine.move_pose(target).unwrap();
+    let moved = machine.platform().unwrap().move_to(target).unwrap();
     assert_eq!(moved.taken_up.len(), 3, "{moved:?}");
     let error = judge.error(&bench.emulated.simulation(), target);
     assert!(error < Metres::from_um(1.0), "{} µm", error.um());
@@ -102,19 +134,34 @@ fn where_the_soft_limits_leave_no_room_forward_play_is_taken_up_in_reverse() {
 fn after_a_power_cycle_nothing_moves_before_a_zero_which_settles_the_play() {
     let mut bench = Bench::of(&UVW, 6, shortened);
     zeroed(&mut bench);
-    bench.machine.calibrate_platform(&bench.store).unwrap();
+    bench
+        .machine
+        .platform()
+        .unwrap()
+        .calibrate(&bench.store)
+        .unwrap();
     bench.machine.shut_down().unwrap();
     bench.power_cycle(truestage::emulated::HallDrift::default());
     let back = bench.machine.now() + core::time::Duration::from_secs(1);
     bench.machine.run_until(back).unwrap();
     bench.machine.start().unwrap();
-    let refused = bench.machine.move_pose(pose(0.1, 0.0, 0.0)).unwrap_err();
+    let refused = bench
+        .machine
+        .platform()
+        .unwrap()
+        .move_to(pose(0.1, 0.0, 0.0))
+        .unwrap_err();
     assert_eq!(refused.exit_code(), 3);
     assert!(refused.to_string().contains("not zeroed"), "{refused}");
-    bench.machine.zero_platform(&bench.store).unwrap();
+    bench
+        .machine
+        .platform()
+        .unwrap()
+        .zero(&bench.store)
+        .unwrap();
     let judge = PoseJudge::here(&bench.emulated.simulation());
     for target in [pose(-0.3, 0.2, 100.0), pose(-0.31, 0.19, 105.0)] {
-        let moved = bench.machine.move_pose(target).unwrap();
+        let moved = bench.machine.platform().unwrap().move_to(target).unwrap();
         assert_eq!(moved.taken_up, []);
         let error = judge.error(&bench.emulated.simulation(), target);
         assert!(error < Metres::from_um(1.0), "{} µm", error.um());
@@ -126,7 +173,7 @@ fn alignment_is_bounded_and_told_apart_from_the_open_loop() {
     let mut bench = Bench::of(&UVW, 3, |text| text);
     let judge = zeroed(&mut bench);
     let target = pose(1.3, -1.2, 900.0);
-    let aligned = bench.machine.align_pose(target).unwrap();
+    let aligned = bench.machine.platform().unwrap().align(target).unwrap();
     // Nothing is calibrated: the first move is off by its screws' errors, the image mends them.
     assert!(aligned.open_loop > Metres::from_um(1.5), "{aligned:?}");
     assert!(aligned.left <= Metres::from_um(0.5), "{aligned:?}");
@@ -140,7 +187,7 @@ fn alignment_is_bounded_and_told_apart_from_the_open_loop() {
     };
     let mut bench = Bench::of(&UVW, 3, never);
     zeroed(&mut bench);
-    let failure = bench.machine.align_pose(target).unwrap_err();
+    let failure = bench.machine.platform().unwrap().align(target).unwrap_err();
     assert_eq!(failure.exit_code(), 5);
     let text = failure.to_string();
     assert!(
@@ -160,12 +207,16 @@ fn a_fourth_screw_must_agree_with_the_others_or_nothing_moves() {
     zeroed(&mut bench);
     let machine = &mut bench.machine;
     let target = pose(0.8, -0.6, 700.0);
-    let moved = machine.move_pose(target).unwrap();
+    let moved = machine.platform().unwrap().move_to(target).unwrap();
     assert_eq!(moved.set_points.len(), 4);
     let before = machine.reading("r").unwrap().unwrap().position;
 
     // A screw alone would pull against the others.
-    let refused = machine.calibrate_platform(&bench.store).unwrap_err();
+    let refused = machine
+        .platform()
+        .unwrap()
+        .calibrate(&bench.store)
+        .unwrap_err();
     assert_eq!(refused.exit_code(), 3);
     let text = refused.to_string();
     for part in ["contradict", "u ", "v ", "w ", "r ", "nothing was moved"] {
@@ -173,7 +224,11 @@ fn a_fourth_screw_must_agree_with_the_others_or_nothing_moves() {
     }
     let after = machine.reading("r").unwrap().unwrap().position;
     assert!((after - before).abs() < Metres::from_um(0.1));
-    machine.move_pose(Pose::default()).unwrap();
+    machine
+        .platform()
+        .unwrap()
+        .move_to(Pose::default())
+        .unwrap();
 }
 
 #[test]

@@ -50,14 +50,16 @@ fn cycle(seed: u64) -> Traces {
     let store = bench.store.clone();
     let result = bench.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)?;
-        let calibrated = machine.calibrate("x", &store, &CalibrateOptions::default())?;
+        machine.linear("x")?.zero(&store)?;
+        let calibrated = machine
+            .linear("x")?
+            .calibrate(&store, &CalibrateOptions::default())?;
         let options = VerifyOptions {
             compensated: true,
             calibration: Some(calibrated.id),
             resume: None,
         };
-        let left = machine.verify("x", &store, &options)?;
+        let left = machine.linear("x")?.verify(&store, &options)?;
         machine.shut_down()?;
         Ok(left.figures.accuracy.bidirectional)
     });

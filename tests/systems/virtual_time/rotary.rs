@@ -38,7 +38,7 @@ fn started(bench: &mut Bench) {
     let result = bench
         .machine
         .start()
-        .and_then(|()| bench.machine.zero_rotary(AXIS));
+        .and_then(|()| bench.machine.rotary(AXIS)?.zero());
     result.unwrap_or_else(|failure| panic!("{failure}"));
 }
 
@@ -50,7 +50,7 @@ fn calibrate(
     let store = bench.store.clone();
     bench
         .machine
-        .guarded(|machine| machine.calibrate_rotary(AXIS, &store, options, operator))
+        .guarded(|machine| machine.rotary(AXIS)?.calibrate(&store, options, operator))
 }
 
 fn calibrated(bench: &mut Bench) -> RotaryCalibrated {
@@ -65,7 +65,7 @@ fn verified(bench: &mut Bench, hand: &mut Hand<'_>) -> Result<RotaryVerified, Fa
     let store = bench.store.clone();
     bench
         .machine
-        .guarded(|machine| machine.verify_rotary(AXIS, &store, true, hand))
+        .guarded(|machine| machine.rotary(AXIS)?.verify(&store, true, hand))
 }
 
 /// The table's true error at a reading, arcsec.
@@ -89,8 +89,10 @@ fn rms(values: &[f64]) -> f64 {
 /// True angle − target, rms in arcsec, at `steps` targets of a turn, the first of them `beside` of
 /// a step from the zero, when the drive is sent what the calibration says; less the mean, for
 /// where the zero is no placement of a plate tells.
-fn residual(bench: &Bench, steps: u32, beside: f64) -> f64 {
-    let compensation = bench.machine.rotary_compensation(AXIS);
+fn residual(bench: &mut Bench, steps: u32, beside: f64) -> f64 {
+    let compensation = bench.machine.rotary(AXIS).unwrap().compensation().cloned();
+    let compensation = compensation.as_ref();
+    let bench = &*bench;
     let errors = (0..steps).map(|step| {
         let target = Radians(TAU * (f64::from(step) + beside) / f64::from(steps));
         let sent = compensation.map_or(target, |it| it.set_point(target).expect("an angle"));
@@ -142,16 +144,16 @@ struct Judged {
 
 fn judged(seed: u64) -> Judged {
     let mut bench = bench(seed);
-    let found = residual(&bench, 360, 0.0);
+    let found = residual(&mut bench, 360, 0.0);
     let calibrated = calibrated(&mut bench);
     assert!(calibrated.solution.missing.is_empty(), "seed {seed}");
     let stated = calibrated.solution.standard_uncertainty();
     let stated = stated.expect("there are residuals");
     Judged {
         found,
-        at_lines: residual(&bench, 360, 0.0),
-        between: residual(&bench, 360, 0.5),
-        anywhere: residual(&bench, 3571, 0.25),
+        at_lines: residual(&mut bench, 360, 0.0),
+        between: residual(&mut bench, 360, 0.5),
+        anywhere: residual(&mut bench, 3571, 0.25),
         uncertainty: rms(&stated.iter().map(|it| it.arcsec()).collect::<Vec<_>>()),
         chi_square: chi_square(&bench, &calibrated),
         freedom: calibrated.solution.degrees_of_freedom as f64,
@@ -213,7 +215,10 @@ fn a_plate_that_is_placed_by_hand_does_as_well() {
     };
     let mut bench = Bench::rotary(21, |text| text, askew);
     calibrated(&mut bench);
-    let left = [residual(&bench, 360, 0.0), residual(&bench, 360, 0.5)];
+    let left = [
+        residual(&mut bench, 360, 0.0),
+        residual(&mut bench, 360, 0.5),
+    ];
     println!("{left:?}");
     assert!(left.iter().all(|it| *it <= LIMIT_ARCSEC), "{left:?}");
 }
@@ -227,7 +232,7 @@ fn a_plate_fixed_half_way_between_two_lines_keeps_its_first_line_in_every_placem
         bench.emulated.simulation_mut().turn_plate(off);
         let calibrated = calibrated(&mut bench);
         assert!(calibrated.solution.outliers.is_empty());
-        let left = residual(&bench, 360, 0.5);
+        let left = residual(&mut bench, 360, 0.5);
         assert!(left <= LIMIT_ARCSEC, "{off}: {left}");
         let mut hand = hand_of(&bench.emulated).lies_at(232.0);
         let asked = calibrated.solution.design.offsets().last();
@@ -245,7 +250,7 @@ fn a_further_placement_between_the_lines_sees_the_table_as_found_and_as_left() {
     let it = verified(&mut bench, &mut hand).unwrap_or_else(|failure| panic!("{failure}"));
     let left = it.left.clone().unwrap();
     assert_eq!(hand.asked[0].by, PlateMove::TurnBy(200.5 - 232.0));
-    assert!((it.found.rms.arcsec() - residual(&bench, 360, 0.5)).abs() > 1.0);
+    assert!((it.found.rms.arcsec() - residual(&mut bench, 360, 0.5)).abs() > 1.0);
     assert!(it.found.largest.arcsec() > 8.0 && it.is_within_tolerance());
     // Scatter of one placement, of the table's and of the plate's error.
     assert!(
@@ -254,8 +259,8 @@ fn a_further_placement_between_the_lines_sees_the_table_as_found_and_as_left() {
         left.rms.arcsec()
     );
     // Without the calibration: what it finds is what the plant has.
-    bench.machine.forget_rotary_calibration(AXIS);
-    let found = residual(&bench, 360, 0.5);
+    bench.machine.rotary(AXIS).unwrap().forget_calibration();
+    let found = residual(&mut bench, 360, 0.5);
     assert!((it.found.rms.arcsec() - found).abs() < 0.05, "{found}");
     let refused = verified(&mut bench, &mut hand);
     assert!(matches!(refused, Err(Failure::Usage { .. })), "{refused:?}");
@@ -303,7 +308,7 @@ fn smudged_lines_are_bridged_and_a_bumped_reading_is_named_and_left_out() {
     );
     assert_eq!(it.solution.missing.len(), 12);
     assert!(it.solution.plate_error[17].is_none() && it.solution.plate_error[16].is_some());
-    assert!(residual(&bench, 360, 0.0) <= LIMIT_ARCSEC);
+    assert!(residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC);
 }
 
 /// Does something after so many passes.
@@ -338,10 +343,10 @@ fn placement_error(emulated: &Emulated) -> Radians {
 
 /// Nothing is in use, and the journal waits for the rest.
 #[track_caller]
-fn check_nothing_stored(bench: &Bench, placements: usize) -> CalibrateOptions {
+fn check_nothing_stored(bench: &mut Bench, placements: usize) -> CalibrateOptions {
     assert_eq!(bench.store.active(AXIS).unwrap().current, None);
     assert!(bench.store.list().unwrap().is_empty());
-    assert!(bench.machine.rotary_compensation(AXIS).is_none());
+    assert!(bench.machine.rotary(AXIS).unwrap().compensation().is_none());
     let path = bench.store.newest_run("calibrate", AXIS).unwrap().unwrap();
     let read = read_journal(&path).unwrap();
     assert!(!read.complete);
@@ -364,14 +369,14 @@ fn a_plate_turned_by_another_number_of_lines_is_named_and_only_that_placement_is
     };
     assert_eq!((source.offset, source.likely), (73, 74));
     assert!(failed.unwrap_err().to_string().contains("--resume"));
-    let resume = check_nothing_stored(&bench, 2);
+    let resume = check_nothing_stored(&mut bench, 2);
     started(&mut bench);
     let mut hand = hand_of(&bench.emulated).lies_at(162.0);
     let it = calibrate(&mut bench, &mut hand, &resume).unwrap_or_else(|it| panic!("{it}"));
     let asked: Vec<_> = hand.asked.iter().map(|it| it.offset).collect();
     assert_eq!(asked, [73.0, 232.0]);
     assert!(it.solution.outliers.is_empty());
-    assert!(residual(&bench, 360, 0.0) <= LIMIT_ARCSEC);
+    assert!(residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC);
 }
 
 #[test]
@@ -384,7 +389,7 @@ fn a_plate_that_slips_while_it_is_read_is_noticed_and_the_placements_before_are_
         matches!(left, Err(Failure::Machine(machine::Failure::Interrupted))),
         "{left:?}"
     );
-    let resume = check_nothing_stored(&bench, 1);
+    let resume = check_nothing_stored(&mut bench, 1);
     // Fixed badly: it moves by some arcseconds between two passes of the second placement.
     started(&mut bench);
     let mut hand = hand_of(&bench.emulated);
@@ -405,13 +410,13 @@ fn a_plate_that_slips_while_it_is_read_is_noticed_and_the_placements_before_are_
     assert_ne!(before, placement_error(&bench.emulated), "it did not slip");
     assert!(*offset == 73.0 && seen.abs() > *limit);
     assert_eq!(slipped.unwrap_err().exit_code(), 5);
-    let resume = check_nothing_stored(&bench, 1);
+    let resume = check_nothing_stored(&mut bench, 1);
     started(&mut bench);
     let mut hand = hand_of(&bench.emulated).lies_at(73.0);
     calibrate(&mut bench, &mut hand, &resume).unwrap_or_else(|failure| panic!("{failure}"));
     let asked: Vec<_> = hand.asked.iter().map(|it| it.offset).collect();
     assert_eq!(asked, [73.0, 162.0, 232.0]);
-    assert!(residual(&bench, 360, 0.0) <= LIMIT_ARCSEC);
+    assert!(residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC);
 }
 
 #[test]
@@ -428,7 +433,7 @@ fn a_detector_that_dies_and_power_that_is_lost_end_the_run_and_it_goes_on_afterw
     })));
     let failed = calibrate(&mut bench, &mut hand, &CalibrateOptions::default());
     assert!(matches!(failed, Err(Failure::NoLines { .. })), "{failed:?}");
-    let resume = check_nothing_stored(&bench, 1);
+    let resume = check_nothing_stored(&mut bench, 1);
 
     // Somebody mends it; then the mains goes off in the middle of the third placement.
     let emulated = bench.emulated.clone();
@@ -443,13 +448,13 @@ fn a_detector_that_dies_and_power_that_is_lost_end_the_run_and_it_goes_on_afterw
     let failed = calibrate(&mut bench, &mut hand, &resume);
     let code = failed.as_ref().map_err(Failure::exit_code).err();
     assert_eq!(code, Some(4), "{failed:?}");
-    let resume = check_nothing_stored(&bench, 2);
+    let resume = check_nothing_stored(&mut bench, 2);
     assert!(!bench.machine.is_zeroed(AXIS));
     let later = bench.machine.now() + Duration::from_secs(1);
     bench.machine.run_until(later).unwrap();
     started(&mut bench);
     let it = calibrate(&mut bench, &mut hand, &resume).unwrap_or_else(|it| panic!("{it}"));
-    assert!(residual(&bench, 360, 0.0) <= LIMIT_ARCSEC);
+    assert!(residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC);
     assert_eq!(it.solution.design.offsets(), [0, 73, 162, 232]);
 }
 
@@ -463,7 +468,7 @@ fn a_run_is_continued_only_with_the_same_plate_and_set_up() {
         matches!(left, Err(Failure::Machine(machine::Failure::Interrupted))),
         "{left:?}"
     );
-    let resume = check_nothing_stored(&bench, 1);
+    let resume = check_nothing_stored(&mut bench, 1);
     for (from, to) in [
         ("GP-360-0001", "GP-360-0002"),
         ("placements = 4", "offsets = [0, 73, 162, 231]"),
@@ -515,7 +520,12 @@ fn compensated_moves_land_over_any_number_of_turns_and_across_the_seam() {
     ] {
         let target = Radians::from_degrees(degrees);
         // From a turn of its own, whichever that is: the first moves are told where they begin.
-        let moved = bench.machine.move_rotary(AXIS, target, way).unwrap();
+        let moved = bench
+            .machine
+            .rotary(AXIS)
+            .unwrap()
+            .move_to(target, way)
+            .unwrap();
         let turns = ((moved.target.degrees() - lands) / 360.0).round();
         assert!((moved.target.degrees() - lands - turns * 360.0).abs() < 1e-9);
         if way == Way::Turns {
@@ -554,14 +564,16 @@ fn a_calibration_of_another_encoder_or_drive_is_refused() {
             text.edit_first(from, to)
         });
         let mut machine = Machine::new(&loaded, Box::new(bench.emulated.transport()));
-        let refused = machine.load_active_rotary(AXIS, &bench.store);
+        let refused = machine.rotary(AXIS).unwrap().load_active(&bench.store);
         let is_foreign = matches!(refused, Err(Failure::Store(StoreError::Foreign { .. })));
         assert!(is_foreign, "{to}: {refused:?}");
     }
     bench.machine.start().unwrap();
     let loaded = bench
         .machine
-        .load_active_rotary(AXIS, &bench.store)
+        .rotary(AXIS)
+        .unwrap()
+        .load_active(&bench.store)
         .unwrap();
     assert_eq!(loaded, Some(id));
 }

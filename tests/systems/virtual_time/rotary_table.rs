@@ -32,7 +32,7 @@ fn run<R>(bench: &mut Bench, procedure: impl FnOnce(&mut Bench) -> Result<R, Fai
 /// Started and zeroed.
 fn ready(bench: &mut Bench) -> Result<(), Failure> {
     bench.machine.start()?;
-    bench.machine.zero_rotary(AXIS)
+    bench.machine.rotary(AXIS)?.zero()
 }
 
 /// Each reading minus the table's and the plate's true errors there, less their mean; arcsec.
@@ -73,7 +73,7 @@ fn sweeps_of_several_placements_read_table_and_plate_to_the_detectors_noise() {
                     phase,
                     ..options(approach)
                 };
-                let sweep = bench.machine.sweep(AXIS, &options)?;
+                let sweep = bench.machine.rotary(AXIS)?.sweep(&options)?;
                 phase = phase.or(Some(sweep.phase));
                 assert_eq!(sweep.read(), 360, "{sweep:?}");
                 let noise = rms(&residuals(bench, &sweep));
@@ -97,8 +97,14 @@ fn two_sweeps_of_one_placement_agree_and_the_directions_differ_by_the_latency_on
     let mut bench = bench(6);
     run(&mut bench, |bench| {
         ready(bench)?;
-        let forward = bench.machine.sweep(AXIS, &options(Approach::Forward))?;
-        let reverse = bench.machine.sweep(AXIS, &options(Approach::Reverse))?;
+        let forward = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Forward))?;
+        let reverse = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Reverse))?;
         let apart: Vec<f64> = forward
             .deviations
             .iter()
@@ -128,7 +134,10 @@ fn missing_and_doubtful_lines_are_named_by_their_place_on_the_table() {
         let injected = faults.map(|fault| simulation.inject(FaultConfig::permanent(fault)));
         let injected = injected.map(|it| it.expect("it is a plate"));
         drop(simulation);
-        let sweep = bench.machine.sweep(AXIS, &options(Approach::Forward))?;
+        let sweep = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Forward))?;
         assert_eq!(sweep.missing, [5, 30]);
         assert_eq!(sweep.overwritten, [110]);
         assert_eq!(sweep.read(), 357);
@@ -140,7 +149,7 @@ fn missing_and_doubtful_lines_are_named_by_their_place_on_the_table() {
             speed: Some(RadiansPerSecond(1.0_f64.to_radians())),
             ..options(Approach::Forward)
         };
-        let sweep = bench.machine.sweep(AXIS, &slow)?;
+        let sweep = bench.machine.rotary(AXIS)?.sweep(&slow)?;
         assert_eq!(sweep.doubled, [110]);
         assert_eq!(sweep.missing, [5, 30]);
         Ok(())
@@ -157,7 +166,7 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
             ..options(Approach::Forward)
         };
         let before = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
-        let refused = bench.machine.sweep(AXIS, &fast);
+        let refused = bench.machine.rotary(AXIS)?.sweep(&fast);
         let Err(Failure::Machine(machine::Failure::Device {
             source: DeviceError::OutOfRange { limit, unit, .. },
             ..
@@ -179,7 +188,10 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
 fn an_angle_is_reached_by_the_way_that_was_asked_for() {
     let mut bench = bench(9);
     run(&mut bench, |bench| {
-        let early = bench.machine.turn_to(AXIS, Radians::ZERO, Way::Shortest);
+        let early = bench
+            .machine
+            .rotary(AXIS)?
+            .turn_to(Radians::ZERO, Way::Shortest);
         assert!(matches!(
             early,
             Err(Failure::Machine(machine::Failure::NotZeroed { .. }))
@@ -193,7 +205,7 @@ fn an_angle_is_reached_by_the_way_that_was_asked_for() {
             (725.0, Way::Turns, 725.0),
         ] {
             let angle = Radians::from_degrees(degrees);
-            let target = bench.machine.turn_to(AXIS, angle, way)?;
+            let target = bench.machine.rotary(AXIS)?.turn_to(angle, way)?;
             assert!(
                 (target.degrees() - expected).abs() < 1e-4,
                 "{}",
@@ -211,13 +223,19 @@ fn a_power_cycle_takes_the_zero_and_zeroing_again_brings_the_readings_back() {
     let mut bench = bench(10);
     run(&mut bench, |bench| {
         ready(bench)?;
-        let before = bench.machine.sweep(AXIS, &options(Approach::Forward))?;
+        let before = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Forward))?;
         bench.machine.shut_down()?;
         bench.power_cycle(HallDrift::default());
         bench.machine.start()?;
         assert!(!bench.machine.is_zeroed(AXIS));
-        bench.machine.zero_rotary(AXIS)?;
-        let after = bench.machine.sweep(AXIS, &options(Approach::Forward))?;
+        bench.machine.rotary(AXIS)?.zero()?;
+        let after = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Forward))?;
         let apart: Vec<f64> = before
             .deviations
             .iter()
@@ -234,13 +252,15 @@ fn a_failure_stops_and_disables_the_table() {
     let mut bench = bench(11);
     let failed = bench.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero_rotary(AXIS)?;
+        machine.rotary(AXIS)?.zero()?;
         bench
             .emulated
             .simulation_mut()
             .inject(FaultConfig::permanent(Fault::BlockedAxis { axis: 0 }))
             .expect("every table can be blocked");
-        machine.turn_to(AXIS, Radians::from_degrees(90.0), Way::Shortest)
+        machine
+            .rotary(AXIS)?
+            .turn_to(Radians::from_degrees(90.0), Way::Shortest)
     });
     assert!(
         matches!(
@@ -263,7 +283,10 @@ fn a_table_without_plate_or_detector_says_what_to_look_for() {
     let mut bench = Bench::rotary(12, |text| text, |text| text.edit(smudge, &all));
     run(&mut bench, |bench| {
         ready(bench)?;
-        let blind = bench.machine.sweep(AXIS, &options(Approach::Forward));
+        let blind = bench
+            .machine
+            .rotary(AXIS)?
+            .sweep(&options(Approach::Forward));
         assert!(
             matches!(blind, Err(Failure::NoLines { lines: 360, .. })),
             "{blind:?}"

@@ -12,7 +12,7 @@ fn voltages_that_do_not_belong_to_their_positions_give_a_reason_and_no_zero() {
         let store = stand.store.clone();
         let result = stand.machine.guarded(|machine| {
             machine.start()?;
-            machine.zero("x", &store)
+            machine.linear("x")?.zero(&store)
         });
         let Err(failure) = result else {
             panic!("seed {seed}: found a zero")

@@ -7,7 +7,14 @@ use units::Metres;
 fn three_axes_start_with_all_their_modules_and_find_their_zero() {
     let mut volume = Volume::zeroed(1, |text| text, |text| text);
     for (axis, at_mm) in [("x", 30.0), ("y", 20.0), ("z", 10.0)] {
-        good(volume.bench.machine.move_to(axis, Metres::from_mm(at_mm)));
+        good(
+            volume
+                .bench
+                .machine
+                .linear(axis)
+                .unwrap()
+                .move_to(Metres::from_mm(at_mm)),
+        );
     }
     let scales = volume.truth(|truth| truth.scales());
     for (scale, at_mm) in scales.into_iter().zip([30.0, 20.0, 10.0]) {
@@ -21,7 +28,7 @@ fn a_machine_calibrated_just_now_puts_its_tool_where_the_path_says() {
     let mut volume = Volume::zeroed(1, |text| text, |text| text);
     volume.know_errors();
     let store = volume.bench.store.clone();
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     let places = spread(0, 20);
     let found = percentile_95(&volume.uncorrected(&places));
     let (mut mover, _) = volume.corrected();
@@ -40,19 +47,19 @@ fn references_and_memories_of_other_errors_are_refused() {
     let mut volume = Volume::zeroed(1, |text| text, |text| text);
     let store = volume.bench.store.clone();
     let machine = &mut volume.bench.machine;
-    assert!(good(machine.volumetric_state(&store)).is_none());
-    let refused = machine.reference_volumetric(&store).unwrap_err();
+    assert!(good(machine.volumetric().unwrap().state(&store)).is_none());
+    let refused = machine.volumetric().unwrap().reference(&store).unwrap_err();
     assert!(refused.to_string().contains("never measured"), "{refused}");
     let first = volume.know_errors();
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     volume.remember_bow(Metres::from_um(15.0));
-    let (_, records) = good(volume.bench.machine.volumetric_state(&store)).expect("it is stored");
+    let (_, records) = good(volume.work().state(&store)).expect("it is stored");
     assert_eq!(records.geometry, first);
     assert!(records.references.is_some() && records.first_memory.is_some());
     // The machine is warmer now: other errors, other references.
     let second = volume.know_errors();
     assert_ne!(first, second);
-    let refused = volume.bench.machine.volumetric_state(&store).unwrap_err();
+    let refused = volume.work().state(&store).unwrap_err();
     let text = refused.to_string();
     assert!(
         text.contains(&first[..12]) && text.contains(&second[..12]),
@@ -60,16 +67,15 @@ fn references_and_memories_of_other_errors_are_refused() {
     );
     assert!(text.contains("truestage reference"), "{text}");
     assert_eq!(refused.exit_code(), 3);
-    good(volume.bench.machine.reference_volumetric(&store));
-    let refused = volume.bench.machine.volumetric_state(&store).unwrap_err();
+    good(volume.work().reference(&store));
+    let refused = volume.work().state(&store).unwrap_err();
     assert!(
         refused.to_string().contains("truestage memory clear"),
         "{refused}"
     );
     let cleared = volume
-        .bench
-        .machine
+        .work()
         .clear_memory(&store, truestage::volumetric::MemoryName::First);
     assert_eq!(good(cleared), (records.first_memory, None));
-    assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
+    assert!(good(volume.work().state(&store)).is_some());
 }

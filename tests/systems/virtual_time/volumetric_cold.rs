@@ -32,7 +32,12 @@ fn warmth_while_lines_are_read_does_not_get_into_the_errors() {
     let mut hand = volume.bench.emulated.clone();
     let cold = volume.truth(|truth| truth.scale_temperature(0));
     let machine = &mut volume.bench.machine;
-    let made = good(machine.calibrate_volumetric(&store, WarmUp::None, None, &mut hand));
+    let made = good(
+        machine
+            .volumetric()
+            .unwrap()
+            .calibrate(&store, WarmUp::None, None, &mut hand),
+    );
     let warmer = volume.truth(|truth| truth.scale_temperature(0)) - cold;
     assert!(warmer.value() > 0.7, "{warmer}");
     assert_eq!(made.unknown.bends.len(), 3, "nobody knows how guides bend");

@@ -91,7 +91,7 @@ fn day_of_known(seed: u64, places: usize) -> Day {
     let mut volume = Volume::zeroed(seed, calm, |text| text);
     volume.know_errors();
     let store = volume.bench.store.clone();
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     work(&mut volume, seed, places)
 }
 
@@ -102,7 +102,12 @@ fn day_of_calibrated(seed: u64, places: usize) -> Day {
     let mut hand = volume.bench.emulated.clone();
     let warm_up = WarmUp::Idle(Duration::from_secs(2 * 3600));
     let machine = &mut volume.bench.machine;
-    let made = good(machine.calibrate_volumetric(&store, warm_up, None, &mut hand));
+    let made = good(
+        machine
+            .volumetric()
+            .unwrap()
+            .calibrate(&store, warm_up, None, &mut hand),
+    );
     eprintln!(
         "seed {seed}: {} lines, {} readings beyond the unknowns, scatter {:.2} of what was stated, u {:.3} um",
         made.lines,
@@ -138,7 +143,7 @@ fn work(volume: &mut Volume, seed: u64, places: usize) -> Day {
     let mut along = Vec::new();
     for (hour, here) in (0..=DAY_H).zip(all.chunks(places)) {
         if idle_until(volume, hour) {
-            good(volume.bench.machine.correct_volume(&mut mover, true));
+            good(volume.work().correct(&mut mover, true));
         }
         volume.visit(&mut mover, &LONG_WAY, &mut along);
         let here = by_short_ways(here.to_vec());

@@ -26,7 +26,7 @@ fn known(seed: u64, machine: impl Fn(String) -> String, deliberate: &str, own: &
     let mut volume = Volume::zeroed(seed, |text| calm(machine(text)), emulated);
     volume.know_errors();
     let store = volume.bench.store.clone();
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     volume
 }
 
@@ -103,18 +103,18 @@ fn fifty_parts_are_made_like_the_first_while_the_machine_drifts() {
     let places = spread(40, 2);
     let everywhere = spread(0, 100);
     let morning = volume.uncorrected(&everywhere);
-    let (mut mover, part) = good(volume.bench.machine.first_part(&store));
-    good(volume.bench.machine.correct_volume(&mut mover, true));
+    let (mut mover, part) = good(volume.work().first_part(&store));
+    good(volume.work().correct(&mut mover, true));
     part.recorder.listen();
     let first = volume.visit(&mut mover, &places, &mut Vec::new());
-    good(volume.bench.machine.keep_part(&store, mover, part));
+    good(volume.work().keep_part(&store, mover, part));
     let (mut mover, state) = volume.corrected();
     assert!(state.memories.first.is_none() && state.memories.second.is_some());
     let mut worst = Metres(0.0);
     let mut unlike = Vec::new();
     for part in 2..=50 {
         idle_until(&mut volume, 3600.0 + f64::from(part) * 500.0);
-        good(volume.bench.machine.correct_volume(&mut mover, true));
+        good(volume.work().correct(&mut mover, true));
         let errors = volume.visit(&mut mover, &places, &mut Vec::new());
         worst = worst.max(largest(&beyond(&errors, &first)));
         if [2, 50].contains(&part) {
@@ -145,8 +145,9 @@ fn fifty_parts_are_made_like_the_first_while_the_machine_drifts() {
     assert!(unlike.iter().all(|it| *it > several), "{unlike:?}");
 }
 
-fn refusal(volume: &Volume) -> String {
-    let stored = volume.bench.machine.volumetric_state(&volume.bench.store);
+fn refusal(volume: &mut Volume) -> String {
+    let store = volume.bench.store.clone();
+    let stored = volume.work().state(&store);
     stored.unwrap_err().to_string()
 }
 
@@ -162,21 +163,18 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     let mut volume = Volume::zeroed(1, calm, same);
     volume.know_errors();
     let store = volume.bench.store.clone();
-    let refused = volume
-        .bench
-        .machine
-        .record_memory(&store, MemoryName::First);
+    let refused = volume.work().record_memory(&store, MemoryName::First);
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("`truestage reference`"), "{refused}");
-    good(volume.bench.machine.reference_volumetric(&store));
+    good(volume.work().reference(&store));
     let record = |volume: &mut Volume, memory| {
-        let recorded = volume.bench.machine.record_memory(&store, memory);
+        let recorded = volume.work().record_memory(&store, memory);
         good(recorded)
     };
     // References that were taken again.
     record(&mut volume, MemoryName::First);
-    good(volume.bench.machine.reference_volumetric(&store));
-    let refused = refusal(&volume);
+    good(volume.work().reference(&store));
+    let refused = refusal(&mut volume);
     let told = "`truestage memory record --memory first`";
     assert!(refused.contains(told), "{refused}");
     let again = record(&mut volume, MemoryName::First);
@@ -185,8 +183,8 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
             .iter()
             .all(|it| it.abs() < Metres::from_um(1.0))
     );
-    assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
-    let cleared = volume.bench.machine.clear_memory(&store, MemoryName::First);
+    assert!(good(volume.work().state(&store)).is_some());
+    let cleared = volume.work().clear_memory(&store, MemoryName::First);
     assert_eq!(good(cleared), (Some(again.id), None));
     idle_until(&mut volume, 2.0 * 3600.0);
     // All of it is in the second before there is a first.
@@ -194,30 +192,40 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     assert!(kept(&all).iter().any(|it| it.abs() > Metres::from_um(3.0)));
     let first = record(&mut volume, MemoryName::First);
     assert_eq!(first.foreign.as_ref(), Some(&all.id));
-    let refused = refusal(&volume);
+    let refused = refusal(&mut volume);
     assert!(refused.contains(&all.id[..12]), "{refused}");
     let told = "`truestage memory record --memory second`";
     assert!(refused.contains(told), "{refused}");
     let beyond = record(&mut volume, MemoryName::Second);
     assert_eq!(beyond.foreign, None);
-    let stored = good(volume.bench.machine.volumetric_state(&store));
+    let stored = good(volume.work().state(&store));
     let (state, _) = stored.expect("it was stored");
     let both = state.memories.kept(Axis::X, Metres::from_mm(250.0));
     for (both, all) in both.into_iter().zip(kept(&all)) {
         assert!((both - all).abs() < Metres::from_um(0.5), "{both:?}");
     }
     // Without its first the second would keep less than there was.
-    let machine = &volume.bench.machine;
-    let cleared = good(machine.clear_memory(&store, MemoryName::First));
+    let machine = &mut volume.bench.machine;
+    let cleared = good(
+        machine
+            .volumetric()
+            .unwrap()
+            .clear_memory(&store, MemoryName::First),
+    );
     assert_eq!(cleared, (Some(first.id), Some(beyond.id.clone())));
-    let refused = refusal(&volume);
+    let refused = refusal(&mut volume);
     assert!(refused.contains("in use: none"), "{refused}");
     let told = "`truestage memory clear --memory second`";
     assert!(refused.contains(told), "{refused}");
-    let machine = &volume.bench.machine;
-    let cleared = good(machine.clear_memory(&store, MemoryName::Second));
+    let machine = &mut volume.bench.machine;
+    let cleared = good(
+        machine
+            .volumetric()
+            .unwrap()
+            .clear_memory(&store, MemoryName::Second),
+    );
     assert_eq!(cleared, (Some(beyond.id), None));
-    assert!(good(volume.bench.machine.volumetric_state(&store)).is_some());
+    assert!(good(volume.work().state(&store)).is_some());
 }
 
 /// 5 arcsec on a tool of 200 mm: 4.8 um.
@@ -238,7 +246,7 @@ fn a_roll_is_corrected_at_a_long_tool() {
     let before = volume.visit(&mut mover, &places, &mut Vec::new());
     assert!(volume.bench.machine.now() < Time::from_seconds(BEGINS_S));
     idle_until(&mut volume, BEGINS_S + 5.0);
-    good(volume.bench.machine.correct_volume(&mut mover, true));
+    good(volume.work().correct(&mut mover, true));
     let after = volume.visit(&mut mover, &places, &mut Vec::new());
     let left = beyond(&after, &before);
     eprintln!(

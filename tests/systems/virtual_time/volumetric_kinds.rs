@@ -41,11 +41,16 @@ fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
         })
     };
     let mut volume = zeroed();
-    assert_eq!(good(volume.bench.machine.volumetric_config()).chain, "XFYZ");
+    assert_eq!(volume.work().config().chain, "XFYZ");
     let store = volume.bench.store.clone();
     let mut hand = volume.bench.emulated.clone();
     let machine = &mut volume.bench.machine;
-    good(machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand));
+    good(
+        machine
+            .volumetric()
+            .unwrap()
+            .calibrate(&store, WarmUp::Idle(WARM_UP), None, &mut hand),
+    );
 
     let mut later = zeroed();
     later.inherit(&volume);
@@ -58,7 +63,14 @@ fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
         let off = later.visit(&mut mover, &here, &mut Vec::new());
         left.push(percentile_95(&frame.all_seen(&here, &off)));
         good(later.bench.machine.idle(WARM_UP));
-        good(later.bench.machine.correct_volume(&mut mover, true));
+        good(
+            later
+                .bench
+                .machine
+                .volumetric()
+                .unwrap()
+                .correct(&mut mover, true),
+        );
     }
     let found = percentile_95(&later.uncorrected(&everywhere));
     let tables = later.by_tables(&everywhere, &state);

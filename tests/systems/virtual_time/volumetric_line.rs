@@ -23,7 +23,7 @@ const ORIGIN: Point = Point::from_mm(0.0, 0.0, 0.0);
 fn zeroed(seed: u64, machine: impl Fn(String) -> String) -> Bench {
     let mut bench = Bench::shaped(&VOLUMETRIC, seed, machine, |text| text);
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));
-    let zeroed = bench.machine.zero_volumetric();
+    let zeroed = bench.machine.volumetric().unwrap().zero();
     zeroed.unwrap_or_else(|it| panic!("{it}"));
     bench
 }
@@ -49,7 +49,10 @@ fn task(optics: LineOptics, start: Point, end: Point, tool: Point) -> LineTask {
 /// Set up by the machine's own hand.
 fn set_up(bench: &mut Bench, task: &LineTask) -> Result<Line, Failure> {
     let mut hand = bench.emulated.clone();
-    bench.machine.set_up_line(task, &readout(), &mut hand)
+    bench
+        .machine
+        .volumetric()?
+        .set_up_line(task, &readout(), &mut hand)
 }
 
 fn metres(point: Point) -> [Metres; 3] {
@@ -87,7 +90,7 @@ fn measured(bench: &mut Bench, task: &LineTask) -> Vec<(LineReading, Metres)> {
     for quarter in [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0] {
         let part = |it: Metres| it * (quarter / 4.0);
         let here = task.start + Point::new(part(way.x), part(way.y), part(way.z));
-        let read = bench.machine.read_line(&line, here);
+        let read = bench.machine.volumetric().unwrap().read_line(&line, here);
         let read = read.unwrap_or_else(|it| panic!("{it}"));
         assert_eq!((read.at, read.tool), (here, task.tool));
         let off = target(bench, task.tool, here) - begun - (here - task.start);
@@ -210,14 +213,14 @@ fn a_beam_that_breaks_on_the_way_is_told_and_no_reading_jumps() {
     let end = Point::from_mm(400.0, 0.0, 0.0);
     let task = task(LineOptics::Linear, ORIGIN, end, TOOL);
     let line = set_up(&mut bench, &task).unwrap_or_else(|it| panic!("{it}"));
-    let read = bench.machine.read_line(&line, ORIGIN);
+    let read = bench.machine.volumetric().unwrap().read_line(&line, ORIGIN);
     read.unwrap_or_else(|it| panic!("{it}"));
     let mut fault = FaultConfig::lasting(Fault::BeamBlocked, Duration::from_millis(20));
     fault.from_s = 1.0;
     let fault = bench.emulated.simulation_mut().inject(fault).unwrap();
     let refused = bench
         .machine
-        .guarded(|machine| machine.read_line(&line, end));
+        .guarded(|machine| machine.volumetric()?.read_line(&line, end));
     check_beam_lost(&refused.unwrap_err());
     assert_eq!(bench.emulated.simulation().fault_deliveries(fault), 1);
     let stopped = {
@@ -230,13 +233,13 @@ fn a_beam_that_breaks_on_the_way_is_told_and_no_reading_jumps() {
     };
     assert!(stopped[0] < Metres::from_mm(300.0), "it went on");
     bench.machine.start().unwrap_or_else(|it| panic!("{it}"));
-    let zeroed = bench.machine.zero_volumetric();
+    let zeroed = bench.machine.volumetric().unwrap().zero();
     zeroed.unwrap_or_else(|it| panic!("{it}"));
-    let refused = bench.machine.read_line(&line, ORIGIN);
+    let refused = bench.machine.volumetric().unwrap().read_line(&line, ORIGIN);
     let text = refused.unwrap_err().to_string();
     assert!(text.contains("new datum"), "{text}");
     let line = set_up(&mut bench, &task).unwrap_or_else(|it| panic!("{it}"));
-    let read = bench.machine.read_line(&line, ORIGIN);
+    let read = bench.machine.volumetric().unwrap().read_line(&line, ORIGIN);
     read.unwrap_or_else(|it| panic!("{it}"));
 }
 
@@ -249,7 +252,7 @@ fn a_tool_that_leaves_the_line_loses_the_beam() {
     let aside = Point::from_mm(200.0, 5.0, 0.0);
     let refused = bench
         .machine
-        .guarded(|machine| machine.read_line(&line, aside));
+        .guarded(|machine| machine.volumetric()?.read_line(&line, aside));
     check_beam_lost(&refused.unwrap_err());
 }
 
@@ -280,7 +283,12 @@ fn a_count_of_the_wrong_sign_is_no_error_of_the_machine() {
     let task = task(LineOptics::Linear, ORIGIN, end, TOOL);
     let line = set_up(&mut bench, &task).unwrap_or_else(|it| panic!("{it}"));
     let near = Point::from_mm(10.0, 0.0, 0.0);
-    let refused = bench.machine.read_line(&line, near).unwrap_err();
+    let refused = bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .read_line(&line, near)
+        .unwrap_err();
     let Failure::Volumetric(VolumetricFailure::ImpossibleReading { seen, .. }) = refused else {
         panic!("{refused}")
     };
@@ -350,13 +358,26 @@ fn the_axes_are_off_while_a_line_is_set_up() {
     assert_eq!(looks.seen, [[true; 3]]);
     let end = Point::from_mm(500.0, 0.0, 0.0);
     let task = task(LineOptics::Linear, ORIGIN, end, TOOL);
-    let line = bench.machine.set_up_line(&task, &readout(), &mut looks);
+    let line = bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .set_up_line(&task, &readout(), &mut looks);
     assert_eq!(*line.unwrap_or_else(|it| panic!("{it}")).task(), task);
     assert_eq!(looks.seen[1..], [[false; 3]; 3]);
     looks.look();
     assert_eq!(looks.seen.last(), Some(&[true; 3]));
-    bench.machine.end_lines(&mut looks).unwrap();
-    let refused = bench.machine.set_up_line(&task, &readout(), &mut Absent);
+    bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .end_lines(&mut looks)
+        .unwrap();
+    let refused = bench
+        .machine
+        .volumetric()
+        .unwrap()
+        .set_up_line(&task, &readout(), &mut Absent);
     assert!(matches!(
         refused,
         Err(Failure::Machine(machine::Failure::Interrupted))

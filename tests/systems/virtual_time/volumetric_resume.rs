@@ -60,7 +60,10 @@ fn calibrate_by(
     };
     let store = volume.bench.store.clone();
     let machine = &mut volume.bench.machine;
-    let made = machine.calibrate_volumetric(&store, warm_up, resume, &mut hand);
+    let made = machine
+        .volumetric()
+        .unwrap()
+        .calibrate(&store, warm_up, resume, &mut hand);
     (made, hand.asked)
 }
 
@@ -82,7 +85,7 @@ fn another_morning(volume: &mut Volume) {
     let back = machine.now() + Duration::from_secs(2);
     good(machine.run_until(back));
     good(machine.start());
-    good(machine.zero_volumetric());
+    good(machine.volumetric().unwrap().zero());
 }
 
 #[test]
@@ -137,7 +140,8 @@ fn a_calibration_that_was_interrupted_goes_on_at_its_first_line_that_is_not_whol
             .count()
     };
     assert!((0..made.lines).all(|line| each(line) == 1));
-    let known = good(volume.bench.machine.volumetric_state(&volume.bench.store));
+    let store = volume.bench.store.clone();
+    let known = good(volume.work().state(&store));
     assert_eq!(known.expect("it is in use").1.geometry, made.id);
 
     let error = calibrate(&mut volume, Some(&path), None).0.unwrap_err();
@@ -155,7 +159,7 @@ fn the_journal_alone_gives_the_stored_errors_again() {
     let again = again.unwrap_or_else(|failure| panic!("{failure}"));
     let stored = volume.bench.store.load(&made.id).expect("it was stored");
     let stored = stored.geometry(&made.id).expect("it is one");
-    let config = good(volume.bench.machine.volumetric_config());
+    let config = volume.work().config();
     assert_eq!(&again.content(config), stored);
     assert_eq!((again.lines, again.u_max), (made.lines, made.u_max));
     let source = made

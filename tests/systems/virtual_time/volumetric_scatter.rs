@@ -58,7 +58,11 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
             slip: None,
         };
         let machine = &mut volume.bench.machine;
-        let refused = machine.calibrate_volumetric(&store, WarmUp::None, None, &mut hand);
+        let refused =
+            machine
+                .volumetric()
+                .unwrap()
+                .calibrate(&store, WarmUp::None, None, &mut hand);
         let slip = hand.slip.expect("the line was asked for");
         let struck = hand.emulated.simulation().fault_deliveries(slip);
         assert_eq!(struck, 1, "line {slips_on}");
@@ -75,7 +79,7 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
             "{slips_on}: {text}"
         );
         assert!(store.list().expect("it can be read").is_empty());
-        let known = machine.volumetric_state(&store);
+        let known = machine.volumetric().unwrap().state(&store);
         let known = known.unwrap_or_else(|failure| panic!("{failure}"));
         assert!(known.is_none(), "it is in use");
         let journal = store.newest_run("calibrate", "volume");

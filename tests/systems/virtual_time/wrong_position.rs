@@ -109,9 +109,9 @@ fn calibrated(bench: &mut Bench) -> Result<ErrorTable, Failure> {
     let store: Store = bench.store.clone();
     bench.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero("x", &store)?;
+        machine.linear("x")?.zero(&store)?;
         let options = CalibrateOptions::default();
-        let calibrated = machine.calibrate("x", &store, &options)?;
+        let calibrated = machine.linear("x")?.calibrate(&store, &options)?;
         machine.shut_down()?;
         Ok(calibrated.fitted.table)
     })

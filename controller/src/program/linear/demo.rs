@@ -72,14 +72,16 @@ fn tell(
     output.note("1 start: identities, set-up, supervision");
     machine.start()?;
     output.note("2 zero: drift-free origin from two Hall sensors");
-    let first_zero = machine.zero(AXIS, store)?;
+    let first_zero = machine.linear(AXIS)?.zero(store)?;
     output.note("3 as found: ISO 230-2 without compensation");
-    let found = machine.verify(AXIS, store, &options(false, None))?;
+    let found = machine.linear(AXIS)?.verify(store, &options(false, None))?;
     output.note("4 calibrate: error table by interferometer");
-    let calibrated = machine.calibrate(AXIS, store, &CalibrateOptions::default())?;
+    let calibrated = machine
+        .linear(AXIS)?
+        .calibrate(store, &CalibrateOptions::default())?;
     output.note("5 as left: ISO 230-2, compensated, between the calibrated positions");
     let compensated = options(true, Some(calibrated.id.clone()));
-    let left = machine.verify(AXIS, store, &compensated)?;
+    let left = machine.linear(AXIS)?.verify(store, &compensated)?;
     output.note("6 power off and on, Hall sensors drifted by up to ±100 mV and ±3 %; zero again");
     let mut rezeros = Vec::new();
     for number in 1..=args.power_cycles {
@@ -87,7 +89,7 @@ fn tell(
         rezeros.push(rezero(machine, store, emulated, drift, &first_zero)?);
     }
     output.note("7 as left, after the power cycles");
-    let after = machine.verify(AXIS, store, &compensated)?;
+    let after = machine.linear(AXIS)?.verify(store, &compensated)?;
     machine.shut_down()?;
     Ok(Story {
         first_zero,
@@ -115,8 +117,8 @@ fn rezero(
     first: &Zeroed,
 ) -> Result<Rezero, Failure> {
     power_cycle(machine, emulated, drift)?;
-    let zeroed = machine.zero(AXIS, store)?;
-    let shift = machine.displacement_at_zero(AXIS)?;
+    let zeroed = machine.linear(AXIS)?.zero(store)?;
+    let shift = machine.linear(AXIS)?.displacement_at_zero()?;
     let threshold = zeroed.single_threshold(first.estimate.mid_voltage);
     let single_threshold_shift = threshold.map(|at| at - zeroed.estimate.origin + shift);
     Ok(Rezero {

@@ -46,11 +46,11 @@ fn with_zeroed_axis<R>(
     session.machine.guarded(|machine| {
         machine.start()?;
         let calibration = if load_calibration {
-            machine.load_active(&axis, &store)?
+            machine.linear(&axis)?.load_active(&store)?
         } else {
             None
         };
-        machine.zero(&axis, &store)?;
+        machine.linear(&axis)?.zero(&store)?;
         let prepared = Prepared {
             calibration,
             resume,
@@ -70,7 +70,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let store = session.store.clone();
     let (zeroed, counters) = session.machine.guarded(|machine| {
         machine.start()?;
-        let zeroed = machine.zero(&axis, &store)?;
+        let zeroed = machine.linear(&axis)?.zero(&store)?;
         machine.shut_down()?;
         Ok((zeroed, to_json::counters(&machine.counters())))
     })?;
@@ -115,7 +115,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
                 resume: prepared.resume,
                 accept_drift: args.accept_drift,
             };
-            machine.calibrate(axis, store, &options)
+            machine.linear(axis)?.calibrate(store, &options)
         },
     )?;
     let fitted = &calibrated.fitted;
@@ -155,8 +155,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
     let name = if compensated { "as_left" } else { "as_found" };
     let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
-        let verified = machine.verify(
-            axis,
+        let verified = machine.linear(axis)?.verify(
             store,
             &VerifyOptions {
                 compensated,
@@ -216,7 +215,7 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     for (axis, target) in &targets {
         let (min, max) = {
-            let config = session.machine.axis_config(axis)?;
+            let config = session.machine.linear(axis)?.config();
             (
                 Metres::from_mm(config.soft_min_mm),
                 Metres::from_mm(config.soft_max_mm),
@@ -236,9 +235,9 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         machine.start()?;
         let mut moved = Vec::new();
         for (axis, target) in &targets {
-            let calibration = machine.load_active(axis, &store)?;
-            machine.zero(axis, &store)?;
-            let one = machine.move_and_read(axis, *target)?;
+            let calibration = machine.linear(axis)?.load_active(&store)?;
+            machine.linear(axis)?.zero(&store)?;
+            let one = machine.linear(axis)?.move_and_read(*target)?;
             moved.push((axis, one, calibration));
         }
         machine.shut_down()?;

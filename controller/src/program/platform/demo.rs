@@ -82,20 +82,20 @@ fn tell(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Story, Fai
         output.note("1 start: identities, set-up, supervision");
         machine.start()?;
         output.note("2 zero: every screw on its index pulse, reached forward");
-        let first = machine.zero_platform(store)?;
+        let first = machine.platform()?.zero(store)?;
         output.note("3 as found: poses all over the work range, seen by the camera");
-        let found = machine.verify_platform(store, false)?;
-        machine.move_pose(Pose::default())?;
+        let found = machine.platform()?.verify(store, false)?;
+        machine.platform()?.move_to(Pose::default())?;
         output.note("4 calibrate: lead error, periodic error and lost motion of each screw");
-        let calibrated = machine.calibrate_platform(store)?;
+        let calibrated = machine.platform()?.calibrate(store)?;
         output.note("5 as left: the same poses, compensated, open loop");
-        let left = machine.verify_platform(store, true)?;
+        let left = machine.platform()?.verify(store, true)?;
         output.note("6 power off and on; zero again, as left");
         power_cycle(machine, emulated, HallDrift::default())?;
-        let second = machine.zero_platform(store)?;
-        let after = machine.verify_platform(store, true)?;
+        let second = machine.platform()?.zero(store)?;
+        let after = machine.platform()?.verify(store, true)?;
         output.note("7 align: move until the image agrees");
-        let aligned = machine.align_pose(somewhere(args.seed))?;
+        let aligned = machine.platform()?.align(somewhere(args.seed))?;
         machine.shut_down()?;
         Ok(Story {
             zeros: [first, second],

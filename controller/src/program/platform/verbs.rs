@@ -19,15 +19,15 @@ fn with_zeroed_platform<R>(
     args: &MachineArgs,
     verb: &str,
     output: Output,
-    possible: impl FnOnce(&Machine) -> Result<(), Failure>,
+    possible: impl FnOnce(&mut Machine) -> Result<(), Failure>,
     procedure: impl FnOnce(&mut Machine, &Store) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     let mut session = Session::open(args, verb, Use::Measurement, output)?;
-    possible(&session.machine)?;
+    possible(&mut session.machine)?;
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero_platform(&store)?;
+        machine.platform()?.zero(&store)?;
         let result = procedure(machine, &store)?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.counters())))
@@ -61,7 +61,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let store = session.store.clone();
     let zeroed = session.machine.guarded(|machine| {
         machine.start()?;
-        let zeroed = machine.zero_platform(&store)?;
+        let zeroed = machine.platform()?.zero(&store)?;
         machine.shut_down()?;
         Ok(zeroed)
     })?;
@@ -84,7 +84,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
                 .into(),
         });
     }
-    let run = |machine: &mut Machine, store: &Store| machine.calibrate_platform(store);
+    let run = |machine: &mut Machine, store: &Store| machine.platform()?.calibrate(store);
     let (calibrated, counters) =
         with_zeroed_platform(&args.axis.machine, "calibrate", output, |_| Ok(()), run)?;
     let mut value = calibrated_value(&calibrated);
@@ -98,9 +98,9 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
     let run = |machine: &mut Machine, store: &Store| {
         if compensated {
-            machine.load_active_screws(store)?;
+            machine.platform()?.load_active(store)?;
         }
-        machine.verify_platform(store, compensated)
+        machine.platform()?.verify(store, compensated)
     };
     let (verified, counters) =
         with_zeroed_platform(&args.axis.machine, "verify", output, |_| Ok(()), run)?;
@@ -117,21 +117,29 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_way()?;
     let target = target_pose(&args.targets)?;
-    let possible = |machine: &Machine| {
-        machine.check_pose(target)?;
+    let possible = |machine: &mut Machine| {
+        machine.platform()?.check_pose(target)?;
         if args.align {
-            machine.check_alignable()?;
+            machine.platform()?.check_alignable()?;
         }
         Ok(())
     };
     let run = |machine: &mut Machine, store: &Store| {
-        let calibrations = machine.load_active_screws(store)?;
-        let aligned = args.align.then(|| machine.align_pose(target)).transpose()?;
+        let calibrations = machine.platform()?.load_active(store)?;
+        let aligned = args
+            .align
+            .then(|| machine.platform()?.align(target))
+            .transpose()?;
         let moved = match aligned {
-            None => Some(machine.move_pose(target)?),
+            None => Some(machine.platform()?.move_to(target)?),
             Some(_) => None,
         };
-        Ok((calibrations, moved, aligned, machine.measure_pose()?))
+        Ok((
+            calibrations,
+            moved,
+            aligned,
+            machine.platform()?.measure_pose()?,
+        ))
     };
     let ((calibrations, moved, aligned, seen), counters) =
         with_zeroed_platform(&args.machine, "move", output, possible, run)?;

@@ -105,21 +105,23 @@ fn tell(stand: &mut Stand, output: Output) -> Result<Story, Failure> {
         output.note("1 start: identity, set-up, touch probe, supervision");
         machine.start()?;
         output.note("2 zero: the encoder's index mark");
-        machine.zero_rotary(AXIS)?;
+        machine.rotary(AXIS)?.zero()?;
         output.note("3 plan: how to place a plate that is worse than the table");
         let plan = planned(machine, output)?;
         output.note("4 calibrate: every line in every placement, forward and reverse");
         let options = CalibrateOptions::default();
-        let calibrated = machine.calibrate_rotary(AXIS, store, &options, &mut hand)?;
+        let calibrated = machine
+            .rotary(AXIS)?
+            .calibrate(store, &options, &mut hand)?;
         output.note("5 as found and as left: the plate half a line beside all of these");
-        let left = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+        let left = machine.rotary(AXIS)?.verify(store, true, &mut hand)?;
         output.note("6 power off and on; zero again, as left");
         power_cycle(machine, emulated, HallDrift::default())?;
-        machine.zero_rotary(AXIS)?;
-        let after = machine.verify_rotary(AXIS, store, true, &mut hand)?;
+        machine.rotary(AXIS)?.zero()?;
+        let after = machine.rotary(AXIS)?.verify(store, true, &mut hand)?;
         output.note("7 move: two turns on, across the seam, compensated");
         let target = Radians::from_degrees(SOMEWHERE_DEG);
-        let moved = machine.move_rotary(AXIS, target, Way::Turns)?;
+        let moved = machine.rotary(AXIS)?.move_to(target, Way::Turns)?;
         machine.shut_down()?;
         Ok(Story {
             plan,
@@ -144,8 +146,8 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
     write_page(store, &left, &html)
 }
 
-fn planned(machine: &truestage::Machine, output: Output) -> Result<Design, Failure> {
-    let config = machine.rotary_config(AXIS)?.calibrate.as_ref();
+fn planned(machine: &mut truestage::Machine, output: Output) -> Result<Design, Failure> {
+    let config = machine.rotary(AXIS)?.config().calibrate.as_ref();
     let config = config.ok_or_else(|| Failure::NotConfigured {
         axis: AXIS.to_owned(),
         section: "calibrate",

@@ -39,7 +39,7 @@ fn with_zeroed_table<R>(
     let store = session.store.clone();
     let (result, counters) = session.machine.guarded(|machine| {
         machine.start()?;
-        machine.zero_rotary(&axis)?;
+        machine.rotary(&axis)?.zero()?;
         let result = procedure(machine, &axis, &store)?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.counters())))
@@ -56,7 +56,9 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         };
         let resumed = options.resume.clone();
         resumable(store, "calibrate", axis, resumed.as_deref(), || {
-            machine.calibrate_rotary(axis, store, &options, &mut operator)
+            machine
+                .rotary(axis)?
+                .calibrate(store, &options, &mut operator)
         })
     };
     let (axis, calibrated, counters) =
@@ -78,8 +80,10 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
         // Uncompensated, too: it knows the plate's errors.
-        machine.load_active_rotary(axis, store)?;
-        machine.verify_rotary(axis, store, compensated, &mut operator)
+        machine.rotary(axis)?.load_active(store)?;
+        machine
+            .rotary(axis)?
+            .verify(store, compensated, &mut operator)
     };
     let (axis, verified, counters) =
         with_zeroed_table(&args.axis, "verify", Use::Measurement, output, run)?;
@@ -134,9 +138,13 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         machine.start()?;
         let mut moved = Vec::new();
         for (axis, angle) in &targets {
-            let calibration = machine.load_active_rotary(axis, &store)?;
-            machine.zero_rotary(axis)?;
-            moved.push((axis, machine.move_rotary(axis, *angle, way)?, calibration));
+            let calibration = machine.rotary(axis)?.load_active(&store)?;
+            machine.rotary(axis)?.zero()?;
+            moved.push((
+                axis,
+                machine.rotary(axis)?.move_to(*angle, way)?,
+                calibration,
+            ));
         }
         machine.shut_down()?;
         Ok(moved)

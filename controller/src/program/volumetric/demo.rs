@@ -55,9 +55,12 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     let (made, hours) = machine.guarded(|machine| {
         output.note("1 start: identity, set-up, supervision; zero: the index pulses of x, y and z");
         machine.start()?;
-        machine.zero_volumetric()?;
+        machine.volumetric()?.zero()?;
         output.note("2 calibrate: references, lines by interferometer, cold and 2 h later");
-        let made = machine.calibrate_volumetric(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
+        let made =
+            machine
+                .volumetric()?
+                .calibrate(&store, WarmUp::Idle(WARM_UP), None, &mut hand)?;
         output.note(&calibrated_text(&made));
         output.note("3 eight hours: deviations along a line that no calibration uses");
         let hours = day(machine, &store, &mut hand, output)?;
@@ -115,7 +118,7 @@ fn day(
         if until > Time::ZERO && !pause.is_zero() {
             machine.idle(pause)?;
         }
-        let mut verified = |by| machine.verify_volumetric(store, by, hand);
+        let mut verified = |by| machine.volumetric()?.verify(store, by, hand);
         let found = verified(VerifyBy::AsFound)?;
         let tables = verified(VerifyBy::Tables)?;
         let live = verified(VerifyBy::Everything)?;

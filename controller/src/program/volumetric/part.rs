@@ -39,19 +39,19 @@ struct Ready {
 
 pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
     let path = read(file)?;
-    let session = Session::open(args, "run", Use::Motion, output)?;
+    let mut session = Session::open(args, "run", Use::Motion, output)?;
     let is_measured = session.store.active(GEOMETRY)?.current.is_some();
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
-    let path = judged(&session.machine, (file, &path), is_measured)?;
+    let path = judged(&mut session.machine, (file, &path), is_measured)?;
     output.note(&before_it_moves(file, &path));
     let CsvPath { points, departure } = path;
-    let ready = |machine: &Machine, store: &Store| {
+    let ready = |machine: &mut Machine, store: &Store| {
         if is_first {
-            let (mover, part) = machine.first_part(store)?;
+            let (mover, part) = machine.volumetric()?.first_part(store)?;
             let (mover, part) = (Some(mover), Some(part));
             return Ok(Ready { mover, part });
         }
-        let mover = machine.stored_mover(store)?;
+        let mover = machine.volumetric()?.stored_mover(store)?;
         Ok(Ready { mover, part: None })
     };
     let follow =
@@ -108,7 +108,7 @@ fn departure_value(departure: &Departure) -> Value {
 /// Reads and judges all of the path, point by point as it will be driven: what cannot be made to
 /// its end is not begun.
 fn judged(
-    machine: &Machine,
+    machine: &mut Machine,
     (file, text): (&Path, &str),
     is_corrected: bool,
 ) -> Result<CsvPath, Failure> {
@@ -116,7 +116,7 @@ fn judged(
         path: file.to_owned(),
         source,
     };
-    let mover = machine.uncorrected_mover()?;
+    let mover = machine.volumetric()?.uncorrected_mover()?;
     let engine = mover.engine();
     let path = read_path(text, engine.axes(), engine.period());
     let path = path.map_err(|source| Failure::Usage {
@@ -130,7 +130,7 @@ fn judged(
         for (point, period) in path.points.iter().zip(0..) {
             let place = Point::new(point[0], point[1], point[2]);
             let at_s = f64::from(period) * engine.period().as_secs_f64();
-            let checked = machine.check_volume(place).map_err(Box::new);
+            let checked = machine.volumetric()?.check(place).map_err(Box::new);
             checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
         }
     }
@@ -146,19 +146,21 @@ fn followed(
     let is_corrected = mover.is_some();
     let mut mover = match mover {
         Some(mover) => mover,
-        None => machine.uncorrected_mover()?,
+        None => machine.volumetric()?.uncorrected_mover()?,
     };
-    machine.correct_volume(&mut mover, is_corrected)?;
+    machine.volumetric()?.correct(&mut mover, is_corrected)?;
     if let Some(part) = &part {
         part.recorder.listen();
     }
     let mut corrected = CorrectedPath::default();
     let count = points.len();
-    machine.drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
+    machine
+        .volumetric()?
+        .drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
     let timing = mover.engine().timing();
     let (timing, thread) = (timing.to_string(), timing.scheduling.clone());
     let kept = match part {
-        Some(part) => Some(machine.keep_part(store, mover, part)?),
+        Some(part) => Some(machine.volumetric()?.keep_part(store, mover, part)?),
         None => None,
     };
     Ok(Followed {
@@ -225,8 +227,11 @@ impl CorrectedPath {
 
 pub(crate) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
-    let ready = |machine: &Machine, store: &Store| machine.check_memory(store, which);
-    let record = |machine: &mut Machine, store: &Store, ()| machine.record_memory(store, which);
+    let ready =
+        |machine: &mut Machine, store: &Store| machine.volumetric()?.check_memory(store, which);
+    let record = |machine: &mut Machine, store: &Store, ()| {
+        machine.volumetric()?.record_memory(store, which)
+    };
     let (kept, counters) =
         with_zeroed_volume(&args.machine, "memory", Use::Motion, output, ready, record)?;
     let text = format!(
@@ -275,8 +280,11 @@ fn kept_value(kept: &Remembered) -> Value {
 
 pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
-    let session = Session::open(&args.machine, "memory", Use::Motion, output)?;
-    let (before, foreign) = session.machine.clear_memory(&session.store, which)?;
+    let mut session = Session::open(&args.machine, "memory", Use::Motion, output)?;
+    let (before, foreign) = session
+        .machine
+        .volumetric()?
+        .clear_memory(&session.store, which)?;
     let text = match &before {
         Some(id) => format!("{} is kept no more", short(id)),
         None => "nothing was kept".into(),
@@ -325,8 +333,8 @@ mod tests {
     fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
         let toml = include_str!("../../../../configs/machines/volumetric.toml");
         let loaded = config::parse(toml, "volumetric.toml").unwrap();
-        let machine = Machine::new(&loaded, Box::new(Nobody));
-        judged(&machine, (Path::new("path.csv"), text), is_corrected)
+        let mut machine = Machine::new(&loaded, Box::new(Nobody));
+        judged(&mut machine, (Path::new("path.csv"), text), is_corrected)
     }
 
     /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.

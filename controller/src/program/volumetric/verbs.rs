@@ -36,7 +36,7 @@ pub(crate) fn with_zeroed_volume<P, R>(
     verb: &str,
     purpose: Use,
     output: Output,
-    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    prepare: impl FnOnce(&mut Machine, &Store) -> Result<P, Failure>,
     procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     zeroed_volume(
@@ -49,14 +49,14 @@ pub(crate) fn with_zeroed_volume<P, R>(
 /// The same on a machine that is connected.
 pub(crate) fn zeroed_volume<P, R>(
     mut session: Session,
-    prepare: impl FnOnce(&Machine, &Store) -> Result<P, Failure>,
+    prepare: impl FnOnce(&mut Machine, &Store) -> Result<P, Failure>,
     procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
         let prepared = prepare(machine, &store)?;
-        machine.zero_volumetric()?;
+        machine.volumetric()?.zero()?;
         let result = procedure(machine, &store, prepared)?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.counters())))
@@ -64,7 +64,7 @@ pub(crate) fn zeroed_volume<P, R>(
 }
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
-    let (machine, ready) = (&args.machine, |_: &Machine, _: &Store| Ok(()));
+    let (machine, ready) = (&args.machine, |_: &mut Machine, _: &Store| Ok(()));
     let run = |_: &mut Machine, _: &Store, ()| Ok(());
     let ((), counters) = with_zeroed_volume(machine, "zero", Use::Motion, output, ready, run)?;
     let text = "x, y and z: zero found on their index pulses";
@@ -77,8 +77,8 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 pub(crate) fn reference(args: &MachineArgs, output: Output) -> Ended {
     // Before any bus: a machine of another kind would be asked for a calibration of this one's.
     has_a_volume(&config::load(&args.config)?.config)?;
-    let ready = |_: &Machine, store: &Store| measured_geometry(store);
-    let run = |machine: &mut Machine, store: &Store, _| machine.reference_volumetric(store);
+    let ready = |_: &mut Machine, store: &Store| measured_geometry(store);
+    let run = |machine: &mut Machine, store: &Store, _| machine.volumetric()?.reference(store);
     let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;
     let mut value = referenced_value(&taken);
     value["counters"] = counters;
@@ -142,13 +142,15 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         }
     };
     let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
-    let ready = |_: &Machine, store: &Store| {
+    let ready = |_: &mut Machine, store: &Store| {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
     };
     let run = |machine: &mut Machine, store: &Store, resume: Option<PathBuf>| {
         let resume = resume.as_deref();
         resumable(store, "calibrate", GEOMETRY, resume, || {
-            machine.calibrate_volumetric(store, warm_up, resume, &mut operator)
+            machine
+                .volumetric()?
+                .calibrate(store, warm_up, resume, &mut operator)
         })
     };
     let (machine, purpose) = (&args.axis.machine, Use::Measurement);
@@ -256,9 +258,10 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         true => VerifyBy::AsFound,
         false => VerifyBy::Everything,
     };
-    let ready = |machine: &Machine, store: &Store| machine.check_verify(store, by);
+    let ready =
+        |machine: &mut Machine, store: &Store| machine.volumetric()?.check_verify(store, by);
     let run = |machine: &mut Machine, store: &Store, ()| {
-        machine.verify_volumetric(store, by, &mut operator)
+        machine.volumetric()?.verify(store, by, &mut operator)
     };
     let (machine, purpose) = (&args.axis.machine, Use::Measurement);
     let (verified, counters) = with_zeroed_volume(machine, "verify", purpose, output, ready, run)?;
@@ -338,23 +341,29 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
             help: "write AXIS=PLACE with a unit: x=12.5mm y=20mm z=5mm".into(),
         });
     }
-    let ready = |machine: &Machine, store: &Store| {
-        let index_mm = machine.volumetric_config()?.zero.index_mm;
+    let ready = |machine: &mut Machine, store: &Store| {
+        let index_mm = machine.volumetric()?.config().zero.index_mm;
         let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
         let target = Point::new(at(0), at(1), at(2));
-        let mover = machine.stored_mover(store)?;
-        machine.uncorrected_mover()?.check_target(target)?;
+        let mover = machine.volumetric()?.stored_mover(store)?;
+        machine
+            .volumetric()?
+            .uncorrected_mover()?
+            .check_target(target)?;
         if mover.is_some() {
-            machine.check_volume(target)?;
+            machine.volumetric()?.check(target)?;
         }
         Ok((mover, target))
     };
     let run = |machine: &mut Machine, _: &Store, (mover, target): (Option<Mover>, Point)| {
         let Some(mut mover) = mover else {
-            return machine.go_straight(target).map(|()| None);
+            return machine.volumetric()?.go_straight(target).map(|()| None);
         };
-        machine.correct_volume(&mut mover, true)?;
-        machine.drive_to(&mut mover, target, STAND).map(Some)
+        machine.volumetric()?.correct(&mut mover, true)?;
+        machine
+            .volumetric()?
+            .drive_to(&mut mover, target, STAND)
+            .map(Some)
     };
     let machine = &args.machine;
     let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;

@@ -37,13 +37,13 @@ pub use evaluate::VolumetricEvaluated;
 pub use plan::volume_plan;
 pub use scatter::{Off, Scatter, WorstReading};
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::run::{note_failure, utc_now};
 use crate::store::{
     CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
     SCHEMA_VERSION, Store,
 };
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
 use crate::volumetric::reference::References;
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
@@ -108,7 +108,7 @@ struct Session<'a> {
     read: VolumeRead,
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Takes references, reads all lines that tell this machine's errors, then (unless it is not
     /// wanted) lets it become warm and reads those again that tell what warmth does; finds the
     /// errors, stores and activates them with their references. With `resume` the lines that are
@@ -119,18 +119,19 @@ impl Machine {
     /// When an axis is not zeroed, a line cannot be set up or read, the readings do not tell all
     /// errors or scatter too much, the result cannot be applied, or anything stops the machine; when the journal is one
     /// of another run, or its references hold no more. What was in use before stays in use then.
-    pub fn calibrate_volumetric(
+    pub fn calibrate(
         &mut self,
         store: &Store,
         warm_up: WarmUp,
         resume: Option<&Path>,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricCalibrated, Failure> {
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         let drives = self.volume_drives(&config);
         let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
-        let header = self.volume_header("calibrate", None)?;
-        let (mut journal, read) = resume::open(store, &header, plan, resume, &self.config_hash)?;
+        let header = self.header("calibrate", None)?;
+        let (mut journal, read) =
+            resume::open(store, &header, plan, resume, self.core.config_hash)?;
         let made = self
             .calibration_session(config, lines, read, &mut journal, operator)
             .and_then(|mut session| {
@@ -144,16 +145,16 @@ impl Machine {
     }
 
     /// The first line of a journal of three axes.
-    pub(super) fn volume_header(
+    pub(super) fn header(
         &self,
         verb: &str,
         calibration: Option<String>,
     ) -> Result<JournalHeader, Failure> {
         let section = "calibrate";
-        let own = self.volumetric_config()?.calibrate.as_ref();
+        let own = self.config.calibrate.as_ref();
         let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
         let instrument = &own.instrument;
-        if !self.config.instrument.contains_key(instrument) {
+        if !self.core.config.instrument.contains_key(instrument) {
             let instrument = instrument.clone();
             return Err(VolumetricFailure::NoInstrument { instrument }.into());
         }
@@ -169,7 +170,7 @@ impl Machine {
             // It is brought along: who it is shows when it is switched on.
             instrument: InstrumentRecord {
                 identity: String::new(),
-                ..self.instrument_record(instrument)
+                ..self.core.instrument_record(instrument)
             },
             started: utc_now(),
             calibration,
@@ -230,7 +231,7 @@ impl Machine {
                 let entry = VolumeReferencesEntry {
                     content: taken.content,
                     temperatures_c: taken.temperatures.iter().map(|it| it.value()).collect(),
-                    at_s: self.now().seconds(),
+                    at_s: self.core.now().seconds(),
                 };
                 journal.write(&Entry::VolumeReferences(entry.clone()))?;
                 journal.flush_to_disk()?;
@@ -244,7 +245,7 @@ impl Machine {
             .iter()
             .any(|plan| plan.lines.iter().any(|it| it.warm));
         let known = Known::new(&config, &references.temperatures, is_warm)?;
-        let thermometry = Thermometry::new(self.config(), &config.temperature);
+        let thermometry = Thermometry::new(self.core.config, &config.temperature);
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
             if let Some(drift) = beam.and_then(beam_drift) {
@@ -267,14 +268,14 @@ impl Machine {
     }
 
     fn become_warm(&mut self, how: WarmUp) -> Result<(), Failure> {
-        let config = self.volumetric_config()?.clone();
+        let config = self.config.clone();
         let corners = [point_of_mm(config.low_mm), point_of_mm(config.high_mm)];
         match how {
             WarmUp::None => {}
-            WarmUp::Idle(span) => self.idle(span)?,
+            WarmUp::Idle(span) => self.core.idle(span)?,
             WarmUp::Travel(span) => {
-                let until = self.now() + span;
-                while self.now() < until {
+                let until = self.core.now() + span;
+                while self.core.now() < until {
                     for corner in corners {
                         self.go_straight(corner)?;
                     }
@@ -282,7 +283,7 @@ impl Machine {
             }
         }
         for axis in &config.axes {
-            self.enable(axis)?;
+            self.core.enable(axis)?;
         }
         Ok(())
     }
@@ -296,13 +297,13 @@ impl Machine {
         let shape = function_shape(session.config.compensation.interpolation);
         let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
         // What cannot be applied must not be stored as what is in use.
-        evaluated.check(self.config(), Some(&session.references.content))?;
+        evaluated.check(self.core.config, Some(&session.references.content))?;
         let source = journal.path().file_name().unwrap_or_default();
         let source = source.to_string_lossy().into_owned();
         let head = RecordHead {
             created: utc_now(),
             source: source.clone(),
-            instrument: self.instrument_record(&session.own.instrument),
+            instrument: self.core.instrument_record(&session.own.instrument),
             ..self.this_volume(GEOMETRY)?
         };
         let content = evaluated.content(&session.config);

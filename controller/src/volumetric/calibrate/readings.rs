@@ -7,16 +7,16 @@ use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres};
 
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::store::{Entry, Journal};
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::correction::lever;
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{LineReadEntry, LineReadingEntry};
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Reads the line of this number, by whatever reads it.
     pub(super) fn run_line(
         &mut self,
@@ -37,7 +37,7 @@ impl Machine {
         let whole = LineReadEntry {
             line: at,
             temperatures_c: shown.iter().map(|it| it.value()).collect(),
-            at_s: self.now().seconds(),
+            at_s: self.core.now().seconds(),
         };
         journal.write(&Entry::LineRead(whole.clone()))?;
         journal.flush_to_disk()?;

@@ -13,11 +13,11 @@ use compensator::volumetric::Axis;
 use units::{Metres, Radians};
 
 use crate::config::ConfigHash;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::store::{
     Entry, Journal, JournalHeader, Store, StoreError, first_difference, not_resumable,
 };
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::warmth_tolerance_k;
 use crate::volumetric::settings::{beam_drift, volume_axis};
 use crate::volumetric::{AXES, VolumePlanEntry, VolumeRead, VolumeReferencesEntry};
@@ -94,7 +94,7 @@ impl From<&VolumeReferencesEntry> for References {
     }
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Whether what the detectors read now (`taken`) leaves `kept`, the references of the run that
     /// is continued, what they were.
     pub(super) fn still_holds(

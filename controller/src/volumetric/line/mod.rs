@@ -25,9 +25,9 @@ use measure::Measure;
 pub use task::{LineOperator, LineOptics, LineTask};
 
 use crate::assemble;
-use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::volumetric::VolumetricFailure;
+use crate::volumetric::handle::WorkVolume;
 
 /// How long the machine lives between two looks at the person, or at the light.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -100,7 +100,7 @@ impl Line {
     }
 }
 
-impl Machine {
+impl WorkVolume<'_> {
     /// Goes to the line's start, has the line set up there with all axes switched off, and makes
     /// the instrument read zero.
     ///
@@ -116,25 +116,25 @@ impl Machine {
     ) -> Result<Line, Failure> {
         let along = task.direction().ok_or(VolumetricFailure::NotALine)?;
         let measure = self.measure_of(task.optics, &readout.instrument)?;
-        let axes = self.volumetric_config()?.axes.clone();
-        self.leave_instrument();
+        let axes = self.config.axes.clone();
+        self.core.leave_instrument();
         self.go_straight(task.start)?;
         self.rest_all(REST)?;
         for axis in &axes {
-            self.disable(axis)?;
+            self.core.disable(axis)?;
         }
         operator.ask_line(task)?;
         while !operator.is_set_up()? {
-            let look = self.now() + LOOK_EVERY;
-            self.tick(look)?;
+            let look = self.core.now() + LOOK_EVERY;
+            self.core.tick(look)?;
         }
         // Whoever mounts something pushes the slides; this switches them on again.
         self.go_straight(task.start)?;
         self.find_light(&readout.instrument)?;
         let offset = self.read_path(readout)?.vacuum;
-        let config = &self.config.instrument[&readout.instrument];
+        let config = &self.core.config.instrument[&readout.instrument];
         let settings = settings::line_corrections(config, measure.has_two_beams());
-        let environment = self.instrument_environment(&readout.instrument)?;
+        let environment = self.core.instrument(&readout.instrument)?.environment();
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(settings, &environment);
         let length = length.map_err(|source| Failure::Correction {
@@ -154,7 +154,7 @@ impl Machine {
     /// Goes to `at` and reads the line there.
     ///
     /// # Errors
-    /// As [`Machine::go_straight`]; a lost beam; a reading that no machine can make.
+    /// As [`Self::go_straight`]; a lost beam; a reading that no machine can make.
     pub fn read_line(&mut self, line: &Line, at: Point) -> Result<LineReading, Failure> {
         self.go_straight(at)?;
         self.read_line_here(line, at)
@@ -171,7 +171,7 @@ impl Machine {
     ) -> Result<LineReading, Failure> {
         let counted = self.read_path(&line.readout)?;
         let instrument = &line.readout.instrument;
-        let environment = self.instrument_environment(instrument)?;
+        let environment = self.core.instrument(instrument)?.environment();
         let environment = assemble::correction_environment(&environment);
         let failed = |source| Failure::Correction {
             instrument: instrument.clone(),
@@ -180,7 +180,7 @@ impl Machine {
         let optical = counted.vacuum - line.offset;
         let corrected = line.length.correct(optical, &environment).map_err(failed)?;
         let budget = line.length.budget(optical, &environment).map_err(failed)?;
-        let own_nm = self.config.instrument[instrument].instrument_standard_uncertainty_nm;
+        let own_nm = self.core.config.instrument[instrument].instrument_standard_uncertainty_nm;
         let mean = counted.standard_deviation / f64::from(counted.samples).sqrt();
         let parts = [Metres(own_nm * 1e-9), mean, combined(&budget)].map(Metres::value);
         let u = Metres(parts.iter().map(|it| it * it).sum::<f64>().sqrt());
@@ -202,7 +202,7 @@ impl Machine {
     /// # Errors
     /// When nobody can be told.
     pub fn end_lines(&mut self, operator: &mut dyn LineOperator) -> Result<(), Failure> {
-        self.forget_instruments();
+        self.core.forget_instruments();
         operator.pack_up()
     }
 
@@ -220,17 +220,17 @@ impl Machine {
     /// Waits until all axes have stood for `span` without a break, by their encoders: after a
     /// cyclic motion no drive has a target that it could report as reached.
     fn rest_all(&mut self, span: Duration) -> Result<(), Failure> {
-        let axes = self.volumetric_config()?.axes.clone();
-        let limit = self.patience().of(SETTLING_LIMIT) + span;
-        let begin = self.now();
+        let axes = self.config.axes.clone();
+        let limit = self.core.patience().of(SETTLING_LIMIT) + span;
+        let begin = self.core.now();
         let mut since = begin;
-        while self.now().since(since) < span {
-            self.tick(since + span)?;
+        while self.core.now().since(since) < span {
+            self.core.tick(since + span)?;
             for axis in &axes {
-                if self.reading(axis)?.is_some_and(|it| it.at_rest) {
+                if self.core.reading(axis)?.is_some_and(|it| it.at_rest) {
                     continue;
                 }
-                since = self.now();
+                since = self.core.now();
                 if since.since(begin) > limit {
                     return Err(Failure::Machine(machine::Failure::Overdue {
                         device: axis.clone(),
@@ -245,7 +245,7 @@ impl Machine {
 
     fn measure_of(&self, optics: LineOptics, instrument: &str) -> Result<Measure, Failure> {
         let named = || instrument.to_owned();
-        let config = self.config.instrument.get(instrument);
+        let config = self.core.config.instrument.get(instrument);
         let config = config.ok_or_else(|| VolumetricFailure::NoInstrument {
             instrument: named(),
         })?;
@@ -259,18 +259,18 @@ impl Machine {
     /// Waits until the instrument counts, and lets its alarms count from then on: whoever set the
     /// line up had his hands in the beam.
     fn find_light(&mut self, instrument: &str) -> Result<(), Failure> {
-        self.use_instrument(instrument)?;
-        self.leave_instrument();
-        let limit = self.now() + self.patience().of(LIGHT_LIMIT);
+        self.core.use_instrument(instrument)?;
+        self.core.leave_instrument();
+        let limit = self.core.now() + self.core.patience().of(LIGHT_LIMIT);
         loop {
-            let now = self.now();
-            self.set_instrument_datum(instrument)?;
-            self.run_until(now + LOOK_EVERY)?;
-            let is_lit = self.instrument(instrument)?.latest().is_some();
+            let now = self.core.now();
+            self.core.set_instrument_datum(instrument)?;
+            self.core.run_until(now + LOOK_EVERY)?;
+            let is_lit = self.core.instrument(instrument)?.latest().is_some();
             if is_lit {
-                return Ok(self.use_instrument(instrument)?);
+                return Ok(self.core.use_instrument(instrument)?);
             }
-            if self.now() >= limit {
+            if self.core.now() >= limit {
                 let instrument = instrument.to_owned();
                 return Err(VolumetricFailure::NoLight { instrument }.into());
             }
@@ -280,14 +280,16 @@ impl Machine {
     /// Lets the machine stand, then averages.
     fn read_path(&mut self, readout: &LineReadout) -> Result<DisplacementReading, Failure> {
         self.rest_all(readout.settle)?;
-        let rate_hz = self.config.instrument[&readout.instrument].sample_rate_hz;
-        Ok(self.average(&readout.instrument, readout.samples, rate_hz)?)
+        let rate_hz = self.core.config.instrument[&readout.instrument].sample_rate_hz;
+        Ok(self
+            .core
+            .average(&readout.instrument, readout.samples, rate_hz)?)
     }
 
     /// What is beyond anything that can be compensated is no error of the machine, but wrong
     /// optics, a wrong sign or a count that was lost.
     fn judge_reading(&self, line: &Line, way: Point, reading: &Reading) -> Result<(), Failure> {
-        let limits = &self.volumetric_config()?.compensation;
+        let limits = &self.config.compensation;
         let size = Metres::from_um(2.0 * limits.size_limit_um);
         let tilt = Radians(limits.slope_limit);
         // A straightedge lies as well as a hand can lay it.

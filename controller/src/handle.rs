@@ -1,0 +1,68 @@
+//! What the handles of all kinds work on.
+
+use core::ops::{Deref, DerefMut};
+
+use crate::config::{ConfigHash, MachineConfig};
+use crate::run;
+use crate::store::{IdentityRecord, InstrumentRecord, RecordHead};
+
+/// A machine below a handle, and the configuration it was assembled of.
+pub(crate) struct Core<'m> {
+    pub(crate) machine: &'m mut machine::Machine,
+    pub(crate) config: &'m MachineConfig,
+    pub(crate) config_hash: &'m ConfigHash,
+}
+
+impl<'m> Core<'m> {
+    pub(crate) const fn new(
+        machine: &'m mut machine::Machine,
+        config: &'m MachineConfig,
+        config_hash: &'m ConfigHash,
+    ) -> Self {
+        Self {
+            machine,
+            config,
+            config_hash,
+        }
+    }
+}
+
+impl Core<'_> {
+    /// The head of a record without measurements, which says who this machine is.
+    pub(crate) fn this_machine(&self, axis: &str) -> RecordHead {
+        run::this_machine(self.machine, (self.config, self.config_hash), axis)
+    }
+
+    /// What the records say of the instrument `name`.
+    pub(crate) fn instrument_record(&self, name: &str) -> InstrumentRecord {
+        let config = &self.config.instrument[name];
+        InstrumentRecord {
+            name: name.to_owned(),
+            identity: self.identity(name).unwrap_or_default().name,
+            air_corrected: config.correct_air,
+            material_corrected: config.correct_material,
+            dead_path_corrected: config.correct_dead_path,
+            cosine_corrected: config.correct_cosine,
+            standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
+        }
+    }
+
+    /// What the records say of the drive of `axis`.
+    pub(crate) fn drive_record(&self, axis: &str) -> IdentityRecord {
+        run::drive_record(self.machine, axis)
+    }
+}
+
+impl Deref for Core<'_> {
+    type Target = machine::Machine;
+
+    fn deref(&self) -> &machine::Machine {
+        self.machine
+    }
+}
+
+impl DerefMut for Core<'_> {
+    fn deref_mut(&mut self) -> &mut machine::Machine {
+        self.machine
+    }
+}

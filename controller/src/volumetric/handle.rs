@@ -1,0 +1,31 @@
+//! The handle of a work volume.
+
+use units::Metres;
+
+use crate::failure::Failure;
+use crate::handle::Core;
+use crate::volumetric::VolumetricConfig;
+
+/// The work volume of three axes: its zero, its moves, its calibration and its references.
+/// [`Machine::volumetric`](crate::Machine::volumetric) gives it.
+pub struct WorkVolume<'m> {
+    pub(crate) core: Core<'m>,
+    pub(crate) config: &'m VolumetricConfig,
+}
+
+impl<'m> WorkVolume<'m> {
+    /// Its section of the configuration.
+    pub const fn config(&self) -> &'m VolumetricConfig {
+        self.config
+    }
+}
+
+impl WorkVolume<'_> {
+    /// Moves one axis to `target` as its drive counts, within its soft limits.
+    pub(super) fn go(&mut self, axis: &str, target: Metres) -> Result<(), Failure> {
+        self.core.require_zeroed(axis)?;
+        self.core.check_soft_limits(axis, target)?;
+        let speed = self.core.axis_settings(axis)?.speed;
+        Ok(self.core.profile_move(axis, target, speed)?)
+    }
+}
