@@ -6,7 +6,7 @@
 use truestage::emulated::Emulated;
 use truestage::linear::VerifyOptions;
 use truestage::run::CalibrateOptions;
-use truestage::{Machine, Store, config};
+use truestage::{Machine, config, store_in};
 
 const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
 const STAGE: &str = include_str!("../../configs/emulated/linear.toml");
@@ -16,7 +16,7 @@ const SEED: u64 = 7;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let loaded = config::parse(MACHINE, "linear.toml")?;
-    let store = Store::new(folder.path(), &loaded.config.machine.name);
+    let store = store_in(folder.path(), &loaded.config.machine.name);
     let emulated = Emulated::new(STAGE, SEED, &loaded.config)?;
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
     let verified = machine.guarded(|machine| {

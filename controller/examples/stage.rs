@@ -3,7 +3,7 @@
 //! `cargo run --example stage -- machine.toml x 12.5`
 #![expect(clippy::print_stdout, reason = "an example shows where the stage is")]
 use truestage::store::Lease;
-use truestage::{Machine, Store, config, ports};
+use truestage::{Machine, config, ports, store_of};
 use units::Metres;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let target = Metres::from_mm(target_mm.parse()?);
     let loaded = config::load(file.as_ref())?;
-    let store = Store::of(&loaded.config.machine);
+    let store = store_of(&loaded.config.machine);
     // Nobody else drives this machine meanwhile.
     let _lease = Lease::take(&store, "move")?;
     let ports = ports::open(&loaded.config, &Default::default(), ports::Use::Motion, 1.0)?;

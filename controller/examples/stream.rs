@@ -3,12 +3,12 @@
 //! `cargo run --example stream -- machine.toml path.csv` (`time_s,x_mm`)
 #![expect(clippy::print_stdout, reason = "an example shows what it reads")]
 use truestage::engine::{Engine, State, read_path};
-use truestage::{Failure, Machine, Store, config, ports, store::Lease};
+use truestage::{Failure, Machine, config, ports, store::Lease, store_of};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().collect();
     let loaded = config::load(words[1].as_ref())?;
-    let store = Store::new(&loaded.config.machine.data_dir, &loaded.config.machine.name);
+    let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "stream")?;
     let ports = ports::open(&loaded.config, &Default::default(), ports::Use::Motion, 1.0)?;
     let mut machine = Machine::new(&loaded, Box::new(ports));

@@ -7,14 +7,14 @@
 //! # A stage in a program of yours
 //!
 //! ```no_run
-//! use truestage::{Failure, Machine, Store, config, ports};
+//! use truestage::{Failure, Machine, config, ports, store_of};
 //! use units::Metres;
 //!
 //! fn main() -> Result<(), Failure> {
 //!     let loaded = config::load("machine.toml".as_ref())?;
 //!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), ports::Use::Motion, 1.0)?;
 //!     let mut machine = Machine::new(&loaded, Box::new(transport));
-//!     let store = Store::of(&loaded.config.machine);
+//!     let store = store_of(&loaded.config.machine);
 //!     machine.guarded(|machine| {
 //!         machine.start()?;
 //!         machine.linear("x")?.zero(&store)?;
@@ -52,6 +52,7 @@ pub mod ports;
 pub mod rotary;
 pub mod run;
 pub mod store;
+mod stores;
 pub mod text;
 pub mod volumetric;
 
@@ -62,3 +63,4 @@ pub use machine::{
     Desk, Engine, EngineFailure, Found, Observer, Patience, Silent, Stage, StopRequest, engine,
 };
 pub use store::Store;
+pub use stores::{CONTENTS, store_in, store_of, store_of_journal};

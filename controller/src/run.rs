@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
 use crate::store::{
-    Entry, EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, RecordHead, SCHEMA_VERSION,
+    EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, Log, RecordHead, SCHEMA_VERSION,
 };
 
 /// How a calibration is made.
@@ -33,12 +33,10 @@ pub(crate) fn missing(axis: &str, section: &'static str) -> Failure {
     }
 }
 
-pub(crate) fn note_failure(journal: &mut Journal, failure: &Failure) {
+pub(crate) fn note_failure<L: Log>(journal: &mut Journal<L>, failure: &Failure) {
     // The failure itself is on its way to the operator; a journal that cannot take the note
     // as well changes nothing about it.
-    let _ = journal.write(&Entry::Failed {
-        cause: failure.to_string(),
-    });
+    let _ = journal.fail(failure.to_string());
 }
 
 /// The head of a record without measurements, which says who `machine` is.

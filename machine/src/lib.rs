@@ -21,6 +21,7 @@ mod observer;
 mod outbox;
 mod parts;
 mod patience;
+pub mod records;
 mod scan;
 mod stop_request;
 mod stopping;

@@ -3,7 +3,6 @@
 use std::fs;
 
 use tests::LINEAR;
-use truestage::Store;
 use truestage::store::Lease;
 
 use crate::programs::{check_error, text, truestage};
@@ -37,7 +36,7 @@ fn no_calibration_is_activated_or_rolled_back_while_another_program_has_the_mach
     let activate = |id: &str| truestage(here, &["cal", "activate", "machine.toml", id]);
     let back = || truestage(here, &["cal", "rollback", "machine.toml", "--axis", "x"]);
     activate(first).with_code(0);
-    let store = Store::new(&here.join("machine-data"), "linear");
+    let store = truestage::store_in(&here.join("machine-data"), "linear");
     let verify = Lease::take(&store, "verify").expect("nobody else has it");
     for refused in [activate(second), back()] {
         check_error(

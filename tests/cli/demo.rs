@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use tests::{Edit, Rig, UVW, UVW_COPLEY};
-use truestage::{Store, config};
+use truestage::config;
 
 use crate::programs::{live_rigs, truestage};
 
@@ -81,11 +81,11 @@ fn both_platforms_shown_in_one_folder_keep_their_calibrations() {
         let machine = config::parse(&text, "machine.toml");
         let machine = machine.unwrap_or_else(|error| panic!("{error}"));
         let machine = machine.config.machine;
-        let store = Store::of(&machine);
+        let store = truestage::store_of(&machine);
         for screw in ["u", "v", "w"] {
             let active = store.active(screw).expect("it can be read").current;
             let id = active.unwrap_or_else(|| panic!("{}: {screw} has none", machine.name));
-            let head = store.load(&id).expect("it is whole").head;
+            let head = store.glance(&id).expect("it is whole").head;
             assert_eq!(
                 (head.machine, head.stage_serial),
                 (machine.name.clone(), machine.stage_serial.clone())

@@ -10,6 +10,7 @@ use drivers::transport::live::{Live, SlcanSettings};
 use drivers::transport::lockstep::Participant;
 use nix::sys::signal::Signal;
 use tests::Rig;
+use truestage::linear::LinearLog;
 use truestage::linear::PointEntry;
 use truestage::store::{ReadJournal, read_journal};
 use wire::{Input, Payload, Port};
@@ -36,16 +37,16 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The one journal of a calibration, as far as it is written.
-fn journal(bench: &Bench) -> Option<ReadJournal> {
+fn journal(bench: &Bench) -> Option<ReadJournal<LinearLog>> {
     let runs = files(&bench.records().join("runs"));
     let path = runs
         .iter()
         .find(|path| path.to_string_lossy().contains("-calibrate-"))?;
-    read_journal(path).ok()
+    read_journal::<LinearLog>(path).ok()
 }
 
 fn points(bench: &Bench) -> Vec<PointEntry> {
-    journal(bench).map_or_else(Vec::new, |journal| journal.points)
+    journal(bench).map_or_else(Vec::new, |journal| journal.log.points)
 }
 
 /// A calibration that has measured at least `count` points.
@@ -74,7 +75,7 @@ fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
         ended.with_code(130);
         let before = journal(&bench).expect("the points are kept");
         assert!(!before.complete);
-        assert!(before.points.len() >= RUN + 3);
+        assert!(before.log.points.len() >= RUN + 3);
         let none = bench.run(&["cal", "list"]).with_code(0);
         assert_eq!(none["calibrations"], serde_json::json!([]));
 
@@ -85,8 +86,8 @@ fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
         let first_run = |all: &[PointEntry]| -> Vec<PointEntry> {
             all.iter().filter(|point| point.run == 1).copied().collect()
         };
-        assert_eq!(first_run(&after.points), first_run(&before.points));
-        assert_eq!(first_run(&after.points).len(), RUN);
+        assert_eq!(first_run(&after.log.points), first_run(&before.log.points));
+        assert_eq!(first_run(&after.log.points).len(), RUN);
     }
 }
 
@@ -98,7 +99,7 @@ fn a_killed_process_leaves_a_stage_that_stops_by_itself_and_no_half_file() {
         process.signal(Signal::SIGKILL);
         assert_eq!(process.end().code, None);
         let torn = journal(&bench).expect("every point that was written can be read");
-        assert!(torn.points.len() >= 3 && !torn.complete);
+        assert!(torn.log.points.len() >= 3 && !torn.complete);
         drive_complains_of_a_silent_master(&bench);
         for path in files(&bench.records()) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();

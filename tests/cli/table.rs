@@ -4,6 +4,7 @@ use std::fs;
 
 use nix::sys::signal::Signal;
 use tests::{Edit, ROTARY, Rig};
+use truestage::rotary::PlateLog;
 use truestage::rotary::SweepEntry;
 use truestage::store::{ReadJournal, read_journal};
 
@@ -25,15 +26,15 @@ fn bench(rig: Rig) -> Bench {
 }
 
 /// The one journal of a calibration, as far as it is written.
-fn journal(bench: &Bench) -> Option<ReadJournal> {
+fn journal(bench: &Bench) -> Option<ReadJournal<PlateLog>> {
     let runs = fs::read_dir(bench.records().join("runs")).ok()?;
     let paths = runs.map(|it| it.expect("a folder can be read").path());
     let mut paths = paths.filter(|path| path.to_string_lossy().contains("-calibrate-"));
-    read_journal(&paths.next()?).ok()
+    read_journal::<PlateLog>(&paths.next()?).ok()
 }
 
-fn of_the_first(journal: &ReadJournal) -> Vec<SweepEntry> {
-    let sweeps = journal.sweeps.iter();
+fn of_the_first(journal: &ReadJournal<PlateLog>) -> Vec<SweepEntry> {
+    let sweeps = journal.log.sweeps.iter();
     sweeps.filter(|it| it.offset == 0.0).cloned().collect()
 }
 
@@ -46,7 +47,7 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         refuses_without_a_person(&bench);
 
         let mut process = bench.start(&["calibrate", "--yes"]);
-        process.wait_until(|| journal(&bench).is_some_and(|it| it.placements.len() == 1));
+        process.wait_until(|| journal(&bench).is_some_and(|it| it.log.placements.len() == 1));
         process.signal(Signal::SIGKILL);
         assert_eq!(process.end().code, None);
         let before = journal(&bench).expect("whole placements are kept");
@@ -57,7 +58,7 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         assert!(!resumed.said.contains("placement 1 of 3"), "{resumed:?}");
         let calibrated = resumed.with_code(0);
         let after = journal(&bench).expect("it is the same journal");
-        assert!(after.complete && after.placements.len() == 3);
+        assert!(after.complete && after.log.placements.len() == 3);
         assert_eq!(of_the_first(&after), of_the_first(&before));
         assert_eq!(calibrated["offsets"], serde_json::json!([0, 73, 162]));
         let id = text(&calibrated["calibration"]);

@@ -8,7 +8,9 @@ use std::path::Path;
 use tests::volume::{Volume, good, quick};
 use tests::{Edit, VOLUMETRIC};
 use truestage::store::read_journal;
+use truestage::volumetric::GeometryContent;
 use truestage::volumetric::OpticsName;
+use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{VerifyBy, WarmUp};
 
 use crate::programs::{check_error, check_says, number, page, text, truestage};
@@ -109,11 +111,11 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
 
 /// The readings of a run as a file that somebody else might have made.
 fn csv_of(journal: &str) -> String {
-    let read = read_journal(Path::new(journal)).expect("it can be read");
-    let plan = read.volume.plan.expect("it has one");
+    let read = read_journal::<VolumeLog>(Path::new(journal)).expect("it can be read");
+    let plan = read.log.plan.expect("it has one");
     let mut csv =
         "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u\n".to_owned();
-    for it in &read.volume.readings {
+    for it in &read.log.readings {
         let line = &plan.lines[it.line];
         let sees = line.sees.unwrap_or_default();
         let (reads, scale) = match line.optics {
@@ -139,8 +141,8 @@ fn errors_follow_again_from_a_journal_and_from_a_file_of_its_readings() {
     let fit = |words: &[&str]| runs.run(&[&["fit", "volumetric"], words].concat());
     let config = ["--config", "machine.toml"];
     let from_journal = fit(&[&[journal.as_str()], &config[..], &["--save"]].concat()).with_code(0);
-    let stored = runs.volume.bench.store.load(id).expect("it was stored");
-    let stored = serde_json::to_value(stored.geometry(id).expect("it is one")).expect("plain");
+    let stored = runs.volume.bench.store.load::<GeometryContent>(id);
+    let stored = serde_json::to_value(stored.expect("it was stored").content).expect("plain");
     assert_eq!(from_journal["functions"], stored["functions"]);
     let again = text(&from_journal["calibration"]).to_owned();
     let words = ["cal", "diff", "machine.toml", id, &again];

@@ -15,6 +15,7 @@ use tests::volume::point_mm;
 use tests::{Edit, INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::read_journal;
+use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{LineOptics, LineTask};
 
 use crate::programs::{
@@ -251,9 +252,10 @@ fn calibrates(live: &Live) -> Value {
     let (made, asked) = live.run_with_hand(&["calibrate", "machine.toml", "--resume"], None);
     assert_eq!(asked.first(), Some(&3), "{made:?}");
     let made = made.with_code(0);
-    let journal = read_journal(&live.path(&made["journal"])).unwrap_or_else(|it| panic!("{it}"));
+    let journal =
+        read_journal::<VolumeLog>(&live.path(&made["journal"])).unwrap_or_else(|it| panic!("{it}"));
     assert!(journal.complete);
-    assert_eq!(number(&made["lines"]) as usize, journal.volume.whole.len());
+    assert_eq!(number(&made["lines"]) as usize, journal.log.whole.len());
     made["geometry"].clone()
 }
 
@@ -263,7 +265,7 @@ fn verifies(live: &Live) {
     assert_eq!(asked, [1]);
     assert!(number(&verified["range_um"]) < number(&verified["limit_um"]));
     let journal = live.path(&verified["journal"]);
-    let read = read_journal(&journal).unwrap_or_else(|it| panic!("{it}"));
+    let read = read_journal::<VolumeLog>(&journal).unwrap_or_else(|it| panic!("{it}"));
     assert!(read.complete && read.header.calibration.is_some());
     let page = truestage(
         live.folder.path(),

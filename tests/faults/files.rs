@@ -4,9 +4,10 @@
 use std::fs;
 
 use tests::{Bench, Edit};
+use truestage::linear::{LinearContent, LinearLog};
 use truestage::rotary::RotaryContent;
 use truestage::run::CalibrateOptions;
-use truestage::store::{CalibrationRecord, Content, Lease, StoreError};
+use truestage::store::{CalibrationRecord, Lease, StoreError};
 use truestage::{Failure, Machine, Store};
 
 use crate::scene::shortened;
@@ -14,7 +15,7 @@ use crate::scene::shortened;
 /// A started machine whose store holds two calibrations, the older and the newer one.
 struct Shelf {
     bench: Bench,
-    record: CalibrationRecord,
+    record: CalibrationRecord<LinearContent>,
     older: String,
     newer: String,
 }
@@ -58,7 +59,7 @@ impl Shelf {
     }
 
     /// Stores a changed record and makes it the active one.
-    fn activate(&self, change: impl FnOnce(&mut CalibrationRecord)) {
+    fn activate(&self, change: impl FnOnce(&mut CalibrationRecord<LinearContent>)) {
         let mut record = self.record.clone();
         change(&mut record);
         let id = self.store().save(&record).unwrap();
@@ -179,7 +180,7 @@ fn a_run_whose_journal_cannot_be_written_is_not_begun() {
     bench.machine.start().unwrap();
     bench.machine.linear("x").unwrap().zero(&store).unwrap();
     let before = bench.true_position();
-    let full = Store::new(&bench.folder.path().join("file"), "m");
+    let full = truestage::store_in(&bench.folder.path().join("file"), "m");
     fs::write(bench.folder.path().join("file"), b"").unwrap();
     let options = CalibrateOptions::default();
     let failure = bench
@@ -197,7 +198,7 @@ fn a_run_whose_journal_cannot_be_written_is_not_begun() {
 }
 
 #[track_caller]
-fn check_foreign(change: impl FnOnce(&mut CalibrationRecord), words: &[&str]) {
+fn check_foreign(change: impl FnOnce(&mut CalibrationRecord<LinearContent>), words: &[&str]) {
     let mut shelf = Shelf::new();
     shelf.activate(change);
     let failure = shelf.load().unwrap_err();
@@ -253,7 +254,12 @@ fn a_file_of_a_newer_program_or_of_another_kind_is_refused_clearly() {
         "{failure}"
     );
     let mut shelf = Shelf::new();
-    shelf.activate(|record| record.content = Content::RotaryErrorTable(a_rotary_table()));
+    let other = CalibrationRecord {
+        head: shelf.record.head.clone(),
+        content: a_rotary_table(),
+    };
+    let id = shelf.store().save(&other).unwrap();
+    shelf.store().activate("x", &id).unwrap();
     let failure = shelf.load().unwrap_err();
     let other = matches!(failure, Failure::Store(StoreError::OtherKind { .. }));
     assert!(other, "{failure:?}");
@@ -300,8 +306,8 @@ fn a_killed_run_goes_on_where_it_stopped() {
         "{failure:?}"
     );
     let journal = store.newest_run("calibrate", "x").unwrap().unwrap();
-    let before = truestage::store::read_journal(&journal).unwrap();
-    assert_eq!((before.points.len(), before.complete), (30, false));
+    let before = truestage::store::read_journal::<LinearLog>(&journal).unwrap();
+    assert_eq!((before.log.points.len(), before.complete), (30, false));
     // Another process would have a flag of its own.
     bench
         .machine
@@ -317,7 +323,11 @@ fn a_killed_run_goes_on_where_it_stopped() {
         66,
         "three runs of eleven targets from both sides"
     );
-    assert_eq!(points[..22], before.points[..22], "the whole run is kept");
+    assert_eq!(
+        points[..22],
+        before.log.points[..22],
+        "the whole run is kept"
+    );
 }
 
 /// Asks to stop after so many measured points.

@@ -8,6 +8,7 @@ use compensator::length_correction::EnvironmentError;
 use drivers::device::Alarm;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
+use truestage::linear::LinearLog;
 use truestage::store::read_journal;
 
 use crate::scene::{Phase, Played, STOPPING, Scene, Wanted, check, check_harmless};
@@ -28,13 +29,13 @@ fn measuring() -> Scene {
 fn check_nothing_recorded(played: &mut Played) {
     let store = &played.bench.store;
     let path = store.newest_run("calibrate", "x").unwrap().unwrap();
-    let read = read_journal(&path).unwrap();
+    let read = read_journal::<LinearLog>(&path).unwrap();
     assert!(!read.complete);
     assert!(
-        !read.points.is_empty(),
+        !read.log.points.is_empty(),
         "the fault came before the first point"
     );
-    for point in &read.points {
+    for point in &read.log.points {
         assert!(
             point.at_s <= played.due.seconds() + 1e-3,
             "recorded after the fault: {point:?}"

@@ -2,9 +2,10 @@
 //! large or too steep, and those that make the axis worse (classes 48, 49).
 
 use tests::Bench;
+use truestage::linear::LinearContent;
 use truestage::linear::VerifyOptions;
 use truestage::run::CalibrateOptions;
-use truestage::store::{CalibrationRecord, Content};
+use truestage::store::CalibrationRecord;
 use truestage::{Failure, Machine, Store};
 use units::Metres;
 
@@ -18,7 +19,7 @@ fn zeroed(seed: u64) -> Bench {
     bench
 }
 
-fn calibrated(seed: u64) -> (Bench, CalibrationRecord, String) {
+fn calibrated(seed: u64) -> (Bench, CalibrationRecord<LinearContent>, String) {
     let mut bench = zeroed(seed);
     let store = bench.store.clone();
     let options = CalibrateOptions::default();
@@ -100,13 +101,11 @@ fn an_axis_that_is_not_zeroed_moves_nothing() {
 /// The record with its deviations passed through `change`, stored and activated.
 fn activate(
     store: &Store,
-    record: &CalibrationRecord,
+    record: &CalibrationRecord<LinearContent>,
     change: impl Fn(usize, f64) -> f64,
 ) -> String {
     let mut changed = record.clone();
-    let Content::LinearErrorTable(content) = &mut changed.content else {
-        panic!("another kind")
-    };
+    let content = &mut changed.content;
     for (at, node) in content.nodes.iter_mut().enumerate() {
         node.forward_m = node.forward_m.map(|it| change(at, it));
         node.reverse_m = node.reverse_m.map(|it| change(at, it));
@@ -213,7 +212,7 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
 #[test]
 fn a_first_calibration_that_makes_it_worse_leaves_none_behind() {
     let (mut bench, record, _) = calibrated(2);
-    let fresh = Store::new(bench.folder.path(), "fresh");
+    let fresh = truestage::store_in(bench.folder.path(), "fresh");
     activate(&fresh, &record, |_, deviation| -deviation);
     bench
         .machine

@@ -11,6 +11,7 @@ use mock_bus::simulation::Simulation;
 use tests::{Bench, Edit};
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, NoCorrection};
+use truestage::linear::LinearLog;
 use truestage::linear::{Calibrated, VerifyOptions};
 use truestage::run::CalibrateOptions;
 use truestage::store::read_journal;
@@ -467,8 +468,9 @@ impl Played {
     #[track_caller]
     pub fn journal_points(&self, verb: &str) -> usize {
         let path = self.bench.store.newest_run(verb, "x").unwrap();
-        read_journal(&path.expect("there is a journal"))
+        read_journal::<LinearLog>(&path.expect("there is a journal"))
             .unwrap()
+            .log
             .points
             .len()
     }
@@ -496,13 +498,13 @@ impl Played {
         let store = &self.bench.store;
         if let Some(id) = store.active("x").unwrap().current {
             store
-                .load(&id)
+                .glance(&id)
                 .unwrap_or_else(|error| panic!("active calibration: {error}"));
         }
         if let Ok(folder) = std::fs::read_dir(store.runs()) {
             for entry in folder {
                 let path = entry.unwrap().path();
-                read_journal(&path).unwrap_or_else(|error| panic!("journal: {error}"));
+                read_journal::<LinearLog>(&path).unwrap_or_else(|error| panic!("journal: {error}"));
             }
         }
         self

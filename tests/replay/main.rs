@@ -151,7 +151,7 @@ fn replayed(recording: &str) -> (Found, ReplayReport) {
     let replay = Replay::parse(recording, &names).unwrap_or_else(|error| panic!("{error}"));
     let replay = Rc::new(RefCell::new(replay));
     let mut machine = Machine::new(&loaded, Box::new(Watched(replay.clone())));
-    let store = Store::new(folder.path(), &loaded.config.machine.name);
+    let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
     let found = run(&mut machine, &store);
     let report = replay.borrow().report();
     (found, report)
@@ -198,7 +198,7 @@ fn a_recording_whose_drive_falls_silent_ends_with_the_reason() {
     let loaded = machine_config(folder.path(), short);
     let replay = Replay::parse(&silent, &[]).unwrap();
     let mut machine = Machine::new(&loaded, Box::new(replay));
-    let store = Store::new(folder.path(), &loaded.config.machine.name);
+    let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
     let result = machine.guarded(|machine| procedure(machine, &store).map(drop));
     let failure = result.unwrap_err();
     assert!(

@@ -156,7 +156,7 @@ impl Bench {
         Self {
             machine: Machine::new(&loaded, Box::new(emulated.transport())),
             emulated,
-            store: Store::new(folder.path(), &loaded.config.machine.name),
+            store: truestage::store_in(folder.path(), &loaded.config.machine.name),
             loaded,
             folder,
         }
@@ -209,7 +209,7 @@ impl Bench {
         let emulated =
             Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
-        let store = Store::new(folder.path(), &loaded.config.machine.name);
+        let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
         Self {
             machine,
             emulated,

@@ -46,7 +46,7 @@ impl Stand {
         let name = &emulator.loaded.config.machine.name;
         Self {
             machine: Machine::new(&emulator.loaded, wrap(emulator.transport())),
-            store: Store::new(emulator.folder.path(), name),
+            store: truestage::store_in(emulator.folder.path(), name),
             emulator,
         }
     }

@@ -11,7 +11,7 @@ use compensator::volumetric::{Axis, Point};
 use mock_bus::plant::VolumetricTruth;
 use truestage::emulated::with_rare_heartbeats;
 use truestage::engine::{Live, Observed};
-use truestage::store::{CalibrationRecord, Content, RecordHead};
+use truestage::store::{CalibrationRecord, RecordHead};
 use truestage::volumetric::{
     BendRecord, GeometryContent, MemoryName, StateMemoryContent, WorkVolume,
 };
@@ -242,7 +242,7 @@ impl Volume {
             axis: GEOMETRY.into(),
             ..self.bench.machine.this_machine("x")
         };
-        let content = Content::VolumetricGeometry(content);
+        let content = content;
         let record = CalibrationRecord { head, content };
         let id = self.bench.store.save(&record).expect("there is room");
         let activated = self.bench.store.activate(GEOMETRY, &id);
@@ -353,7 +353,6 @@ impl Volume {
             axis: pointer.into(),
             ..self.bench.machine.this_machine("x")
         };
-        let content = Content::StateMemory(content);
         let id = store.save(&CalibrationRecord { head, content });
         let activated = store.activate(pointer, &id.expect("there is room"));
         activated.expect("it was just stored");

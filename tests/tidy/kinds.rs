@@ -8,7 +8,9 @@ const KINDS: &[&str] = &["linear", "platform", "rotary", "volumetric"];
 
 /// Files that say what can be configured, stored and shown: whoever only reads a file of a kind need
 /// not move a machine of that kind.
-const DATA: &[&str] = &["check", "config", "entries", "record", "settings"];
+const DATA: &[&str] = &[
+    "check", "config", "entries", "log", "record", "settings", "sound",
+];
 
 /// What these may import of their own kind: each other, and what follows from a configuration alone.
 const OF_DATA: &[&str] = &[
@@ -16,8 +18,10 @@ const OF_DATA: &[&str] = &[
     "config",
     "entries",
     "line_speed",
+    "log",
     "record",
     "settings",
+    "sound",
     "state",
 ];
 

@@ -4,7 +4,9 @@ use core::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-use super::dependence::ConfigHash;
+use machine::records::ConfigHash;
+
+use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
 use super::validate::{Finding, validate};
@@ -52,7 +54,7 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     let findings = validate(&config);
     if findings.is_empty() {
         return Ok(Loaded {
-            hash: ConfigHash::of(&config),
+            hash: hash_of(&config),
             config,
             patience: Patience::NONE,
         });

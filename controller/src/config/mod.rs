@@ -13,10 +13,11 @@ mod model;
 pub(crate) mod validate;
 
 pub use camera::{CameraConfig, CameraDevice};
-pub use dependence::ConfigHash;
+pub use dependence::hash_of;
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
 pub use load::{Loaded, load, parse};
+pub use machine::records::ConfigHash;
 pub use model::{
     AmplifierConfig, AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CalibrateConfig, CanAxis,
     CanBus, CanTransport, CompensationConfig, CyclicConfig, EndPolicyName, InstrumentConfig,

@@ -9,14 +9,13 @@ use units::Metres;
 use crate::config::{CalibrateConfig, ConfigHash};
 use crate::failure::Failure;
 use crate::linear::LinearContent;
+use crate::linear::LinearLog;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
 use crate::linear::run_plan::RunPlan;
 use crate::linear::settings;
 use crate::linear::stage::LinearStage;
 use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
-use crate::store::{
-    CalibrationRecord, Content, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
-};
+use crate::store::{CalibrationRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store};
 use machine::Stage;
 
 /// A calibration that was made, stored and activated.
@@ -29,7 +28,7 @@ pub struct Calibrated {
     /// Where every point is.
     pub journal: PathBuf,
     /// What it says.
-    pub record: CalibrationRecord,
+    pub record: CalibrationRecord<LinearContent>,
     /// How the fit went.
     pub fitted: Fitted,
     /// What was measured.
@@ -101,13 +100,13 @@ impl LinearStage<'_> {
         let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
-        let record = store.load(&id)?;
+        let record = store.load::<LinearContent>(&id)?;
         record.head.belongs_to(
             &id,
             &self.core.this_machine(self.axis),
             self.core.config_hash,
         )?;
-        let compensation = self.prepare(record.linear(&id)?.table(&id)?)?;
+        let compensation = self.prepare(record.content.table(&id)?)?;
         self.set_compensation(Some(compensation));
         Ok(Some(id))
     }
@@ -132,10 +131,10 @@ impl LinearStage<'_> {
     fn calibration_record(
         &self,
         plan: &RunPlan,
-        journal: &Journal,
+        journal: &Journal<LinearLog>,
         measured: &Measured,
         fitted: &Fitted,
-    ) -> CalibrationRecord {
+    ) -> CalibrationRecord<LinearContent> {
         let head = RecordHead {
             created: utc_now(),
             source: journal
@@ -149,10 +148,7 @@ impl LinearStage<'_> {
             ..self.core.this_machine(self.axis)
         };
         let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
-        CalibrationRecord {
-            head,
-            content: Content::LinearErrorTable(content),
-        }
+        CalibrationRecord { head, content }
     }
 
     pub(super) fn journal_header(
@@ -183,17 +179,17 @@ pub(super) fn open_journal(
     header: &JournalHeader,
     resume: Option<&PathBuf>,
     hash: &ConfigHash,
-) -> Result<(Journal, EarlierRuns), Failure> {
+) -> Result<(Journal<LinearLog>, EarlierRuns), Failure> {
     match resume {
         None => Ok((
             Journal::create(&store.runs(), header)?,
             EarlierRuns::default(),
         )),
         Some(path) => {
-            let (journal, read) = Journal::resume(path, header, hash)?;
+            let (journal, read) = Journal::<LinearLog>::resume(path, header, hash)?;
             let earlier = EarlierRuns {
-                points: read.points,
-                closures: read.closures,
+                points: read.log.points,
+                closures: read.log.closures,
             };
             Ok((journal, earlier))
         }

@@ -15,8 +15,9 @@ use crate::linear::cross_check::{CrossCheck, Plausible, Run, judge_scale};
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::stage::LinearStage;
+use crate::linear::{LinearEntry, LinearLog};
 use crate::store::ClosureEntry;
-use crate::store::{Entry, EnvironmentRecord, Journal};
+use crate::store::{EnvironmentRecord, Journal};
 use machine::Stage;
 
 /// How a series is measured.
@@ -102,7 +103,7 @@ struct Session<'a> {
     plan: &'a RunPlan,
     correction: Correction,
     datum: Datum,
-    journal: &'a mut Journal,
+    journal: &'a mut Journal<LinearLog>,
     counter: Counter,
     check: CrossCheck,
     watch: EnvironmentWatch,
@@ -128,7 +129,7 @@ impl LinearStage<'_> {
         &mut self,
         plan: &RunPlan,
         options: MeasureOptions,
-        journal: &mut Journal,
+        journal: &mut Journal<LinearLog>,
         mut runs: EarlierRuns,
     ) -> Result<Measured, Failure> {
         let per_run = plan.targets.len() * 2;
@@ -169,7 +170,7 @@ impl LinearStage<'_> {
             runs.points.extend(points);
             runs.closures.push(closure);
         }
-        session.journal.write(&Entry::Complete)?;
+        session.journal.complete()?;
         session.journal.flush_to_disk()?;
         self.core.leave_instrument();
         let environment = mean_environment(&runs.points);
@@ -229,7 +230,7 @@ impl LinearStage<'_> {
             environment: EnvironmentRecord::from(&environment),
         };
         session.check.take(&point)?;
-        session.journal.write(&Entry::Point(point))?;
+        session.journal.write(&LinearEntry::Point(point))?;
         session.counter.done += 1;
         let Counter { stage, done, total } = session.counter;
         self.core.observer().progress(stage, axis, done, total);
@@ -266,7 +267,7 @@ impl LinearStage<'_> {
                 limit,
             });
         }
-        session.journal.write(&Entry::Closed(closure))?;
+        session.journal.write(&LinearEntry::Closed(closure))?;
         Ok(closure)
     }
 

@@ -74,9 +74,6 @@ impl LinearContent {
                 u_reverse: node.reverse_u_m.map(Metres),
             })
             .collect();
-        ErrorTable::new(nodes).map_err(|source| StoreError::Table {
-            id: id.to_owned(),
-            source,
-        })
+        ErrorTable::new(nodes).map_err(|source| StoreError::model(id, source))
     }
 }

@@ -19,11 +19,10 @@ use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::ZeroEntry;
 use crate::linear::stage::LinearStage;
-use crate::run::missing;
+use crate::linear::{LinearEntry, LinearLog};
 use crate::run::utc_now;
-use crate::store::{
-    Entry, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, read_journal,
-};
+use crate::run::{missing, note_failure};
+use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, read_journal};
 use machine::{STOP_LIMIT, Stage};
 
 /// A zero that was found.
@@ -71,15 +70,9 @@ impl LinearStage<'_> {
         let previous = previous_zero(store, self.axis);
         let mut journal = Journal::create(&store.runs(), &self.zero_header())?;
         let found = self.find_zero(&config, &mut journal);
-        if let Err(failure) = &found {
-            // The cause is on its way to the operator; the journal is only a second place.
-            let _ = journal.write(&Entry::Failed {
-                cause: failure.to_string(),
-            });
-        }
-        let (outcome, estimate, entry) = found?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        let (outcome, estimate, entry) =
+            found.inspect_err(|failure| note_failure(&mut journal, failure))?;
+        journal.complete()?;
         Ok(Zeroed {
             estimate,
             outcome,
@@ -92,7 +85,7 @@ impl LinearStage<'_> {
     fn find_zero(
         &mut self,
         config: &ZeroConfig,
-        journal: &mut Journal,
+        journal: &mut Journal<LinearLog>,
     ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
         self.core
             .observer()
@@ -114,7 +107,7 @@ impl LinearStage<'_> {
             .progress(Stage::Zero, self.axis, 3, STEPS);
         let estimate = self.estimate(config, &settings, &outcome)?;
         let entry = self.zero_entry(&estimate);
-        journal.write(&Entry::Zero(entry))?;
+        journal.write(&LinearEntry::Zero(entry))?;
         self.adopt_zero(estimate.origin)?;
         self.core
             .observer()
@@ -326,7 +319,7 @@ impl LinearStage<'_> {
 /// that cannot be read is no reason not to zero.
 fn previous_zero(store: &Store, axis: &str) -> Option<ZeroEntry> {
     let path = store.newest_run("zero", axis).ok().flatten()?;
-    read_journal(&path).ok()?.zeros.pop()
+    read_journal::<LinearLog>(&path).ok()?.log.zeros.pop()
 }
 
 /// Which samples were used already.

@@ -30,10 +30,9 @@ pub(crate) fn document(title: &str, body: &str, note: &str) -> String {
     )
 }
 
-/// The head of a page for one run.
-pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
+/// The head of a page for one run in which so many `points` were measured.
+pub fn facts_of<L>(journal: &ReadJournal<L>, points: usize) -> Vec<(String, String)> {
     let header = &journal.header;
-    let points = journal.points.len() + journal.strokes.len() + journal.poses.len();
     let mut facts = vec![
         (
             "machine".to_owned(),

@@ -16,10 +16,11 @@ use crate::platform::config::ScrewMethodName as Method;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
+use crate::platform::{PlatformEntry, PlatformLog};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
 use crate::run::{note_failure, utc_now};
 use crate::store::ClosureEntry;
-use crate::store::{CalibrationRecord, Content, Entry, Journal, RecordHead, Store};
+use crate::store::{CalibrationRecord, Journal, RecordHead, Store};
 use machine::Stage;
 
 /// A screw that was calibrated.
@@ -70,8 +71,7 @@ impl AlignmentPlatform<'_> {
         let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
         let stored = self.fit_and_store(store, &journal, &plan, &strokes);
         let screws = stored.inspect_err(|it| note_failure(&mut journal, it))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         Ok(PlatformCalibrated {
             screws,
             journal: journal.path().to_owned(),
@@ -96,7 +96,7 @@ impl AlignmentPlatform<'_> {
     fn measure_screws(
         &mut self,
         plan: &PlatformCalibrateConfig,
-        journal: &mut Journal,
+        journal: &mut Journal<PlatformLog>,
     ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
         let count = self.state.screws.len();
         let targets = targets(plan);
@@ -117,7 +117,7 @@ impl AlignmentPlatform<'_> {
             self.approach_zero()?;
         }
         let closure = self.closure(plan)?;
-        journal.write(&Entry::Closed(ClosureEntry {
+        journal.write(&PlatformEntry::Closed(ClosureEntry {
             run: plan.runs,
             start_m: 0.0,
             closure_m: closure.value(),
@@ -131,12 +131,12 @@ impl AlignmentPlatform<'_> {
         run: u32,
         approach: Approach,
         stroke: Metres,
-        journal: &mut Journal,
+        journal: &mut Journal<PlatformLog>,
     ) -> Result<Stroke, Failure> {
         let pose = self.measure_pose()?;
         let measured = self.state.kinematics.strokes(pose)[at];
         let axis = self.state.screws[at].axis.clone();
-        journal.write(&Entry::Stroke(StrokeEntry {
+        journal.write(&PlatformEntry::Stroke(StrokeEntry {
             axis,
             run,
             approach: approach.symbol(),
@@ -224,7 +224,7 @@ impl AlignmentPlatform<'_> {
     fn fit_and_store(
         &mut self,
         store: &Store,
-        journal: &Journal,
+        journal: &Journal<PlatformLog>,
         plan: &PlatformCalibrateConfig,
         strokes: &[Vec<Stroke>],
     ) -> Result<Vec<ScrewCalibrated>, Failure> {
@@ -238,7 +238,7 @@ impl AlignmentPlatform<'_> {
     fn store_screws(
         &mut self,
         store: &Store,
-        journal: &Journal,
+        journal: &Journal<PlatformLog>,
         plan: &PlatformCalibrateConfig,
         strokes: &[Vec<Stroke>],
         fitted: &[(ScrewModel, Vec<StrokeOutlier>)],
@@ -259,7 +259,6 @@ impl AlignmentPlatform<'_> {
             };
             let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
             let content = ScrewContent::new(model, method, rows).without(outliers);
-            let content = Content::ScrewModel(content);
             let id = store.save(&CalibrationRecord { head, content })?;
             calibrated.push(ScrewCalibrated {
                 axis,
@@ -291,13 +290,13 @@ impl AlignmentPlatform<'_> {
         for (at, axis) in axes.into_iter().enumerate() {
             let id = store.active(&axis)?.current;
             if let Some(id) = &id {
-                let record = store.load(id)?;
+                let record = store.load::<ScrewContent>(id)?;
                 record.head.belongs_to(
                     id,
                     &self.core.this_machine(&axis),
                     self.core.config_hash,
                 )?;
-                let model = record.screw(id)?.model();
+                let model = record.content.model();
                 let compensation = self.prepare_screw(at, model)?;
                 let state = &mut self.state.screws[at];
                 state.compensation = Some(compensation);

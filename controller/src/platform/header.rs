@@ -5,9 +5,10 @@ use units::Metres;
 use crate::failure::Failure;
 use crate::platform::ArrangementEntry;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::{PlatformEntry, PlatformLog};
 use crate::run::utc_now;
 use crate::store::{
-    Entry, IdentityRecord, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store,
+    IdentityRecord, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store,
 };
 
 impl AlignmentPlatform<'_> {
@@ -19,11 +20,11 @@ impl AlignmentPlatform<'_> {
         runs: u32,
         calibration: Option<String>,
         tolerance: Option<Metres>,
-    ) -> Result<Journal, Failure> {
+    ) -> Result<Journal<PlatformLog>, Failure> {
         let header = self.header(verb, runs, calibration)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
         let screws = &self.state.screws;
-        journal.write(&Entry::Arrangement(ArrangementEntry {
+        journal.write(&PlatformEntry::Arrangement(ArrangementEntry {
             axes: screws.iter().map(|it| it.axis.clone()).collect(),
             edge_m: Metres::from_mm(self.config.edge_mm).value(),
             tolerance_m: tolerance.map(Metres::value),

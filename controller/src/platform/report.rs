@@ -8,6 +8,7 @@ use units::{Approach, Metres, Radians};
 
 use crate::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
 use crate::page::{IN_USE, document, escape, facts};
+use crate::platform::PlatformLog;
 use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
 use crate::platform::{difference, largest_error};
 use crate::store::ClosureEntry;
@@ -17,6 +18,9 @@ use crate::text;
 /// How finely a model's curve is drawn.
 const CURVE_POINTS: u32 = 240;
 
+/// A calibration of a screw, under its name.
+pub type Named = (String, CalibrationRecord<ScrewContent>);
+
 /// What a page of a platform shows; what is empty is left out.
 #[derive(Clone, Debug, Default)]
 pub struct PlatformPage<'a> {
@@ -25,31 +29,31 @@ pub struct PlatformPage<'a> {
     /// Name and value, for the head of the page.
     pub facts: Vec<(String, String)>,
     /// Verifications: a heading (`as found`, `as left` …) and the run.
-    pub visits: Vec<(String, &'a ReadJournal)>,
+    pub visits: Vec<(String, &'a ReadJournal<PlatformLog>)>,
     /// The run that calibrated, with the calibrations made from it by their names.
-    pub calibrated: Option<(&'a ReadJournal, Vec<(String, CalibrationRecord)>)>,
+    pub calibrated: Option<(&'a ReadJournal<PlatformLog>, Vec<Named>)>,
     /// Runs that found the zero.
-    pub zeros: Vec<&'a ReadJournal>,
+    pub zeros: Vec<&'a ReadJournal<PlatformLog>>,
 }
 
 impl<'a> PlatformPage<'a> {
     /// The page of one run; `calibrations` are those made from it.
-    pub fn of(journal: &'a ReadJournal, calibrations: Vec<(String, CalibrationRecord)>) -> Self {
+    pub fn of(journal: &'a ReadJournal<PlatformLog>, calibrations: Vec<Named>) -> Self {
         let header = &journal.header;
         let mut page = Self {
             title: format!("{} of platform {}", header.verb, header.machine),
             facts: facts_of(journal),
             ..Self::default()
         };
-        let visited = journal.poses.iter().any(|it| it.target.is_some());
+        let visited = journal.log.poses.iter().any(|it| it.target.is_some());
         if visited {
             let compensated = header.calibration.is_some();
             let title = if compensated { "as left" } else { "as found" };
             page.visits.push((title.to_owned(), journal));
-        } else if !journal.poses.is_empty() {
+        } else if !journal.log.poses.is_empty() {
             page.zeros.push(journal);
         }
-        if !journal.strokes.is_empty() {
+        if !journal.log.strokes.is_empty() {
             page.calibrated = Some((journal, calibrations));
         }
         page
@@ -57,8 +61,9 @@ impl<'a> PlatformPage<'a> {
 }
 
 /// The head of a page of one run, with the calibrations' names as short as elsewhere.
-pub fn facts_of(journal: &ReadJournal) -> Vec<(String, String)> {
-    let mut facts = crate::page::facts_of(journal);
+pub fn facts_of(journal: &ReadJournal<PlatformLog>) -> Vec<(String, String)> {
+    let mut facts =
+        crate::page::facts_of(journal, journal.log.strokes.len() + journal.log.poses.len());
     let named = facts.iter_mut().filter(|(name, _)| name == IN_USE);
     for (_, value) in named {
         let each = value.split(' ').map(|it| match it.split_once('=') {
@@ -115,8 +120,8 @@ struct Visited<'a> {
 }
 
 impl<'a> Visit<'a> {
-    fn of((title, journal): &'a (String, &'a ReadJournal)) -> Self {
-        let arrangement = journal.arrangement.as_ref();
+    fn of((title, journal): &'a (String, &'a ReadJournal<PlatformLog>)) -> Self {
+        let arrangement = journal.log.arrangement.as_ref();
         let edge = Metres(arrangement.map_or(0.0, |it| it.edge_m));
         let visited = |entry: &'a PoseEntry| {
             let target = Pose::from(entry.target?);
@@ -131,7 +136,7 @@ impl<'a> Visit<'a> {
         };
         Self {
             title,
-            poses: journal.poses.iter().filter_map(visited).collect(),
+            poses: journal.log.poses.iter().filter_map(visited).collect(),
             edge,
             tolerance: arrangement.and_then(|it| it.tolerance_m).map(Metres),
         }
@@ -273,9 +278,9 @@ fn pose_table(visit: &Visit<'_>) -> String {
 }
 
 /// Every screw of a calibration: its model, its strokes and what the model leaves of them.
-fn screws(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -> String {
+fn screws(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -> String {
     let mut html = String::from("<h2>Screws</h2>");
-    if let Some(ClosureEntry { closure_m, .. }) = journal.closures.last() {
+    if let Some(ClosureEntry { closure_m, .. }) = journal.log.closures.last() {
         let closure = Metres(*closure_m).um();
         let _ = write!(
             html,
@@ -284,13 +289,14 @@ fn screws(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -
     }
     for axis in axes_of(journal) {
         let strokes: Vec<_> = journal
+            .log
             .strokes
             .iter()
             .filter(|it| it.axis == axis)
             .collect();
         let record = calibrations.iter().find(|(_, it)| it.head.axis == axis);
         html += &format!("<h2>Screw {}</h2>", escape(axis));
-        let content = record.and_then(|(id, it)| Some((id, it.screw(id).ok()?)));
+        let content = record.map(|(id, it)| (id, &it.content));
         let model = content.map(|(_, it)| it.model());
         match content {
             Some((id, content)) => {
@@ -317,9 +323,14 @@ fn screws(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -
 }
 
 /// The screws in the order of the configuration, or as they appear.
-fn axes_of(journal: &ReadJournal) -> Vec<&str> {
-    let Some(ArrangementEntry { axes, .. }) = &journal.arrangement else {
-        let mut axes: Vec<&str> = journal.strokes.iter().map(|it| it.axis.as_str()).collect();
+fn axes_of(journal: &ReadJournal<PlatformLog>) -> Vec<&str> {
+    let Some(ArrangementEntry { axes, .. }) = &journal.log.arrangement else {
+        let mut axes: Vec<&str> = journal
+            .log
+            .strokes
+            .iter()
+            .map(|it| it.axis.as_str())
+            .collect();
         axes.dedup();
         return axes;
     };
@@ -390,12 +401,12 @@ fn residuals(axis: &str, strokes: &[&StrokeEntry], model: &ScrewModel) -> String
     chart(&title, ("stroke (mm)", "seen − model (µm)"), &series, None)
 }
 
-fn zeros(journals: &[&ReadJournal]) -> String {
+fn zeros(journals: &[&ReadJournal<PlatformLog>]) -> String {
     let mut html = String::from(
         "<table><tr><th>found</th><th>seen at x (µm)</th><th>y (µm)</th><th>angle (″)</th></tr>",
     );
     for journal in journals {
-        for it in &journal.poses {
+        for it in &journal.log.poses {
             let seen = Pose::from(it.seen);
             let _ = write!(
                 html,

@@ -14,8 +14,9 @@ use crate::platform::PoseEntry;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::state::{difference, largest_error};
+use crate::platform::{PlatformEntry, PlatformLog};
 use crate::run::note_failure;
-use crate::store::{Entry, Journal, Store};
+use crate::store::{Journal, Store};
 use machine::Stage;
 
 /// One pose that was verified.
@@ -112,7 +113,7 @@ impl AlignmentPlatform<'_> {
         &mut self,
         targets: &[Pose],
         compensated: bool,
-        journal: &mut Journal,
+        journal: &mut Journal<PlatformLog>,
     ) -> Result<Vec<PoseChecked>, Failure> {
         let edge = Metres::from_mm(self.config.edge_mm);
         let mut checked = Vec::new();
@@ -124,7 +125,7 @@ impl AlignmentPlatform<'_> {
             };
             let seen = self.measure_pose()?;
             let skew_s = moved.skew.map(|it| it.as_secs_f64());
-            journal.write(&Entry::Pose(PoseEntry {
+            journal.write(&PlatformEntry::Pose(PoseEntry {
                 target: Some((*target).into()),
                 set_points_m: moved.set_points.iter().map(|(_, at)| at.value()).collect(),
                 seen: seen.into(),
@@ -142,8 +143,7 @@ impl AlignmentPlatform<'_> {
                 .observer()
                 .progress(Stage::Verify, "platform", done, total);
         }
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         Ok(checked)
     }
 

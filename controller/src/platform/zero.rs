@@ -10,9 +10,10 @@ use units::{Metres, MetresPerSecond};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::platform::PlatformEntry;
 use crate::platform::PoseEntry;
 use crate::platform::handle::AlignmentPlatform;
-use crate::store::{Entry, Store};
+use crate::store::Store;
 use machine::Stage;
 
 /// The datum is what everything is measured from: it is looked at so many times more often.
@@ -40,9 +41,8 @@ impl AlignmentPlatform<'_> {
             .find_zero()
             .inspect_err(|failure| crate::run::note_failure(&mut journal, failure))?;
         let at_s = self.core.now().seconds();
-        journal.write(&Entry::Pose(PoseEntry::looked(datum, at_s)))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.write(&PlatformEntry::Pose(PoseEntry::looked(datum, at_s)))?;
+        journal.complete()?;
         Ok(PlatformZeroed {
             datum,
             journal: journal.path().to_owned(),

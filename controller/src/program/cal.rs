@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use serde_json::{Value, json};
 use truestage::config::Loaded;
-use truestage::linear::{LinearContent, NodeRecord};
-use truestage::store::{CalibrationRecord, Content, Lease, RecordHead, Store, short};
+use truestage::store::{Glance, Lease, RecordHead, Store, short};
 use truestage::volumetric::MemoryName;
 use truestage::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
-use truestage::{Failure, config};
-use units::Metres;
+use truestage::{Failure, config, store_of};
 
+use crate::program::kind::Kind;
 use crate::program::output::{Ended, Output};
+use crate::program::show::Shown;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CalCommand {
@@ -57,21 +57,21 @@ pub(crate) enum CalCommand {
 
 pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
     match command {
-        CalCommand::List { config } => list(&store_of(config)?, output),
-        CalCommand::Show { config, id } => show(&store_of(config)?, id, output),
+        CalCommand::List { config } => list(&opened(config)?, output),
+        CalCommand::Show { config, id } => show(&opened(config)?, id, output),
         CalCommand::Diff {
             config,
             before,
             after,
-        } => diff(&store_of(config)?, before, after, output),
+        } => diff(&opened(config)?, before, after, output),
         CalCommand::Activate { config, id } => activate(config, id, output),
         CalCommand::Rollback { config, axis } => rollback(config, axis, output),
     }
 }
 
-fn store_of(config: &std::path::Path) -> Result<Store, Failure> {
+fn opened(config: &std::path::Path) -> Result<Store, Failure> {
     let loaded = config::load(config)?;
-    Ok(Store::of(&loaded.config.machine))
+    Ok(store_of(&loaded.config.machine))
 }
 
 fn list(store: &Store, output: Output) -> Ended {
@@ -84,9 +84,12 @@ pub(crate) fn listed(store: &Store) -> Result<(String, Value), Failure> {
     let mut lines = Vec::new();
     let mut values = Vec::new();
     for id in store.list()? {
-        match store.load(&id) {
-            Ok(record) => {
-                let CalibrationRecord { head, content } = record;
+        match store.glance(&id) {
+            Ok(Glance {
+                head,
+                kind,
+                summary,
+            }) => {
                 let used = store.active(&head.axis)?.current.as_deref() == Some(&id);
                 lines.push(format!(
                     "{} {}  {}  axis {}  {}  {}",
@@ -94,11 +97,11 @@ pub(crate) fn listed(store: &Store) -> Result<(String, Value), Failure> {
                     short(&id),
                     head.created,
                     head.axis,
-                    content.summary(),
+                    summary,
                     head.source
                 ));
                 values.push(json!({"id": id, "active": used, "axis": head.axis,
-                                   "kind": content.kind(), "created": head.created,
+                                   "kind": kind, "created": head.created,
                                    "source": head.source}));
             }
             Err(error) => {
@@ -121,47 +124,20 @@ fn show(store: &Store, id: &str, output: Output) -> Ended {
 /// One calibration, as text and as JSON.
 pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure> {
     let id = store.resolve(id)?;
-    let record = store.load(&id)?;
-    let head = &record.head;
-    let mut text = format!(
-        "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, ",
+    let Glance { head, kind, .. } = store.glance(&id)?;
+    let (lines, value) = (of_kind(kind).one)(store, &id)?;
+    let text = format!(
+        "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, {lines}",
         head.machine, head.stage_serial, head.axis, head.created, head.program, head.source,
     );
-    text += &match &record.content {
-        Content::LinearErrorTable(content) => linear_lines(content),
-        Content::RotaryErrorTable(content) => super::rotary::fit::shown(content),
-        Content::ScrewModel(content) => super::platform::fit::shown(content),
-        Content::VolumetricGeometry(content) => super::volumetric::shown::shown(content),
-        Content::BeamReferences(_) | Content::StateMemory(_) => record.content.summary(),
-    };
-    let value = serde_json::to_value(&record).expect("plain data always serialises");
     Ok((text, json!({"id": id, "record": value})))
 }
 
-fn linear_lines(content: &LinearContent) -> String {
-    let head = format!(
-        "{} runs, closure {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
-        content.runs,
-        micrometres(content.closure_m),
-    );
-    content
-        .nodes
-        .iter()
-        .fold(head, |text, node| text + &node_line(node))
-}
-
-fn micrometres(metres: Option<f64>) -> String {
-    metres.map_or("–".to_owned(), |it| format!("{:.3}", Metres(it).um()))
-}
-
-fn node_line(node: &NodeRecord) -> String {
-    format!(
-        "\n  {:>13.3}   {:>12}   {:>12}   {:>11}",
-        Metres(node.position_m).mm(),
-        micrometres(node.forward_m),
-        micrometres(node.reverse_m),
-        micrometres(node.forward_u_m.or(node.reverse_u_m)),
-    )
+/// How a kind of content is shown that the store knows.
+fn of_kind(kind: &str) -> Shown {
+    let all = Kind::ALL.into_iter().flat_map(|it| it.verbs().shown);
+    let own = all.into_iter().find(|it| it.kind == kind);
+    *own.expect("a test looks for each kind that is stored")
 }
 
 fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
@@ -177,75 +153,29 @@ pub(crate) fn compared(
     output: Output,
 ) -> Result<(String, Value), Failure> {
     let (before_id, after_id) = (store.resolve(before)?, store.resolve(after)?);
-    let (before, after) = (store.load(&before_id)?, store.load(&after_id)?);
+    let (before, after) = (store.glance(&before_id)?, store.glance(&after_id)?);
     let (old_axis, new_axis) = (&before.head.axis, &after.head.axis);
     if old_axis != new_axis {
         let what = format!("note: the first is of axis {old_axis}, the second of axis {new_axis}");
         output.note(&what);
     }
-    let (lines, values) = match &after.content {
-        Content::LinearErrorTable(new) => linear_changes(before.linear(&before_id)?, new),
-        Content::RotaryErrorTable(new) => {
-            super::rotary::fit::changes(before.rotary(&before_id)?, new)
-        }
-        Content::ScrewModel(new) => super::platform::fit::changes(before.screw(&before_id)?, new),
-        Content::VolumetricGeometry(new) => {
-            super::volumetric::shown::changes(before.geometry(&before_id)?, new)
-        }
-        Content::BeamReferences(_) | Content::StateMemory(_) => {
-            let kind = after.content.kind();
-            return Err(Failure::Usage {
-                what: format!("records of the kind {kind} are not compared"),
-                help: "`cal show --json` prints them".into(),
-            });
-        }
-    };
+    let changes = (of_kind(after.kind).two)(store, &before_id, &after_id)?;
+    let (lines, values) = changes.ok_or_else(|| Failure::Usage {
+        what: format!("records of the kind {} are not compared", after.kind),
+        help: "`cal show --json` prints them".into(),
+    })?;
     Ok((lines.join("\n"), json!({"changes": values})))
-}
-
-fn linear_changes(before: &LinearContent, after: &LinearContent) -> (Vec<String>, Vec<Value>) {
-    let mut lines = vec!["  position (mm)   Δ forward (µm)   Δ reverse (µm)".to_owned()];
-    let mut values = Vec::new();
-    for new in &after.nodes {
-        let Some(old) = before
-            .nodes
-            .iter()
-            .find(|old| old.position_m == new.position_m)
-        else {
-            continue;
-        };
-        let change = |new: Option<f64>, old: Option<f64>| Some(new? - old?);
-        let (forward, reverse) = (
-            change(new.forward_m, old.forward_m),
-            change(new.reverse_m, old.reverse_m),
-        );
-        let position = Metres(new.position_m).mm();
-        let (forward_um, reverse_um) = (micrometres(forward), micrometres(reverse));
-        lines.push(format!(
-            "  {position:>13.3}   {forward_um:>14}   {reverse_um:>14}"
-        ));
-        values.push(json!({
-            "position_mm": position,
-            "forward_um": forward.map(|it| Metres(it).um()),
-            "reverse_um": reverse.map(|it| Metres(it).um()),
-        }));
-    }
-    if values.is_empty() {
-        lines.push("  no position stands in both".into());
-    }
-    (lines, values)
 }
 
 /// The stage and the configuration are checked here; the drive itself when it is used.
 fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let section = &loaded.config.machine;
-    let store = Store::of(&loaded.config.machine);
+    let store = store_of(&loaded.config.machine);
     // Whoever measures with a calibration must find it there to the end.
     let _lease = Lease::take(&store, "cal activate")?;
     let id = store.resolve(id)?;
-    let record = store.load(&id)?;
-    let CalibrationRecord { head, .. } = record;
+    let head = store.glance(&id)?.head;
     let here = RecordHead {
         stage_serial: section.stage_serial.clone(),
         config_hash: loaded.hash.as_str().to_owned(),
@@ -279,7 +209,7 @@ const PLATFORM: &str = "platform";
 
 fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
-    let store = Store::of(&loaded.config.machine);
+    let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "cal rollback")?;
     if let (PLATFORM, Some(platform)) = (axis, &loaded.config.platform) {
         let screws = platform.actuator.iter().map(|it| it.axis.as_str());
@@ -307,4 +237,16 @@ fn rollback_all(store: &Store, axes: &[&str], output: Output) -> Ended {
         &lines.join("\n"),
         &json!({"axis": PLATFORM, "active": active}),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_calibration_that_is_stored_is_shown() {
+        for kind in truestage::CONTENTS {
+            assert_eq!(of_kind(kind.name()).kind, kind.name());
+        }
+    }
 }

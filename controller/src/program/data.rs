@@ -11,8 +11,8 @@ use compensator::iso230;
 use serde_json::json;
 use truestage::config::MachineConfig;
 use truestage::linear::LinearContent;
-use truestage::store::{CalibrationRecord, Content, Store, short};
-use truestage::{Failure, config, json as to_json, text};
+use truestage::store::{CalibrationRecord, short};
+use truestage::{Failure, config, json as to_json, store_of, text};
 use units::Metres;
 
 use crate::program::data_file::{head_of, read};
@@ -121,11 +121,8 @@ fn store_fit(
         truestage::linear::settings::compensation(&loaded.config, &name, fitted.table.clone())?;
     }
     let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
-    let record = CalibrationRecord {
-        head,
-        content: Content::LinearErrorTable(content),
-    };
-    Ok(Store::of(&loaded.config.machine).save(&record)?)
+    let record = CalibrationRecord { head, content };
+    Ok(store_of(&loaded.config.machine).save(&record)?)
 }
 
 /// The linear axis that a table is stored for.

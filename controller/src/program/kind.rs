@@ -21,6 +21,9 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    pub(crate) const ALL: [Self; 4] =
+        [Self::Linear, Self::Rotary, Self::Platform, Self::Volumetric];
+
     /// What this kind does for the verbs of the cycle.
     pub(crate) const fn verbs(self) -> &'static Verbs {
         match self {

@@ -7,6 +7,7 @@ mod data_file;
 mod demo;
 mod kind;
 mod linear;
+mod made_from;
 mod operator;
 mod output;
 mod page;
@@ -17,6 +18,7 @@ mod resume;
 mod rotary;
 mod scan;
 mod session;
+mod show;
 #[cfg(test)]
 mod stored_tests;
 mod targets;

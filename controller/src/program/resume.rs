@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use truestage::Failure;
-use truestage::store::{Store, read_journal};
+use truestage::store::{AnyLog, Store, read_journal};
 
 use crate::program::NEWEST_RUN;
 
@@ -29,7 +29,7 @@ pub(crate) fn journal_to_resume(
     }
     let newest = store.newest_run(verb, axis)?;
     let incomplete = match &newest {
-        Some(path) => !read_journal(path)?.complete,
+        Some(path) => !read_journal::<AnyLog>(path)?.complete,
         None => false,
     };
     match newest.filter(|_| incomplete) {
@@ -78,7 +78,7 @@ mod tests {
 
     fn store() -> (tempfile::TempDir, Store) {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path(), "m");
+        let store = truestage::store_in(folder.path(), "m");
         fs::create_dir_all(store.runs()).unwrap();
         fs::write(store.runs().join("20200101-calibrate-x-00.jsonl"), "").unwrap();
         (folder, store)

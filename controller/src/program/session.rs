@@ -9,7 +9,7 @@ use drivers::transport::record::Recorder;
 use truestage::config::{self, Loaded};
 use truestage::ports::{self, Overrides, Use};
 use truestage::store::Lease;
-use truestage::{Failure, Machine, StopRequest, Store, assemble};
+use truestage::{Failure, Machine, StopRequest, Store, assemble, store_of};
 
 use crate::program::output::Output;
 use crate::program::progress::Bars;
@@ -35,7 +35,7 @@ impl Session {
         if let Some(path) = &args.record {
             refuse_existing(path)?;
         }
-        let store = Store::of(&loaded.config.machine);
+        let store = store_of(&loaded.config.machine);
         let lease = Lease::take(&store, verb)?;
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();

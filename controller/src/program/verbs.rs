@@ -1,12 +1,23 @@
-//! What each kind of machine does for the verbs of the cycle.
+//! What each kind of machine does for the verbs of the command.
+
+use std::path::Path;
+
+use truestage::Failure;
 
 use super::output::{Ended, Output};
+use super::show::Shown;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 
-/// The verbs of one kind.
+/// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {
     pub(crate) zero: fn(&AxisArgs, Output) -> Ended,
     pub(crate) calibrate: fn(&CalibrateArgs, Output) -> Ended,
     pub(crate) verify: fn(&VerifyArgs, Output) -> Ended,
     pub(crate) move_to: fn(&MoveArgs, Output) -> Ended,
+    /// What its calibrations say.
+    pub(crate) shown: &'static [Shown],
+    /// By what its journals are known.
+    pub(crate) opened_by: &'static [&'static str],
+    /// The page of the journal at a path.
+    pub(crate) page: fn(&Path) -> Result<String, Failure>,
 }

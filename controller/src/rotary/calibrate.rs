@@ -13,11 +13,12 @@ use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
 use crate::rotary::placement::{Placed, PlateRun};
 use crate::rotary::table::RotaryTable;
+use crate::rotary::{PlateEntry, PlateLog};
 use crate::rotary::{PlatePlanEntry, RotaryContent};
 use crate::run::{CalibrateOptions, note_failure, utc_now};
 use crate::store::{
-    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, ReadJournal,
-    RecordHead, SCHEMA_VERSION, Store, first_difference, not_resumable,
+    CalibrationRecord, InstrumentRecord, Journal, JournalHeader, ReadJournal, RecordHead,
+    SCHEMA_VERSION, Store, first_difference, not_resumable,
 };
 
 /// So many placements are needed before one can be told to be misplaced by the others.
@@ -91,8 +92,7 @@ impl RotaryTable<'_> {
         };
         let stored = self.store_table(store, &run, &journal, content.clone());
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         let closures = placed.iter().map(|it| it.closure.abs());
         Ok(RotaryCalibrated {
             path: store.calibration_path(&id),
@@ -113,7 +113,7 @@ impl RotaryTable<'_> {
         run: &PlateRun,
         offsets: &[f64],
         mut placed: Vec<Placed>,
-        journal: &mut Journal,
+        journal: &mut Journal<PlateLog>,
         operator: &mut dyn Operator,
     ) -> Result<Vec<Placed>, Failure> {
         // A run that was continued may have been killed between a placement and its judgement.
@@ -139,7 +139,7 @@ impl RotaryTable<'_> {
         &mut self,
         store: &Store,
         run: &PlateRun,
-        journal: &Journal,
+        journal: &Journal<PlateLog>,
         content: RotaryContent,
     ) -> Result<String, Failure> {
         let source = journal.path().file_name().unwrap_or_default();
@@ -151,7 +151,6 @@ impl RotaryTable<'_> {
         };
         // Nothing is stored that cannot be applied.
         let compensation = self.prepare(&content, "just made")?;
-        let content = Content::RotaryErrorTable(content);
         let record = CalibrationRecord { head, content };
         let id = store.save(&record)?;
         store.activate(self.axis, &id)?;
@@ -198,7 +197,7 @@ fn doubt(
     axis: &str,
     run: &PlateRun,
     placed: &[Placed],
-    journal: &mut Journal,
+    journal: &mut Journal<PlateLog>,
 ) -> Result<(), Failure> {
     if placed.len() < JUDGED_MIN {
         return Ok(());
@@ -208,7 +207,7 @@ fn doubt(
         return Ok(());
     };
     let offset = source.offset as f64;
-    journal.write(&Entry::Misplaced { offset })?;
+    journal.write(&PlateEntry::Misplaced { offset })?;
     journal.flush_to_disk()?;
     let axis = axis.to_owned();
     Err(RotaryFailure::Misplaced { axis, source }.into())
@@ -221,17 +220,17 @@ fn open(
     plan: &PlatePlanEntry,
     resume: Option<&PathBuf>,
     hash: &ConfigHash,
-) -> Result<(Journal, Vec<Placed>), Failure> {
+) -> Result<(Journal<PlateLog>, Vec<Placed>), Failure> {
     let Some(path) = resume else {
         let mut journal = Journal::create(&store.runs(), header)?;
-        journal.write(&Entry::PlatePlan(plan.clone()))?;
+        journal.write(&PlateEntry::PlatePlan(plan.clone()))?;
         journal.flush_to_disk()?;
         return Ok((journal, Vec::new()));
     };
-    let (mut journal, read) = Journal::resume(path, header, hash)?;
-    match &read.plate_plan {
+    let (mut journal, read) = Journal::<PlateLog>::resume(path, header, hash)?;
+    match &read.log.plan {
         // Killed before its second line: nothing was read yet.
-        None => journal.write(&Entry::PlatePlan(plan.clone()))?,
+        None => journal.write(&PlateEntry::PlatePlan(plan.clone()))?,
         Some(before) => {
             if let Some(it) = first_difference(before, plan) {
                 return Err(not_resumable(path, "how the plate is read", it).into());
@@ -241,9 +240,9 @@ fn open(
     Ok((journal, placed_of(&read, plan.passes)))
 }
 
-fn placed_of(read: &ReadJournal, passes: u32) -> Vec<Placed> {
-    let placements = read.placements.iter();
+fn placed_of(read: &ReadJournal<PlateLog>, passes: u32) -> Vec<Placed> {
+    let placements = read.log.placements.iter();
     placements
-        .map(|it| Placed::of(it, &read.sweeps, passes))
+        .map(|it| Placed::of(it, &read.log.sweeps, passes))
         .collect()
 }

@@ -13,6 +13,7 @@ use compensator::rotary::{Placement, RotarySeries};
 use core::f64::consts::TAU;
 use units::Radians;
 
+use crate::rotary::PlateLog;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::placement::{Placed, PlateRun};
 use crate::store::ReadJournal;
@@ -99,11 +100,11 @@ pub struct Evaluated {
 
 /// The evaluation of the placements that `journal` has whole; `None` when they are too few, or do
 /// not part table and plate.
-pub fn evaluated(journal: &ReadJournal) -> Option<Evaluated> {
-    let plan = journal.plate_plan.as_ref()?;
-    let placements = journal.placements.iter();
+pub fn evaluated(journal: &ReadJournal<PlateLog>) -> Option<Evaluated> {
+    let plan = journal.log.plan.as_ref()?;
+    let placements = journal.log.placements.iter();
     let placed: Vec<Placed> = placements
-        .map(|it| Placed::of(it, &journal.sweeps, plan.passes))
+        .map(|it| Placed::of(it, &journal.log.sweeps, plan.passes))
         .collect();
     let options = SolveOptions {
         amplification_max: f64::INFINITY,

@@ -18,13 +18,13 @@ pub(crate) struct TableInUse {
 impl TableInUse {
     pub(super) fn new(
         id: &str,
-        record: &CalibrationRecord,
+        record: &CalibrationRecord<RotaryContent>,
         compensation: PeriodicCompensation,
     ) -> Result<Self, StoreError> {
         Ok(Self {
             id: id.to_owned(),
             plate: record.head.instrument.name.clone(),
-            content: record.rotary(id)?.clone(),
+            content: record.content.clone(),
             compensation,
         })
     }

@@ -74,13 +74,13 @@ impl RotaryTable<'_> {
         let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
-        let record = store.load(&id)?;
+        let record = store.load::<RotaryContent>(&id)?;
         record.head.belongs_to(
             &id,
             &self.core.this_machine(self.axis),
             self.core.config_hash,
         )?;
-        let compensation = self.prepare(record.rotary(&id)?, &id)?;
+        let compensation = self.prepare(&record.content, &id)?;
         let in_use = TableInUse::new(&id, &record, compensation)?;
         self.memory.calibration = Some(in_use);
         Ok(Some(id))

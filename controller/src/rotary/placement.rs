@@ -13,9 +13,10 @@ use crate::rotary::failure::RotaryFailure;
 use crate::rotary::operator::{Operator, PlateMove, PlateTask};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlacementEntry, PlatePlanEntry, SweepEntry};
+use crate::rotary::{PlateEntry, PlateLog};
 use crate::rotary::{Sweep, SweepOptions};
 use crate::run::missing;
-use crate::store::{Entry, Journal};
+use crate::store::Journal;
 use machine::Stage;
 
 /// How long the machine lives between two looks at the person.
@@ -245,7 +246,7 @@ impl RotaryTable<'_> {
         run: &PlateRun,
         (offset, phase): (f64, Option<Radians>),
         (done, total): (u32, u32),
-        journal: &mut Journal,
+        journal: &mut Journal<PlateLog>,
     ) -> Result<Placed, Failure> {
         let of_part = offset.fract() * run.spacing();
         let mut phase = match phase {
@@ -275,7 +276,7 @@ impl RotaryTable<'_> {
                 approach,
                 self.core.now().seconds(),
             );
-            journal.write(&Entry::Sweep(entry.clone()))?;
+            journal.write(&PlateEntry::Sweep(entry.clone()))?;
             sweeps.push(entry);
             let done = u64::from(done + number + 1);
             let observer = self.core.observer();
@@ -283,7 +284,7 @@ impl RotaryTable<'_> {
         }
         self.warn_of_lines(&sweeps);
         let placement = self.closed(run, offset, &sweeps)?;
-        journal.write(&Entry::Placed(placement))?;
+        journal.write(&PlateEntry::Placed(placement))?;
         journal.flush_to_disk()?;
         self.memory.plate_at = Some(offset);
         Ok(Placed::of(&placement, &sweeps, run.passes))

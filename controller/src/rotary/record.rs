@@ -115,12 +115,8 @@ impl RotaryContent {
         let deviations = self.table_error_rad.iter().map(|error| Radians(-error));
         let uncertainty = self.standard_uncertainty_rad.as_ref();
         let uncertainty = uncertainty.map(|it| it.iter().copied().map(Radians).collect());
-        PeriodicTable::new(deviations.collect(), uncertainty).map_err(|source| {
-            StoreError::Periodic {
-                id: short(id),
-                source,
-            }
-        })
+        PeriodicTable::new(deviations.collect(), uncertainty)
+            .map_err(|source| StoreError::model(&short(id), source))
     }
 }
 

@@ -8,31 +8,33 @@ use units::Radians;
 use crate::page::band::{Sure, band, enlargement, said};
 use crate::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::page::{document, escape, facts, facts_of};
+use crate::rotary::PlateLog;
 use crate::rotary::{Evaluated, evaluated};
 use crate::rotary::{JudgedEntry, RotaryContent};
-use crate::store::{CalibrationRecord, Content, ReadJournal};
+use crate::store::{CalibrationRecord, ReadJournal};
 
 /// So many readings that were left out are named.
 const NAMED: usize = 20;
 
 /// The page of `journal`, with the calibrations that were made from it.
-pub fn render(journal: &ReadJournal, calibrations: &[(String, CalibrationRecord)]) -> String {
+pub fn render(
+    journal: &ReadJournal<PlateLog>,
+    calibrations: &[(String, CalibrationRecord<RotaryContent>)],
+) -> String {
     render_with(journal, calibrations, &[])
 }
 
 /// The same, with verifications that were made later, each under its name.
 pub fn render_with(
-    journal: &ReadJournal,
-    calibrations: &[(String, CalibrationRecord)],
-    later: &[(&str, &ReadJournal)],
+    journal: &ReadJournal<PlateLog>,
+    calibrations: &[(String, CalibrationRecord<RotaryContent>)],
+    later: &[(&str, &ReadJournal<PlateLog>)],
 ) -> String {
     let header = &journal.header;
     let mut html = facts(&facts_of_run(journal, calibrations));
     html += &placements(journal);
     for (_, record) in calibrations {
-        if let Content::RotaryErrorTable(content) = &record.content {
-            html += &calibration(content);
-        }
+        html += &calibration(&record.content);
     }
     if header.verb == "calibrate" {
         html += &match evaluated(journal) {
@@ -44,7 +46,7 @@ pub fn render_with(
     }
     let own = core::iter::once(("", journal));
     for (name, journal) in own.chain(later.iter().copied()) {
-        if let Some(judged) = &journal.judged {
+        if let Some(judged) = &journal.log.judged {
             html += &verification(name, judged, journal);
         }
     }
@@ -55,14 +57,14 @@ pub fn render_with(
 }
 
 fn facts_of_run(
-    journal: &ReadJournal,
-    calibrations: &[(String, CalibrationRecord)],
+    journal: &ReadJournal<PlateLog>,
+    calibrations: &[(String, CalibrationRecord<RotaryContent>)],
 ) -> Vec<(String, String)> {
-    let mut facts = facts_of(journal);
+    let mut facts = facts_of(journal, 0);
     // Readings of a plate are no points.
     facts.retain(|(name, _)| name != "points" && name != "instrument");
     let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
-    if let Some(plan) = &journal.plate_plan {
+    if let Some(plan) = &journal.log.plan {
         let offsets: Vec<_> = plan.offsets.iter().map(f64::to_string).collect();
         add("plate", format!("{}, {} lines", plan.plate, plan.lines));
         add("placements", format!("at {} lines", offsets.join(", ")));
@@ -86,19 +88,25 @@ fn arcsec(radians: f64) -> f64 {
 }
 
 /// What was read in each placement.
-fn placements(journal: &ReadJournal) -> String {
+fn placements(journal: &ReadJournal<PlateLog>) -> String {
     let mut html = String::from(
         "<h2>Placements</h2><table><tr><th>offset (lines)</th><th>passes</th><th>readings</th>\
          <th>not read</th><th>moved meanwhile (″)</th></tr>",
     );
-    let mut offsets: Vec<f64> = journal.sweeps.iter().map(|it| it.offset).collect();
+    let mut offsets: Vec<f64> = journal.log.sweeps.iter().map(|it| it.offset).collect();
     offsets.dedup();
     for offset in offsets {
-        let own = || journal.sweeps.iter().filter(move |it| it.offset == offset);
+        let own = || {
+            journal
+                .log
+                .sweeps
+                .iter()
+                .filter(move |it| it.offset == offset)
+        };
         let all = own().map(|it| it.deviations_rad.len()).sum::<usize>();
         let read = own().map(|it| it.deviations_rad.iter().flatten().count());
         let read: usize = read.sum();
-        let closed = journal.placements.iter().find(|it| it.offset == offset);
+        let closed = journal.log.placements.iter().find(|it| it.offset == offset);
         let moved = closed.map_or("not read to its end".to_owned(), |it| {
             format!("{:+.4}", arcsec(it.closure_rad))
         });
@@ -231,8 +239,8 @@ fn residuals(evaluated: &Evaluated) -> String {
     )
 }
 
-fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal) -> String {
-    let plan = journal.plate_plan.as_ref();
+fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog>) -> String {
+    let plan = journal.log.plan.as_ref();
     let offset = plan.and_then(|it| it.offsets.first()).copied();
     let offset = offset.unwrap_or(0.0);
     let mut html = format!("<h2>As found and as left{}</h2>", escape(name));
@@ -308,7 +316,7 @@ mod tests {
     #[test]
     fn the_page_shows_the_largest_error_that_lists_show() {
         let largest = format!("{:.3}", content().largest_error().arcsec());
-        let listed = crate::store::Content::RotaryErrorTable(content()).summary();
+        let listed = content().summary();
         assert!(
             listed.contains(&format!("up to {largest} arcsec")),
             "{listed}"

@@ -24,9 +24,10 @@ use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
 use crate::rotary::placement::{Placed, PlateRun};
 use crate::rotary::table::RotaryTable;
+use crate::rotary::{PlateEntry, PlateLog};
 use crate::run::missing;
 use crate::run::note_failure;
-use crate::store::{Entry, Journal, Store, short};
+use crate::store::{Journal, Store, short};
 use machine::Stage;
 
 /// How much better another place of the plate must fit.
@@ -142,11 +143,10 @@ impl RotaryTable<'_> {
             tolerance: Radians::from_arcsec(config.tolerance_arcsec),
             journal: journal.path().to_owned(),
         };
-        journal.write(&Entry::Judged(verified.entry()))?;
+        journal.write(&PlateEntry::Judged(verified.entry()))?;
         self.judge_table(store, &verified)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         Ok(verified)
     }
 
@@ -154,10 +154,10 @@ impl RotaryTable<'_> {
         &mut self,
         run: &PlateRun,
         (offset, lay_at, phase): (f64, Option<f64>, Option<Radians>),
-        journal: &mut Journal,
+        journal: &mut Journal<PlateLog>,
         operator: &mut dyn Operator,
     ) -> Result<Placed, Failure> {
-        journal.write(&Entry::PlatePlan(run.plan(vec![offset])))?;
+        journal.write(&PlateEntry::PlatePlan(run.plan(vec![offset])))?;
         self.place_plate(run, offset, (1, 1), lay_at, operator)?;
         self.read_placement(run, (offset, phase), (0, run.sweeps()), journal)
     }

@@ -190,35 +190,6 @@ pub struct VolumeCheckEntry {
     pub limit_m: f64,
 }
 
-/// What a journal of three axes holds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct VolumeRead {
-    /// How the errors are to be found.
-    pub plan: Option<VolumePlanEntry>,
-    /// What the detectors read first.
-    pub references: Option<VolumeReferencesEntry>,
-    /// Every reading, in the order they were made.
-    pub readings: Vec<LineReadingEntry>,
-    /// The lines that are whole.
-    pub whole: Vec<LineReadEntry>,
-    /// What a verification is.
-    pub check: Option<VolumeCheckEntry>,
-}
-
-impl VolumeRead {
-    /// Whether the line is whole.
-    pub fn is_whole(&self, line: usize) -> bool {
-        self.whole.iter().any(|it| it.line == line)
-    }
-
-    /// The zero of the interferometer is set for each line: half a line cannot be continued.
-    pub(crate) fn keep_whole_lines(&mut self) {
-        let whole = &self.whole;
-        let is_whole = |line: usize| whole.iter().any(|it| it.line == line);
-        self.readings.retain(|it| is_whole(it.line));
-    }
-}
-
 impl LineReadingEntry {
     /// An observation of the line with this number, as it was read.
     pub fn of(line: usize, observation: &Observation) -> Self {

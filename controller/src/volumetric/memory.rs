@@ -12,7 +12,7 @@ use units::{Metres, Radians};
 
 use crate::failure::Failure;
 use crate::run::utc_now;
-use crate::store::{CalibrationRecord, Content, RecordHead, Store};
+use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::correction::{bends, lever};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::References;
@@ -136,7 +136,6 @@ impl WorkVolume<'_> {
             source: source.to_owned(),
             ..self.this_volume(memory_pointer(memory))?
         };
-        let content = Content::StateMemory(content);
         let id = store.save(&CalibrationRecord { head, content })?;
         store.activate(memory_pointer(memory), &id)?;
         let foreign = foreign_second(store)?;
@@ -177,8 +176,8 @@ fn foreign_second(store: &Store) -> Result<Option<String>, Failure> {
     let Some(second) = current(MemoryName::Second)? else {
         return Ok(None);
     };
-    let record = store.load(&second)?;
-    let is_own = record.state_memory(&second)?.first == current(MemoryName::First)?;
+    let record = store.load::<StateMemoryContent>(&second)?;
+    let is_own = record.content.first == current(MemoryName::First)?;
     Ok((!is_own).then_some(second))
 }
 

@@ -25,6 +25,7 @@ mod first_part;
 mod handle;
 mod inputs;
 mod line;
+mod log;
 mod memory;
 mod moves;
 mod path_refusal;
@@ -32,6 +33,7 @@ mod record;
 mod reference;
 pub mod report;
 pub mod settings;
+mod sound;
 mod state;
 mod thermometers;
 mod verify;
@@ -49,12 +51,13 @@ pub use config::{
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use entries::{
     BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
-    VolumeCheckEntry, VolumePlanEntry, VolumeRead, VolumeReferencesEntry,
+    VolumeCheckEntry, VolumePlanEntry, VolumeReferencesEntry,
 };
 pub use failure::VolumetricFailure;
 pub use first_part::{FirstPart, FirstPartCorrection, PartRecorder};
 pub use handle::WorkVolume;
 pub use line::{Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask};
+pub use log::{VolumeEntry, VolumeLog};
 pub use memory::Remembered;
 pub use moves::Mover;
 pub use path_refusal::PathRefusal;

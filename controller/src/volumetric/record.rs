@@ -101,10 +101,10 @@ impl FunctionRecord {
             Some(u) => it.with_uncertainties(&quantities(u)),
             None => Ok(it),
         });
-        function.map_err(|source| StoreError::Function {
+        function.map_err(|source| StoreError::Part {
             id: short(id),
             name: self.name.clone(),
-            source,
+            source: source.into(),
         })
     }
 }
@@ -198,10 +198,7 @@ impl GeometryContent {
                 None => true,
             };
             if taken {
-                return Err(StoreError::ErrorName {
-                    id: short(id),
-                    name: record.name.clone(),
-                });
+                return Err(no_error(id, &record.name));
             }
         }
         Ok(axes)
@@ -299,10 +296,9 @@ impl BeamReferencesContent {
         let slider = [first.function(id)?, second.function(id)?];
         let end = record.end_m.unwrap_or_default().map(Metres);
         let reference = BeamReference::new(slider, end, drift);
-        reference.map(Some).map_err(|source| StoreError::Beam {
-            id: short(id),
-            source,
-        })
+        reference
+            .map(Some)
+            .map_err(|source| StoreError::model(&short(id), source))
     }
 
     /// The reference of the roll, in the record `id`; `None` where there is none.
@@ -407,10 +403,7 @@ impl StateMemoryContent {
             let functions = [first.function(id)?, second.function(id)?];
             let place = AXES.iter().position(|it| *it == record.axis);
             let place = place.filter(|at| map.of[*at].is_none());
-            let place = place.ok_or_else(|| StoreError::ErrorName {
-                id: short(id),
-                name: record.axis.to_string(),
-            })?;
+            let place = place.ok_or_else(|| no_error(id, &record.axis.to_string()))?;
             map.of[place] = Some(functions);
         }
         Ok(map)
@@ -425,12 +418,17 @@ impl StateMemoryContent {
     }
 }
 
+/// The error for a record with a part that three axes do not have, or that it has twice.
+fn no_error(id: &str, name: &str) -> StoreError {
+    let source = format!("`{name}` is no error of three axes, or is there twice");
+    StoreError::model(&short(id), source)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::Store;
-    use crate::store::record::tests::record;
-    use crate::store::{CalibrationRecord, Content};
+    use crate::store::{CalibrationRecord, Content, RecordHead};
+    use crate::store_in;
 
     fn function(values: [f64; 3]) -> Function<Metres> {
         let nodes = [0.0, 0.1, 0.25].map(Metres);
@@ -438,15 +436,18 @@ mod tests {
         function.with_uncertainties(&[Metres(1e-7); 3]).unwrap()
     }
 
-    fn stored(content: Content) -> (String, CalibrationRecord) {
+    fn stored<C: Content + PartialEq + core::fmt::Debug>(content: C) -> (String, C) {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path(), "m");
-        let mut record = record("A");
-        record.content = content;
+        let store = store_in(folder.path(), "m");
+        let head = RecordHead {
+            axis: "x".into(),
+            ..RecordHead::default()
+        };
+        let record = CalibrationRecord { head, content };
         let id = store.save(&record).unwrap();
         let loaded = store.load(&id).unwrap();
         assert_eq!(loaded, record);
-        (id, loaded)
+        (id, loaded.content)
     }
 
     #[test]
@@ -460,8 +461,7 @@ mod tests {
         };
         let content = GeometryContent::new(&axes, &squareness, &[Celsius(20.5)]);
         assert_eq!(content.functions[0].name, "e_yx");
-        let (id, record) = stored(Content::VolumetricGeometry(content));
-        let content = record.geometry(&id).unwrap();
+        let (id, content) = stored(content);
         assert_eq!(content.squareness(), squareness);
         assert_eq!(content.temperatures(), [Celsius(20.5)]);
         let back = content.errors(&id).unwrap();
@@ -486,15 +486,16 @@ mod tests {
             ..GeometryContent::default()
         };
         for (names, wrong) in [(["e_yx", "e_wx"], "e_wx"), (["e_ax", "e_ax"], "e_ax")] {
-            match with(&names).errors("id") {
-                Err(StoreError::ErrorName { name, .. }) => assert_eq!(name, wrong),
-                other => panic!("{other:?}"),
-            }
+            let refused = with(&names).errors("id").unwrap_err().to_string();
+            assert!(
+                refused.contains(&format!("`{wrong}` is no error")),
+                "{refused}"
+            );
         }
         let mut short = with(&["e_yx"]);
         short.functions[0].values_si.pop();
         let refused = short.errors("id");
-        assert!(matches!(refused, Err(StoreError::Function { .. })));
+        assert!(matches!(refused, Err(StoreError::Part { .. })));
     }
 
     #[test]
@@ -509,8 +510,7 @@ mod tests {
             }],
             roll: None,
         };
-        let (id, record) = stored(Content::BeamReferences(content));
-        let content = record.beam_references(&id).unwrap();
+        let (id, content) = stored(content);
         let drift = BeamDrift::Translating;
         let beam = content.beam(&id, Axis::Y, drift).unwrap().unwrap();
         assert_eq!(beam.end(), [Metres(1e-5), Metres(-2e-5)]);
@@ -519,14 +519,12 @@ mod tests {
         let mut map = StateMap::default();
         map.of[2] = Some([function([0.0, 5e-6, 0.0]), function([0.0; 3])]);
         let content = StateMemoryContent::new(MemoryName::Second, "r", &map);
-        let (id, record) = stored(Content::StateMemory(content));
-        let content = record.state_memory(&id).unwrap();
+        let (id, content) = stored(content);
         let back = content.map(&id).unwrap();
         let [first, second] = back.at(Axis::Z, Metres(0.1));
         assert!((first - Metres(5e-6)).abs() < Metres(1e-18), "{first}");
         assert_eq!(second, Metres::ZERO);
         assert_eq!(content.memory, MemoryName::Second);
-        assert!(record.geometry(&id).is_err());
     }
 
     #[test]
@@ -541,8 +539,8 @@ mod tests {
             ..without
         };
         assert!(with.summary().contains("abc"), "{}", with.summary());
-        let (id, record) = stored(Content::StateMemory(with));
-        let first = &record.state_memory(&id).unwrap().first;
+        let (_, content) = stored(with);
+        let first = &content.first;
         assert_eq!(first.as_deref(), Some("abc"));
     }
 }

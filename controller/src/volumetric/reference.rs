@@ -15,14 +15,14 @@ use units::{Celsius, Metres, Quantity, Radians, Time};
 use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::run::utc_now;
-use crate::store::{CalibrationRecord, Content, RecordHead, Store, short};
+use crate::store::{CalibrationRecord, RecordHead, Store, short};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
 use crate::volumetric::settings::{beam_detector, beam_drift, volume_axis};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AXES, BeamRecord, BeamReferencesContent, FunctionRecord};
 use crate::volumetric::{BeamConfig, BeamDetectorConfig, RollConfig, VolumetricConfig};
-use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
+use crate::volumetric::{GEOMETRY, GeometryContent, REFERENCES, VolumetricFailure};
 use machine::Stage;
 use machine::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
 
@@ -141,7 +141,8 @@ impl WorkVolume<'_> {
     /// stops the machine. What was in use before stays in use then.
     pub fn reference(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
         let geometry = measured_geometry(store)?;
-        let then = store.load(&geometry)?.geometry(&geometry)?.temperatures();
+        let errors = store.load::<GeometryContent>(&geometry)?.content;
+        let then = errors.temperatures();
         let config = self.config.clone();
         if !config.temperature.is_empty() {
             // Before anything moves, and again by what it was while they were taken.
@@ -172,7 +173,7 @@ impl WorkVolume<'_> {
             source: source.to_owned(),
             ..self.this_volume(REFERENCES)?
         };
-        let content = Content::BeamReferences(references.content.clone());
+        let content = references.content.clone();
         let id = store.save(&CalibrationRecord { head, content })?;
         store.activate(REFERENCES, &id)?;
         Ok(VolumetricReferenced { id, references })

@@ -11,9 +11,9 @@ use units::{Metres, Radians};
 use crate::page::band::{Sure, band, enlargement, said};
 use crate::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
 use crate::page::{document, escape, facts};
-use crate::store::{CalibrationRecord, Content, ReadJournal};
+use crate::store::{ReadJournal, Store, StoreError};
 use crate::volumetric::{
-    FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeRead,
+    FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeLog,
 };
 
 /// Parts between two nodes in which a curve is drawn.
@@ -34,17 +34,41 @@ pub struct HourOfDay<'a> {
     /// Which hour.
     pub hour: f64,
     /// As found, by tables alone, corrected by what the machine sees.
-    pub runs: [&'a ReadJournal; 3],
+    pub runs: [&'a ReadJournal<VolumeLog>; 3],
+}
+
+/// What was made from a run.
+#[derive(Clone, Debug, Default)]
+pub struct Made {
+    /// The name and the kind of each record.
+    pub named: Vec<(String, &'static str)>,
+    /// The errors among them.
+    pub geometries: Vec<GeometryContent>,
+}
+
+impl Made {
+    /// What `store` has from the journal called `source`.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn of(store: &Store, source: &str) -> Result<Self, StoreError> {
+        let geometries = store.made_from::<GeometryContent>(source)?;
+        let named = store.glances_from(source)?;
+        Ok(Self {
+            named: named.into_iter().map(|(id, it)| (id, it.kind)).collect(),
+            geometries: geometries.into_iter().map(|(_, it)| it.content).collect(),
+        })
+    }
 }
 
 /// The page of `journal`, with the calibrations that were made from it.
-pub fn render(journal: &ReadJournal, made: &[(String, CalibrationRecord)]) -> String {
+pub fn render(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
     let header = &journal.header;
     let title = format!("{} of three axes, {}", header.verb, header.machine);
     let mut html = facts(&facts_of_run(journal, made));
-    if journal.volume.check.is_some() {
+    if journal.log.check.is_some() {
         html += &verification(journal);
-        html += &temperatures(&journal.volume.readings);
+        html += &temperatures(&journal.log.readings);
     } else {
         html += &calibration(journal, made);
     }
@@ -54,8 +78,8 @@ pub fn render(journal: &ReadJournal, made: &[(String, CalibrationRecord)]) -> St
 /// The page of a demonstration: a day, and the calibration that it began with.
 pub fn render_day(
     day: &[HourOfDay<'_>],
-    calibrated: &ReadJournal,
-    made: &[(String, CalibrationRecord)],
+    calibrated: &ReadJournal<VolumeLog>,
+    made: &Made,
 ) -> String {
     let title = format!("A day of three axes, {}", calibrated.header.machine);
     let mut html = facts(&facts_of_run(calibrated, made));
@@ -67,11 +91,8 @@ pub fn render_day(
 const NOTE: &str = "deviation = actual − target, at the tool; tilts are right-handed. E of an axis \
                     and a direction: e_yx is the displacement of x along y, e_ax its tilt about x.";
 
-fn facts_of_run(
-    journal: &ReadJournal,
-    made: &[(String, CalibrationRecord)],
-) -> Vec<(String, String)> {
-    let mut facts = crate::page::facts_of(journal);
+fn facts_of_run(journal: &ReadJournal<VolumeLog>, made: &Made) -> Vec<(String, String)> {
+    let mut facts = crate::page::facts_of(journal, 0);
     // Readings of lines are no points, and three axes no axis.
     facts.retain(|(name, _)| name != "points" && name != "axis" && name != "drive");
     // Who the instrument is shows when it is switched on, after the journal was begun.
@@ -79,15 +100,15 @@ fn facts_of_run(
         *value = value.replacen(" ()", "", 1);
     }
     let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
-    let read = &journal.volume;
+    let read = &journal.log;
     if let Some(plan) = &read.plan {
         let (whole, all) = (read.whole.len(), plan.lines.len());
         add("lines", format!("{whole} of {all} read whole"));
         add("chain", plan.chain.clone());
     }
     add("readings", read.readings.len().to_string());
-    for (id, record) in made {
-        add(&format!("made: {}", record.content.kind()), id.clone());
+    for (id, kind) in &made.named {
+        add(&format!("made: {kind}"), id.clone());
     }
     facts
 }
@@ -138,7 +159,7 @@ fn curves(day: &[HourOfDay<'_>]) -> String {
     }
     let readings: Vec<_> = day
         .iter()
-        .flat_map(|it| it.runs[2].volume.readings.iter().cloned())
+        .flat_map(|it| it.runs[2].log.readings.iter().cloned())
         .collect();
     html + &temperatures(&readings)
 }
@@ -160,8 +181,8 @@ fn way(reading: &LineReadingEntry, from: [f64; 3]) -> f64 {
 }
 
 /// Way in millimetres and deviation in micrometres, from what it was at the beginning.
-fn deviations(journal: &ReadJournal) -> Vec<(f64, f64)> {
-    let readings = &journal.volume.readings;
+fn deviations(journal: &ReadJournal<VolumeLog>) -> Vec<(f64, f64)> {
+    let readings = &journal.log.readings;
     let first = readings.first();
     let (from, zero) = first.map_or(([0.0; 3], 0.0), |it| (it.at_m, it.deviation_si));
     let each = readings.iter();
@@ -169,21 +190,21 @@ fn deviations(journal: &ReadJournal) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn range_of(journal: &ReadJournal) -> f64 {
-    let each = journal.volume.readings.iter().map(|it| it.deviation_si);
+fn range_of(journal: &ReadJournal<VolumeLog>) -> f64 {
+    let each = journal.log.readings.iter().map(|it| it.deviation_si);
     let (low, high) = each.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| {
         (low.min(it), high.max(it))
     });
     (high - low).max(0.0)
 }
 
-fn verification(journal: &ReadJournal) -> String {
-    let Some(check) = &journal.volume.check else {
+fn verification(journal: &ReadJournal<VolumeLog>) -> String {
+    let Some(check) = &journal.log.check else {
         return String::new();
     };
     let range = um(range_of(journal));
     let points = deviations(journal);
-    let readings = &journal.volume.readings;
+    let readings = &journal.log.readings;
     let sure = points.iter().zip(readings);
     let sure = sure.map(|((x, y), it)| (*x, *y, um(it.u_si)));
     let sure: Vec<Sure> = sure.collect();
@@ -251,14 +272,10 @@ fn temperatures(readings: &[LineReadingEntry]) -> String {
     format!("<h2>Temperatures</h2><figure>{chart}</figure>")
 }
 
-fn calibration(journal: &ReadJournal, made: &[(String, CalibrationRecord)]) -> String {
-    let stored = made.iter().filter_map(|(_, record)| match &record.content {
-        Content::VolumetricGeometry(content) => Some(content),
-        _ => None,
-    });
-    let mut html: String = stored.clone().map(geometry).collect();
-    let read = &journal.volume;
-    html += &agreement::residuals(read, stored.clone().next());
+fn calibration(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
+    let mut html: String = made.geometries.iter().map(geometry).collect();
+    let read = &journal.log;
+    html += &agreement::residuals(read, made.geometries.first());
     html += &temperatures(&read.readings);
     html + &lines(read)
 }
@@ -406,7 +423,7 @@ fn largest(content: &GeometryContent) -> String {
     html + "</table>"
 }
 
-fn lines(read: &VolumeRead) -> String {
+fn lines(read: &VolumeLog) -> String {
     let Some(plan) = &read.plan else {
         return String::new();
     };

@@ -9,7 +9,7 @@ use compensator::volumetric::online::{BeamReference, Memories};
 
 use crate::config::ConfigHash;
 use crate::failure::Failure;
-use crate::store::{CalibrationRecord, IdentityRecord, RecordHead, Store, StoreError, short};
+use crate::store::{Content, IdentityRecord, RecordHead, Store, StoreError, short};
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::settings::beam_drift;
@@ -51,17 +51,17 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// The record that is in use under `pointer`, with its name.
-    fn active(&self, pointer: &str) -> Result<Option<(String, CalibrationRecord)>, StoreError> {
+    fn active<C: Content>(&self, pointer: &str) -> Result<Option<(String, C)>, StoreError> {
         let Some(id) = self.store.active(pointer)?.current else {
             return Ok(None);
         };
-        let record = self.store.load(&id)?;
+        let record = self.store.load::<C>(&id)?;
         let here = RecordHead {
             axis: pointer.to_owned(),
             ..self.here.clone()
         };
         record.head.belongs_to(&id, &here, self.hash)?;
-        Ok(Some((id, record)))
+        Ok(Some((id, record.content)))
     }
 }
 
@@ -93,12 +93,11 @@ impl WorkVolume<'_> {
             here,
             hash: self.core.config_hash,
         };
-        let Some((id, record)) = reader.active(GEOMETRY)? else {
+        let Some((id, geometry)) = reader.active::<GeometryContent>(GEOMETRY)? else {
             return Ok(None);
         };
-        let geometry = record.geometry(&id)?;
-        self.check_drives(&id, geometry, config)?;
-        check_thermometers(geometry, config)?;
+        self.check_drives(&id, &geometry, config)?;
+        check_thermometers(&geometry, config)?;
         let mut state = VolumetricState {
             axes: geometry.errors(&id)?,
             squareness: geometry.squareness(),
@@ -111,8 +110,7 @@ impl WorkVolume<'_> {
             geometry: id,
             ..VolumetricRecords::default()
         };
-        if let Some((id, record)) = reader.active(REFERENCES)? {
-            let references = record.beam_references(&id)?;
+        if let Some((id, references)) = reader.active::<BeamReferencesContent>(REFERENCES)? {
             if references.geometry != records.geometry {
                 let (references, measured_with) = (short(&id), short(&references.geometry));
                 let geometry = short(&records.geometry);
@@ -123,7 +121,7 @@ impl WorkVolume<'_> {
                 }
                 .into());
             }
-            state.beams = beams(&id, references, config)?;
+            state.beams = beams(&id, &references, config)?;
             state.roll = references.roll(&id)?;
             records.references = Some(id);
         }
@@ -208,11 +206,11 @@ fn memories(
 ) -> Result<Memories, Failure> {
     let mut memories = Memories::default();
     for memory in wanted {
-        let Some((id, record)) = reader.active(memory_pointer(*memory))? else {
+        let pointer = memory_pointer(*memory);
+        let Some((id, content)) = reader.active::<StateMemoryContent>(pointer)? else {
             continue;
         };
-        let content = record.state_memory(&id)?;
-        check_memory(&id, content, records)?;
+        check_memory(&id, &content, records)?;
         let map = Some(content.map(&id)?);
         match memory {
             MemoryName::First => (memories.first, records.first_memory) = (map, Some(id)),

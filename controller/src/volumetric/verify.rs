@@ -9,13 +9,14 @@ use units::Metres;
 
 use crate::failure::Failure;
 use crate::run::note_failure;
-use crate::store::{Entry, Journal, Store};
+use crate::store::{Journal, Store};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::place_of_temperature;
 use crate::volumetric::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
 use crate::volumetric::settings::point_of_mm;
 use crate::volumetric::{LineReadingEntry, VolumeCheckEntry, metres};
 use crate::volumetric::{Mover, VolumetricCorrection, VolumetricFailure};
+use crate::volumetric::{VolumeEntry, VolumeLog};
 use crate::volumetric::{VolumetricConfig, VolumetricVerifyConfig};
 use machine::Stage;
 use machine::engine::THERMOMETERS_MAX;
@@ -141,7 +142,7 @@ impl WorkVolume<'_> {
         let (mover, geometry) = self.mover_by(store, by)?;
         let header = self.header("verify", geometry)?;
         let mut journal = Journal::create(&store.runs(), &header)?;
-        journal.write(&Entry::VolumeCheck(VolumeCheckEntry {
+        journal.write(&VolumeEntry::VolumeCheck(VolumeCheckEntry {
             state: by.text().to_owned(),
             from_m: metres(point_of_mm(own.from_mm)),
             to_m: metres(point_of_mm(own.to_mm)),
@@ -151,8 +152,7 @@ impl WorkVolume<'_> {
         let points = self
             .read_verified(&config, &own, mover, operator, &mut journal)
             .inspect_err(|it| note_failure(&mut journal, it))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         let path = journal.path().to_owned();
         Ok(judged(points, Metres::from_um(own.limit_um), path))
     }
@@ -163,7 +163,7 @@ impl WorkVolume<'_> {
         own: &VolumetricVerifyConfig,
         mut mover: Option<Mover>,
         operator: &mut dyn LineOperator,
-        journal: &mut Journal,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<Vec<VolumetricVerifiedPoint>, Failure> {
         let section = "calibrate";
         let calibrate = config.calibrate.as_ref();
@@ -216,13 +216,13 @@ impl WorkVolume<'_> {
         line: &Line,
         at: Point,
         correction_m: Option<[f64; 3]>,
-        journal: &mut Journal,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<VolumetricVerifiedPoint, Failure> {
         let read = self.read_line_here(line, at)?;
         let Reading::Length { deviation, u, .. } = read.reading else {
             return Err(VolumetricFailure::NotALine.into());
         };
-        journal.write(&Entry::LineReading(LineReadingEntry {
+        journal.write(&VolumeEntry::LineReading(LineReadingEntry {
             scatter_m: Some(read.scatter.value()),
             temperatures_c: self.thermometers_now(config),
             correction_m,

@@ -7,7 +7,7 @@ use mock_bus::fault::{Fault, FaultConfig};
 use tests::{EMULATED, machine_config};
 use truestage::emulated::Emulated;
 use truestage::run::CalibrateOptions;
-use truestage::{Machine, Store, ports};
+use truestage::{Machine, ports};
 
 /// A calibration that meets `fault` fails after so long, on the wall: the machine stopped, as far as
 /// it can be reached, and the reason told.
@@ -19,7 +19,7 @@ fn told_after(fault: &Fault, speed: f64) -> Duration {
     let emulated = Emulated::new(EMULATED, 7, &loaded.config);
     let emulated = emulated.unwrap_or_else(|error| panic!("{error}"));
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
-    let store = Store::of(&loaded.config.machine);
+    let store = truestage::store_of(&loaded.config.machine);
     let ready = machine.guarded(|machine| {
         machine.start()?;
         machine.linear("x")?.zero(&store)

@@ -9,6 +9,7 @@ use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
 use truestage::emulated::{Emulated, HallDrift};
+use truestage::rotary::PlateLog;
 use truestage::rotary::Way;
 use truestage::rotary::{
     Operator, PlateMove, PlateTask, RotaryCalibrated, RotaryFailure, RotaryVerified,
@@ -348,9 +349,9 @@ fn check_nothing_stored(bench: &mut Bench, placements: usize) -> CalibrateOption
     assert!(bench.store.list().unwrap().is_empty());
     assert!(bench.machine.rotary(AXIS).unwrap().compensation().is_none());
     let path = bench.store.newest_run("calibrate", AXIS).unwrap().unwrap();
-    let read = read_journal(&path).unwrap();
+    let read = read_journal::<PlateLog>(&path).unwrap();
     assert!(!read.complete);
-    assert_eq!(read.placements.len(), placements);
+    assert_eq!(read.log.placements.len(), placements);
     CalibrateOptions {
         resume: Some(path),
         accept_drift: false,

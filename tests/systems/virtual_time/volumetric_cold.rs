@@ -2,6 +2,7 @@
 
 use tests::Edit;
 use tests::volume::{Frame, Volume, good, percentile_95, spread};
+use truestage::volumetric::GeometryContent;
 use truestage::volumetric::{GEOMETRY, WarmUp};
 use units::Metres;
 
@@ -43,9 +44,9 @@ fn warmth_while_lines_are_read_does_not_get_into_the_errors() {
     assert_eq!(made.unknown.bends.len(), 3, "nobody knows how guides bend");
     assert!(made.found.bends.is_empty() && made.unknown.without_effect.is_empty());
     let id = store.active(GEOMETRY).expect("it can be read").current;
-    let record = store.load(id.as_ref().expect("it is in use"));
+    let record = store.load::<GeometryContent>(id.as_ref().expect("it is in use"));
     let record = record.expect("it can be read");
-    let geometry = record.geometry(&made.id).expect("it is one");
+    let geometry = record.content;
     assert_eq!(geometry.unknown.bends, [['x', 'z'], ['y', 'z'], ['z', 'y']]);
     let places = spread(0, 30);
     let (mut mover, _) = volume.corrected();

@@ -9,6 +9,7 @@ use tests::volume::{Volume, good, quick};
 use truestage::Failure;
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::store::{ReadJournal, read_journal};
+use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{
     LineOperator, LineTask, VolumetricCalibrated, VolumetricEvaluated, WarmUp,
 };
@@ -72,8 +73,8 @@ fn journal_of(volume: &Volume) -> PathBuf {
     newest.expect("it can be read").expect("there is one")
 }
 
-fn read(path: &Path) -> ReadJournal {
-    read_journal(path).unwrap_or_else(|error| panic!("{error}"))
+fn read(path: &Path) -> ReadJournal<VolumeLog> {
+    read_journal::<VolumeLog>(path).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The mains goes off and on, and the machine is zeroed again.
@@ -102,7 +103,7 @@ fn a_calibration_that_was_interrupted_goes_on_at_its_first_line_that_is_not_whol
     let path = journal_of(&volume);
     let before = read(&path);
     assert!(before.failure.is_some() && !before.complete);
-    assert_eq!(before.volume.whole.len(), 10, "{asked:?}");
+    assert_eq!(before.log.whole.len(), 10, "{asked:?}");
     assert!(
         volume
             .bench
@@ -125,20 +126,13 @@ fn a_calibration_that_was_interrupted_goes_on_at_its_first_line_that_is_not_whol
 
     let after = read(&path);
     assert!(after.complete && after.failure.is_none());
-    assert_eq!(after.volume.references, before.volume.references);
-    let of_whole = |journal: &ReadJournal| {
-        let readings = journal.volume.readings.iter().filter(|it| it.line < 9);
+    assert_eq!(after.log.references, before.log.references);
+    let of_whole = |journal: &ReadJournal<VolumeLog>| {
+        let readings = journal.log.readings.iter().filter(|it| it.line < 9);
         readings.cloned().collect::<Vec<_>>()
     };
     assert_eq!(of_whole(&after), of_whole(&before));
-    let each = |line: usize| {
-        after
-            .volume
-            .whole
-            .iter()
-            .filter(|it| it.line == line)
-            .count()
-    };
+    let each = |line: usize| after.log.whole.iter().filter(|it| it.line == line).count();
     assert!((0..made.lines).all(|line| each(line) == 1));
     let store = volume.bench.store.clone();
     let known = good(volume.work().state(&store));
@@ -155,12 +149,12 @@ fn the_journal_alone_gives_the_stored_errors_again() {
     let made = good(calibrate(&mut volume, None, None).0);
     let journal = read(&made.journal);
     let shape = Shape::Spline;
-    let again = VolumetricEvaluated::of(&journal.volume, shape);
+    let again = VolumetricEvaluated::of(&journal.log, shape);
     let again = again.unwrap_or_else(|failure| panic!("{failure}"));
-    let stored = volume.bench.store.load(&made.id).expect("it was stored");
-    let stored = stored.geometry(&made.id).expect("it is one");
+    let stored = volume.bench.store.load(&made.id);
+    let stored = stored.expect("it was stored").content;
     let config = volume.work().config();
-    assert_eq!(&again.content(config), stored);
+    assert_eq!(again.content(config), stored);
     assert_eq!((again.lines, again.u_max), (made.lines, made.u_max));
     let source = made
         .journal
@@ -170,7 +164,7 @@ fn the_journal_alone_gives_the_stored_errors_again() {
     let from_it = volume
         .bench
         .store
-        .made_from(&source)
+        .glances_from(&source)
         .expect("it can be read");
     let mut names: Vec<&str> = from_it.iter().map(|(id, _)| id.as_str()).collect();
     names.sort_unstable();
@@ -179,7 +173,7 @@ fn the_journal_alone_gives_the_stored_errors_again() {
     assert_eq!(names, expected);
 
     // Without the diagonals nothing tells the squarenesses, and that is said.
-    let mut some = journal.volume.clone();
+    let mut some = journal.log.clone();
     let plan = some.plan.clone().expect("it has one");
     some.whole
         .retain(|it| !plan.lines[it.line].purpose.starts_with("squareness"));

@@ -5,6 +5,7 @@ use tests::volume::{Volume, quick};
 use truestage::Failure;
 use truestage::emulated::Emulated;
 use truestage::store::read_journal;
+use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{LineOperator, LineTask, VolumetricFailure, WarmUp};
 
 /// Some micrometres: more than these errors are known to, less than a machine of this size has.
@@ -84,7 +85,7 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
         assert!(known.is_none(), "it is in use");
         let journal = store.newest_run("calibrate", "volume");
         let journal = journal.expect("it can be read").expect("there is one");
-        let journal = read_journal(&journal).unwrap_or_else(|error| panic!("{error}"));
+        let journal = read_journal::<VolumeLog>(&journal).unwrap_or_else(|error| panic!("{error}"));
         assert!(journal.failure.is_some() && !journal.complete);
     }
 }

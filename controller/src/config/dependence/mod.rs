@@ -9,55 +9,13 @@ mod text;
 mod version_1;
 mod version_2;
 
+use machine::records::ConfigHash;
+
 use super::model::MachineConfig;
 
-/// BLAKE3 of what a calibration depends on, in hexadecimal: as it is written today, and as earlier
-/// programs wrote it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ConfigHash {
-    current: String,
-    earlier: Vec<String>,
-}
-
-impl ConfigHash {
-    /// Of `config`.
-    pub fn of(config: &MachineConfig) -> Self {
-        let hash = |text: String| blake3::hash(text.as_bytes()).to_hex().to_string();
-        Self {
-            current: hash(version_2::text(config)),
-            earlier: vec![hash(version_1::text(config))],
-        }
-    }
-
-    /// As records and journals of today carry it.
-    pub fn as_str(&self) -> &str {
-        &self.current
-    }
-
-    /// Whether a record or journal that carries `recorded` was made with the same values, by this
-    /// program or an earlier one.
-    pub fn is(&self, recorded: &str) -> bool {
-        self.current == recorded || self.earlier.iter().any(|it| it == recorded)
-    }
-
-    /// What to show and compare beside `recorded`: the same where both were made with the same values,
-    /// else today's.
-    pub fn beside<'a>(&'a self, recorded: &'a str) -> &'a str {
-        if self.is(recorded) {
-            recorded
-        } else {
-            &self.current
-        }
-    }
-
-    /// One that only `text` agrees with.
-    #[cfg(test)]
-    pub(crate) fn only(text: &str) -> Self {
-        Self {
-            current: text.to_owned(),
-            earlier: Vec::new(),
-        }
-    }
+/// The hash of what a calibration depends on in `config`.
+pub fn hash_of(config: &MachineConfig) -> ConfigHash {
+    ConfigHash::of_texts(&version_2::text(config), &[version_1::text(config)])
 }
 
 #[cfg(test)]

@@ -130,7 +130,7 @@ fn the_text_is_written_as_it_was_published() {
     for (file, published) in golden {
         let config = parse(file, "m").unwrap().config;
         assert_eq!(version_2::text(&config), published);
-        let hash = ConfigHash::of(&config);
+        let hash = hash_of(&config);
         let of_text = blake3::hash(published.as_bytes()).to_hex();
         assert_eq!(hash.as_str(), of_text.as_str());
     }

@@ -12,7 +12,7 @@ use std::time::Instant;
 use truestage::config::{self, Loaded};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::store::Lease;
-use truestage::{Failure, Machine, Store, ports};
+use truestage::{Failure, Machine, ports, store_of};
 
 pub(crate) use self::stand::DemoArgs;
 use self::stand::{Stand, Which};
@@ -26,7 +26,7 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     }
     let started = Instant::now();
     let mut loaded = load(args)?;
-    let store = Store::of(&loaded.config.machine);
+    let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = args.machine.files();
     let emulated = match args.speed {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use truestage::emulated::{EmulatedOnPtys, HallDrift};
-use truestage::store::ReadJournal;
+use truestage::store::JournalHeader;
 use truestage::{Failure, Machine, Store};
 use units::Time;
 
@@ -102,13 +102,13 @@ pub(crate) fn power_cycle(
     machine.start()
 }
 
-/// Writes the page of a demonstration whose run `journal` is, and says where.
+/// Writes the page of a demonstration whose run begins with `header`, and says where.
 pub(crate) fn write_page(
     store: &Store,
-    journal: &ReadJournal,
+    header: &JournalHeader,
     html: &str,
 ) -> Result<PathBuf, Failure> {
-    let stamp = journal.header.started.replace([':', '-'], "");
+    let stamp = header.started.replace([':', '-'], "");
     let path = store.reports().join(format!("{stamp}-demo.html"));
     store.write_report(&path, html)?;
     Ok(path)

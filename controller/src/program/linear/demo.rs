@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use truestage::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
 use truestage::linear::ZeroEntry;
 use truestage::linear::report::{self, Page, Section};
-use truestage::linear::{Calibrated, Verified, VerifyOptions, Zeroed};
+use truestage::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
 use truestage::page::facts_of;
 use truestage::run::CalibrateOptions;
 use truestage::store::read_journal;
@@ -212,7 +212,7 @@ fn to_value(story: &Story, report: &std::path::Path, wall: Duration) -> Value {
 }
 
 fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
-    let journal = read_journal(&story.left.journal)?;
+    let journal = read_journal::<LinearLog>(&story.left.journal)?;
     let verified = [
         ("as found", &story.found),
         ("as left", &story.left),
@@ -229,15 +229,15 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
     let zeros = story
         .rezeros
         .iter()
-        .filter_map(|it| read_journal(&it.zeroed.journal).ok())
-        .flat_map(|journal| journal.zeros)
+        .filter_map(|it| read_journal::<LinearLog>(&it.zeroed.journal).ok())
+        .flat_map(|journal| journal.log.zeros)
         .collect::<Vec<ZeroEntry>>();
     let page = Page {
         title: format!("truestage: axis {AXIS} of {}", journal.header.machine),
-        facts: facts_of(&journal),
+        facts: facts_of(&journal, journal.log.points.len()),
         sections,
-        calibration: Some(story.calibrated.record.linear(&story.calibrated.id)?),
+        calibration: Some(&story.calibrated.record.content),
         zeros,
     };
-    write_page(store, &journal, &report::render(&page))
+    write_page(store, &journal.header, &report::render(&page))
 }

@@ -2,8 +2,14 @@
 
 pub(crate) mod demo;
 mod moved;
+mod page;
+mod shown;
 pub(crate) mod verbs;
 
+use truestage::linear::{LinearContent, LinearLog};
+use truestage::store::Log;
+
+use super::show::Shown;
 use super::verbs::Verbs;
 
 /// What it does for the verbs of the cycle.
@@ -12,4 +18,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    shown: &[Shown::of::<LinearContent>()],
+    opened_by: LinearLog::OPENED_BY,
+    page: page::html,
 };

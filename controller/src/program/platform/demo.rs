@@ -12,8 +12,8 @@ use truestage::{Failure, Store, json as to_json};
 use units::{Metres, Radians};
 
 use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::made_from::made_from;
 use crate::program::output::Output;
-use crate::program::page::made_from;
 use crate::program::platform::verbs::{
     calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
 };
@@ -130,7 +130,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         calibrated: Some((&measured, calibrations)),
         zeros: zeros.iter().collect(),
     };
-    write_page(store, &left, &page::render(&page))
+    write_page(store, &left.header, &page::render(&page))
 }
 
 /// Another pose for each seed.

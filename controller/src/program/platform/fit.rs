@@ -11,13 +11,14 @@ use serde_json::{Value, json};
 use truestage::platform::PlatformConfig;
 use truestage::platform::json as to_json;
 use truestage::platform::{ScrewContent, ScrewMethodName};
-use truestage::store::{CalibrationRecord, Content, Store, short};
+use truestage::store::{CalibrationRecord, short};
 use truestage::text::ScrewTerm;
-use truestage::{Failure, config, text};
+use truestage::{Failure, config, store_of, text};
 use units::{Metres, Short};
 
 use crate::program::data_file::{head_of, read};
 use crate::program::output::{Ended, Output};
+use crate::program::show::{Changes, Show};
 
 /// What `truestage fit screw` is told.
 #[derive(Debug, Args)]
@@ -214,10 +215,9 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
         })?;
         let rows = u32::try_from(it.rows).unwrap_or(u32::MAX);
         let content = ScrewContent::new(&it.model, method, rows).without(&it.outliers);
-        let content = Content::ScrewModel(content);
         records.push(CalibrationRecord { head, content });
     }
-    let store = Store::of(&loaded.config.machine);
+    let store = store_of(&loaded.config.machine);
     let ids: Result<_, _> = records.iter().map(|record| store.save(record)).collect();
     Ok(ids?)
 }
@@ -242,8 +242,18 @@ fn limits_of(loaded: &config::Loaded, axis: &str) -> Limits {
     }
 }
 
+impl Show for ScrewContent {
+    fn lines(&self) -> String {
+        shown(self)
+    }
+
+    fn changes(&self, after: &Self) -> Option<Changes> {
+        Some(changes(self, after))
+    }
+}
+
 /// A stored model, for `cal show`.
-pub(crate) fn shown(content: &ScrewContent) -> String {
+fn shown(content: &ScrewContent) -> String {
     let scatter = content.scatter_m.map_or(String::new(), |it| {
         format!(", a single stop scatters by {:.3} µm", Metres(it).um())
     });
@@ -262,7 +272,7 @@ pub(crate) fn shown(content: &ScrewContent) -> String {
 }
 
 /// Two stored models, for `cal diff`.
-pub(crate) fn changes(before: &ScrewContent, after: &ScrewContent) -> (Vec<String>, Vec<Value>) {
+fn changes(before: &ScrewContent, after: &ScrewContent) -> Changes {
     let (old, new) = (
         text::screw_terms(&before.model()),
         text::screw_terms(&after.model()),

@@ -14,8 +14,8 @@ use truestage::{Failure, Store};
 use units::Radians;
 
 use crate::program::demo::stand::{Shown, Stand, power_cycle, took, write_page};
+use crate::program::made_from::made_from;
 use crate::program::output::Output;
-use crate::program::page::made_from;
 use crate::program::rotary::verbs::{
     calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
     verified_value,
@@ -143,7 +143,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
     let calibrations = made_from(&story.calibrated.journal)?;
     let later = [("", &left), (", after a power cycle", &after)];
     let html = page::render_with(&measured, &calibrations, &later);
-    write_page(store, &left, &html)
+    write_page(store, &left.header, &html)
 }
 
 fn planned(machine: &mut truestage::Machine, output: Output) -> Result<Design, Failure> {

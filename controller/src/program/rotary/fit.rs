@@ -9,15 +9,16 @@ use compensator::rotary::{
     self, Criterion, Design, PlanError, Reading, Solution, SolveOptions,
     rms_amplification_of_a_pair, rms_amplification_of_all,
 };
-use serde_json::{Value, json};
+use serde_json::json;
 use truestage::rotary::RotaryContent;
 use truestage::rotary::json as to_json;
-use truestage::store::{CalibrationRecord, Content, Store, short};
-use truestage::{Failure, config};
+use truestage::store::{CalibrationRecord, short};
+use truestage::{Failure, config, store_of};
 use units::Radians;
 
 use crate::program::data_file::{read, rotary_head_of};
 use crate::program::output::{Ended, Output};
+use crate::program::show::{Changes, Show};
 
 /// Harmonics that a plan prints; `--json` has them all.
 const SHOWN: usize = 8;
@@ -268,13 +269,22 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
             content.table("just made")?,
         )?;
     }
-    let content = Content::RotaryErrorTable(content);
     let record = CalibrationRecord { head, content };
-    Ok(Store::of(&loaded.config.machine).save(&record)?)
+    Ok(store_of(&loaded.config.machine).save(&record)?)
+}
+
+impl Show for RotaryContent {
+    fn lines(&self) -> String {
+        shown(self)
+    }
+
+    fn changes(&self, after: &Self) -> Option<Changes> {
+        Some(changes(self, after))
+    }
 }
 
 /// A stored table, for `cal show`.
-pub(crate) fn shown(content: &RotaryContent) -> String {
+fn shown(content: &RotaryContent) -> String {
     let arcsec = |value: f64| format!("{:.4}", Radians(value).arcsec());
     let cell = |value: Option<f64>| value.map_or("–".to_owned(), arcsec);
     let mut text = format!(
@@ -297,7 +307,7 @@ pub(crate) fn shown(content: &RotaryContent) -> String {
 }
 
 /// Two stored tables, for `cal diff`.
-pub(crate) fn changes(before: &RotaryContent, after: &RotaryContent) -> (Vec<String>, Vec<Value>) {
+fn changes(before: &RotaryContent, after: &RotaryContent) -> Changes {
     if before.lines != after.lines {
         let text = format!("  {} lines before, {} after", before.lines, after.lines);
         return (vec![text], Vec::new());

@@ -88,7 +88,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let store = Store::new(folder.path(), "m");
+        let store = truestage::store_in(folder.path(), "m");
         for part in ["calibrations", "runs"] {
             fs::create_dir_all(store.root().join(part)).expect("there is room");
         }

@@ -9,13 +9,12 @@ use serde_json::json;
 use truestage::emulated::{Emulated, with_rare_heartbeats};
 use truestage::store::{Lease, ReadJournal, read_journal};
 use truestage::volumetric::report::{HourOfDay, render_day};
-use truestage::volumetric::{VerifyBy, VolumetricCalibrated, WarmUp};
-use truestage::{Failure, Machine, Store, config};
+use truestage::volumetric::{VerifyBy, VolumeLog, VolumetricCalibrated, WarmUp};
+use truestage::{Failure, Machine, Store, config, store_of};
 use units::{Metres, Time};
 
 use crate::program::demo::stand::{DemoArgs, write_page};
 use crate::program::output::{Ended, Output};
-use crate::program::page::made_from;
 use crate::program::volumetric::verbs::{calibrated_text, calibrated_value};
 
 /// How long the machine warms up between cold and warm lines.
@@ -42,7 +41,7 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
         loaded.config.machine.data_dir.clone_from(folder);
     }
     let section = &loaded.config.machine;
-    let store = Store::new(&section.data_dir, &section.name);
+    let store = store_of(section);
     let _lease = Lease::take(&store, "demo")?;
     let emulated = Emulated::new(description, args.seed, &loaded.config)?;
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
@@ -87,7 +86,7 @@ fn write_report(
 ) -> Result<PathBuf, Failure> {
     let read = |path: &Path| read_journal(path).map_err(Failure::from);
     let calibrated = read(&made.journal)?;
-    let mut runs: Vec<[ReadJournal; 3]> = Vec::new();
+    let mut runs: Vec<[ReadJournal<VolumeLog>; 3]> = Vec::new();
     for hour in hours {
         let [found, tables, live] = &hour.journals;
         runs.push([read(found)?, read(tables)?, read(live)?]);
@@ -100,8 +99,8 @@ fn write_report(
             runs: runs.each_ref(),
         })
         .collect();
-    let html = render_day(&day, &calibrated, &made_from(&made.journal)?);
-    write_page(store, &calibrated, &html)
+    let html = render_day(&day, &calibrated, &super::made_from(&made.journal)?);
+    write_page(store, &calibrated.header, &html)
 }
 
 fn day(

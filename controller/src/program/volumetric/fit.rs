@@ -7,21 +7,19 @@ use clap::Args;
 use compensator::volumetric::identify::{IdentifyError, Observation, Optics};
 use compensator::volumetric::{VolumeLine, VolumeSeries};
 use serde_json::json;
-use truestage::Failure;
 use truestage::config;
 use truestage::config::Loaded;
-use truestage::store::{
-    CalibrationRecord, Content, ReadJournal, RecordHead, Store, read_journal, short,
-};
+use truestage::store::{CalibrationRecord, ReadJournal, RecordHead, read_journal, short};
 use truestage::volumetric::VolumetricConfig;
 use truestage::volumetric::settings::function_shape;
 use truestage::volumetric::{
-    BeamReferencesContent, LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeRead,
+    BeamReferencesContent, LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeLog,
     VolumeReferencesEntry,
 };
 use truestage::volumetric::{
     GEOMETRY, REFERENCES, VolumetricEvaluated, VolumetricFailure, volume_plan,
 };
+use truestage::{Failure, store_of};
 use units::Radians;
 
 use crate::program::data_file::{read, volume_head_of};
@@ -55,9 +53,9 @@ pub(crate) struct VolumetricArgs {
 
 /// Readings, and where they come from.
 struct Given {
-    read: VolumeRead,
+    read: VolumeLog,
     /// Of a run of this program.
-    journal: Option<ReadJournal>,
+    journal: Option<ReadJournal<VolumeLog>>,
     /// By reading: its line in the data file.
     rows: Vec<usize>,
 }
@@ -105,9 +103,9 @@ fn of_journal(args: &VolumetricArgs) -> Result<Given, Failure> {
             help: "leave it out: a journal has its own".into(),
         });
     }
-    let journal = read_journal(&args.data)?;
+    let journal = read_journal::<VolumeLog>(&args.data)?;
     Ok(Given {
-        read: journal.volume.clone(),
+        read: journal.log.clone(),
         journal: Some(journal),
         rows: Vec::new(),
     })
@@ -119,7 +117,7 @@ fn of_series(args: &VolumetricArgs, config: &VolumetricConfig) -> Result<Given, 
     let series = VolumeSeries::from_csv(&read(&args.data)?, &file)?;
     let (mut plan, _) = volume_plan(config, false, Vec::new())?;
     plan.lines.clear();
-    let mut given = VolumeRead::default();
+    let mut given = VolumeLog::default();
     let mut rows = Vec::new();
     for (number, line) in series.lines().iter().enumerate() {
         plan.lines.push(entry(number, line));
@@ -170,7 +168,7 @@ fn entry(number: usize, line: &VolumeLine) -> LineEntry {
     }
 }
 
-fn leave_out(read: &mut VolumeRead, names: &[String]) -> Result<(), Failure> {
+fn leave_out(read: &mut VolumeLog, names: &[String]) -> Result<(), Failure> {
     let Some(plan) = &mut read.plan else {
         return Ok(());
     };
@@ -221,7 +219,7 @@ fn save(
             help: "say with --temperatures-c what they showed when the lines were read".into(),
         });
     }
-    let store = Store::of(&machine.machine);
+    let store = store_of(&machine.machine);
     let mut head = volume_head_of(loaded, GEOMETRY, &args.data)?;
     let references = match &given.journal {
         Some(journal) => {
@@ -233,14 +231,14 @@ fn save(
         None => None,
     };
     evaluated.check(machine, references)?;
-    let content = Content::VolumetricGeometry(evaluated.content(own));
+    let content = evaluated.content(own);
     let record = CalibrationRecord { head, content };
     let geometry = store.save(&record)?;
     let references = references.map(|it| {
-        let content = Content::BeamReferences(BeamReferencesContent {
+        let content = BeamReferencesContent {
             geometry: geometry.clone(),
             ..it.clone()
-        });
+        };
         let head = RecordHead {
             axis: REFERENCES.to_owned(),
             ..record.head.clone()
@@ -250,7 +248,11 @@ fn save(
     Ok((geometry, references.transpose()?))
 }
 
-fn same_machine(path: &Path, journal: &ReadJournal, loaded: &Loaded) -> Result<(), Failure> {
+fn same_machine(
+    path: &Path,
+    journal: &ReadJournal<VolumeLog>,
+    loaded: &Loaded,
+) -> Result<(), Failure> {
     let (header, section) = (&journal.header, &loaded.config.machine);
     let hash = loaded.hash.beside(&header.config_hash);
     let comparisons = [
@@ -298,6 +300,7 @@ mod tests {
 
     use super::*;
     use crate::program::stored_tests::lines_of;
+    use truestage::Store;
 
     const JOURNAL: &str = include_str!("../../../golden/volumetric_calibrate.jsonl");
     const MACHINE: &str = include_str!("../../../../configs/machines/volumetric.toml");
@@ -324,7 +327,7 @@ mod tests {
             Self {
                 folder,
                 config,
-                store: Store::of(&loaded.config.machine),
+                store: store_of(&loaded.config.machine),
             }
         }
 
@@ -396,9 +399,8 @@ mod tests {
         let desk = Desk::new();
         let path = desk.journal("run.jsonl", |_, _| ());
         desk.save(path.clone()).expect("it is sound");
-        let made = desk.store.made_from("run.jsonl").unwrap();
-        let stored = made.iter().find_map(|(id, it)| it.geometry(id).ok());
-        let stored = stored.expect("it was stored");
+        let made = truestage::volumetric::report::Made::of(&desk.store, "run.jsonl").unwrap();
+        let stored = made.geometries.first().expect("it was stored");
         let agreement = stored.agreement.expect("with its figures");
         let html = truestage::volumetric::report::render(&read_journal(&path).unwrap(), &made);
         for text in [agreement.readings_text(), agreement.tool_text()] {
@@ -407,7 +409,10 @@ mod tests {
         }
         assert_eq!(html.matches("standard uncertainty 0").count(), 1);
         // Without what was made, it is evaluated alike.
-        let html = truestage::volumetric::report::render(&read_journal(&path).unwrap(), &[]);
+        let html = truestage::volumetric::report::render(
+            &read_journal(&path).unwrap(),
+            &Default::default(),
+        );
         assert!(html.contains(&agreement.tool_text()));
     }
 }

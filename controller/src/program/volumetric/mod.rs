@@ -6,6 +6,16 @@ pub(crate) mod part;
 pub(crate) mod shown;
 pub(crate) mod verbs;
 
+use std::path::Path;
+
+use truestage::store::{Log, read_journal};
+use truestage::volumetric::report::Made;
+use truestage::volumetric::{
+    BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog,
+};
+use truestage::{Failure, store_of_journal};
+
+use super::show::Shown;
 use super::verbs::Verbs;
 
 /// What it does for the verbs of the cycle.
@@ -14,4 +24,28 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    shown: &[
+        Shown::of::<GeometryContent>(),
+        Shown::of::<BeamReferencesContent>(),
+        Shown::of::<StateMemoryContent>(),
+    ],
+    opened_by: VolumeLog::OPENED_BY,
+    page: html,
 };
+
+/// The page of the journal at `path`, with what was made from it.
+fn html(path: &Path) -> Result<String, Failure> {
+    let journal = read_journal::<VolumeLog>(path)?;
+    Ok(truestage::volumetric::report::render(
+        &journal,
+        &made_from(path)?,
+    ))
+}
+
+/// What was made from the journal at `path`.
+fn made_from(path: &Path) -> Result<Made, Failure> {
+    Ok(match (store_of_journal(path), path.file_name()) {
+        (Some(store), Some(name)) => Made::of(&store, &name.to_string_lossy())?,
+        _ => Made::default(),
+    })
+}

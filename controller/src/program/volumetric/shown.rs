@@ -1,7 +1,42 @@
 //! The stored errors of three axes on the screen.
 
-use serde_json::{Value, json};
-use truestage::volumetric::{FunctionRecord, GeometryContent};
+use serde_json::json;
+use truestage::store::Content;
+use truestage::volumetric::{
+    BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent,
+};
+
+use crate::program::show::{Changes, Show};
+
+impl Show for GeometryContent {
+    fn lines(&self) -> String {
+        shown(self)
+    }
+
+    fn changes(&self, after: &Self) -> Option<Changes> {
+        Some(changes(self, after))
+    }
+}
+
+impl Show for BeamReferencesContent {
+    fn lines(&self) -> String {
+        self.summary()
+    }
+
+    fn changes(&self, _: &Self) -> Option<Changes> {
+        None
+    }
+}
+
+impl Show for StateMemoryContent {
+    fn lines(&self) -> String {
+        self.summary()
+    }
+
+    fn changes(&self, _: &Self) -> Option<Changes> {
+        None
+    }
+}
 
 /// How well the readings agree; by name, each function's largest value and uncertainty; the
 /// squarenesses.
@@ -30,10 +65,7 @@ pub(crate) fn shown(content: &GeometryContent) -> String {
 }
 
 /// Two stored geometries, for `cal diff`: the largest change of each function at its nodes.
-pub(crate) fn changes(
-    before: &GeometryContent,
-    after: &GeometryContent,
-) -> (Vec<String>, Vec<Value>) {
+fn changes(before: &GeometryContent, after: &GeometryContent) -> Changes {
     let mut lines = vec!["  error      largest Δ".to_owned()];
     let mut values = Vec::new();
     for new in &after.functions {

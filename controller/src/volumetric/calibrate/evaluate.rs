@@ -17,7 +17,7 @@ use crate::volumetric::calibrate::plan::axis_of;
 use crate::volumetric::settings::{beam_drift, bend_plans};
 use crate::volumetric::{
     AXES, AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
-    LineEntry, UnknownRecord, VolumePlanEntry, VolumeRead, error_name, point,
+    LineEntry, UnknownRecord, VolumeLog, VolumePlanEntry, error_name, point,
 };
 use crate::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
 
@@ -51,7 +51,7 @@ impl VolumetricEvaluated {
     ///
     /// # Errors
     /// When it was not written how, or the readings do not tell all errors.
-    pub fn of(read: &VolumeRead, shape: Shape) -> Result<Self, Failure> {
+    pub fn of(read: &VolumeLog, shape: Shape) -> Result<Self, Failure> {
         let entry = read.plan.as_ref().ok_or(VolumetricFailure::NoPlan)?;
         let wrong = || VolumetricFailure::NoPlan;
         let (plan, observations) = plan_of(entry, read, shape).ok_or_else(wrong)?;
@@ -170,7 +170,7 @@ fn without_effect(plan: &Plan) -> Vec<ErrorName> {
     names.filter(|it| !is_planned(it)).collect()
 }
 
-fn references(read: &VolumeRead) -> Vec<Celsius> {
+fn references(read: &VolumeLog) -> Vec<Celsius> {
     let shown = read.references.iter().flat_map(|it| &it.temperatures_c);
     shown.copied().map(Celsius).collect()
 }
@@ -179,7 +179,7 @@ fn references(read: &VolumeRead) -> Vec<Celsius> {
 /// is called what it is not.
 fn plan_of(
     entry: &VolumePlanEntry,
-    read: &VolumeRead,
+    read: &VolumeLog,
     shape: Shape,
 ) -> Option<(Plan, Vec<Observation>)> {
     let whole = read.whole.iter();

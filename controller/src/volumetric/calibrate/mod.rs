@@ -40,15 +40,15 @@ pub use scatter::{Off, Scatter, WorstReading};
 use crate::failure::Failure;
 use crate::run::{note_failure, utc_now};
 use crate::store::{
-    CalibrationRecord, Content, Entry, InstrumentRecord, Journal, JournalHeader, RecordHead,
-    SCHEMA_VERSION, Store,
+    CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
+use crate::volumetric::VolumeEntry;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
 use crate::volumetric::reference::References;
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
-use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeRead, VolumeReferencesEntry};
+use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
 use crate::volumetric::{GEOMETRY, VolumetricFailure};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
@@ -105,7 +105,7 @@ struct Session<'a> {
     /// All lines, as in the plan.
     lines: Vec<StandardLine>,
     /// What was read up to now.
-    read: VolumeRead,
+    read: VolumeLog,
 }
 
 impl WorkVolume<'_> {
@@ -139,8 +139,7 @@ impl WorkVolume<'_> {
                 self.conclude(store, session, &journal)
             });
         let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
-        journal.write(&Entry::Complete)?;
-        journal.flush_to_disk()?;
+        journal.complete()?;
         Ok(made)
     }
 
@@ -183,7 +182,7 @@ impl WorkVolume<'_> {
         &mut self,
         session: &mut Session<'_>,
         warm_up: WarmUp,
-        journal: &mut Journal,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<(), Failure> {
         let total = session.lines.len();
         let mut is_warm = false;
@@ -214,8 +213,8 @@ impl WorkVolume<'_> {
         &mut self,
         config: VolumetricConfig,
         lines: Vec<StandardLine>,
-        mut read: VolumeRead,
-        journal: &mut Journal,
+        mut read: VolumeLog,
+        journal: &mut Journal<VolumeLog>,
         operator: &'a mut dyn LineOperator,
     ) -> Result<Session<'a>, Failure> {
         let section = "calibrate";
@@ -233,7 +232,7 @@ impl WorkVolume<'_> {
                     temperatures_c: taken.temperatures.iter().map(|it| it.value()).collect(),
                     at_s: self.core.now().seconds(),
                 };
-                journal.write(&Entry::VolumeReferences(entry.clone()))?;
+                journal.write(&VolumeEntry::VolumeReferences(entry.clone()))?;
                 journal.flush_to_disk()?;
                 entry
             }
@@ -292,7 +291,7 @@ impl WorkVolume<'_> {
         &mut self,
         store: &Store,
         session: Session<'_>,
-        journal: &Journal,
+        journal: &Journal<VolumeLog>,
     ) -> Result<VolumetricCalibrated, Failure> {
         let shape = function_shape(session.config.compensation.interpolation);
         let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
@@ -308,7 +307,6 @@ impl WorkVolume<'_> {
         };
         let content = evaluated.content(&session.config);
         let unknown = content.unknown.clone();
-        let content = Content::VolumetricGeometry(content);
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
         store.activate(GEOMETRY, &id)?;

@@ -8,13 +8,14 @@ use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres};
 
 use crate::failure::Failure;
-use crate::store::{Entry, Journal};
+use crate::store::Journal;
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::correction::lever;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{LineReadEntry, LineReadingEntry};
+use crate::volumetric::{VolumeEntry, VolumeLog};
 
 impl WorkVolume<'_> {
     /// Reads the line of this number, by whatever reads it.
@@ -22,7 +23,7 @@ impl WorkVolume<'_> {
         &mut self,
         session: &mut Session<'_>,
         at: usize,
-        journal: &mut Journal,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<(), Failure> {
         let shown = match session.by_own_detectors(at) {
             Some(observations) => {
@@ -39,7 +40,7 @@ impl WorkVolume<'_> {
             temperatures_c: shown.iter().map(|it| it.value()).collect(),
             at_s: self.core.now().seconds(),
         };
-        journal.write(&Entry::LineRead(whole.clone()))?;
+        journal.write(&VolumeEntry::LineRead(whole.clone()))?;
         journal.flush_to_disk()?;
         session.read.whole.push(whole);
         Ok(())
@@ -50,7 +51,7 @@ impl WorkVolume<'_> {
         &mut self,
         session: &mut Session<'_>,
         number: usize,
-        journal: &mut Journal,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<Vec<Celsius>, Failure> {
         let line = session.lines[number];
         let task = LineTask {
@@ -138,8 +139,12 @@ impl WorkVolume<'_> {
 
 impl Session<'_> {
     /// Writes a reading down.
-    fn keep(&mut self, reading: LineReadingEntry, journal: &mut Journal) -> Result<(), Failure> {
-        journal.write(&Entry::LineReading(reading.clone()))?;
+    fn keep(
+        &mut self,
+        reading: LineReadingEntry,
+        journal: &mut Journal<VolumeLog>,
+    ) -> Result<(), Failure> {
+        journal.write(&VolumeEntry::LineReading(reading.clone()))?;
         self.read.readings.push(reading);
         Ok(())
     }

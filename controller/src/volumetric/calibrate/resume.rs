@@ -14,13 +14,12 @@ use units::{Metres, Radians};
 
 use crate::config::ConfigHash;
 use crate::failure::Failure;
-use crate::store::{
-    Entry, Journal, JournalHeader, Store, StoreError, first_difference, not_resumable,
-};
+use crate::store::{Journal, JournalHeader, Store, StoreError, first_difference, not_resumable};
+use crate::volumetric::VolumeEntry;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::warmth_tolerance_k;
 use crate::volumetric::settings::{beam_drift, volume_axis};
-use crate::volumetric::{AXES, VolumePlanEntry, VolumeRead, VolumeReferencesEntry};
+use crate::volumetric::{AXES, VolumeLog, VolumePlanEntry, VolumeReferencesEntry};
 use crate::volumetric::{BeamConfig, VolumetricCalibrateConfig, VolumetricConfig};
 use crate::volumetric::{References, VolumetricFailure};
 
@@ -31,19 +30,19 @@ pub(super) fn open(
     plan: VolumePlanEntry,
     resume: Option<&Path>,
     hash: &ConfigHash,
-) -> Result<(Journal, VolumeRead), Failure> {
+) -> Result<(Journal<VolumeLog>, VolumeLog), Failure> {
     let Some(path) = resume else {
         let mut journal = Journal::create(&store.runs(), header)?;
         let read = begin(&mut journal, plan)?;
         return Ok((journal, read));
     };
-    let (mut journal, read) = Journal::resume(path, header, hash)?;
-    let read = match read.volume.plan {
+    let (mut journal, read) = Journal::<VolumeLog>::resume(path, header, hash)?;
+    let read = match read.log.plan {
         // Killed before its second line: nothing was read yet.
         None => begin(&mut journal, plan)?,
         Some(ref before) => {
             same_plan(path, before, &plan)?;
-            read.volume
+            read.log
         }
     };
     Ok((journal, read))
@@ -71,12 +70,12 @@ fn same_plan(
     })
 }
 
-fn begin(journal: &mut Journal, plan: VolumePlanEntry) -> Result<VolumeRead, StoreError> {
-    journal.write(&Entry::VolumePlan(plan.clone()))?;
+fn begin(journal: &mut Journal<VolumeLog>, plan: VolumePlanEntry) -> Result<VolumeLog, StoreError> {
+    journal.write(&VolumeEntry::VolumePlan(plan.clone()))?;
     journal.flush_to_disk()?;
-    Ok(VolumeRead {
+    Ok(VolumeLog {
         plan: Some(plan),
-        ..VolumeRead::default()
+        ..VolumeLog::default()
     })
 }
 
@@ -101,7 +100,7 @@ impl WorkVolume<'_> {
         &self,
         config: &VolumetricConfig,
         own: &VolumetricCalibrateConfig,
-        read: &VolumeRead,
+        read: &VolumeLog,
         kept: &VolumeReferencesEntry,
         taken: &References,
     ) -> Result<(), Failure> {
@@ -136,7 +135,7 @@ impl WorkVolume<'_> {
 /// count as read at one warmth, and the machine must be as warm as where it was interrupted.
 fn same_warmth(
     config: &VolumetricConfig,
-    read: &VolumeRead,
+    read: &VolumeLog,
     kept: &VolumeReferencesEntry,
     taken: &References,
 ) -> Result<(), VolumetricFailure> {

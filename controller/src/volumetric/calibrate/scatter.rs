@@ -6,7 +6,7 @@ use compensator::volumetric::Point;
 use compensator::volumetric::identify::{Conspicuous, Observation, Reading, Scattered};
 use units::{Metres, Radians};
 
-use crate::volumetric::{VolumePlanEntry, VolumeRead};
+use crate::volumetric::{VolumeLog, VolumePlanEntry};
 
 /// Readings that scatter more than they may.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Scatter {
     pub(super) fn of(
         scattered: &Scattered,
         plan: &VolumePlanEntry,
-        read: &VolumeRead,
+        read: &VolumeLog,
         observations: &[Observation],
     ) -> Self {
         let whole = read.whole.iter().map(|it| it.line);

@@ -8,7 +8,7 @@ use compensator::volumetric::model::ErrorName;
 use serde::{Deserialize, Serialize};
 use units::Metres;
 
-use crate::store::{StoreError, short};
+use crate::store::StoreError;
 
 /// Letters of the axes in files.
 pub(crate) const AXES: [char; 3] = ['x', 'y', 'z'];
@@ -94,10 +94,7 @@ fn letter(axis: Axis) -> char {
 
 fn axis_of(letter: char, id: &str) -> Result<Axis, StoreError> {
     let axis = Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
-    axis.ok_or_else(|| StoreError::ErrorName {
-        id: short(id),
-        name: letter.to_string(),
-    })
+    axis.ok_or_else(|| super::no_error(id, &letter.to_string()))
 }
 
 impl BendRecord {

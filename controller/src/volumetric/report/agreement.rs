@@ -6,7 +6,7 @@ use compensator::volumetric::function::Shape;
 use crate::page::chart::{BLUE, Mark, Series, chart};
 use crate::page::escape;
 use crate::volumetric::VolumetricEvaluated;
-use crate::volumetric::{AgreementRecord, GeometryContent, VolumeRead};
+use crate::volumetric::{AgreementRecord, GeometryContent, VolumeLog};
 
 /// The figures as they are stored.
 pub(crate) fn figures(agreement: &AgreementRecord) -> String {
@@ -19,7 +19,7 @@ pub(crate) fn figures(agreement: &AgreementRecord) -> String {
 
 /// What is left of each reading, evaluated again from what was written down by the curves that were
 /// used; `stored` is what was made from it.
-pub(crate) fn residuals(read: &VolumeRead, stored: Option<&GeometryContent>) -> String {
+pub(crate) fn residuals(read: &VolumeLog, stored: Option<&GeometryContent>) -> String {
     let Some(shape) = shape(read, stored) else {
         return "<p class=\"note\">This run does not say how errors run between their nodes, and no \
                 calibration was made from it: its readings are not evaluated here.</p>"
@@ -54,7 +54,7 @@ pub(crate) fn residuals(read: &VolumeRead, stored: Option<&GeometryContent>) -> 
     )
 }
 
-pub(crate) fn shape(read: &VolumeRead, stored: Option<&GeometryContent>) -> Option<Shape> {
+pub(crate) fn shape(read: &VolumeLog, stored: Option<&GeometryContent>) -> Option<Shape> {
     let planned = read.plan.as_ref().and_then(|it| it.shape);
     let used = stored
         .and_then(|it| it.functions.first())

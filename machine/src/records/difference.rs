@@ -5,7 +5,7 @@ use serde_json::Value;
 
 /// Where two values first differ, and what stands there.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Difference {
+pub struct Difference {
     /// Keys and places in lists, from the outside in; empty when the values are no tables or lists.
     pub place: String,
     /// In the one.
@@ -16,7 +16,7 @@ pub(crate) struct Difference {
 
 impl Difference {
     /// `what`, and where in it.
-    pub(crate) fn in_what(&self, what: &str) -> String {
+    pub fn in_what(&self, what: &str) -> String {
         if self.place.is_empty() {
             return what.to_owned();
         }
@@ -25,10 +25,7 @@ impl Difference {
 }
 
 /// The first difference of what `expected` and `seen` look like in a file, if there is one.
-pub(crate) fn first_difference<T: Serialize + ?Sized>(
-    expected: &T,
-    seen: &T,
-) -> Option<Difference> {
+pub fn first_difference<T: Serialize + ?Sized>(expected: &T, seen: &T) -> Option<Difference> {
     let value = |it: &T| serde_json::to_value(it).expect("plain data always serialises");
     below("", &value(expected), &value(seen))
 }

@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{SCHEMA_VERSION, sound};
+use super::SCHEMA_VERSION;
+use super::sound::Unsound;
+
+/// Why a model cannot be made of what was stored.
+pub type ModelError = Box<dyn core::error::Error + Send + Sync>;
 
 /// Why something cannot be stored, or what is stored cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -92,7 +96,7 @@ pub enum StoreError {
         /// The kind wanted.
         expected: &'static str,
         /// The kind it is.
-        seen: &'static str,
+        seen: String,
     },
     /// Another program uses the machine.
     #[error("the machine is in use by {owner}; stop that first")]
@@ -120,47 +124,23 @@ pub enum StoreError {
         /// Which axis.
         axis: String,
     },
-    /// The nodes of the record make no table.
+    /// The record's values make no model of their kind.
     #[error("calibration {id}: {source}")]
-    Table {
+    Model {
         /// The calibration.
         id: String,
         /// Why.
-        source: compensator::error_table::TableError,
+        source: ModelError,
     },
-    /// The values of the record make no table of a rotary axis.
-    #[error("calibration {id}: {source}")]
-    Periodic {
-        /// The calibration.
-        id: String,
-        /// Why.
-        source: compensator::rotary::PeriodicError,
-    },
-    /// The nodes of the record make no function of a position.
+    /// Likewise one part of it.
     #[error("calibration {id}, {name}: {source}")]
-    Function {
+    Part {
         /// The calibration.
         id: String,
-        /// Which function.
+        /// Which part.
         name: String,
         /// Why.
-        source: compensator::volumetric::function::FunctionError,
-    },
-    /// The record has a part that three axes do not have, or has it twice.
-    #[error("calibration {id}: `{name}` is no error of three axes, or is there twice")]
-    ErrorName {
-        /// The calibration.
-        id: String,
-        /// What it is called.
-        name: String,
-    },
-    /// The record's references belong to no beam.
-    #[error("calibration {id}: {source}")]
-    Beam {
-        /// The calibration.
-        id: String,
-        /// Why.
-        source: compensator::volumetric::online::DriftError,
+        source: ModelError,
     },
     /// Nothing is left of the run to be done.
     #[error("{}: this run is complete; start a new one without --resume", path.display())]
@@ -182,15 +162,20 @@ pub enum StoreError {
     },
 }
 
+impl StoreError {
+    /// The error for calibration `id`, of whose values no model can be made.
+    pub fn model(id: &str, source: impl Into<ModelError>) -> Self {
+        let (id, source) = (id.to_owned(), source.into());
+        Self::Model { id, source }
+    }
+}
+
 fn at_line(path: &Path, line: Option<usize>) -> String {
     let line = line.map_or_else(String::new, |it| format!(": line {it}"));
     path.display().to_string() + &line
 }
 
-pub(super) fn unsound(
-    path: &Path,
-    line: Option<usize>,
-) -> impl FnOnce(sound::Unsound) -> StoreError {
+pub(super) fn unsound(path: &Path, line: Option<usize>) -> impl FnOnce(Unsound) -> StoreError {
     let path = path.to_owned();
     move |it| StoreError::Unsound {
         path,
@@ -201,7 +186,7 @@ pub(super) fn unsound(
     }
 }
 
-pub(crate) fn io_error(
+pub(super) fn io_error(
     action: &'static str,
     path: &Path,
 ) -> impl FnOnce(std::io::Error) -> StoreError {

@@ -57,7 +57,7 @@ mod tests {
     fn the_lease_can_be_read_by_whom_any_other_new_file_can_be() {
         use std::os::unix::fs::MetadataExt;
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path(), "m");
+        let store = Store::new(folder.path(), "m", &[]);
         let _lease = Lease::take(&store, "calibrate").unwrap();
         let ordinary = store.root().join("ordinary");
         fs::write(&ordinary, b"x").unwrap();
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn a_second_program_is_told_who_has_the_machine() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path(), "m");
+        let store = Store::new(folder.path(), "m", &[]);
         let first = Lease::take(&store, "calibrate").unwrap();
         let error = Lease::take(&store, "move").unwrap_err().to_string();
         assert!(error.contains("truestage calibrate, process"), "{error}");

@@ -5,33 +5,31 @@
 //! A checksum says that nothing changed by accident; whoever edits a file makes it anew. Limits are
 //! wide: they are what no stage, instrument or building reaches, not what a good machine keeps.
 
-mod calibration;
-mod journal;
-mod volume;
-
 use core::fmt;
 use core::ops::RangeInclusive;
 
-pub(super) use calibration::record;
-pub(super) use journal::{entry, header};
-
 /// What cannot be so, where it stands, and what was expected there.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Unsound {
-    pub(super) place: String,
-    pub(super) expected: String,
-    pub(super) seen: String,
+pub struct Unsound {
+    /// Where it stands.
+    pub place: String,
+    /// What can stand there.
+    pub expected: String,
+    /// What does.
+    pub seen: String,
 }
 
-pub(super) type Judged = Result<(), Unsound>;
+/// Whether something can be so, and what cannot.
+pub type Judged = Result<(), Unsound>;
 
 /// What numbers of a kind may be, and how a person calls that.
-pub(super) struct Limits {
+pub struct Limits {
     range: RangeInclusive<f64>,
     unit: &'static str,
 }
 
-const fn limits(low: f64, high: f64, unit: &'static str) -> Limits {
+/// From `low` to `high`; a `low` of the smallest number above 0 is said as "more than 0".
+pub const fn limits(low: f64, high: f64, unit: &'static str) -> Limits {
     Limits {
         range: low..=high,
         unit,
@@ -39,35 +37,53 @@ const fn limits(low: f64, high: f64, unit: &'static str) -> Limits {
 }
 
 /// Places along an axis, and what stands for one.
-pub(super) const PLACE_M: Limits = limits(-1e3, 1e3, "m");
+pub const PLACE_M: Limits = limits(-1e3, 1e3, "m");
 /// What a place is off by.
-pub(super) const ERROR_M: Limits = limits(-1.0, 1.0, "m");
-pub(super) const ERROR_U_M: Limits = limits(0.0, 1.0, "m");
-pub(super) const LENGTH_M: Limits = limits(f64::MIN_POSITIVE, 1e3, "m");
-pub(super) const ANGLE_RAD: Limits = limits(-10.0, 10.0, "rad");
-pub(super) const ANGLE_U_RAD: Limits = limits(0.0, 10.0, "rad");
+pub const ERROR_M: Limits = limits(-1.0, 1.0, "m");
+/// How uncertain that is.
+pub const ERROR_U_M: Limits = limits(0.0, 1.0, "m");
+/// What is longer than nothing.
+pub const LENGTH_M: Limits = limits(f64::MIN_POSITIVE, 1e3, "m");
+/// Angles, and what they are off by.
+pub const ANGLE_RAD: Limits = limits(-10.0, 10.0, "rad");
+/// How uncertain that is.
+pub const ANGLE_U_RAD: Limits = limits(0.0, 10.0, "rad");
 /// Turns are counted on.
-pub(super) const TURNS_RAD: Limits = limits(-1e6, 1e6, "rad");
-pub(super) const RESOLUTION: Limits = limits(f64::MIN_POSITIVE, 1.0, "m or rad a count");
-pub(super) const SLOPE: Limits = limits(-1.0, 1.0, "m/m");
-pub(super) const PER_KELVIN: Limits = limits(-1.0, 1.0, "a kelvin");
-pub(super) const PER_KELVIN_U: Limits = limits(0.0, 1.0, "a kelvin");
+pub const TURNS_RAD: Limits = limits(-1e6, 1e6, "rad");
+/// One count of an encoder.
+pub const RESOLUTION: Limits = limits(f64::MIN_POSITIVE, 1.0, "m or rad a count");
+/// What a place is off by, by way.
+pub const SLOPE: Limits = limits(-1.0, 1.0, "m/m");
+/// Thermal coefficients.
+pub const PER_KELVIN: Limits = limits(-1.0, 1.0, "a kelvin");
+/// How uncertain these are.
+pub const PER_KELVIN_U: Limits = limits(0.0, 1.0, "a kelvin");
 /// From absolute zero to what melts any stage.
-pub(super) const CELSIUS: Limits = limits(-273.15, 1500.0, "°C");
-pub(super) const KELVIN_U: Limits = limits(0.0, 1e3, "K");
-pub(super) const PASCAL: Limits = limits(0.0, 1e7, "Pa");
+pub const CELSIUS: Limits = limits(-273.15, 1500.0, "°C");
+/// How uncertain temperatures are.
+pub const KELVIN_U: Limits = limits(0.0, 1e3, "K");
+/// Pressure of air.
+pub const PASCAL: Limits = limits(0.0, 1e7, "Pa");
 /// Sensors say a little less than nothing and a little more than all.
-pub(super) const HUMIDITY: Limits = limits(-0.5, 1.5, "of 1");
-pub(super) const VOLTS: Limits = limits(-1e4, 1e4, "V");
+pub const HUMIDITY: Limits = limits(-0.5, 1.5, "of 1");
+/// What sensors give.
+pub const VOLTS: Limits = limits(-1e4, 1e4, "V");
 /// Thirty years.
-pub(super) const SECONDS: Limits = limits(0.0, 1e9, "s");
-pub(super) const RATIO: Limits = limits(0.0, 1e9, "times");
-pub(super) const SPEED_RAD_PER_S: Limits = limits(f64::MIN_POSITIVE, 1e4, "rad/s");
+pub const SECONDS: Limits = limits(0.0, 1e9, "s");
+/// How many times something is something else.
+pub const RATIO: Limits = limits(0.0, 1e9, "times");
+/// How fast tables turn.
+pub const SPEED_RAD_PER_S: Limits = limits(f64::MIN_POSITIVE, 1e4, "rad/s");
 /// Plates have no more lines, and lists no more entries.
-pub(super) const COUNT_MAX: usize = 1_000_000;
+pub const COUNT_MAX: usize = 1_000_000;
+/// Passes over a plate, and runs, at most.
+pub const PASSES_MAX: usize = 10_000;
 
 /// Nothing is expected that is not between `limits`.
-pub(super) fn number(place: impl fmt::Display, seen: f64, limits: &Limits) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn number(place: impl fmt::Display, seen: f64, limits: &Limits) -> Judged {
     // A NaN is in no range.
     if limits.range.contains(&seen) {
         return Ok(());
@@ -80,7 +96,8 @@ pub(super) fn number(place: impl fmt::Display, seen: f64, limits: &Limits) -> Ju
     Err(unsound(place, expected, format!("{seen:e}")))
 }
 
-pub(super) fn unsound(
+/// What cannot be so at `place`.
+pub fn unsound(
     place: impl fmt::Display,
     expected: impl Into<String>,
     seen: impl Into<String>,
@@ -92,23 +109,38 @@ pub(super) fn unsound(
     }
 }
 
-pub(super) fn optional(place: &str, seen: Option<f64>, limits: &Limits) -> Judged {
+/// Likewise, where there is one.
+///
+/// # Errors
+/// When it is not so.
+pub fn optional(place: &str, seen: Option<f64>, limits: &Limits) -> Judged {
     seen.map_or(Ok(()), |it| number(place, it, limits))
 }
 
-pub(super) fn numbers(place: &str, seen: &[f64], limits: &Limits) -> Judged {
+/// Likewise, each of a list.
+///
+/// # Errors
+/// When it is not so.
+pub fn numbers(place: &str, seen: &[f64], limits: &Limits) -> Judged {
     let mut each = seen.iter().enumerate();
     each.try_for_each(|(at, it)| number(format_args!("{place}[{at}]"), *it, limits))
 }
 
-pub(super) fn optionals(place: &str, seen: &[Option<f64>], limits: &Limits) -> Judged {
+/// Likewise, each of a list that is there.
+///
+/// # Errors
+/// When it is not so.
+pub fn optionals(place: &str, seen: &[Option<f64>], limits: &Limits) -> Judged {
     let known = seen.iter().enumerate();
     let mut known = known.filter_map(|(at, it)| Some((at, (*it)?)));
     known.try_for_each(|(at, it)| number(format_args!("{place}[{at}]"), it, limits))
 }
 
 /// A list that has as many entries as something else.
-pub(super) fn as_many(place: &str, seen: usize, expected: usize, of: &str) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn as_many(place: &str, seen: usize, expected: usize, of: &str) -> Judged {
     is(
         place,
         seen == expected,
@@ -117,13 +149,20 @@ pub(super) fn as_many(place: &str, seen: usize, expected: usize, of: &str) -> Ju
     )
 }
 
-pub(super) fn counted(place: &str, seen: usize, range: RangeInclusive<usize>) -> Judged {
+/// A number of entries within `range`.
+///
+/// # Errors
+/// When it is not so.
+pub fn counted(place: &str, seen: usize, range: RangeInclusive<usize>) -> Judged {
     let expected = || format!("{} to {}", range.start(), range.end());
     is(place, range.contains(&seen), expected, || seen.to_string())
 }
 
 /// That `holds`.
-pub(super) fn is(
+///
+/// # Errors
+/// When it is not so.
+pub fn is(
     place: impl fmt::Display,
     holds: bool,
     expected: impl FnOnce() -> String,
@@ -136,7 +175,10 @@ pub(super) fn is(
 }
 
 /// One of these letters.
-pub(super) fn letter(place: &str, seen: char, among: &[char]) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn letter(place: &str, seen: char, among: &[char]) -> Judged {
     let expected = || {
         let each: Vec<String> = among.iter().map(|it| format!("`{it}`")).collect();
         each.join(" or ")
@@ -147,12 +189,18 @@ pub(super) fn letter(place: &str, seen: char, among: &[char]) -> Judged {
 }
 
 /// The two ways to come to a place.
-pub(super) fn approach(place: &str, seen: char) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn approach(place: &str, seen: char) -> Judged {
     letter(place, seen, &['+', '-'])
 }
 
 /// What names a folder's file must not lead elsewhere.
-pub(super) fn file_name(place: &str, seen: &str) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn file_name(place: &str, seen: &str) -> Judged {
     let is_name = !seen.is_empty() && seen.len() <= 200 && seen != "." && seen != "..";
     let is_plain = seen.chars().all(|it| it != '/' && !it.is_control());
     let expected = || "a name without `/`, of 200 letters at most".to_owned();
@@ -165,7 +213,10 @@ pub(super) fn file_name(place: &str, seen: &str) -> Judged {
 const STEP_MIN_M: f64 = 1e-10;
 
 /// Places one behind the other, and not on each other.
-pub(super) fn increasing(place: &str, seen: &[f64]) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn increasing(place: &str, seen: &[f64]) -> Judged {
     // A comparison with NaN is false.
     let follows = |it: &[f64]| it[1] - it[0] >= STEP_MIN_M;
     let back = seen.windows(2).position(|it| !follows(it));
@@ -177,7 +228,10 @@ pub(super) fn increasing(place: &str, seen: &[f64]) -> Judged {
 }
 
 /// What a model of its own says of it.
-pub(super) fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judged {
     let expected = "what can be applied";
     built
         .map(|_| ())
@@ -185,7 +239,10 @@ pub(super) fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judg
 }
 
 /// What is said once is not said otherwise later.
-fn once(place: &str, is_new: bool) -> Judged {
+///
+/// # Errors
+/// When it is not so.
+pub fn once(place: &str, is_new: bool) -> Judged {
     let expected = || "one such line in a journal".to_owned();
     is(place, is_new, expected, || "another one".to_owned())
 }

@@ -1,17 +1,92 @@
-//! Lines of journals of three axes.
+//! Journals of three axes: each line by itself, and against those before it.
+
+use machine::records::sound::{
+    ANGLE_RAD, CELSIUS, ERROR_M, ERROR_U_M, Judged, KELVIN_U, LENGTH_M, PLACE_M, SECONDS, as_many,
+    counted, increasing, is, letter, limits, model, number, numbers, once, optional, optionals,
+    unsound,
+};
+use machine::records::{JournalHeader, Log};
+use serde::{Deserialize, Serialize};
 
 use compensator::volumetric::model::Chain;
 
-use super::calibration::references as beams;
-use super::{
-    ANGLE_RAD, CELSIUS, ERROR_M, ERROR_U_M, Judged, KELVIN_U, LENGTH_M, PLACE_M, SECONDS, as_many,
-    counted, increasing, is, letter, model, number, numbers, once, optional, unsound,
-};
+use crate::volumetric::sound::references as beams;
 use crate::volumetric::{AXES, error_name};
 use crate::volumetric::{
     LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeCheckEntry, VolumePlanEntry,
-    VolumeRead, VolumeReferencesEntry,
+    VolumeReferencesEntry,
 };
+
+/// A line of such a journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "entry", rename_all = "snake_case")]
+pub enum VolumeEntry {
+    /// How the errors of three axes are to be found: the second line of such a run.
+    VolumePlan(VolumePlanEntry),
+    /// What their detectors read before the first line.
+    VolumeReferences(VolumeReferencesEntry),
+    /// A reading of a line.
+    LineReading(LineReadingEntry),
+    /// A line was read to its end.
+    LineRead(LineReadEntry),
+    /// Which line a verification of three axes reads: the second line of such a run.
+    VolumeCheck(VolumeCheckEntry),
+}
+
+/// What such a journal holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VolumeLog {
+    /// How the errors are to be found.
+    pub plan: Option<VolumePlanEntry>,
+    /// What the detectors read first.
+    pub references: Option<VolumeReferencesEntry>,
+    /// Every reading, in the order they were made.
+    pub readings: Vec<LineReadingEntry>,
+    /// The lines that are whole.
+    pub whole: Vec<LineReadEntry>,
+    /// What a verification is.
+    pub check: Option<VolumeCheckEntry>,
+}
+
+impl Log for VolumeLog {
+    type Entry = VolumeEntry;
+
+    const OPENED_BY: &'static [&'static str] = &["volume_plan", "volume_check"];
+
+    fn judge(&self, _: &JournalHeader, entry: &VolumeEntry) -> Judged {
+        match entry {
+            VolumeEntry::VolumePlan(it) => plan(self, it),
+            VolumeEntry::VolumeReferences(it) => references(self, it),
+            VolumeEntry::LineReading(it) => reading(self, it),
+            VolumeEntry::LineRead(it) => whole(self, it),
+            VolumeEntry::VolumeCheck(it) => check(self, it),
+        }
+    }
+
+    fn take(&mut self, entry: VolumeEntry) {
+        match entry {
+            VolumeEntry::VolumePlan(it) => self.plan = Some(it),
+            VolumeEntry::VolumeReferences(it) => self.references = Some(it),
+            VolumeEntry::LineReading(it) => self.readings.push(it),
+            VolumeEntry::LineRead(it) => self.whole.push(it),
+            VolumeEntry::VolumeCheck(it) => self.check = Some(it),
+        }
+    }
+
+    fn keep_whole(&mut self, _: &JournalHeader) {
+        // The zero of the interferometer is set for each line: half a line cannot be continued.
+        let whole = &self.whole;
+        let is_whole = |line: usize| whole.iter().any(|it| it.line == line);
+        self.readings.retain(|it| is_whole(it.line));
+    }
+}
+
+impl VolumeLog {
+    /// Whether the line is whole.
+    pub fn is_whole(&self, line: usize) -> bool {
+        self.whole.iter().any(|it| it.line == line)
+    }
+}
 
 /// Lines, nodes of an axis, places of a line, thermometers, at most.
 const LINES_MAX: usize = 10_000;
@@ -21,7 +96,7 @@ const THERMOMETERS_MAX: usize = 1_000;
 /// A direction's length is 1 but for rounding.
 const ROUNDING: f64 = 1e-6;
 
-pub(super) fn plan(read: &VolumeRead, it: &VolumePlanEntry) -> Judged {
+fn plan(read: &VolumeLog, it: &VolumePlanEntry) -> Judged {
     once("volume_plan", read.plan.is_none())?;
     model("chain", it.chain.parse::<Chain>())?;
     let corners = [
@@ -108,7 +183,7 @@ fn warmth(it: &VolumePlanEntry) -> Judged {
     Ok(())
 }
 
-pub(super) fn references(read: &VolumeRead, it: &VolumeReferencesEntry) -> Judged {
+fn references(read: &VolumeLog, it: &VolumeReferencesEntry) -> Judged {
     once("volume_references", read.references.is_none())?;
     beams(&it.content)?;
     counted(
@@ -121,13 +196,13 @@ pub(super) fn references(read: &VolumeRead, it: &VolumeReferencesEntry) -> Judge
 }
 
 /// A line of the plan; a verification has only one.
-fn line(read: &VolumeRead, seen: usize) -> Judged {
+fn line(read: &VolumeLog, seen: usize) -> Judged {
     let count = read.plan.as_ref().map_or(1, |it| it.lines.len());
     let expected = || format!("one of {count} lines, from 0");
     is("line", seen < count, expected, || seen.to_string())
 }
 
-pub(super) fn reading(read: &VolumeRead, it: &LineReadingEntry) -> Judged {
+fn reading(read: &VolumeLog, it: &LineReadingEntry) -> Judged {
     line(read, it.line)?;
     numbers("at_m", &it.at_m, &PLACE_M)?;
     numbers("tool_m", &it.tool_m, &PLACE_M)?;
@@ -147,7 +222,7 @@ pub(super) fn reading(read: &VolumeRead, it: &LineReadingEntry) -> Judged {
     number("read_si", it.read_si, &ERROR_M)?;
     number("deviation_si", it.deviation_si, &ERROR_M)?;
     // Beyond it no square is anything any more.
-    number("u_si", it.u_si, &super::limits(1e-15, 1.0, "m or rad"))?;
+    number("u_si", it.u_si, &limits(1e-15, 1.0, "m or rad"))?;
     optional("scatter_m", it.scatter_m, &ERROR_U_M)?;
     numbers("sideways_m", it.sideways_m.as_flattened(), &ERROR_M)?;
     numbers("roll_rad", &it.roll_rad, &ANGLE_RAD)?;
@@ -156,7 +231,7 @@ pub(super) fn reading(read: &VolumeRead, it: &LineReadingEntry) -> Judged {
         it.temperatures_c.len(),
         0..=THERMOMETERS_MAX,
     )?;
-    super::optionals("temperatures_c", &it.temperatures_c, &CELSIUS)?;
+    optionals("temperatures_c", &it.temperatures_c, &CELSIUS)?;
     numbers(
         "correction_m",
         &it.correction_m.unwrap_or_default(),
@@ -165,7 +240,7 @@ pub(super) fn reading(read: &VolumeRead, it: &LineReadingEntry) -> Judged {
     number("at_s", it.at_s, &SECONDS)
 }
 
-pub(super) fn whole(read: &VolumeRead, it: &LineReadEntry) -> Judged {
+fn whole(read: &VolumeLog, it: &LineReadEntry) -> Judged {
     line(read, it.line)?;
     let is_new = !read.is_whole(it.line);
     let expected = || "each line once".to_owned();
@@ -178,7 +253,7 @@ pub(super) fn whole(read: &VolumeRead, it: &LineReadEntry) -> Judged {
     number("at_s", it.at_s, &SECONDS)
 }
 
-pub(super) fn check(read: &VolumeRead, it: &VolumeCheckEntry) -> Judged {
+fn check(read: &VolumeLog, it: &VolumeCheckEntry) -> Judged {
     once("volume_check", read.check.is_none())?;
     numbers("from_m", &it.from_m, &PLACE_M)?;
     numbers("to_m", &it.to_m, &PLACE_M)?;

@@ -3,9 +3,12 @@
 use drivers::device::{Environment, Identity};
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigHash;
-use crate::store::failure::StoreError;
-use crate::store::name::short;
+use super::failure::StoreError;
+use super::hash::ConfigHash;
+use super::name::short;
+use super::sound::{
+    self, CELSIUS, ERROR_U_M, HUMIDITY, Judged, PASCAL, RESOLUTION, number, optional,
+};
 
 /// What every calibration says, whatever its kind.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -86,6 +89,17 @@ impl RecordHead {
         Ok(())
     }
 
+    /// Whether it can be so.
+    pub(super) fn judge(&self) -> Judged {
+        // The axis names the file that says what is in use.
+        sound::file_name("axis", &self.axis)?;
+        optional("resolution_m", self.resolution_m, &RESOLUTION)?;
+        optional("resolution_rad", self.resolution_rad, &RESOLUTION)?;
+        let u = self.instrument.standard_uncertainty_m;
+        number("instrument.standard_uncertainty_m", u, &ERROR_U_M)?;
+        self.environment.judge("environment")
+    }
+
     fn resolution(&self) -> String {
         match (self.resolution_m, self.resolution_rad) {
             (Some(metres), _) => format!("{} nm", units::Short(metres * 1e9)),
@@ -149,6 +163,22 @@ pub struct EnvironmentRecord {
     pub material_temperature_c: Option<f64>,
     pub pressure_pa: Option<f64>,
     pub relative_humidity: Option<f64>,
+}
+
+impl EnvironmentRecord {
+    /// Whether sensors of the surroundings can say so; `place` is where it stands.
+    ///
+    /// # Errors
+    /// Naming the first key that cannot be so.
+    pub fn judge(&self, place: &str) -> Judged {
+        let at = |key: &str| format!("{place}.{key}");
+        let air = self.air_temperature_c;
+        optional(&at("air_temperature_c"), air, &CELSIUS)?;
+        let material = self.material_temperature_c;
+        optional(&at("material_temperature_c"), material, &CELSIUS)?;
+        optional(&at("pressure_pa"), self.pressure_pa, &PASCAL)?;
+        optional(&at("relative_humidity"), self.relative_humidity, &HUMIDITY)
+    }
 }
 
 impl From<&Environment> for EnvironmentRecord {

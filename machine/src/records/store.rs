@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::record::CalibrationRecord;
-use super::{SCHEMA_VERSION, StoreError, io_error, sound, unsound, write_new_or_replace};
-use crate::config::MachineSection;
+use super::content::{CalibrationRecord, Content, ContentKind, Glance};
+use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound, write_new_or_replace};
 
 /// Which calibration an axis uses, and which it used before (oldest first).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,19 +24,16 @@ pub struct ActivePointer {
 #[derive(Clone, Debug)]
 pub struct Store {
     root: PathBuf,
+    kinds: &'static [ContentKind],
 }
 
 impl Store {
-    /// The store of `machine` below `data_dir`.
-    pub fn new(data_dir: &Path, machine: &str) -> Self {
+    /// The store of `machine` below `data_dir`, in which calibrations of these `kinds` may lie.
+    pub fn new(data_dir: &Path, machine: &str, kinds: &'static [ContentKind]) -> Self {
         Self {
             root: data_dir.join(machine),
+            kinds,
         }
-    }
-
-    /// The store of the machine that a configuration describes.
-    pub fn of(machine: &MachineSection) -> Self {
-        Self::new(&machine.data_dir, &machine.name)
     }
 
     /// The machine's folder.
@@ -79,7 +75,7 @@ impl Store {
     ///
     /// # Errors
     /// When it cannot be written; nothing stored before is touched.
-    pub fn save(&self, record: &CalibrationRecord) -> Result<String, StoreError> {
+    pub fn save<C: Content>(&self, record: &CalibrationRecord<C>) -> Result<String, StoreError> {
         let bytes = record.bytes();
         let id = blake3::hash(&bytes).to_hex().to_string();
         write_new_or_replace(&self.calibration_path(&id), &bytes)?;
@@ -90,17 +86,51 @@ impl Store {
     /// says can be so.
     ///
     /// # Errors
-    /// When it is not there, damaged, written by a newer program, or says what cannot be.
-    pub fn load(&self, id: &str) -> Result<CalibrationRecord, StoreError> {
+    /// When it is not there, damaged, written by a newer program, of another kind, or says what
+    /// cannot be.
+    pub fn load<C: Content>(&self, id: &str) -> Result<CalibrationRecord<C>, StoreError> {
+        let (path, bytes) = self.bytes(id)?;
+        let tag: Tag = parse_versioned(&path, &bytes)?;
+        if tag.kind != C::KIND {
+            return Err(StoreError::OtherKind {
+                id: short(id),
+                axis: tag.axis,
+                expected: C::KIND,
+                seen: tag.kind,
+            });
+        }
+        let record: CalibrationRecord<C> = parse_versioned(&path, &bytes)?;
+        record.judge().map_err(unsound(&path, None))?;
+        Ok(record)
+    }
+
+    /// Likewise, for whoever does not know of which kind it is.
+    ///
+    /// # Errors
+    /// As [`Store::load`]; when this store knows no such kind.
+    pub fn glance(&self, id: &str) -> Result<Glance, StoreError> {
+        let (path, bytes) = self.bytes(id)?;
+        let tag: Tag = parse_versioned(&path, &bytes)?;
+        let kind = self.kinds.iter().find(|it| it.name == tag.kind);
+        let kind = kind.ok_or_else(|| StoreError::Format {
+            path: path.clone(),
+            line: 1,
+            cause: format!("no kind of calibration is called `{}`", tag.kind),
+        })?;
+        let (glance, judged) = (kind.parse)(&bytes).map_err(format_error(&path))?;
+        judged.map_err(unsound(&path, None))?;
+        Ok(glance)
+    }
+
+    /// Where calibration `id` is, and its bytes, if they are those that were stored.
+    fn bytes(&self, id: &str) -> Result<(PathBuf, Vec<u8>), StoreError> {
         let path = self.calibration_path(id);
         let bytes = fs::read(&path).map_err(io_error("read", &path))?;
         let seen = blake3::hash(&bytes).to_hex().to_string();
         if seen != id {
             return Err(StoreError::Damaged { path, seen });
         }
-        let record = parse_versioned(&path, &bytes)?;
-        sound::record(&record).map_err(unsound(&path, None))?;
-        Ok(record)
+        Ok((path, bytes))
     }
 
     /// The full name of the one calibration that begins with `prefix`.
@@ -136,24 +166,39 @@ impl Store {
     }
 
     /// The store that the journal at `path` lies in, by its place; `None` when it lies elsewhere.
-    pub fn of_journal(path: &Path) -> Option<Self> {
+    pub fn of_journal(path: &Path, kinds: &'static [ContentKind]) -> Option<Self> {
         let runs = path.parent()?;
         let is_store = runs.file_name()? == "runs";
         let root = runs.parent()?.to_owned();
-        is_store.then_some(Self { root })
+        is_store.then_some(Self { root, kinds })
     }
 
-    /// The calibrations that were made from the journal called `source`, with their names; what
-    /// cannot be read is passed over.
+    /// The calibrations of a kind that were made from the journal called `source`, with their names;
+    /// what cannot be read is passed over.
     ///
     /// # Errors
     /// When the folder cannot be read.
-    pub fn made_from(&self, source: &str) -> Result<Vec<(String, CalibrationRecord)>, StoreError> {
+    pub fn made_from<C: Content>(
+        &self,
+        source: &str,
+    ) -> Result<Vec<(String, CalibrationRecord<C>)>, StoreError> {
         let records = self.list()?.into_iter().filter_map(|id| {
             let record = self.load(&id).ok()?;
             (record.head.source == source).then_some((id, record))
         });
         Ok(records.collect())
+    }
+
+    /// Likewise of every kind.
+    ///
+    /// # Errors
+    /// As [`Store::made_from`].
+    pub fn glances_from(&self, source: &str) -> Result<Vec<(String, Glance)>, StoreError> {
+        let glances = self.list()?.into_iter().filter_map(|id| {
+            let glance = self.glance(&id).ok()?;
+            (glance.head.source == source).then_some((id, glance))
+        });
+        Ok(glances.collect())
     }
 
     /// What `axis` uses.
@@ -177,7 +222,7 @@ impl Store {
     /// # Errors
     /// When `id` cannot be loaded or the pointer cannot be written.
     pub fn activate(&self, axis: &str, id: &str) -> Result<(), StoreError> {
-        self.load(id)?;
+        self.glance(id)?;
         let mut pointer = self.active(axis)?;
         pointer
             .history
@@ -208,7 +253,7 @@ impl Store {
         let earlier = pointer.history.pop().ok_or_else(|| StoreError::NoEarlier {
             axis: axis.to_owned(),
         })?;
-        self.load(&earlier)?;
+        self.glance(&earlier)?;
         Ok(earlier)
     }
 
@@ -221,7 +266,7 @@ impl Store {
         let mut pointer = self.active(axis)?;
         pointer.current = None;
         while let (None, Some(earlier)) = (&pointer.current, pointer.history.pop()) {
-            pointer.current = Some(earlier).filter(|id| self.load(id).is_ok());
+            pointer.current = Some(earlier).filter(|id| self.glance(id).is_ok());
         }
         self.write_pointer(axis, &pointer)?;
         Ok(pointer.current)
@@ -268,6 +313,13 @@ fn list_folder(folder: &Path) -> Result<Vec<String>, StoreError> {
     Ok(names)
 }
 
+/// Of which kind a calibration is, and of which axis.
+#[derive(Deserialize)]
+struct Tag {
+    kind: String,
+    axis: String,
+}
+
 fn parse_versioned<T: for<'de> Deserialize<'de>>(
     path: &Path,
     bytes: &[u8],
@@ -276,90 +328,24 @@ fn parse_versioned<T: for<'de> Deserialize<'de>>(
     struct Version {
         schema_version: u32,
     }
-    let format = |error: serde_json::Error| StoreError::Format {
-        path: path.to_owned(),
-        line: error.line(),
-        cause: error.to_string(),
-    };
-    let version: Version = serde_json::from_slice(bytes).map_err(format)?;
+    let version: Version = serde_json::from_slice(bytes).map_err(format_error(path))?;
     if version.schema_version > SCHEMA_VERSION {
         return Err(StoreError::Newer {
             path: path.to_owned(),
             seen: version.schema_version,
         });
     }
-    serde_json::from_slice(bytes).map_err(format)
+    serde_json::from_slice(bytes).map_err(format_error(path))
+}
+
+fn format_error(path: &Path) -> impl Fn(serde_json::Error) -> StoreError {
+    let path = path.to_owned();
+    move |error| StoreError::Format {
+        path: path.clone(),
+        line: error.line(),
+        cause: error.to_string(),
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::record::tests::record;
-    use super::*;
-
-    fn store() -> (tempfile::TempDir, Store) {
-        let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path(), "m");
-        (folder, store)
-    }
-
-    #[test]
-    fn a_calibration_is_found_again_by_the_beginning_of_its_name() {
-        let (_folder, store) = store();
-        let id = store.save(&record("A")).unwrap();
-        assert_eq!(store.resolve(&id[..6]).unwrap(), id);
-        assert_eq!(store.load(&id).unwrap(), record("A"));
-        let stored = store.load(&id).unwrap();
-        let table = stored.linear(&id).unwrap().table(&id).unwrap();
-        assert_eq!(table.nodes().len(), 2);
-        assert!(matches!(
-            store.resolve("zz"),
-            Err(StoreError::Unknown { .. })
-        ));
-    }
-
-    #[test]
-    fn any_flipped_byte_is_found() {
-        let (_folder, store) = store();
-        let id = store.save(&record("A")).unwrap();
-        let path = store.calibration_path(&id);
-        let good = fs::read(&path).unwrap();
-        for at in 0..good.len() {
-            let mut bad = good.clone();
-            bad[at] ^= 0x04;
-            fs::write(&path, &bad).unwrap();
-            assert!(
-                matches!(store.load(&id), Err(StoreError::Damaged { .. })),
-                "byte {at}"
-            );
-        }
-        fs::write(&path, &good[..good.len() / 2]).unwrap();
-        assert!(matches!(store.load(&id), Err(StoreError::Damaged { .. })));
-    }
-
-    #[test]
-    fn rollback_returns_to_the_one_before() {
-        let (_folder, store) = store();
-        let first = store.save(&record("A")).unwrap();
-        let second = store.save(&record("B")).unwrap();
-        assert!(matches!(
-            store.rollback("x"),
-            Err(StoreError::NoEarlier { .. })
-        ));
-        store.activate("x", &first).unwrap();
-        store.activate("x", &second).unwrap();
-        assert_eq!(store.active("x").unwrap().current, Some(second));
-        assert_eq!(store.rollback("x").unwrap(), first);
-        assert_eq!(store.active("x").unwrap().current, Some(first));
-    }
-
-    #[test]
-    fn a_file_from_a_newer_program_is_refused() {
-        let (_folder, store) = store();
-        let path = store.pointer_path("x");
-        write_new_or_replace(&path, br#"{"schema_version":2,"future":1}"#).unwrap();
-        assert!(matches!(
-            store.active("x"),
-            Err(StoreError::Newer { seen: 2, .. })
-        ));
-    }
-}
+mod tests;

@@ -14,7 +14,7 @@ const ORDINARY_MODE: u32 = 0o666;
 /// folder. Whatever happens, `path` holds the old content or the whole new one. A file that is
 /// replaced keeps its mode; a new one has the ordinary one, because a calibration is for everybody
 /// who uses the machine, while a temporary file is for its maker only.
-pub(crate) fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
     let mut file = tempfile::Builder::new()

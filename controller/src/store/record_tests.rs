@@ -1,19 +1,18 @@
 use super::*;
-use crate::config::ConfigHash;
-use crate::linear::NodeRecord;
-use crate::platform::{HarmonicRecord, ScrewMethodName, StrokeRecord};
-use crate::rotary::ReadingName;
-use crate::store::{SCHEMA_VERSION, Store, write_new_or_replace};
+use crate::linear::{LinearContent, NodeRecord};
+use crate::platform::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
+use crate::rotary::{ReadingName, RotaryContent};
+use crate::store_in;
 
 /// Written by the first program, before there were other kinds, and named by its hash then.
 const EARLIER: &str = include_str!("earlier_linear.json");
 const EARLIER_ID: &str = "9e34c78936a61aa45d4971e6a4bf2e81a7d2b24d48795819cae1e3a5ae244e9d";
 
 fn hash() -> ConfigHash {
-    ConfigHash::only("h")
+    ConfigHash::recorded("h")
 }
 
-pub(crate) fn record(serial: &str) -> CalibrationRecord {
+fn record(serial: &str) -> CalibrationRecord<LinearContent> {
     let node = |position_m| NodeRecord {
         position_m,
         forward_m: Some(1e-6),
@@ -38,19 +37,19 @@ pub(crate) fn record(serial: &str) -> CalibrationRecord {
         source: "run".into(),
         ..RecordHead::default()
     };
-    let content = Content::LinearErrorTable(LinearContent {
+    let content = LinearContent {
         runs: 3,
         nodes: vec![node(0.0), node(0.003)],
         ..LinearContent::default()
-    });
+    };
     CalibrationRecord { head, content }
 }
 
-fn rotary() -> CalibrationRecord {
-    let mut record = record("A");
-    record.head.resolution_m = None;
-    record.head.resolution_rad = Some(1e-7);
-    record.content = Content::RotaryErrorTable(RotaryContent {
+fn rotary() -> CalibrationRecord<RotaryContent> {
+    let mut head = record("A").head;
+    head.resolution_m = None;
+    head.resolution_rad = Some(1e-7);
+    let content = RotaryContent {
         lines: 3,
         offsets: vec![0, 1],
         table_error_rad: vec![1e-6, -2e-6, 1e-6],
@@ -63,13 +62,13 @@ fn rotary() -> CalibrationRecord {
         noise_amplification: 0.7,
         missing: vec![ReadingName { offset: 1, line: 2 }],
         outliers: vec![],
-    });
-    record
+    };
+    CalibrationRecord { head, content }
 }
 
-fn screw() -> CalibrationRecord {
-    let mut record = record("A");
-    record.content = Content::ScrewModel(ScrewContent {
+fn screw() -> CalibrationRecord<ScrewContent> {
+    let head = record("A").head;
+    let content = ScrewContent {
         rows: 54,
         offset_m: 1e-7,
         slope_m_per_m: 6e-4,
@@ -90,70 +89,82 @@ fn screw() -> CalibrationRecord {
             deviation_m: 9e-5,
         }],
         ..ScrewContent::default()
-    });
-    record
+    };
+    CalibrationRecord { head, content }
 }
 
 fn store() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::new(folder.path(), "m");
+    let store = store_in(folder.path(), "m");
     (folder, store)
 }
 
 #[test]
 fn a_calibration_of_the_first_program_is_read_under_its_old_name() {
     let (_folder, store) = store();
-    write_new_or_replace(&store.calibration_path(EARLIER_ID), EARLIER.as_bytes()).unwrap();
-    assert_eq!(store.load(EARLIER_ID).unwrap(), record("A"));
+    let path = store.calibration_path(EARLIER_ID);
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, EARLIER).unwrap();
+    assert_eq!(
+        store.load::<LinearContent>(EARLIER_ID).unwrap(),
+        record("A")
+    );
     store.activate("x", EARLIER_ID).unwrap();
     assert_eq!(store.active("x").unwrap().current.unwrap(), EARLIER_ID);
 }
 
+#[track_caller]
+fn check_stored<C: Content + PartialEq + core::fmt::Debug>(
+    stored: &CalibrationRecord<C>,
+    kind: &str,
+    summary: &str,
+) {
+    let (_folder, store) = store();
+    let id = store.save(stored).unwrap();
+    assert_eq!(store.load::<C>(&id).unwrap(), *stored);
+    let glance = store.glance(&id).unwrap();
+    assert_eq!((glance.kind, &*glance.summary), (kind, summary));
+    assert_eq!(glance.head, stored.head);
+    let text = String::from_utf8(stored.bytes()).unwrap();
+    assert!(text.contains(&format!("\"kind\": \"{kind}\"")), "{text}");
+}
+
 #[test]
 fn every_kind_is_read_as_it_was_stored_and_says_what_it_is() {
-    let (_folder, store) = store();
-    for (stored, kind, summary) in [
-        (record("A"), LinearContent::KIND, "2 nodes"),
-        (
-            rotary(),
-            RotaryContent::KIND,
-            "3 lines, 2 placements, errors up to 0.413 arcsec",
-        ),
-        (
-            screw(),
-            ScrewContent::KIND,
-            "slope +0.600 µm/mm, lost motion 2.290 µm, 1 harmonics, from 54 strokes by least squares",
-        ),
-    ] {
-        let id = store.save(&stored).unwrap();
-        assert_eq!(store.load(&id).unwrap(), stored);
-        assert_eq!(
-            (stored.content.kind(), &*stored.content.summary()),
-            (kind, summary)
-        );
-        let text = String::from_utf8(stored.bytes()).unwrap();
-        assert!(text.contains(&format!("\"kind\": \"{kind}\"")), "{text}");
-    }
+    check_stored(&record("A"), "linear_error_table", "2 nodes");
+    check_stored(
+        &rotary(),
+        "rotary_error_table",
+        "3 lines, 2 placements, errors up to 0.413 arcsec",
+    );
+    check_stored(
+        &screw(),
+        "screw_model",
+        "slope +0.600 µm/mm, lost motion 2.290 µm, 1 harmonics, from 54 strokes by least squares",
+    );
 }
 
 #[test]
 fn a_calibration_of_another_kind_is_refused_by_name() {
-    let error = rotary().linear("0123456789abcdef").unwrap_err();
+    let (_folder, store) = store();
+    let id = store.save(&rotary()).unwrap();
+    let error = store.load::<LinearContent>(&id).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "calibration 0123456789ab of axis x is of the kind `rotary_error_table`, but \
-         `linear_error_table` is needed here; calibrate the axis again, or roll back to a \
-         calibration of that kind"
+        format!(
+            "calibration {} of axis x is of the kind `rotary_error_table`, but \
+             `linear_error_table` is needed here; calibrate the axis again, or roll back to a \
+             calibration of that kind",
+            short(&id)
+        )
     );
-    assert!(record("A").rotary("id").is_err());
-    assert!(rotary().rotary("id").is_ok());
+    assert!(store.load::<ScrewContent>(&id).is_err());
+    assert!(store.load::<RotaryContent>(&id).is_ok());
 }
 
 #[test]
 fn a_screws_model_comes_back_to_the_last_bit() {
-    let Content::ScrewModel(mut content) = screw().content else {
-        panic!("another kind")
-    };
+    let mut content = screw().content;
     // What was left out is not part of the model.
     content.outliers.clear();
     let model = content.model();
@@ -161,15 +172,13 @@ fn a_screws_model_comes_back_to_the_last_bit() {
         ScrewContent::new(&model, ScrewMethodName::LeastSquares, 54),
         content
     );
-    assert!(screw().screw("id").is_ok());
-    assert!(record("A").screw("id").is_err());
 }
 
 #[track_caller]
 fn check_unreadable(change: impl Fn(String) -> String, says: &str) {
     let text = change(EARLIER.to_owned());
     assert_ne!(text, EARLIER);
-    let error = serde_json::from_str::<CalibrationRecord>(&text).unwrap_err();
+    let error = serde_json::from_str::<CalibrationRecord<LinearContent>>(&text).unwrap_err();
     assert!(error.to_string().contains(says), "{error}");
 }
 
@@ -188,7 +197,7 @@ fn a_key_that_is_unknown_or_missing_in_head_or_content_is_refused() {
     );
     check_unreadable(
         replace("linear_error_table", "tea_leaves"),
-        "unknown variant `tea_leaves`",
+        "the kind is `tea_leaves`, expected `linear_error_table`",
     );
 }
 

@@ -1,0 +1,51 @@
+//! Stored calibrations on the screen: what each kind of content shows of one, and of two.
+
+use serde_json::Value;
+use truestage::Failure;
+use truestage::store::{Content, Store};
+
+/// Lines for people, and values for programs.
+pub(crate) type Changes = (Vec<String>, Vec<Value>);
+
+/// What is shown of a content.
+pub(crate) trait Show: Content {
+    /// It, in lines.
+    fn lines(&self) -> String;
+
+    /// What is otherwise in `after`; `None` for what is not compared.
+    fn changes(&self, after: &Self) -> Option<Changes>;
+}
+
+/// A stored calibration in lines, and as it lies in its file.
+type One = fn(&Store, &str) -> Result<(String, Value), Failure>;
+/// What is otherwise in the second; `None` for what is not compared.
+type Two = fn(&Store, &str, &str) -> Result<Option<Changes>, Failure>;
+
+/// A kind of content that can be shown.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown {
+    pub(crate) kind: &'static str,
+    pub(crate) one: One,
+    pub(crate) two: Two,
+}
+
+impl Shown {
+    pub(crate) const fn of<C: Show>() -> Self {
+        Self {
+            kind: C::KIND,
+            one: one::<C>,
+            two: two::<C>,
+        }
+    }
+}
+
+fn one<C: Show>(store: &Store, id: &str) -> Result<(String, Value), Failure> {
+    let record = store.load::<C>(id)?;
+    let value = serde_json::to_value(&record).expect("plain data always serialises");
+    Ok((record.content.lines(), value))
+}
+
+fn two<C: Show>(store: &Store, before: &str, after: &str) -> Result<Option<Changes>, Failure> {
+    let (before, after) = (store.load::<C>(before)?, store.load::<C>(after)?);
+    Ok(before.content.changes(&after.content))
+}

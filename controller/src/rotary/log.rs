@@ -1,0 +1,168 @@
+//! Journals of a rotary table: each line by itself, and against those before it.
+
+use machine::records::sound::{
+    ANGLE_RAD, ANGLE_U_RAD, COUNT_MAX, Judged, PASSES_MAX, SECONDS, SPEED_RAD_PER_S, TURNS_RAD,
+    Unsound, approach, as_many, counted, is, limits, number, numbers, once, optionals, unsound,
+};
+use machine::records::{JournalHeader, Log};
+use serde::{Deserialize, Serialize};
+
+use crate::rotary::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+
+/// A line of such a journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "entry", rename_all = "snake_case")]
+pub enum PlateEntry {
+    /// How a plate is to be read: the second line.
+    PlatePlan(PlatePlanEntry),
+    /// A pass over the lines of a plate.
+    Sweep(SweepEntry),
+    /// A placement of a plate was read whole.
+    Placed(PlacementEntry),
+    /// What a verification with a plate found.
+    Judged(JudgedEntry),
+    /// A placement turned out to be another one than was asked for: it must be read again.
+    Misplaced {
+        /// By how many lines the plate was to be turned.
+        offset: f64,
+    },
+}
+
+/// What such a journal holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlateLog {
+    /// How the plate is read.
+    pub plan: Option<PlatePlanEntry>,
+    /// Passes over it.
+    pub sweeps: Vec<SweepEntry>,
+    /// Its placements that were read whole.
+    pub placements: Vec<PlacementEntry>,
+    /// What a verification with it found.
+    pub judged: Option<JudgedEntry>,
+}
+
+impl Log for PlateLog {
+    type Entry = PlateEntry;
+
+    const OPENED_BY: &'static [&'static str] = &["plate_plan"];
+
+    fn judge(&self, _: &JournalHeader, entry: &PlateEntry) -> Judged {
+        match entry {
+            PlateEntry::PlatePlan(it) => plate_plan(self, it),
+            PlateEntry::Sweep(it) => sweep(self, it),
+            PlateEntry::Placed(it) => placed(self, it),
+            PlateEntry::Judged(it) => judged(self, it),
+            PlateEntry::Misplaced { offset } => at_offset(plan_of(self)?, *offset),
+        }
+    }
+
+    fn take(&mut self, entry: PlateEntry) {
+        match entry {
+            PlateEntry::PlatePlan(it) => self.plan = Some(it),
+            PlateEntry::Sweep(it) => self.sweeps.push(it),
+            PlateEntry::Placed(it) => self.placements.push(it),
+            PlateEntry::Judged(it) => self.judged = Some(it),
+            PlateEntry::Misplaced { offset } => self.forget(offset),
+        }
+    }
+
+    fn keep_whole(&mut self, _: &JournalHeader) {
+        let placed = |offset: f64| self.placements.iter().any(|it| it.offset == offset);
+        self.sweeps.retain(|it| placed(it.offset));
+    }
+}
+
+impl PlateLog {
+    fn forget(&mut self, offset: f64) {
+        self.sweeps.retain(|it| it.offset != offset);
+        self.placements.retain(|it| it.offset != offset);
+    }
+}
+
+fn plate_plan(read: &PlateLog, it: &PlatePlanEntry) -> Judged {
+    once("plate_plan", read.plan.is_none())?;
+    let lines = it.lines as usize;
+    counted("lines", lines, 2..=COUNT_MAX)?;
+    counted("offsets", it.offsets.len(), 1..=lines)?;
+    let around = limits(0.0, f64::from(it.lines), "lines");
+    numbers("offsets", &it.offsets, &around)?;
+    for (at, offset) in it.offsets.iter().enumerate() {
+        let is_new = !it.offsets[..at].contains(offset);
+        let expected = || "each offset once".to_owned();
+        let place = format_args!("offsets[{at}]");
+        is(place, is_new, expected, || format!("{offset} again"))?;
+    }
+    counted("passes", it.passes as usize, 1..=PASSES_MAX)?;
+    number("speed_rad_per_s", it.speed_rad_per_s, &SPEED_RAD_PER_S)
+}
+
+fn plan_of(read: &PlateLog) -> Result<&PlatePlanEntry, Unsound> {
+    let missing = || unsound("entry", "a plate_plan before it", "none");
+    read.plan.as_ref().ok_or_else(missing)
+}
+
+fn at_offset(plan: &PlatePlanEntry, offset: f64) -> Judged {
+    let expected = || "one of the plan's offsets".to_owned();
+    let known = plan.offsets.contains(&offset);
+    is("offset", known, expected, || format!("{offset:e}"))
+}
+
+fn sweep(read: &PlateLog, it: &SweepEntry) -> Judged {
+    let plan = plan_of(read)?;
+    let lines = plan.lines as usize;
+    at_offset(plan, it.offset)?;
+    // One beyond the last is the first repeated.
+    counted("pass", it.pass as usize, 1..=plan.passes as usize + 1)?;
+    approach("approach", it.approach)?;
+    number("phase_rad", it.phase_rad, &ANGLE_RAD)?;
+    as_many(
+        "deviations_rad",
+        it.deviations_rad.len(),
+        lines,
+        "the lines",
+    )?;
+    optionals("deviations_rad", &it.deviations_rad, &ANGLE_RAD)?;
+    let lists = [
+        ("missing", &it.missing),
+        ("doubled", &it.doubled),
+        ("overwritten", &it.overwritten),
+    ];
+    for (key, list) in lists {
+        counted(key, list.len(), 0..=lines)?;
+        let beyond = list.iter().find(|it| **it as usize >= lines);
+        let expected = || format!("positions below {lines}, the lines");
+        let seen = || beyond.map_or(String::new(), u32::to_string);
+        is(key, beyond.is_none(), expected, seen)?;
+    }
+    numbers("strays_rad", &it.strays_rad, &TURNS_RAD)?;
+    number("at_s", it.at_s, &SECONDS)
+}
+
+fn placed(read: &PlateLog, it: &PlacementEntry) -> Judged {
+    at_offset(plan_of(read)?, it.offset)?;
+    let is_read = read.sweeps.iter().any(|own| own.offset == it.offset);
+    let expected = || "passes of this placement before it".to_owned();
+    is("entry", is_read, expected, || "none".to_owned())?;
+    let is_new = read.placements.iter().all(|own| own.offset != it.offset);
+    let expected = || "each placement once".to_owned();
+    is("offset", is_new, expected, || {
+        format!("{} again", it.offset)
+    })?;
+    number("closure_rad", it.closure_rad, &ANGLE_RAD)?;
+    number("at_s", it.at_s, &SECONDS)
+}
+
+fn judged(read: &PlateLog, it: &JudgedEntry) -> Judged {
+    once("judged", read.judged.is_none())?;
+    let lines = plan_of(read)?.lines as usize;
+    as_many("found_rad", it.found_rad.len(), lines, "the lines")?;
+    optionals("found_rad", &it.found_rad, &ANGLE_RAD)?;
+    if let Some(left) = &it.left_rad {
+        as_many("left_rad", left.len(), lines, "the lines")?;
+        optionals("left_rad", left, &ANGLE_RAD)?;
+    }
+    number("tolerance_rad", it.tolerance_rad, &ANGLE_U_RAD)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,465 @@
+//! Run journals: every measured point is written when it is measured.
+//!
+//! One line an entry: eight hexadecimal digits of CRC-32, a blank, JSON whose key `entry` says what it
+//! is. A killed run leaves whole lines and at most one torn one at the end, which is dropped when it is
+//! read. How a run begins, goes on and ends is said in every journal alike; what it measured, in the
+//! words of its kind ([`Log`]).
+
+use core::marker::PhantomData;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::difference::{Difference, first_difference};
+use super::hash::ConfigHash;
+use super::head::{IdentityRecord, InstrumentRecord};
+use super::sound::{
+    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers,
+};
+use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
+
+/// What a run is: written first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JournalHeader {
+    /// Of this file.
+    pub schema_version: u32,
+    /// `calibrate`, `verify`, `zero`.
+    pub verb: String,
+    /// The machine's name.
+    pub machine: String,
+    /// The stage's serial number.
+    pub stage_serial: String,
+    /// BLAKE3 of what a calibration depends on.
+    pub config_hash: String,
+    /// Which axis.
+    pub axis: String,
+    /// Who the drive is.
+    pub drive: IdentityRecord,
+    /// What measures.
+    pub instrument: InstrumentRecord,
+    /// When, UTC, RFC 3339.
+    pub started: String,
+    /// The calibration in use, `None` for uncompensated moves.
+    pub calibration: Option<String>,
+    /// The targets of one run, metres.
+    pub targets_m: Vec<f64>,
+    /// How many runs.
+    pub runs: u32,
+}
+
+impl JournalHeader {
+    fn judge(&self) -> Judged {
+        counted("runs", self.runs as usize, 0..=PASSES_MAX)?;
+        counted("targets_m", self.targets_m.len(), 0..=COUNT_MAX)?;
+        numbers("targets_m", &self.targets_m, &PLACE_M)?;
+        let u = self.instrument.standard_uncertainty_m;
+        number("instrument.standard_uncertainty_m", u, &ERROR_U_M)
+    }
+
+    /// Whether `seen` can be the number of a run.
+    ///
+    /// # Errors
+    /// When there is no such run.
+    pub fn judge_run(&self, seen: u32) -> Judged {
+        let most = (self.runs as usize).max(1);
+        counted("run", seen as usize, 1..=most)
+    }
+}
+
+/// The datum's place, measured again after a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosureEntry {
+    /// Which run, from 1.
+    pub run: u32,
+    /// What the instrument read there before the run, metres; 0 right after the datum.
+    pub start_m: f64,
+    /// What the instrument read there, metres; 0 when nothing drifted.
+    pub closure_m: f64,
+}
+
+impl ClosureEntry {
+    /// Whether it can close a run of `header`'s.
+    ///
+    /// # Errors
+    /// Naming the first thing that cannot be so.
+    pub fn judge(&self, header: &JournalHeader) -> Judged {
+        header.judge_run(self.run)?;
+        number("start_m", self.start_m, &ERROR_M)?;
+        number("closure_m", self.closure_m, &ERROR_M)
+    }
+}
+
+/// What journals of one kind of machine hold besides how the run went.
+pub trait Log: Default {
+    /// What a line of it says: an enum that is tagged by the key `entry`.
+    type Entry: Serialize + DeserializeOwned;
+
+    /// What a line after the header is called in no other kind's journals.
+    const OPENED_BY: &'static [&'static str];
+
+    /// Whether `entry` can follow what was taken.
+    ///
+    /// # Errors
+    /// Naming the first thing that cannot be so.
+    fn judge(&self, header: &JournalHeader, entry: &Self::Entry) -> Judged;
+
+    /// Takes what was judged.
+    fn take(&mut self, entry: Self::Entry);
+
+    /// Keeps what a continued run goes on from.
+    fn keep_whole(&mut self, header: &JournalHeader);
+}
+
+/// The log of a journal of which nobody asks what was measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AnyLog {
+    /// What the first line after the header is called.
+    pub opened_by: Option<String>,
+}
+
+impl Log for AnyLog {
+    type Entry = serde_json::Value;
+
+    const OPENED_BY: &'static [&'static str] = &[];
+
+    fn judge(&self, _: &JournalHeader, _: &Self::Entry) -> Judged {
+        Ok(())
+    }
+
+    fn take(&mut self, entry: Self::Entry) {
+        let name = entry.get("entry").and_then(|it| it.as_str());
+        self.opened_by = self.opened_by.take().or(name.map(str::to_owned));
+    }
+
+    fn keep_whole(&mut self, _: &JournalHeader) {}
+}
+
+/// How a run begins, goes on and ends: the lines of every journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "entry", rename_all = "snake_case")]
+enum Mark {
+    /// First line.
+    Header(Box<JournalHeader>),
+    /// The run was continued here after an interruption, at that time (UTC, RFC 3339).
+    Resumed { at: String },
+    /// The run failed, as the operator was told; what stands before stays valid.
+    Failed { cause: String },
+    /// The run is complete.
+    Complete,
+}
+
+const MARKS: [&str; 4] = ["header", "resumed", "failed", "complete"];
+
+enum Line<E> {
+    Mark(Mark),
+    Entry(E),
+}
+
+/// A journal being written, with a log of kind `L`.
+#[derive(Debug)]
+pub struct Journal<L> {
+    path: PathBuf,
+    file: File,
+    log: PhantomData<fn(L)>,
+}
+
+impl<L: Log> Journal<L> {
+    /// Starts a journal in `folder`.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(folder: &Path, header: &JournalHeader) -> Result<Self, StoreError> {
+        fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
+        let stamp = header.started.replace([':', '-'], "");
+        for attempt in 0..10_000_u32 {
+            let name = format!("{stamp}-{}-{}-{attempt:02}.jsonl", header.verb, header.axis);
+            let path = folder.join(name);
+            match OpenOptions::new().append(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    let mut journal = Self::over(path, file);
+                    journal.append(&Mark::Header(Box::new(header.clone())))?;
+                    return Ok(journal);
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(io_error("create", &path)(error)),
+            }
+        }
+        let taken = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
+        Err(io_error("create a new journal in", folder)(taken))
+    }
+
+    /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
+    /// that it is continued with.
+    ///
+    /// # Errors
+    /// When it cannot be read or does not describe the same run as `header`.
+    pub fn resume(
+        path: &Path,
+        header: &JournalHeader,
+        hash: &ConfigHash,
+    ) -> Result<(Self, ReadJournal<L>), StoreError> {
+        let mut read = read_journal::<L>(path)?;
+        same_run(path, &read.header, header, hash)?;
+        if read.complete {
+            return Err(StoreError::AlreadyComplete {
+                path: path.to_owned(),
+            });
+        }
+        let file = OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(io_error("open", path))?;
+        file.set_len(read.valid_bytes)
+            .map_err(io_error("cut the torn line of", path))?;
+        let mut journal = Self::over(path.to_owned(), file);
+        journal.append(&Mark::Resumed {
+            at: header.started.clone(),
+        })?;
+        read.failure = None;
+        read.log.keep_whole(&read.header);
+        Ok((journal, read))
+    }
+
+    const fn over(path: PathBuf, file: File) -> Self {
+        let log = PhantomData;
+        Self { path, file, log }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends one entry; it is in the kernel's hands when this returns, so that killing the
+    /// process loses nothing.
+    ///
+    /// # Errors
+    /// When it cannot be written: the run must stop, its points would be lost.
+    pub fn write(&mut self, entry: &L::Entry) -> Result<(), StoreError> {
+        self.append(entry)
+    }
+
+    /// Says why the run failed.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn fail(&mut self, cause: String) -> Result<(), StoreError> {
+        self.append(&Mark::Failed { cause })
+    }
+
+    /// Says that the run is complete, and forces everything to the disk.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn complete(&mut self) -> Result<(), StoreError> {
+        self.append(&Mark::Complete)?;
+        self.flush_to_disk()
+    }
+
+    fn append(&mut self, line: &impl Serialize) -> Result<(), StoreError> {
+        let json = serde_json::to_string(line).expect("plain data always serialises");
+        let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
+        self.file
+            .write_all(line.as_bytes())
+            .map_err(io_error("append to", &self.path))
+    }
+
+    /// Forces everything to the disk; called where the axis stands and time does not matter.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
+        self.file
+            .sync_data()
+            .map_err(io_error("flush to disk", &self.path))
+    }
+}
+
+/// A journal that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadJournal<L> {
+    /// What the run is.
+    pub header: JournalHeader,
+    /// What was measured.
+    pub log: L,
+    /// Whether the run was finished.
+    pub complete: bool,
+    /// Why it ended before, as the operator was told, unless it was continued.
+    pub failure: Option<String>,
+    /// How many bytes are whole lines.
+    pub valid_bytes: u64,
+    /// Whether a torn line follows them.
+    pub torn: bool,
+}
+
+fn same_run(
+    path: &Path,
+    old: &JournalHeader,
+    new: &JournalHeader,
+    hash: &ConfigHash,
+) -> Result<(), StoreError> {
+    let text = |a: &str, b: &str| first_difference(a, b);
+    let config_hash = hash.beside(&old.config_hash);
+    let comparisons = [
+        ("verb", text(&old.verb, &new.verb)),
+        ("stage serial", text(&old.stage_serial, &new.stage_serial)),
+        ("configuration hash", text(&old.config_hash, config_hash)),
+        ("axis", text(&old.axis, &new.axis)),
+        ("drive", first_difference(&old.drive, &new.drive)),
+        (
+            "calibration",
+            first_difference(&old.calibration, &new.calibration),
+        ),
+        (
+            "instrument and its corrections",
+            first_difference(&old.instrument, &new.instrument),
+        ),
+        ("number of runs", first_difference(&old.runs, &new.runs)),
+        ("targets", first_difference(&old.targets_m, &new.targets_m)),
+    ];
+    let different = comparisons
+        .into_iter()
+        .find_map(|(what, it)| Some((what, it?)));
+    different.map_or(Ok(()), |(what, it)| Err(not_resumable(path, what, it)))
+}
+
+/// The error for a journal whose run was another one than would be continued, with where they differ.
+pub fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
+    StoreError::NotResumable {
+        path: path.to_owned(),
+        what: it.in_what(what),
+        expected: it.expected,
+        seen: it.seen,
+    }
+}
+
+/// Reads a journal up to its last whole line.
+///
+/// # Errors
+/// When it cannot be read, has no header, a line before the last one is damaged, or one says what
+/// cannot be.
+pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let mut read: Option<ReadJournal<L>> = None;
+    let mut valid_bytes = 0;
+    let mut torn = false;
+    let lines: Vec<&[u8]> = bytes.split_inclusive(|byte| *byte == b'\n').collect();
+    for (at, line) in lines.iter().enumerate() {
+        match parse_line::<L::Entry>(line) {
+            Ok(parsed) => {
+                valid_bytes += line.len() as u64;
+                take(path, at + 1, parsed, &mut read)?;
+            }
+            Err(_) if at + 1 == lines.len() => torn = true,
+            Err(cause) => {
+                return Err(StoreError::Format {
+                    path: path.to_owned(),
+                    line: at + 1,
+                    cause,
+                });
+            }
+        }
+    }
+    let mut read = read.ok_or_else(|| StoreError::Format {
+        path: path.to_owned(),
+        line: 1,
+        cause: "no whole header line".into(),
+    })?;
+    read.valid_bytes = valid_bytes;
+    read.torn = torn;
+    Ok(read)
+}
+
+fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
+    #[derive(Deserialize)]
+    struct Tag {
+        entry: String,
+    }
+    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
+    let text = text.strip_suffix('\n').ok_or("the line does not end")?;
+    let (digits, json) = text.split_once(' ').ok_or("no checksum")?;
+    let expected = u32::from_str_radix(digits, 16).map_err(|error| error.to_string())?;
+    let seen = crc32fast::hash(json.as_bytes());
+    if seen != expected {
+        return Err(format!("checksum {seen:08x}, the line says {expected:08x}"));
+    }
+    let tag: Tag = serde_json::from_str(json).map_err(|error| error.to_string())?;
+    let parsed = match MARKS.contains(&tag.entry.as_str()) {
+        true => serde_json::from_str(json).map(Line::Mark),
+        false => serde_json::from_str(json).map(Line::Entry),
+    };
+    parsed.map_err(|error| error.to_string())
+}
+
+fn take<L: Log>(
+    path: &Path,
+    line: usize,
+    parsed: Line<L::Entry>,
+    read: &mut Option<ReadJournal<L>>,
+) -> Result<(), StoreError> {
+    let Some(read) = read else {
+        *read = Some(begin(path, line, parsed)?);
+        return Ok(());
+    };
+    match parsed {
+        Line::Mark(Mark::Header(_)) => return Err(no_header(path, line)),
+        Line::Mark(Mark::Resumed { .. }) => {
+            read.complete = false;
+            read.failure = None;
+            read.log.keep_whole(&read.header);
+        }
+        Line::Mark(Mark::Failed { cause }) => {
+            read.complete = false;
+            read.failure = Some(cause);
+        }
+        Line::Mark(Mark::Complete) => read.complete = true,
+        Line::Entry(entry) => {
+            let judged = read.log.judge(&read.header, &entry);
+            judged.map_err(unsound(path, Some(line)))?;
+            read.log.take(entry);
+        }
+    }
+    Ok(())
+}
+
+/// The first line must be the header.
+fn begin<L: Log>(
+    path: &Path,
+    line: usize,
+    parsed: Line<L::Entry>,
+) -> Result<ReadJournal<L>, StoreError> {
+    let Line::Mark(Mark::Header(header)) = parsed else {
+        return Err(no_header(path, line));
+    };
+    if header.schema_version > SCHEMA_VERSION {
+        return Err(StoreError::Newer {
+            path: path.to_owned(),
+            seen: header.schema_version,
+        });
+    }
+    header.judge().map_err(unsound(path, Some(line)))?;
+    Ok(ReadJournal {
+        header: *header,
+        log: L::default(),
+        complete: false,
+        failure: None,
+        valid_bytes: 0,
+        torn: false,
+    })
+}
+
+fn no_header(path: &Path, line: usize) -> StoreError {
+    StoreError::Format {
+        path: path.to_owned(),
+        line,
+        cause: "the header must be the first line and the only one".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,42 @@
+//! What is kept: calibrations, run journals, reports.
+//!
+//! Layout below the configuration's `data_dir`, one folder a machine:
+//! ```text
+//! MACHINE/calibrations/HASH.json   immutable, named by the BLAKE3 of its bytes
+//! MACHINE/active/AXIS.json         which calibration is in use, and which were before
+//! MACHINE/runs/TIME-VERB-AXIS.jsonl   one checksummed line for each measured point
+//! MACHINE/reports/                 pages for people
+//! ```
+//! The structs of these files are their own and carry a version: model types are never
+//! (de)serialised, and a file from a newer program is refused. What a calibration says is a
+//! [`Content`] of its kind, what a journal says a [`Log`] of its kind; nothing here knows any.
+
+mod atomic;
+mod content;
+mod difference;
+mod failure;
+mod hash;
+mod head;
+mod journal;
+mod lease;
+mod name;
+pub mod sound;
+mod store;
+
+pub use atomic::write_new_or_replace;
+pub use content::{CalibrationRecord, Content, ContentKind, Glance};
+pub use difference::{Difference, first_difference};
+pub use failure::{ModelError, StoreError};
+pub use hash::ConfigHash;
+pub use head::{EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead};
+pub use journal::{
+    AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_journal,
+};
+pub use lease::Lease;
+pub use name::short;
+pub use store::{ActivePointer, Store};
+
+use failure::{io_error, unsound};
+
+/// The version of every file this program writes.
+pub const SCHEMA_VERSION: u32 = 1;
