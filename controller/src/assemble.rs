@@ -43,9 +43,11 @@ use wire::Port;
 use wire::canopen::NodeId;
 
 use crate::config::{
-    AnalogConfig, AnalogDevice, AxisConfig, AxisDevice, CanBus, HomeOffsetName, IdentityConfig,
-    InstrumentConfig, InstrumentDevice, MachineConfig, OptionCodesConfig, ZeroConfig,
+    AnalogConfig, AxisConfig, CanBus, Cia402AxisConfig, DconConfig, DriveConfig, HomeOffsetName,
+    IdentityConfig, InstrumentConfig, InstrumentDevice, MachineConfig, ModuleConfig, NodeConfig,
+    OptionCodesConfig,
 };
+use crate::linear::ZeroConfig;
 
 /// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
 const CO2_UMOL_PER_MOL: f64 = 450.0;
@@ -73,26 +75,28 @@ pub(crate) fn axes(
         .axis
         .iter()
         .map(|(name, axis)| {
-            let port = axis.port().expect(CHECKED);
-            let device: Box<dyn Axis> = match axis.device {
-                AxisDevice::Cia402 => Box::new(Cia402Drive::new(cia402_settings(
-                    axis,
-                    &config.can[port],
-                    patience,
-                ))),
-                AxisDevice::Copley => Box::new(CopleyAxis::new(copley_settings(
-                    axis,
-                    &config.serial[port],
-                    patience,
-                ))),
-            };
+            let device = axis_device(axis, config, patience);
             Unit {
                 name: name.clone(),
-                port: ports[port],
+                port: ports[axis.port()],
                 device,
             }
         })
         .collect()
+}
+
+/// The driver of an axis; the configuration has been checked.
+pub fn axis_device(axis: &AxisConfig, config: &MachineConfig, patience: Patience) -> Box<dyn Axis> {
+    match &axis.drive {
+        DriveConfig::Cia402(drive) => {
+            let settings = cia402_settings(axis, drive, &config.can[&drive.bus], patience);
+            Box::new(Cia402Drive::new(settings))
+        }
+        DriveConfig::Copley(drive) => {
+            let settings = copley_settings(axis, drive, &config.serial[&drive.line], patience);
+            Box::new(CopleyAxis::new(settings))
+        }
+    }
 }
 
 pub(crate) fn analogs(
@@ -104,25 +108,24 @@ pub(crate) fn analogs(
         .analog
         .iter()
         .map(|(name, analog)| {
-            let (line, device): (&String, Box<dyn AnalogInput>) = match analog.device {
-                AnalogDevice::Cia401 => {
-                    let bus = analog.bus.as_ref().expect(CHECKED);
-                    let settings = cia401_settings(analog, &config.can[bus], patience);
-                    (bus, Box::new(Cia401Analog::new(settings)))
+            let device: Box<dyn AnalogInput> = match &analog.module {
+                ModuleConfig::Cia401(node) => {
+                    let bus = &config.can[&node.bus];
+                    let settings = cia401_settings(analog, node, bus, patience);
+                    Box::new(Cia401Analog::new(settings))
                 }
-                AnalogDevice::Cia404 => {
-                    let bus = analog.bus.as_ref().expect(CHECKED);
-                    let settings = cia404_settings(analog, &config.can[bus], patience);
-                    (bus, Box::new(Cia404Analog::new(settings)))
+                ModuleConfig::Cia404(module) => {
+                    let bus = &config.can[&module.node.bus];
+                    let settings = cia404_settings(analog, module, bus, patience);
+                    Box::new(Cia404Analog::new(settings))
                 }
-                AnalogDevice::Dcon => {
-                    let line = analog.line.as_ref().expect(CHECKED);
-                    (line, Box::new(Dcon::new(dcon_settings(analog, patience))))
+                ModuleConfig::Dcon(module) => {
+                    Box::new(Dcon::new(dcon_settings(analog, module, patience)))
                 }
             };
             Unit {
                 name: name.clone(),
-                port: ports[line],
+                port: ports[analog.port()],
                 device,
             }
         })
@@ -215,17 +218,18 @@ pub(crate) fn reference_limit(zero: &ZeroConfig, axis: &AxisConfig) -> Duration 
 }
 
 /// The drive of an axis, as its driver is told; the configuration has been checked.
-///
-/// # Panics
-/// When the axis has another device.
-pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: Patience) -> Cia402Settings {
-    let can = axis.can().expect(CHECKED);
+pub fn cia402_settings(
+    axis: &AxisConfig,
+    can: &Cia402AxisConfig,
+    bus: &CanBus,
+    patience: Patience,
+) -> Cia402Settings {
     let heartbeats = (
         can.heartbeat_producer_ms,
         can.heartbeat_consumer_ms,
         can.watch_master_ms,
     );
-    let common = node_settings(can.node_id, bus, can.identity, heartbeats, patience);
+    let common = node_settings(can.node_id, bus, &can.identity, heartbeats, patience);
     let homing = axis.zero.as_ref().map(|zero| reference_limit(zero, axis));
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
@@ -259,24 +263,27 @@ pub fn cia402_settings(axis: &AxisConfig, bus: &CanBus, patience: Patience) -> C
     }
 }
 
+/// What every module on CAN is told; the configuration has been checked.
+pub(crate) fn module_settings(node: &NodeConfig, bus: &CanBus, patience: Patience) -> NodeSettings {
+    let heartbeats = (
+        node.heartbeat_producer_ms,
+        node.heartbeat_consumer_ms,
+        node.watch_master_ms,
+    );
+    node_settings(node.node_id, bus, &node.identity, heartbeats, patience)
+}
+
 /// A CiA 401 module, as its driver is told; the configuration has been checked.
 ///
 /// # Panics
-/// When the module is of another kind.
-pub fn cia401_settings(analog: &AnalogConfig, bus: &CanBus, patience: Patience) -> Cia401Settings {
-    let heartbeats = (
-        analog.heartbeat_producer_ms.expect(CHECKED),
-        analog.heartbeat_consumer_ms.expect(CHECKED),
-        analog.watch_master_ms.expect(CHECKED),
-    );
-    let identity = analog.identity.as_ref().expect(CHECKED);
-    let common = node_settings(
-        analog.node_id.expect(CHECKED),
-        bus,
-        identity,
-        heartbeats,
-        patience,
-    );
+/// With more channels than a process data object has.
+pub fn cia401_settings(
+    analog: &AnalogConfig,
+    node: &NodeConfig,
+    bus: &CanBus,
+    patience: Patience,
+) -> Cia401Settings {
+    let common = module_settings(node, bus, patience);
     let channels: Vec<_> = analog
         .channels
         .iter()
@@ -299,14 +306,17 @@ pub(crate) fn dcon_range(full_scale_v: &[f64]) -> Option<InputRange> {
 /// A DCON module, as its driver is told; the configuration has been checked.
 ///
 /// # Panics
-/// When the module is of another kind.
-pub fn dcon_settings(analog: &AnalogConfig, patience: Patience) -> DconSettings {
-    let period = analog.poll_period_ms.expect(CHECKED);
-    let address = analog.address.expect(CHECKED);
+/// When its channels have different ranges.
+pub fn dcon_settings(
+    analog: &AnalogConfig,
+    module: &DconConfig,
+    patience: Patience,
+) -> DconSettings {
+    let (period, address) = (module.poll_period_ms, module.address);
     let range = dcon_range(&analog.full_scale_v).expect(CHECKED);
     let usual = DconSettings::new(address, range, analog.channels.clone());
     DconSettings {
-        checksum: analog.checksum,
+        checksum: module.checksum,
         period: Duration::from_secs_f64(period * 1e-3),
         answer_timeout: patience.of(usual.answer_timeout),
         stale_after: patience.of(usual.stale_after),

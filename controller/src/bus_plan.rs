@@ -28,7 +28,7 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, sync_period)
         .with_heartbeat(ms(bus.master_heartbeat_ms));
     let axes = config.axis.values();
-    let axes = axes.filter_map(|axis| Some((axis.can()?, axis.cyclic.is_some())));
+    let axes = axes.filter_map(|axis| Some((axis.can()?, axis.cyclic().is_some())));
     for (axis, is_cyclic) in axes.filter(|(axis, _)| axis.bus == name) {
         if is_cyclic {
             plan = plan.with_pdos(&[SET_POINT_PDO_BYTES]);
@@ -45,20 +45,17 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
             plan = plan.with_pdos(&[LATCH_PDO_BYTES]);
         }
     }
-    for analog in config
-        .analog
-        .values()
-        .filter(|analog| analog.bus.as_deref() == Some(name))
-    {
+    let modules = config.analog.values();
+    let modules = modules.filter_map(|it| Some((it, it.node()?)));
+    for (analog, node) in modules.filter(|(_, node)| node.bus == name) {
         // Two bytes a channel; four channels fill a PDO.
-        let inputs = analog.channels.len() + analog.temperature_channels.len();
+        let inputs = analog.channels.len() + analog.temperature_channels().len();
         let pdos: Vec<u8> = (0..inputs.div_ceil(4))
             .map(|pdo| (inputs - 4 * pdo).min(4) as u8 * 2)
             .collect();
-        plan = plan.with_seldom_pdos(&pdos, analog.every_syncs.unwrap_or(1));
-        if let Some(period) = analog.heartbeat_producer_ms {
-            plan = plan.with_heartbeat(ms(period));
-        }
+        plan = plan
+            .with_seldom_pdos(&pdos, analog.every_syncs().unwrap_or(1))
+            .with_heartbeat(ms(node.heartbeat_producer_ms));
     }
     plan.load()
 }

@@ -188,7 +188,7 @@ fn endpoints(
     let machines_own = |name: &String| {
         let mut analogs = config.analog.values();
         let mut axes = config.axis.values();
-        analogs.any(|it| it.line.as_ref() == Some(name)) || axes.any(|it| it.port() == Some(name))
+        analogs.any(|it| it.port() == name) || axes.any(|it| it.port() == name)
     };
     let lines = config
         .serial

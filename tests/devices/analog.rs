@@ -18,7 +18,7 @@ fn cia401(rig: Rig) -> Desk<Cia401Analog> {
     let emulator = Emulator::new(rig, &Setup::new(22));
     let loaded = &emulator.loaded;
     let (analog, bus) = (&loaded.config.analog["hall"], &loaded.config.can["can0"]);
-    let settings = assemble::cia401_settings(analog, bus, loaded.patience);
+    let settings = assemble::cia401_settings(analog, analog.node().unwrap(), bus, loaded.patience);
     Desk::new(emulator, "can0", Cia401Analog::new(settings))
 }
 
@@ -26,7 +26,7 @@ fn dcon(rig: Rig) -> Desk<Dcon> {
     let emulator = Emulator::new(rig, &Setup::new(22).over_dcon());
     let loaded = &emulator.loaded;
     let analog = &loaded.config.analog["hall"];
-    let mut settings = assemble::dcon_settings(analog, loaded.patience);
+    let mut settings = assemble::dcon_settings(analog, analog.dcon().unwrap(), loaded.patience);
     settings.stale_after = SILENCE;
     Desk::new(emulator, "adc", Dcon::new(settings))
 }

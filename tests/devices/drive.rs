@@ -19,7 +19,7 @@ fn drive(rig: Rig) -> Drive {
     let emulator = Emulator::new(rig, &Setup::new(21));
     let loaded = &emulator.loaded;
     let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
-    let mut settings = assemble::cia402_settings(axis, bus, loaded.patience);
+    let mut settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
     settings.common.master_consumer_time = SILENCE;
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
@@ -220,7 +220,7 @@ fn a_drive_that_is_another_one_is_refused_before_anything_is_set() {
         let emulator = Emulator::new(rig, &change);
         let loaded = &emulator.loaded;
         let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
-        let settings = assemble::cia402_settings(axis, bus, loaded.patience);
+        let settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
         let mut drive = Desk::new(emulator, "can0", Cia402Drive::new(settings));
         let refused = drive.start();
         let seen = 0x42_0002;

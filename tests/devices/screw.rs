@@ -30,7 +30,7 @@ fn after_every_power_cycle_the_index_pulse_gives_the_same_origin() {
         let emulator = Emulator::new(rig, &Setup::uvw(41));
         let loaded = &emulator.loaded;
         let (axis, bus) = (&loaded.config.axis["u"], &loaded.config.can["can0"]);
-        let settings = assemble::cia402_settings(axis, bus, loaded.patience);
+        let settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
         let mut drive = Desk::new(emulator, "can0", Cia402Drive::new(settings));
         for cycle in 0..3 {
             let homed = drive

@@ -6,7 +6,6 @@ use drivers::device::{Alarm, Axis, AxisCommand, AxisReading, DeviceError, LineUs
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
 use truestage::assemble;
-use truestage::config::AxisDevice;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 use wire::canopen::NodeId;
 use wire::{Payload, Port};
@@ -55,17 +54,8 @@ impl Group {
         let patience = emulator.loaded.patience;
         let mut transport = emulator.transport();
         let members = config.axis.values().map(|axis| {
-            let name = axis.port().expect("the configuration was checked");
-            let device: Box<dyn Axis> = match axis.device {
-                AxisDevice::Cia402 => {
-                    let settings = assemble::cia402_settings(axis, &config.can[name], patience);
-                    Box::new(drivers::device::cia402::Cia402Drive::new(settings))
-                }
-                AxisDevice::Copley => {
-                    let settings = assemble::copley_settings(axis, &config.serial[name], patience);
-                    Box::new(drivers::device::copley::CopleyAxis::new(settings))
-                }
-            };
+            let device = assemble::axis_device(axis, config, patience);
+            let name = axis.port();
             Member {
                 axis: device,
                 port: ports[name],

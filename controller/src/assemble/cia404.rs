@@ -3,8 +3,8 @@
 use drivers::device::cia404::{Cia404Settings, InputSettings, Quantity};
 use units::portable::powi;
 
-use super::{CHECKED, node_settings};
-use crate::config::{AnalogConfig, CanBus};
+use super::{CHECKED, module_settings};
+use crate::config::{AnalogConfig, CanBus, Cia404Config};
 use machine::Patience;
 
 /// What 16 bits reach in volts when a count is a millivolt.
@@ -22,27 +22,24 @@ pub(crate) fn voltage_digits(full_scale_v: f64) -> Option<u8> {
 /// A CiA 404 module, as its driver is told; the configuration has been checked.
 ///
 /// # Panics
-/// When the module is of another kind.
-pub fn cia404_settings(analog: &AnalogConfig, bus: &CanBus, patience: Patience) -> Cia404Settings {
-    let heartbeats = (
-        analog.heartbeat_producer_ms.expect(CHECKED),
-        analog.heartbeat_consumer_ms.expect(CHECKED),
-        analog.watch_master_ms.expect(CHECKED),
-    );
-    let identity = analog.identity.as_ref().expect(CHECKED);
-    let node = analog.node_id.expect(CHECKED);
-    let common = node_settings(node, bus, identity, heartbeats, patience);
+/// With a range that is not to be told, or more inputs than a module has.
+pub fn cia404_settings(
+    analog: &AnalogConfig,
+    module: &Cia404Config,
+    bus: &CanBus,
+    patience: Patience,
+) -> Cia404Settings {
+    let common = module_settings(&module.node, bus, patience);
     let voltages = analog.channels.iter().zip(&analog.full_scale_v);
     let voltages = voltages.map(|(channel, full_scale_v)| InputSettings {
         input: channel + 1,
         quantity: Quantity::Voltage,
         decimal_digits: voltage_digits(*full_scale_v).expect(CHECKED),
     });
-    let sensors = analog.temperature_channels.iter();
+    let sensors = module.temperature_channels.iter();
     let sensors = sensors.map(|channel| InputSettings::pt100(channel + 1));
     let inputs: Vec<_> = voltages.chain(sensors).collect();
-    let every_syncs = analog.every_syncs.expect(CHECKED);
-    Cia404Settings::new(common, &inputs, every_syncs).expect(CHECKED)
+    Cia404Settings::new(common, &inputs, module.every_syncs).expect(CHECKED)
 }
 
 #[cfg(test)]

@@ -7,15 +7,20 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 use wire::copley::Address;
 
 use super::{CHECKED, millis, reference_limit};
-use crate::config::{AxisConfig, SerialLine};
+use crate::config::{AxisConfig, CopleyAxisConfig, SerialLine};
 use machine::Patience;
 
 /// A Copley amplifier, as its driver is told; the configuration has been checked.
 ///
 /// # Panics
-/// When the axis has another device.
-pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: Patience) -> CopleySettings {
-    let serial = axis.serial().expect(CHECKED);
+/// With an address that no amplifier has.
+pub fn copley_settings(
+    axis: &AxisConfig,
+    serial: &CopleyAxisConfig,
+    line: &SerialLine,
+    patience: Patience,
+) -> CopleySettings {
+    let amplifier = serial.amplifier.clone().unwrap_or_default();
     let address = Address::node(serial.address).expect(CHECKED);
     let scale = Scale::new(Metres(axis.resolution_nm * 1e-9)).expect(CHECKED);
     let speed_max = MetresPerSecond(axis.speed_max_mm_per_s * 1e-3);
@@ -25,8 +30,8 @@ pub fn copley_settings(axis: &AxisConfig, line: &SerialLine, patience: Patience)
     let homing = axis.zero.as_ref().map(|zero| reference_limit(zero, axis));
     CopleySettings {
         baud: line.baud_bit_per_s,
-        model: serial.model.map(str::to_owned),
-        serial: serial.serial_number,
+        model: amplifier.model,
+        serial: amplifier.serial_number,
         soft_limits: Some((
             Metres::from_mm(axis.soft_min_mm),
             Metres::from_mm(axis.soft_max_mm),

@@ -89,15 +89,16 @@ fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
     let axes = axes
         .filter_map(|(name, axis)| Some((name, axis.can()?)))
         .filter(|(_, axis)| axis.bus == bus)
-        .map(|(name, axis)| node(axis.node_id, true, name, axis.identity));
+        .map(|(name, axis)| node(axis.node_id, true, name, &axis.identity));
     let rotaries = config.rotary.iter();
     let rotaries = rotaries
         .filter(|(_, rotary)| rotary.bus == bus)
         .map(|(name, rotary)| node(rotary.node_id, true, name, &rotary.identity));
     let analogs = config.analog.iter();
     let analogs = analogs
-        .filter(|(_, analog)| analog.bus.as_deref() == Some(bus))
-        .filter_map(|(name, it)| Some(node(it.node_id?, false, name, it.identity.as_ref()?)));
+        .filter_map(|(name, it)| Some((name, it.node()?)))
+        .filter(|(_, it)| it.bus == bus)
+        .map(|(name, it)| node(it.node_id, false, name, &it.identity));
     axes.chain(rotaries).chain(analogs).collect()
 }
 
@@ -119,11 +120,11 @@ fn axis_settings(axis: &AxisConfig, config: &MachineConfig) -> AxisSettings {
 
 /// `None` for an axis without the section, and for one on a serial line.
 fn cyclic(axis: &AxisConfig, config: &MachineConfig) -> Option<CyclicSettings> {
-    let (can, cyclic) = axis.can().zip(axis.cyclic.as_ref())?;
+    let (can, cyclic) = axis.can().zip(axis.cyclic())?;
     let (limits, correction) = cyclic_settings(axis, cyclic);
     Some(CyclicSettings {
         limits,
         correction,
-        period: sync_period(&config.can[can.bus]),
+        period: sync_period(&config.can[&can.bus]),
     })
 }

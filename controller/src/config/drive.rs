@@ -1,17 +1,22 @@
 //! What the sections of several drives and modules have in common.
 
 use drivers::device::Identity;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What a CANopen node must answer at start.
-#[derive(Clone, Debug, Deserialize)]
+/// Who a CANopen node must be.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct IdentityConfig {
+    /// 0x1000.
     pub device_type: u32,
+    /// 0x1018:01.
     pub vendor_id: u32,
+    /// 0x1018:02.
     pub product_code: u32,
+    /// 0x1018:03.
     pub revision: Option<u32>,
+    /// 0x1018:04.
     pub serial_number: Option<u32>,
 }
 
@@ -30,7 +35,7 @@ impl IdentityConfig {
 }
 
 /// What a drive takes its home offset (0x607C) for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HomeOffsetName {
     /// The position at home, as many drives do.
@@ -40,14 +45,18 @@ pub enum HomeOffsetName {
     ZeroFromHome,
 }
 
-/// The option codes 0x605A to 0x605E of CiA 402; what is absent stays as the drive has it.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+/// The option codes of CiA 402; what is absent stays as the drive has it.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct OptionCodesConfig {
+    /// 0x605A.
     pub quick_stop: Option<i16>,
+    /// 0x605B.
     pub shutdown: Option<i16>,
+    /// 0x605C.
     pub disable: Option<i16>,
+    /// 0x605D.
     pub halt: Option<i16>,
+    /// 0x605E.
     pub fault_reaction: Option<i16>,
 }

@@ -9,6 +9,8 @@ use machine::records::ConfigHash;
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
+use super::schema;
+use super::structure::{self, Part};
 use super::validate::{Finding, validate};
 use machine::Patience;
 
@@ -49,100 +51,80 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
-    let config: MachineConfig =
-        toml::from_str(text).map_err(|error| structural(text, file, &error))?;
-    let findings = validate(&config);
-    if findings.is_empty() {
-        return Ok(Loaded {
-            hash: hash_of(&config),
-            config,
-            patience: Patience::NONE,
-        });
+    let document: toml::Table = toml::from_str(text).map_err(|error| syntax(text, file, &error))?;
+    let mut findings = structure::judge(&document, &schema::inline());
+    let is_readable = findings.iter().all(|(_, part)| *part == Part::Size);
+    let config: MachineConfig = match toml::from_str(text) {
+        Ok(config) if is_readable => config,
+        // The schema is made of the same declarations: what it lets pass can be read.
+        Err(error) if findings.is_empty() => return Err(syntax(text, file, &error)),
+        Ok(_) | Err(_) => return Err(invalid(text, file, findings)),
+    };
+    for finding in validate(&config) {
+        // What is impossible by itself is told once.
+        if findings.iter().all(|(it, _)| it.key != finding.key) {
+            findings.push((finding, Part::Value));
+        }
     }
-    let mut findings: Vec<_> = findings
-        .into_iter()
-        .map(|it| place(text, file, it))
-        .collect();
-    findings.sort_by_key(|it| (it.line, it.column));
-    Err(ConfigError::Invalid { findings })
+    if !findings.is_empty() {
+        return Err(invalid(text, file, findings));
+    }
+    Ok(Loaded {
+        hash: hash_of(&config),
+        config,
+        patience: Patience::NONE,
+    })
 }
 
-fn structural(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
+fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let span = error.span().unwrap_or(0..0);
-    let message = error
-        .message()
-        .lines()
-        .next()
-        .unwrap_or("not valid")
-        .to_owned();
-    let finding = Diagnostic::at(file, text, &span, "", message.clone(), advice(&message));
+    let message = error.message().lines().next().unwrap_or("not valid");
+    let finding = Diagnostic::at(file, text, &span, "", message.to_owned(), String::new());
     ConfigError::Invalid {
         findings: vec![finding],
     }
 }
 
-/// The words between backquotes: the key that was seen, then those that were expected.
-fn quoted(message: &str) -> Vec<&str> {
-    message.split('`').skip(1).step_by(2).collect()
+/// Each finding at its place, in the order of the file.
+fn invalid(text: &str, file: &str, findings: Vec<(Finding, Part)>) -> ConfigError {
+    let placed = findings.into_iter().map(|(it, part)| {
+        let span = span_of(text, &it.key, part).unwrap_or(0..0);
+        Diagnostic::at(file, text, &span, &it.key, it.cause, it.help)
+    });
+    let mut findings: Vec<_> = placed.collect();
+    findings.sort_by_key(|it| (it.line, it.column));
+    ConfigError::Invalid { findings }
 }
 
-fn advice(message: &str) -> String {
-    let words = quoted(message);
-    if message.starts_with("unknown field") {
-        return unknown_key_advice(&words);
-    }
-    if message.starts_with("missing field") {
-        let key = words.first().copied().unwrap_or("it");
-        return format!("add `{key}`; configs/README.md describes every key");
-    }
-    String::new()
-}
-
-fn unknown_key_advice(words: &[&str]) -> String {
-    let Some((seen, expected)) = words.split_first() else {
-        return String::new();
-    };
-    let stem = |key: &str| key.split('_').next().unwrap_or("").to_owned();
-    let same_stem: Vec<_> = expected
-        .iter()
-        .filter(|key| stem(key) == stem(seen))
-        .collect();
-    let near = same_stem
-        .into_iter()
-        .max_by_key(|key| common_prefix(key, seen))
-        .or_else(|| expected.iter().max_by_key(|key| common_prefix(key, seen)));
-    match near {
-        Some(key) if common_prefix(key, seen) >= 3 => {
-            format!("did you mean `{key}`? A key's ending is its unit")
-        }
-        _ => format!("known here: {}", expected.join(", ")),
-    }
-}
-
-fn common_prefix(a: &str, b: &str) -> usize {
-    a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count()
-}
-
-fn place(text: &str, file: &str, finding: Finding) -> Diagnostic {
-    let span = span_of(text, &finding.key).unwrap_or(0..0);
-    Diagnostic::at(file, text, &span, &finding.key, finding.cause, finding.help)
-}
-
-/// Where the value of a dotted key stands; the deepest table on the way when it is absent.
-fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
+/// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it
+/// is absent.
+fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.get_ref();
     let mut span = None;
-    for part in key.split('.') {
-        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == part) else {
+    let mut parts = key.split('.').peekable();
+    while let Some(own) = parts.next() {
+        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
             break;
         };
         span = Some(match value.get_ref() {
             DeValue::Table(_) => name.span(),
+            _ if part == Part::Name => name.span(),
             _ => value.span(),
         });
         match value.get_ref() {
             DeValue::Table(inner) => table = inner,
+            DeValue::Array(items) => {
+                let at = parts.next().and_then(|it| it.parse::<usize>().ok());
+                let Some(item) = at.and_then(|at| items.get(at)) else {
+                    break;
+                };
+                span = Some(item.span());
+                match item.get_ref() {
+                    DeValue::Table(inner) => table = inner,
+                    _ => break,
+                }
+            }
             _ => break,
         }
     }
@@ -222,7 +204,7 @@ mod tests {
             (
                 "soft_min_mm = -3.0",
                 "soft_min_mm = nan",
-                "axis.x.soft_max_mm",
+                "axis.x.soft_min_mm",
             ),
             (
                 "soft_max_mm = 63.0",
@@ -467,7 +449,12 @@ mod tests {
         let settings = |text: &str| {
             let config = parse(text, "m").unwrap().config;
             let (axis, bus) = (&config.axis["x"], &config.can["can0"]);
-            crate::assemble::cia402_settings(axis, bus, Patience::NONE)
+            crate::assemble::cia402_settings(
+                axis,
+                axis.can().expect("it is on CAN"),
+                bus,
+                Patience::NONE,
+            )
         };
         let usual = settings(LINEAR);
         assert_eq!(usual.options.quick_stop, None);
@@ -507,6 +494,7 @@ mod tests {
         let keys = "device = \"cia401\"\npoll_period_ms = 50.0";
         let text = LINEAR.edit_first("device = \"cia401\"", keys);
         let error = parse(&text, "m").unwrap_err().to_string();
-        assert!(error.contains("a cia401 module has no such key"), "{error}");
+        let says = "`device = \"cia401\"` has no such key";
+        assert!(error.contains(says), "{error}");
     }
 }

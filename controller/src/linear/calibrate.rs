@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted};
 use units::Metres;
 
-use crate::config::{CalibrateConfig, ConfigHash};
+use crate::config::ConfigHash;
 use crate::failure::Failure;
+use crate::linear::CalibrateConfig;
 use crate::linear::LinearContent;
 use crate::linear::LinearLog;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};

@@ -3,6 +3,7 @@
 
 mod calibrate;
 pub(crate) mod check;
+mod config;
 mod cross_check;
 mod datum;
 mod datum_in_use;
@@ -22,6 +23,9 @@ mod verify;
 mod zero;
 
 pub use calibrate::Calibrated;
+pub use config::{
+    CalibrateConfig, CompensationConfig, EndPolicyName, InterpolationName, VerifyConfig, ZeroConfig,
+};
 pub use entries::{PointEntry, ZeroEntry};
 pub use log::{LinearEntry, LinearLog};
 pub use measure::{MeasureOptions, Measured};

@@ -5,8 +5,9 @@ use drivers::device::umd2::Umd2Settings;
 use units::{Metres, MetresPerSecond};
 
 use crate::assemble::{CHECKED, half_wavelength};
-use crate::config::{CompensationConfig, EndPolicyName, InterpolationName, MachineConfig};
+use crate::config::MachineConfig;
 use crate::failure::Failure;
+use crate::linear::{CompensationConfig, EndPolicyName, InterpolationName};
 
 /// How far a position of `axis` may stand off its neighbours whatever the others do: what the
 /// configuration says, and half of what the instrument counts. Less than that is no lost count.

@@ -7,8 +7,8 @@ use compensator::error_table::ErrorTable;
 use compensator::iso230::{self, Figures};
 use units::Metres;
 
-use crate::config::VerifyConfig;
 use crate::failure::Failure;
+use crate::linear::VerifyConfig;
 use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured};
 use crate::linear::run_plan::RunPlan;

@@ -14,9 +14,9 @@ use drivers::device::{AxisCommand, DriveCommand};
 use units::{Metres, MetresPerSecond, Time, Volts};
 
 use crate::assemble;
-use crate::config::ZeroConfig;
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::linear::ZeroConfig;
 use crate::linear::ZeroEntry;
 use crate::linear::stage::LinearStage;
 use crate::linear::{LinearEntry, LinearLog};
@@ -266,11 +266,10 @@ impl LinearStage<'_> {
 
     fn pairing(&self, config: &ZeroConfig) -> Result<Pairing, Failure> {
         let can = self.config.can();
-        let bus = can.expect("the check asks for a drive on CAN").bus;
+        let bus = &can.expect("the check asks for a drive on CAN").bus;
         let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
-        let poll_s = self.core.config.analog[&config.analog]
-            .poll_period_ms
-            .map_or(0.0, |ms| ms * 1e-3);
+        let module = &self.core.config.analog[&config.analog];
+        let poll_s = module.dcon().map_or(0.0, |it| it.poll_period_ms * 1e-3);
         let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
         Ok(Pairing {
             window,

@@ -262,8 +262,8 @@ impl AlignmentPlatform<'_> {
     }
 
     fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
-        let bus = self.core.config.axis[axis].bus.as_ref();
-        let bus = bus.and_then(|bus| self.core.config.can.get(bus));
+        let drive = self.core.config.axis[axis].can();
+        let bus = drive.and_then(|it| self.core.config.can.get(&it.bus));
         Ok(bus.map(|bus| Duration::from_secs_f64(bus.sync_period_ms * 1e-3)))
     }
 

@@ -3,12 +3,13 @@
 use std::sync::OnceLock;
 
 use compensator::rotary::{self, Criterion, Design, PlanError};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::config::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
 
 /// The kinds of drive of a rotary axis: those with a touch probe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RotaryDevice {
     /// A CiA 402 drive on CAN.
@@ -16,7 +17,7 @@ pub enum RotaryDevice {
 }
 
 /// Where the position of a rotary axis's drive starts again (0x607B).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionRangeName {
     /// Not until 32 bits are full.
@@ -28,7 +29,7 @@ pub enum PositionRangeName {
 }
 
 /// A direction of travel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DirectionName {
     /// Coordinates increase.
@@ -38,7 +39,7 @@ pub enum DirectionName {
 }
 
 /// An edge of an input.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeName {
     /// From low to high.
@@ -48,64 +49,119 @@ pub enum EdgeName {
     Negative,
 }
 
-/// One rotary axis that turns endlessly.
-#[derive(Clone, Debug, Deserialize)]
+/// A rotary axis that turns endlessly, and its drive.
+///
+/// Angles count on over the turns; a table may turn any number of them. Speeds and accelerations
+/// must fit 31 bits of counts.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryConfig {
+    /// The kind of drive.
     pub device: RotaryDevice,
+    /// The bus that the drive is on.
+    #[schemars(extend("x-range" = "a `[can.NAME]`"))]
     pub bus: String,
+    /// Its number there.
+    #[schemars(range(min = 1, max = 127))]
     pub node_id: u8,
+    /// Position units of the drive in one turn: exactly a whole number.
+    #[schemars(range(min = 360, max = 2147483647))]
     pub counts_per_turn: u32,
+    /// `true` when the drive counts against the table.
     #[serde(default)]
     pub reverse: bool,
+    /// Where the drive's position wraps round to its lower limit (0x607B, written at the start).
+    /// `"counts_on"`: not until 32 bits are full; targets beyond them are refused.
+    /// `"to_last_count"`: after the last count of a turn, and the upper limit written is that
+    /// count. `"to_first_count"`: at the same place, but the upper limit written is the number of
+    /// counts of a turn, which the drive takes for 0. A drive that wraps must have 0x60F2 and be
+    /// set to take the shortest way.
     pub position_range: PositionRangeName,
+    /// Speed of ordinary moves and of sweeps over a plate.
+    #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
     pub speed_deg_per_s: f64,
+    /// Fastest possible: faster moves are refused, faster changes of position not believed.
+    #[schemars(range(min = 0.001, max = 100000.0))]
     pub speed_max_deg_per_s: f64,
+    /// Of moves and of the search of the index mark.
+    #[schemars(range(min = 0.01, max = 1000000.0))]
     pub acceleration_deg_per_s2: f64,
+    /// 0x6085.
+    #[schemars(range(min = 0.01, max = 1000000.0))]
     pub quick_stop_deceleration_deg_per_s2: f64,
+    /// Following error window (0x6065).
+    #[schemars(range(min = 0.001, max = 1000000.0))]
     pub following_error_limit_arcsec: f64,
+    /// For how long it may be exceeded (0x6066).
     pub following_error_timeout_ms: u16,
+    /// How near its target the axis must be (0x6067).
+    #[schemars(range(min = 0.0001, max = 100000.0))]
     pub position_window_arcsec: f64,
+    /// For how long it must be there (0x6068).
     pub position_window_time_ms: u16,
+    /// Longest time of one move.
+    #[schemars(range(min = 0.01, max = 100000.0))]
     pub move_timeout_s: f64,
+    /// Period of the drive's heartbeat (0x1017).
+    #[schemars(range(min = 5, max = 10000))]
     pub heartbeat_producer_ms: u16,
+    /// Without a heartbeat for this long the drive counts as lost.
+    #[schemars(extend("x-range" = "at least 2 × `heartbeat_producer_ms`"))]
     pub heartbeat_consumer_ms: u16,
+    /// Without the controller's heartbeat for this long the drive stops by itself (0x1016).
+    #[schemars(extend("x-range" = "at least 2 × `master_heartbeat_ms`"))]
     pub watch_master_ms: u16,
+    /// What the drive takes 0x607C for, as for a linear axis.
     #[serde(default)]
     pub home_offset: HomeOffsetName,
+    /// As for a linear axis.
     #[serde(default)]
     pub option_codes: OptionCodesConfig,
+    /// Who the drive must be.
     pub identity: IdentityConfig,
+    /// How it gets its origin: the encoder's index mark.
     pub zero: Option<RotaryZeroConfig>,
+    /// What sees the lines of a plate pass.
     pub line_detector: Option<LineDetectorConfig>,
+    /// How it is calibrated.
     pub calibrate: Option<RotaryCalibrateConfig>,
+    /// How it is verified.
     pub verify: Option<RotaryVerifyConfig>,
+    /// How a calibration is applied, and its limits; needed to calibrate or to use one.
     pub compensation: Option<RotaryCompensationConfig>,
 }
 
-/// The zero: the encoder's index mark.
-#[derive(Clone, Debug, Deserialize)]
+/// The origin of a rotary axis: the encoder's index mark.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryZeroConfig {
+    /// From which side the mark is sought (methods 34 and 33).
     pub index_direction: DirectionName,
+    /// How fast it is sought.
+    #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
     pub index_speed_deg_per_s: f64,
+    /// What the mark's angle is called.
+    #[schemars(range(min = 0.0, max = 360.0))]
     pub index_deg: f64,
 }
 
-/// What sees the lines of a plate pass, wired to the drive's touch probe.
-#[derive(Clone, Debug, Deserialize)]
+/// What sees the lines of a plate pass.
+///
+/// It is wired to the drive's touch probe 1, which latches the angle at each line (0x60B8 to
+/// 0x60BB, and 0x60D5 or 0x60D6 where the drive counts edges). A sweep is refused when less than
+/// two SYNC periods would lie between two lines; the refusal says which speed fits.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct LineDetectorConfig {
+    /// The edge of its pulse that is at the line.
     #[serde(default)]
     pub edge: EdgeName,
+    /// 0x60D0:01, where the drive has a choice of inputs.
     pub input: Option<i16>,
 }
 
 /// What planned offsets keep small.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OptimiseName {
     /// The noise of the worst harmonic.
@@ -115,20 +171,48 @@ pub enum OptimiseName {
     Rms,
 }
 
-/// The calibration run: a plate read in several placements.
-#[derive(Clone, Debug, Deserialize)]
+/// The calibration run of a rotary axis (system S2).
+///
+/// A plate of lines is fixed on the table and read, turned and read again; somebody turns it when
+/// asked. Needs the sections `zero`, `line_detector` and `compensation`.
+///
+/// Two placements cannot judge each other: with two, a plate turned by a wrong number of lines is
+/// not noticed, and not one line may be missing.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryCalibrateConfig {
+    /// Serial number of the plate: a run is continued, and a calibration verified, with the same
+    /// one.
+    #[schemars(extend("x-range" = "not empty"))]
     pub plate: String,
+    /// Its lines.
+    #[schemars(range(min = 12, max = 100000))]
     pub lines: u32,
+    /// By how many lines it is turned in each placement, against the first.
+    #[schemars(extend("x-range" = "each once, below `lines`; or `placements`"))]
     pub offsets: Option<Vec<u32>>,
+    /// How often it is placed; the offsets are planned (`truestage plan rotary`).
+    #[schemars(extend("x-range" = "2 or more; or `offsets`"))]
     pub placements: Option<u32>,
+    /// What planned offsets keep small.
+    #[schemars(extend("x-range" = "with `placements`"))]
     pub optimise: Option<OptimiseName>,
+    /// Turns over all lines in each direction and placement; the first is repeated at the end.
+    #[schemars(range(min = 1, max = 1000))]
     pub passes: u32,
+    /// Of a pass, the axis's own without it; between two lines there must be two SYNC periods.
+    #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
     pub speed_deg_per_s: Option<f64>,
+    /// Standard deviation of one line in one pass. Readings that scatter more than twice as much
+    /// are refused.
+    #[schemars(range(min = 1e-06, max = 10000.0))]
     pub reading_noise_arcsec: f64,
+    /// Offsets that amplify the noise of a harmonic more than this are refused, before anything is
+    /// read.
+    #[schemars(range(min = 0.1, max = 1000000.0))]
     pub amplification_limit: f64,
+    /// How far an eighth of the lines may have moved while a placement was read.
+    #[schemars(range(min = 1e-06, max = 10000.0))]
     pub closure_limit_arcsec: f64,
     /// Planned once, when the file is judged: of thousands of lines it takes longer than a drive
     /// waits for a heartbeat.
@@ -169,18 +253,28 @@ impl RotaryCalibrateConfig {
     }
 }
 
-/// The verification: the same plate in a further placement.
-#[derive(Clone, Debug, Deserialize)]
+/// The verification of a rotary axis: the same plate in a further placement.
+///
+/// It sees errors of every harmonic of the table, and those between the lines; not where the zero
+/// is, nor what table and detector do alike in every placement.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryVerifyConfig {
+    /// Where the plate is placed. Whole lines: the places of the calibration, each read by another
+    /// line. A half line beyond: the places between them, where the interpolation is on trial.
+    #[schemars(range(min = 0.0), extend("x-range" = "at most below `lines`, in quarters; none of the calibration's"))]
     pub offset_lines: f64,
+    /// Turns over all lines in each direction; the first is repeated at the end.
+    #[schemars(range(min = 1, max = 1000))]
     pub passes: u32,
+    /// Largest deviation (less the mean) of the table with its calibration. The scatter of these
+    /// readings is in it.
+    #[schemars(range(min = 1e-06, max = 1000000.0))]
     pub tolerance_arcsec: f64,
 }
 
 /// How the deviation between two lines is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PeriodicInterpolationName {
     /// The trigonometric polynomial through all lines.
@@ -190,11 +284,16 @@ pub enum PeriodicInterpolationName {
 }
 
 /// How a table's error is undone, and its limits.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "configs/README.md documents each key")]
 pub struct RotaryCompensationConfig {
+    /// Between the lines: the trigonometric polynomial through all of them, right for errors
+    /// without harmonics above half their number; or straight lines.
     pub interpolation: PeriodicInterpolationName,
+    /// Largest deviation corrected.
+    #[schemars(range(min = 0.0001, max = 100000.0))]
     pub size_limit_arcsec: f64,
+    /// Largest slope of the deviation, dimensionless.
+    #[schemars(range(min = 1e-09, max = 0.5))]
     pub slope_limit: f64,
 }

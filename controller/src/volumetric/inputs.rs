@@ -19,7 +19,7 @@ pub(super) fn place_of_voltage(config: &MachineConfig, module: &str, channel: u8
 
 /// Likewise of a thermometer.
 pub(super) fn place_of_temperature(config: &MachineConfig, module: &str, channel: u8) -> usize {
-    place(config, module, channel, |it| &it.temperature_channels)
+    place(config, module, channel, AnalogConfig::temperature_channels)
 }
 
 /// The engine lists the modules in the order of their names.
@@ -27,7 +27,7 @@ fn place(
     config: &MachineConfig,
     module: &str,
     channel: u8,
-    channels: fn(&AnalogConfig) -> &Vec<u8>,
+    channels: fn(&AnalogConfig) -> &[u8],
 ) -> usize {
     let modules = config.analog.iter();
     let before = modules.take_while(|(name, _)| **name != module);
@@ -57,7 +57,7 @@ pub(super) fn confirmed_by_samples(
     feed: &FeedConfig,
     module: &str,
 ) -> FeedConfig {
-    let every = config.analog.get(module).and_then(|it| it.every_syncs);
+    let every = config.analog.get(module).and_then(|it| it.every_syncs());
     FeedConfig {
         confirm: feed.confirm.saturating_mul(every.unwrap_or(1).into()),
         ..feed.clone()

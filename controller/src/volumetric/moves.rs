@@ -266,7 +266,7 @@ fn settling(config: &VolumetricConfig, machine: &MachineConfig) -> Duration {
     };
     let period_ms = machine.can.values().map(|it| it.sync_period_ms);
     let every = machine.analog.values();
-    let every = every.filter_map(|it| it.every_syncs).max().unwrap_or(1);
+    let every = every.filter_map(|it| it.every_syncs()).max().unwrap_or(1);
     let sample_s = period_ms.fold(0.0, f64::max) * 1e-3 * f64::from(every);
     let confirmed_s = f64::from(feed.confirm) * sample_s;
     Duration::from_secs_f64(confirmed_s + feed.blend_s + SMOOTHINGS * feed.smoothing_s)

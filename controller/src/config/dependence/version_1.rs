@@ -8,7 +8,8 @@
 use core::fmt::{Debug, Formatter, Result};
 
 use super::super::drive::IdentityConfig;
-use super::super::model::{AxisConfig, AxisDevice, MachineConfig};
+use crate::config::axis::{AxisConfig, DriveConfig};
+use crate::config::model::MachineConfig;
 use crate::rotary::{DirectionName, RotaryConfig};
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, CurvePointConfig, LayoutName, RollConfig,
@@ -39,18 +40,15 @@ fn axis(name: &str, axis: &AxisConfig) -> String {
     let zero = axis.zero.as_ref();
     let zero = zero.map(|zero| (&zero.analog, zero.level_below_peak_v));
     let resolution_nm = axis.resolution_nm;
-    match (axis.can(), axis.serial()) {
-        (Some(can), _) => {
-            let (node_id, identity) = (can.node_id, Identity(can.identity));
+    match &axis.drive {
+        DriveConfig::Cia402(drive) => {
+            let (node_id, identity) = (drive.node_id, Identity(&drive.identity));
             format!("{name} Cia402 {node_id} {resolution_nm} {identity:?} {zero:?}")
         }
-        (None, serial) => {
-            let device = Word(match axis.device {
-                AxisDevice::Cia402 => "Cia402",
-                AxisDevice::Copley => "Copley",
-            });
-            let address = serial.map(|it| it.address);
-            let amplifier = axis.amplifier.as_ref().map(|it| Amplifier {
+        DriveConfig::Copley(drive) => {
+            let device = Word("Copley");
+            let address = Some(drive.address);
+            let amplifier = drive.amplifier.as_ref().map(|it| Amplifier {
                 model: it.model.as_deref(),
                 serial_number: it.serial_number,
             });
@@ -129,7 +127,11 @@ fn roll(config: &MachineConfig, roll: &RollConfig) -> String {
 
 fn module<'a>(config: &'a MachineConfig, name: &str) -> impl Debug + use<'a> {
     let analog = config.analog.get(name);
-    analog.map(|it| (&it.bus, it.node_id, it.identity.as_ref().map(Identity)))
+    analog.map(|it| {
+        let node = it.node();
+        let (bus, node_id) = (node.map(|it| &it.bus), node.map(|it| it.node_id));
+        (bus, node_id, node.map(|it| Identity(&it.identity)))
+    })
 }
 
 /// A word without quotes.

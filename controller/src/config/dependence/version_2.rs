@@ -5,8 +5,10 @@
 //! only where it says something else than what machines did before there was that key.
 
 use super::super::drive::IdentityConfig;
-use super::super::model::{AnalogConfig, AxisConfig, AxisDevice, MachineConfig};
 use super::text::{Place, Value, quoted};
+use crate::config::analog::AnalogConfig;
+use crate::config::axis::AxisConfig;
+use crate::config::model::MachineConfig;
 use crate::platform::config::ActuatorConfig;
 use crate::rotary::{DirectionName, RotaryConfig, RotaryDevice};
 use crate::volumetric::{
@@ -39,14 +41,15 @@ pub(super) fn text(config: &MachineConfig) -> String {
 }
 
 fn say_axis(mut place: Place<'_>, axis: &AxisConfig) {
-    place.say("device", axis.device);
-    place.say("node_id", axis.node_id);
-    place.say("address", axis.address);
+    let (can, serial) = (axis.can(), axis.serial());
+    place.say("device", axis.device());
+    place.say("node_id", can.map(|it| it.node_id));
+    place.say("address", serial.map(|it| it.address));
     place.say("resolution_nm", axis.resolution_nm);
-    if let Some(identity) = &axis.identity {
-        say_identity(place.at("identity"), identity);
+    if let Some(drive) = can {
+        say_identity(place.at("identity"), &drive.identity);
     }
-    if let Some(amplifier) = &axis.amplifier {
+    if let Some(amplifier) = serial.and_then(|it| it.amplifier.as_ref()) {
         let mut place = place.at("amplifier");
         place.say("model", &amplifier.model);
         place.say("serial_number", amplifier.serial_number);
@@ -152,12 +155,13 @@ fn say_roll(mut place: Place<'_>, config: &MachineConfig, roll: &RollConfig) {
 fn say_module(mut place: Place<'_>, config: &MachineConfig, name: &str) {
     let module: Option<&AnalogConfig> = config.analog.get(name);
     let Some(module) = module else { return };
-    place.say("bus", &module.bus);
-    place.say("node_id", module.node_id);
-    place.say("line", &module.line);
-    place.say("address", module.address);
-    if let Some(identity) = &module.identity {
-        say_identity(place.at("identity"), identity);
+    let (node, dcon) = (module.node(), module.dcon());
+    place.say("bus", node.map(|it| &it.bus));
+    place.say("node_id", node.map(|it| it.node_id));
+    place.say("line", dcon.map(|it| &it.line));
+    place.say("address", dcon.map(|it| it.address));
+    if let Some(node) = node {
+        say_identity(place.at("identity"), &node.identity);
     }
 }
 
@@ -177,7 +181,6 @@ macro_rules! by_its_word {
 }
 
 by_its_word! {
-    AxisDevice { Cia402: "cia402", Copley: "copley" }
     RotaryDevice { Cia402: "cia402" }
     DirectionName { Forward: "forward", Reverse: "reverse" }
     BeamDriftName { Pivoting: "pivoting", Translating: "translating", Mixed: "mixed" }

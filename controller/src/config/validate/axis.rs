@@ -9,45 +9,26 @@ use units::Short;
 
 use super::drive::{check_heartbeat, check_watch};
 use crate::config::judge::{Finding, Judge};
-use crate::config::{AxisConfig, AxisDevice, CyclicConfig, MachineConfig};
+use crate::config::{AxisConfig, Cia402AxisConfig, CopleyAxisConfig, DriveConfig, MachineConfig};
 
 /// The rates that both amplifiers and serial ports have.
 const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
 
 pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    judge.within("resolution_nm", axis.resolution_nm.abs(), 0.01, 1e6);
     judge.below(
         ("soft_min_mm", axis.soft_min_mm),
         ("soft_max_mm", axis.soft_max_mm),
     );
-    judge.within("speed_max_mm_per_s", axis.speed_max_mm_per_s, 1e-3, 1e5);
     judge.within(
         "speed_mm_per_s",
         axis.speed_mm_per_s,
         1e-3,
         axis.speed_max_mm_per_s,
     );
-    judge.within(
-        "acceleration_mm_per_s2",
-        axis.acceleration_mm_per_s2,
-        1e-2,
-        1e6,
-    );
-    let quick_stop = axis.quick_stop_deceleration_mm_per_s2;
-    judge.within("quick_stop_deceleration_mm_per_s2", quick_stop, 1e-2, 1e7);
-    judge.within(
-        "following_error_limit_um",
-        axis.following_error_limit_um,
-        1e-3,
-        1e5,
-    );
-    judge.within("position_window_um", axis.position_window_um, 1e-4, 1e4);
-    judge.within("move_timeout_s", axis.move_timeout_s, 0.01, 1e5);
-    match axis.device {
-        AxisDevice::Cia402 => check_cia402(judge, config, axis),
-        AxisDevice::Copley => check_copley(judge, config, axis),
+    match &axis.drive {
+        DriveConfig::Cia402(drive) => check_cia402(judge, config, drive),
+        DriveConfig::Copley(drive) => check_copley(judge, config, axis, drive),
     }
-    check_strangers(judge, axis);
     let counts =
         axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
     if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
@@ -63,9 +44,9 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
 /// Drives hold speeds and accelerations in 32 bits, in units of their counts.
 fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
     // What an amplifier counts in: 0.1 counts/s and 10 counts/s².
-    let (speed_counts, acceleration_counts) = match axis.device {
-        AxisDevice::Cia402 => (1.0, 1.0),
-        AxisDevice::Copley => (0.1, 10.0),
+    let (speed_counts, acceleration_counts) = match axis.drive {
+        DriveConfig::Cia402(_) => (1.0, 1.0),
+        DriveConfig::Copley(_) => (0.1, 10.0),
     };
     let largest_mm = f64::from(i32::MAX) * axis.resolution_nm.abs() * 1e-6;
     let reference_speed = axis.zero.as_ref().map(|it| it.reference_speed_mm_per_s);
@@ -111,95 +92,8 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
     }
 }
 
-/// Keys that only drives on CAN have, and whether each is there; the first ones are needed.
-fn can_keys(axis: &AxisConfig) -> [(&'static str, bool); 11] {
-    [
-        ("bus", axis.bus.is_some()),
-        ("node_id", axis.node_id.is_some()),
-        (
-            "following_error_timeout_ms",
-            axis.following_error_timeout_ms.is_some(),
-        ),
-        (
-            "heartbeat_producer_ms",
-            axis.heartbeat_producer_ms.is_some(),
-        ),
-        (
-            "heartbeat_consumer_ms",
-            axis.heartbeat_consumer_ms.is_some(),
-        ),
-        ("watch_master_ms", axis.watch_master_ms.is_some()),
-        ("identity", axis.identity.is_some()),
-        ("home_offset", axis.home_offset.is_some()),
-        ("option_codes", axis.option_codes.is_some()),
-        ("synchronous_start", axis.synchronous_start.is_some()),
-        ("cyclic", axis.cyclic.is_some()),
-    ]
-}
-
-const CAN_KEYS_NEEDED: usize = 7;
-
-/// Likewise of amplifiers on serial lines.
-fn line_keys(axis: &AxisConfig) -> [(&'static str, bool); 4] {
-    [
-        ("line", axis.line.is_some()),
-        ("address", axis.address.is_some()),
-        ("poll_period_ms", axis.poll_period_ms.is_some()),
-        ("amplifier", axis.amplifier.is_some()),
-    ]
-}
-
-const LINE_KEYS_NEEDED: usize = 3;
-
-fn check_needed(judge: &mut Judge<'_>, device: &str, needed: &[(&str, bool)]) {
-    let missing: Vec<_> = needed
-        .iter()
-        .filter(|(_, is_there)| !is_there)
-        .map(|(key, _)| format!("`{key}`"))
-        .collect();
-    if !missing.is_empty() {
-        let missing = missing.join(", ");
-        judge.say(
-            "device",
-            format!("a {device} axis needs {missing}"),
-            format!("add {missing}; configs/README.md describes every key"),
-        );
-    }
-}
-
-/// A key of another kind of device would be believed to do something.
-fn check_strangers(judge: &mut Judge<'_>, axis: &AxisConfig) {
-    let (can, line) = (can_keys(axis), line_keys(axis));
-    let (name, strangers) = match axis.device {
-        AxisDevice::Cia402 => ("cia402", line.as_slice()),
-        AxisDevice::Copley => ("copley", can.as_slice()),
-    };
-    for (key, _) in strangers.iter().filter(|(_, is_there)| *is_there) {
-        judge.say(key, format!("a {name} axis has no such key"), "remove it");
-    }
-}
-
-fn check_cyclic(judge: &mut Judge<'_>, axis: &AxisConfig, cyclic: &CyclicConfig) {
-    judge.within("cyclic.jerk_mm_per_s3", cyclic.jerk_mm_per_s3, 1.0, 1e9);
-    judge.within(
-        "cyclic.deviation_limit_um",
-        cyclic.deviation_limit_um,
-        1e-2,
-        1e5,
-    );
-    judge.within(
-        "cyclic.correction_limit_um",
-        cyclic.correction_limit_um,
-        0.0,
-        1e4,
-    );
-    judge.within(
-        "cyclic.correction_rate_um_per_s",
-        cyclic.correction_rate_um_per_s,
-        0.0,
-        1e6,
-    );
-    if axis.synchronous_start != Some(true) {
+fn check_cyclic(judge: &mut Judge<'_>, drive: &Cia402AxisConfig) {
+    if !drive.synchronous_start {
         judge.say(
             "synchronous_start",
             "is not true, but the axis follows cyclic set-points",
@@ -209,8 +103,8 @@ fn check_cyclic(judge: &mut Judge<'_>, axis: &AxisConfig, cyclic: &CyclicConfig)
 }
 
 /// Every drive is told the SYNC period as so many units of a power of ten.
-fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    let bus = axis.bus.as_ref().and_then(|it| config.can.get(it));
+fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402AxisConfig) {
+    let bus = config.can.get(&drive.bus);
     let Some(period_ms) = bus.map(|it| it.sync_period_ms) else {
         return;
     };
@@ -235,33 +129,26 @@ fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig
     );
 }
 
-fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    check_needed(judge, "cia402", &can_keys(axis)[..CAN_KEYS_NEEDED]);
-    if let Some(cyclic) = &axis.cyclic {
-        check_cyclic(judge, axis, cyclic);
-        check_period(judge, config, axis);
+fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402AxisConfig) {
+    if drive.cyclic.is_some() {
+        check_cyclic(judge, drive);
+        check_period(judge, config, drive);
     }
-    if let Some(bus) = &axis.bus {
-        judge.known("bus", bus, &config.can, "CAN bus");
-    }
-    if let Some(node) = axis.node_id {
-        judge.within("node_id", node.into(), 1.0, 127.0);
-    }
-    if let (Some(producer), Some(consumer)) =
-        (axis.heartbeat_producer_ms, axis.heartbeat_consumer_ms)
-    {
-        check_heartbeat(judge, producer, consumer);
-    }
-    if let (Some(bus), Some(watch)) = (&axis.bus, axis.watch_master_ms) {
-        check_watch(judge, config, bus, watch);
-    }
+    judge.known("bus", &drive.bus, &config.can, "CAN bus");
+    check_heartbeat(
+        judge,
+        drive.heartbeat_producer_ms,
+        drive.heartbeat_consumer_ms,
+    );
+    check_watch(judge, config, &drive.bus, drive.watch_master_ms);
 }
 
-fn check_copley(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
-    check_needed(judge, "copley", &line_keys(axis)[..LINE_KEYS_NEEDED]);
-    if let Some(address) = axis.address {
-        judge.within("address", address.into(), 0.0, 127.0);
-    }
+fn check_copley(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    axis: &AxisConfig,
+    drive: &CopleyAxisConfig,
+) {
     if axis.zero.is_some() {
         judge.say(
             "zero",
@@ -269,12 +156,7 @@ fn check_copley(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig
             "remove the section, or use a drive on CAN",
         );
     }
-    if let Some(period) = axis.poll_period_ms {
-        judge.within("poll_period_ms", period, 1.0, 300.0);
-    }
-    let Some(name) = &axis.line else {
-        return;
-    };
+    let name = &drive.line;
     judge.known("line", name, &config.serial, "serial line");
     if let Some(line) = config.serial.get(name)
         && !AMPLIFIER_RATES.contains(&line.baud_bit_per_s)
@@ -292,12 +174,12 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let mut taken: BTreeMap<(&str, u8), String> = BTreeMap::new();
     let mut owned: BTreeMap<&str, String> = BTreeMap::new();
     for (name, axis) in &config.axis {
-        let Some(line) = axis.line.as_deref() else {
+        let Some(drive) = axis.serial() else {
             continue;
         };
+        let (line, address) = (&*drive.line, drive.address);
         let key = format!("axis.{name}.address");
         owned.entry(line).or_insert_with(|| key.clone());
-        let address = axis.address.unwrap_or(0);
         if let Some(other) = taken.insert((line, address), key.clone()) {
             findings.push(Finding {
                 key,
@@ -309,7 +191,7 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let analogs = config
         .analog
         .iter()
-        .filter_map(|(name, it)| Some((it.line.as_deref()?, format!("analog.{name}.line"))));
+        .filter_map(|(name, it)| Some((&*it.dcon()?.line, format!("analog.{name}.line"))));
     let instruments = config
         .instrument
         .iter()
@@ -347,14 +229,14 @@ mod tests {
 
     #[test]
     fn each_device_needs_its_own_keys_and_has_no_others() {
-        let says = "a cia402 axis needs `heartbeat_producer_ms`";
-        let key = "axis.u.device";
+        let says = "missing `heartbeat_producer_ms`";
+        let key = "axis.u";
         check(DRIVES, "heartbeat_producer_ms = 50\n", "", key, says);
-        let says = "a copley axis needs `line`, `poll_period_ms`";
+        let says = "missing `poll_period_ms`";
         let both = "line = \"amps\"\naddress = 0                    # at the cable\n";
         let gone = AMPLIFIERS.edit_first(both, "address = 0\n");
         check(&gone, "poll_period_ms = 20.0\n", "", key, says);
-        let says = "a copley axis has no such key";
+        let says = "`device = \"copley\"` has no such key";
         for (stranger, key) in [
             ("watch_master_ms = 500\n", "axis.u.watch_master_ms"),
             ("synchronous_start = true\n", "axis.u.synchronous_start"),
@@ -363,7 +245,7 @@ mod tests {
             check(AMPLIFIERS, "device = \"copley\"\n", &to, key, says);
         }
         let to = "device = \"cia402\"\naddress = 1\n";
-        let says = "a cia402 axis has no such key";
+        let says = "`device = \"cia402\"` has no such key";
         check(DRIVES, "device = \"cia402\"\n", to, "axis.u.address", says);
     }
 

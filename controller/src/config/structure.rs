@@ -1,0 +1,367 @@
+//! Whether a file has the keys, types and ranges that its schema says.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value as Schema;
+use toml::{Table, Value};
+use units::Short;
+
+use super::judge::Finding;
+
+/// What is wrong with a key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// That it is there.
+    Name,
+    /// What it says.
+    Value,
+    /// How much it says: the file can be read, and judged further.
+    Size,
+}
+
+/// What was found, by keys, and which part of each it is.
+type Findings = Vec<(Finding, Part)>;
+
+/// All that is not as `schema` says.
+pub(super) fn judge(document: &Table, schema: &Schema) -> Findings {
+    let mut findings = Vec::new();
+    table("", document, schema, &mut findings);
+    findings
+}
+
+fn say(findings: &mut Findings, key: &str, cause: String, help: String) {
+    let key = key.to_owned();
+    findings.push((Finding { key, cause, help }, Part::Value));
+}
+
+fn say_size(findings: &mut Findings, key: &str, seen: f64, help: String) {
+    let (key, cause) = (key.to_owned(), format!("{} is impossible", Short(seen)));
+    findings.push((Finding { key, cause, help }, Part::Size));
+}
+
+fn below(path: &str, key: &str) -> String {
+    match path.is_empty() {
+        true => key.to_owned(),
+        false => format!("{path}.{key}"),
+    }
+}
+
+fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
+    if let Some(variants) = schema.as_array() {
+        let words = variants.iter();
+        let words = words.filter_map(|it| it["properties"][DEVICE]["const"].as_str());
+        return name(path, value, &words.collect::<Vec<_>>(), findings);
+    }
+    let schema = without_null(schema);
+    if let Some(names) = names(schema) {
+        return name(path, value, &names, findings);
+    }
+    let seen = kind(value);
+    match (expected(schema), value) {
+        ("object", Value::Table(inner)) => table(path, inner, schema, findings),
+        ("array", Value::Array(items)) => array(path, items, schema, findings),
+        ("number", Value::Float(it)) => number(path, *it, schema, findings),
+        // Whoever writes 5 means 5.0.
+        ("number" | "integer", Value::Integer(it)) => number(path, *it as f64, schema, findings),
+        ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
+        (expected, _) => {
+            let cause = format!("{} is expected here, this is {seen}", in_words(expected));
+            say(findings, path, cause, correction(expected, value));
+        }
+    }
+}
+
+/// What may be left out is, where it is there, what it is otherwise.
+fn without_null(schema: &Schema) -> &Schema {
+    let choices = schema["anyOf"].as_array();
+    let real = choices.and_then(|it| it.iter().find(|it| it["type"] != "null"));
+    real.unwrap_or(schema)
+}
+
+fn expected(schema: &Schema) -> &str {
+    let one = match &schema["type"] {
+        Schema::Array(types) => types.iter().find(|it| *it != "null"),
+        one => Some(one),
+    };
+    one.and_then(Schema::as_str).unwrap_or("object")
+}
+
+fn in_words(expected: &str) -> &'static str {
+    match expected {
+        "object" => "a section",
+        "array" => "a list",
+        "number" => "a number",
+        "integer" => "a whole number",
+        "boolean" => "`true` or `false`",
+        _ => "text",
+    }
+}
+
+const fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::String(_) => "text",
+        Value::Integer(_) => "a whole number",
+        Value::Float(_) => "a number",
+        Value::Boolean(_) => "`true` or `false`",
+        Value::Datetime(_) => "a date",
+        Value::Array(_) => "a list",
+        Value::Table(_) => "a section",
+    }
+}
+
+fn correction(expected: &str, value: &Value) -> String {
+    match (expected, value) {
+        ("number" | "integer" | "boolean", Value::String(text)) => {
+            format!("write it without quotes: {text}")
+        }
+        ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
+            format!("write it in quotes: \"{value}\"")
+        }
+        ("integer", Value::Float(it)) => format!("write {:.0}", it),
+        ("array", _) => "write it in brackets: [...]".into(),
+        _ => String::new(),
+    }
+}
+
+fn table(path: &str, seen: &Table, schema: &Schema, findings: &mut Findings) {
+    if schema["properties"].is_null() {
+        // Named by the user, all alike.
+        for (key, value) in seen {
+            let own = &schema["additionalProperties"];
+            any(&below(path, key), value, own, findings);
+        }
+        return;
+    }
+    let section = Section::of(schema, seen);
+    let keys = section.keys.keys().copied();
+    let free: Vec<&str> = keys.filter(|it| !seen.contains_key(*it)).collect();
+    let mut mistyped = Vec::new();
+    for (key, value) in seen {
+        match section.keys.get(key.as_str()) {
+            Some(own) => any(&below(path, key), value, own, findings),
+            None => {
+                let is_anothers = section.is_of_another_device(key);
+                if is_anothers && section.device.is_none() {
+                    // Nobody knows yet which device it is.
+                    continue;
+                }
+                let (cause, help) = match is_anothers {
+                    true => (section.has_no_such_key(), "remove it".to_owned()),
+                    false => {
+                        mistyped.extend(meant(key, &free));
+                        ("there is no such key here".to_owned(), advice(key, &free))
+                    }
+                };
+                let key = below(path, key);
+                findings.push((Finding { key, cause, help }, Part::Name));
+            }
+        }
+    }
+    // What was only mistyped is told once.
+    let missed = section.required.iter();
+    let missed = missed.filter(|it| free.contains(it) && !mistyped.contains(it));
+    for key in missed {
+        missing(path, key, section.keys[*key], findings);
+    }
+}
+
+/// What a section can hold, with the device that it is about, where it is about one.
+struct Section<'a> {
+    keys: BTreeMap<&'a str, &'a Schema>,
+    required: Vec<&'a str>,
+    device: Option<&'a str>,
+    /// Of devices that it is not about.
+    others: Vec<&'a str>,
+}
+
+impl<'a> Section<'a> {
+    fn of(schema: &'a Schema, seen: &Table) -> Self {
+        let mut section = Self {
+            keys: BTreeMap::new(),
+            required: Vec::new(),
+            device: None,
+            others: Vec::new(),
+        };
+        section.add(schema);
+        let word = seen.get(DEVICE).and_then(Value::as_str);
+        let variants = schema["oneOf"].as_array().into_iter().flatten();
+        for variant in variants.clone() {
+            let device = variant["properties"][DEVICE]["const"].as_str();
+            if device.is_some() && device == word {
+                section.device = device;
+                section.add(variant);
+            } else {
+                let keys = variant["properties"].as_object().into_iter().flatten();
+                section.others.extend(keys.map(|(key, _)| key.as_str()));
+            }
+        }
+        if section.device.is_none() && variants.clone().next().is_some() {
+            // What it can be is told where the word stands.
+            section.keys.insert(DEVICE, &schema["oneOf"]);
+            section.required.push(DEVICE);
+        }
+        section
+    }
+
+    fn add(&mut self, part: &'a Schema) {
+        let keys = part["properties"].as_object().into_iter().flatten();
+        self.keys.extend(keys.map(|(key, own)| (key.as_str(), own)));
+        let required = part["required"].as_array().into_iter().flatten();
+        self.required.extend(required.filter_map(Schema::as_str));
+    }
+
+    fn is_of_another_device(&self, key: &str) -> bool {
+        self.others.contains(&key)
+    }
+
+    fn has_no_such_key(&self) -> String {
+        let device = self.device.unwrap_or_default();
+        format!("`device = \"{device}\"` has no such key")
+    }
+}
+
+/// The key that says which device a section is about.
+const DEVICE: &str = "device";
+
+fn missing(path: &str, key: &str, schema: &Schema, findings: &mut Findings) {
+    let what = match expected(without_null(schema)) {
+        "object" if names(schema).is_none() => format!("the section `{}`", below(path, key)),
+        _ => format!("`{key}`"),
+    };
+    let help = format!("add {what}; configs/README.md describes every key");
+    say(findings, path, format!("missing {what}"), help);
+}
+
+fn array(path: &str, items: &[Value], schema: &Schema, findings: &mut Findings) {
+    let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
+    let count = items.len() as u64;
+    if least.is_some_and(|it| count < it) || most.is_some_and(|it| count > it) {
+        let wanted = match (least, most) {
+            (Some(least), Some(most)) if least == most => least.to_string(),
+            (Some(least), Some(most)) => format!("{least} to {most}"),
+            (least, most) => format!(
+                "{} or {}",
+                least.unwrap_or(0),
+                most.map_or("more".into(), |it| it.to_string())
+            ),
+        };
+        say(
+            findings,
+            path,
+            format!("{count} entries"),
+            format!("give {wanted}"),
+        );
+        return;
+    }
+    for (at, item) in items.iter().enumerate() {
+        // Numbers of a list are found where the list is; its sections each by themselves.
+        let own = match item {
+            Value::Table(_) => below(path, &at.to_string()),
+            _ => path.to_owned(),
+        };
+        any(&own, item, &schema["items"], findings);
+        above(&own, item, schema, findings);
+    }
+}
+
+fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
+    let bound = |key: &str| schema[key].as_f64();
+    let (low, high) = match schema["x-magnitude"].as_array() {
+        Some(bounds) => (bounds[0].as_f64(), bounds[1].as_f64()),
+        None => (bound("minimum"), bound("maximum")),
+    };
+    let value = match schema["x-magnitude"].is_array() {
+        true => seen.abs(),
+        false => seen,
+    };
+    // A comparison with NaN, which TOML can write, is false.
+    let is_within = low.is_none_or(|it| value >= it) && high.is_none_or(|it| value <= it);
+    let is_whole = expected(schema) != "integer" || seen.fract() == 0.0;
+    if !(is_within && is_whole && seen.is_finite()) {
+        let help = match (low, high) {
+            (Some(low), Some(high)) => format!("give {} to {}", Short(low), Short(high)),
+            (Some(low), None) => format!("give {} or more", Short(low)),
+            (None, Some(high)) => format!("give {} or less", Short(high)),
+            (None, None) => "give a number".into(),
+        };
+        say_size(findings, path, seen, help);
+        return;
+    }
+    above(path, &Value::Float(seen), schema, findings);
+}
+
+/// What must be more than something.
+fn above(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
+    let Some(limit) = schema["x-above"].as_f64() else {
+        return;
+    };
+    let seen = match value {
+        Value::Float(it) => *it,
+        Value::Integer(it) => *it as f64,
+        _ => return,
+    };
+    let is_above = seen > limit;
+    if !is_above {
+        let help = format!("give more than {}", Short(limit));
+        say_size(findings, path, seen, help);
+    }
+}
+
+/// The words that a value is one of, where it is one of words.
+fn names(schema: &Schema) -> Option<Vec<&str>> {
+    if let Some(words) = schema["enum"].as_array() {
+        return Some(words.iter().filter_map(Schema::as_str).collect());
+    }
+    if let Some(word) = schema["const"].as_str() {
+        return Some(vec![word]);
+    }
+    let choices = schema["oneOf"].as_array()?;
+    let each = choices.iter().map(names);
+    let words: Option<Vec<Vec<&str>>> = each.collect();
+    Some(words?.concat())
+}
+
+fn name(path: &str, value: &Value, names: &[&str], findings: &mut Findings) {
+    let seen = match value {
+        Value::String(text) if names.contains(&text.as_str()) => return,
+        Value::String(text) => format!("`{text}`"),
+        other => kind(other).to_owned(),
+    };
+    let known: Vec<_> = names.iter().map(|it| format!("\"{it}\"")).collect();
+    let help = format!("give {}", known.join(" or "));
+    say(findings, path, format!("{seen} is not known here"), help);
+}
+
+/// What somebody who wrote `seen` may have meant.
+fn advice(seen: &str, free: &[&str]) -> String {
+    match meant(seen, free) {
+        Some(key) => format!("did you mean `{key}`? A key's ending is its unit"),
+        None if free.is_empty() => "remove it: every key of this section is there".into(),
+        None => format!("known here: {}", free.join(", ")),
+    }
+}
+
+/// The key of `free` that is most like `seen`, if one is.
+fn meant<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
+    let likeness = |key: &str| {
+        let whole = strsim::normalized_damerau_levenshtein(key, seen);
+        // With another unit it is still the same quantity.
+        whole.max(strsim::normalized_damerau_levenshtein(stem(key), stem(seen)) * STEM_WEIGHT)
+    };
+    let scored = free.iter().map(|key| (likeness(key), *key));
+    let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 >= LIKE).then_some(best.1)
+}
+
+/// So much alike two words are one that was mistyped.
+const LIKE: f64 = 0.6;
+/// A key that is right as a whole is nearer than one that is right but for its unit.
+const STEM_WEIGHT: f64 = 0.95;
+
+/// A key without its unit.
+fn stem(key: &str) -> &str {
+    key.rsplit_once('_').map_or(key, |(stem, _)| stem)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+use crate::Edit;
+use crate::config::{ConfigError, Diagnostic, parse};
+
+const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
+const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
+
+fn findings(text: &str) -> Vec<Diagnostic> {
+    match parse(text, "m.toml") {
+        Err(ConfigError::Invalid { findings }) => findings,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// With the first `from` become `to`, one thing is found: at `key`, and what it says.
+#[track_caller]
+fn check(text: &str, from: &str, to: &str, key: &str, says: [&str; 2]) {
+    let found = findings(&text.edit_first(from, to));
+    let [one] = &found[..] else {
+        panic!("{to}: {found:#?}")
+    };
+    assert_eq!(one.key, key);
+    let [cause, help] = says;
+    assert!(one.cause.contains(cause), "{one}");
+    assert!(one.help.contains(help), "{one}");
+}
+
+#[test]
+fn all_that_is_wrong_with_keys_types_and_values_is_told_at_once() {
+    let text = LINEAR
+        .edit_first("sync_period_ms = 5.0", "sync_period_ms = 0.1")
+        .edit_first("speed_mm_per_s", "spede_mm_per_s")
+        .edit_first("runs = 3", "runs = \"3\"");
+    let found = findings(&text);
+    let keys: Vec<_> = found.iter().map(|it| it.key.as_str()).collect();
+    let expected = [
+        "can.can0.sync_period_ms",
+        "axis.x.spede_mm_per_s",
+        "axis.x.calibrate.runs",
+    ];
+    assert_eq!(keys, expected, "{found:#?}");
+}
+
+#[test]
+fn a_value_of_another_type_says_how_it_is_written() {
+    let key = "axis.x.resolution_nm";
+    let says = [
+        "a number is expected here, this is text",
+        "without quotes: 10",
+    ];
+    check(
+        LINEAR,
+        "resolution_nm = 10.0",
+        "resolution_nm = \"10\"",
+        key,
+        says,
+    );
+    let says = ["text is expected here, this is a whole number", "\"7\""];
+    let (from, key) = ("name = \"linear\"", "machine.name");
+    check(LINEAR, from, "name = 7", key, says);
+    let says = ["a list is expected here", "[...]"];
+    let (from, key) = ("channels = [0, 1]", "analog.hall.channels");
+    check(LINEAR, from, "channels = 0", key, says);
+    let says = [
+        "a whole number is expected here, this is a number",
+        "write 2",
+    ];
+    check(
+        LINEAR,
+        "node_id = 1\n",
+        "node_id = 1.6\n",
+        "axis.x.node_id",
+        says,
+    );
+}
+
+#[test]
+fn a_word_that_is_not_known_says_which_are() {
+    let says = ["`usb` is not known here", "\"socketcan\" or \"slcan\""];
+    let from = "transport = \"slcan\"";
+    check(
+        LINEAR,
+        from,
+        "transport = \"usb\"",
+        "can.can0.transport",
+        says,
+    );
+    let says = ["`servo` is not known here", "\"cia402\" or \"copley\""];
+    let from = "device = \"cia402\"";
+    check(LINEAR, from, "device = \"servo\"", "axis.x.device", says);
+}
+
+#[test]
+fn a_mistyped_key_is_told_once_with_the_one_that_was_meant() {
+    for (from, to) in [
+        ("soft_min_mm", "soft_min_um"),
+        ("position_window_um", "postion_window_um"),
+        ("move_timeout_s", "move_time_out_s"),
+        ("following_error_limit_um", "folowing_eror_limit_um"),
+    ] {
+        let key = format!("axis.x.{to}");
+        let help = format!("did you mean `{from}`?");
+        check(LINEAR, from, to, &key, ["no such key here", &help]);
+    }
+    let says = ["no such key here", "known here: "];
+    check(
+        LINEAR,
+        "[can.can0]",
+        "[can.can0]\nqwertz = 1",
+        "can.can0.qwertz",
+        says,
+    );
+}
+
+#[test]
+fn a_list_of_another_length_and_a_section_of_a_list_are_found_where_they_stand() {
+    let says = ["3 entries", "give 2"];
+    let (from, key) = ("point_mm = [", "platform.actuator.0.point_mm");
+    check(UVW, from, "point_mm = [0.0, ", key, says);
+    let found = findings(&UVW.edit_first("lead_mm = ", "leed_mm = "));
+    let line = UVW
+        .lines()
+        .position(|it| it.starts_with("lead_mm"))
+        .map(|it| it + 1);
+    assert_eq!(
+        (Some(found[0].line), found[0].column),
+        (line, 1),
+        "{found:#?}"
+    );
+}
+
+#[test]
+fn a_section_that_is_missing_is_named() {
+    let begin = UVW.find("[platform.zero]").expect("it is there");
+    let end = begin + UVW[begin + 1..].find("\n[").expect("another follows") + 1;
+    let text = format!("{}{}", &UVW[..begin], &UVW[end..]);
+    let found = findings(&text);
+    assert!(
+        found[0].cause.contains("the section `platform.zero`"),
+        "{found:#?}"
+    );
+}

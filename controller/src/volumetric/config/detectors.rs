@@ -1,0 +1,252 @@
+//! What watches three axes: beams and their detectors, roll detectors, thermometers.
+
+use core::num::NonZeroU32;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::VolumeAxisName;
+
+/// The reference beams, of the axes that have one.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BeamsConfig {
+    /// Along x.
+    pub x: Option<BeamConfig>,
+    /// Along y.
+    pub y: Option<BeamConfig>,
+    /// Along z.
+    pub z: Option<BeamConfig>,
+}
+
+impl BeamsConfig {
+    /// In the order x, y, z.
+    pub fn each(&self) -> [Option<&BeamConfig>; 3] {
+        [&self.x, &self.y, &self.z].map(Option::as_ref)
+    }
+}
+
+/// How a beam moves when it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BeamDriftName {
+    /// Its source stays, its direction changes.
+    Pivoting,
+    /// Its direction stays, its source moves.
+    Translating,
+    /// Both, in a share that is known.
+    Mixed,
+}
+
+/// A reference beam along an axis, and what sees it.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BeamConfig {
+    /// How the beam moves when it moves: about its source, sideways as a whole, or both.
+    pub drift: BeamDriftName,
+    /// Where the source is, by the axis's scale.
+    #[schemars(extend("x-range" = "unless `translating`"))]
+    pub source_mm: Option<f64>,
+    /// Where the end detector is, by the axis's scale.
+    #[schemars(extend("x-range" = "unless `translating`; elsewhere than the source"))]
+    pub end_mm: Option<f64>,
+    /// The share of the shift at the end that is sideways as a whole.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-range" = "with `mixed`, only then"))]
+    pub translation_share: Option<f64>,
+    /// Of a displacement as it enters the correction: what noise, air, the width of the spot and
+    /// how the beam is taken to move leave of it.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub standard_uncertainty_um: Option<f64>,
+    /// The detector on the slide.
+    pub slider: BeamDetectorConfig,
+    /// The detector behind the travel, which sees the beam's own drift.
+    pub end: Option<BeamDetectorConfig>,
+}
+
+/// How four channels belong to two directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LayoutName {
+    /// Quadrants (+, +), (−, +), (−, −), (+, −).
+    Quadrants,
+    /// Electrodes first +, first −, second +, second −.
+    Lateral,
+}
+
+/// A detector of four channels.
+///
+/// First and second direction are the other two axes in the order x, y, z. The slider's place is
+/// that of the *slide* (a slide that goes one way sees its spot go the other way: negative
+/// factors), that of the end detector is the *beam's*.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BeamDetectorConfig {
+    /// The module that its channels are wired to.
+    #[schemars(extend("x-range" = "an `[analog.NAME]` on CAN"))]
+    pub analog: String,
+    /// Quadrants (+, +), (−, +), (−, −), (+, −), or electrodes first +, first −, second +, second
+    /// −.
+    #[schemars(extend("x-range" = "of that module's `channels`; each input is one detector's"))]
+    pub channels: [u8; 4],
+    /// Where the detector sits when all axes are at 0, measured from the machine's zero. It is the
+    /// detector's lever arm on its slide: with it, tilts of the slide are taken off what the
+    /// detector sees, both when references give straightnesses and at each cycle (tilts that roll
+    /// detectors and thermometers know of). Calibrations made with another place are refused as
+    /// foreign.
+    #[serde(default)]
+    pub place_mm: [f64; 3],
+    /// Which of these the channels are.
+    pub layout: LayoutName,
+    /// What each channel gives in the dark.
+    #[serde(default)]
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
+    pub dark_mv: [f64; 4],
+    /// What each channel is multiplied with, after the dark was taken off.
+    #[serde(default = "equal")]
+    #[schemars(extend("x-above" = 0.0))]
+    pub gain: [f64; 4],
+    /// Place = this × ratio of the channels (difference by sum), for the first and second
+    /// direction.
+    #[schemars(extend("x-range" = "with `ratio_max`, or a `curve`"))]
+    pub um_per_one: Option<[f64; 2]>,
+    /// Up to which ratio that is used.
+    #[schemars(extend("x-range" = "with `um_per_one`"))]
+    pub ratio_max: Option<f64>,
+    /// Measured curve, monotone cubics between its points.
+    #[serde(default)]
+    #[schemars(extend("x-range" = "two or more, ratios increasing"))]
+    pub curve: Vec<CurvePointConfig>,
+    /// At or above this a channel is saturated.
+    #[schemars(extend("x-above" = 0.0))]
+    pub saturation_v: f64,
+    /// Of the sum of the channels: below it the beam is blocked.
+    #[schemars(extend("x-above" = 0.0), extend("x-range" = "below `intensity_max_v`"))]
+    pub intensity_min_v: f64,
+    /// Above it other light is there.
+    pub intensity_max_v: f64,
+    /// An older sample says nothing about now.
+    #[schemars(extend("x-range" = "at least two sampling periods"))]
+    pub age_max_ms: f64,
+    /// How fast a place can change; more is not believed.
+    #[schemars(extend("x-above" = 0.0))]
+    pub speed_max_um_per_s: f64,
+    /// How far apart two samples of one place can be; more is not believed.
+    #[schemars(extend("x-above" = 0.0))]
+    pub noise_max_um: f64,
+    /// A channel that gives so many equal samples in a row is stuck, and the detector in trouble;
+    /// for channels whose noise reaches the converter's next step: with a standard deviation of
+    /// half a step at least, 100 in a row are no coincidence; more where a module sends oftener
+    /// than it converts.
+    #[schemars(range(min = 10, max = 1000000))]
+    pub stuck_samples: Option<NonZeroU32>,
+}
+
+const fn equal() -> [f64; 4] {
+    [1.0; 4]
+}
+
+/// A point of a detector's measured curve, monotone cubics between its points.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurvePointConfig {
+    /// Ratio of the channels: difference by sum.
+    pub ratio: f64,
+    /// The place there, in the first direction.
+    pub first_um: f64,
+    /// In the second direction.
+    pub second_um: f64,
+}
+
+/// Two detectors that see one slide roll.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RollConfig {
+    /// Whose slide.
+    pub axis: VolumeAxisName,
+    /// The module that its channels are wired to.
+    #[schemars(extend("x-range" = "an `[analog.NAME]` on CAN"))]
+    pub analog: String,
+    /// The inputs of the two detectors.
+    #[schemars(extend("x-range" = "of that module"))]
+    pub channels: [u8; 2],
+    /// From volts to the readings x₁ and x₂.
+    #[schemars(extend("x-magnitude" = [1e-9, 1e3]))]
+    pub mm_per_v: [f64; 2],
+    /// H of the optics.
+    #[schemars(extend("x-range" = "together they must determine the roll"))]
+    pub height_mm: f64,
+    /// L of the optics.
+    pub base_mm: f64,
+    /// Φ of the optics.
+    pub inclination_deg: f64,
+    /// Larger rolls are not believed.
+    #[schemars(extend("x-above" = 0.0))]
+    pub roll_max_arcsec: f64,
+    /// Of a roll as it enters the correction.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub standard_uncertainty_arcsec: Option<f64>,
+    /// An older sample says nothing about now.
+    #[schemars(extend("x-range" = "at least two sampling periods"))]
+    pub age_max_ms: f64,
+    /// How fast the roll can change; more is not believed.
+    #[schemars(range(min = 1e-06, max = 1000000.0))]
+    pub speed_max_arcsec_per_s: f64,
+    /// How far apart two samples of one roll can be; more is not believed.
+    #[schemars(range(min = 1e-06, max = 1000000.0))]
+    pub noise_max_arcsec: f64,
+    /// A channel that gives so many equal samples in a row is stuck, as for a beam detector.
+    #[schemars(range(min = 10, max = 1000000))]
+    pub stuck_samples: Option<NonZeroU32>,
+}
+
+/// A thermometer, and what warmth does to the machine.
+///
+/// What it does counts from the temperature at the calibration. Thermometers that make one effect
+/// between them (`over` and `under` of a bend; expansion along one axis, growth along one
+/// direction, one squareness) fail together: when one of them cannot be relied upon, the `reaction`
+/// applies to all of them, and they return to use together.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TemperatureConfig {
+    /// The module that it is wired to.
+    #[schemars(extend("x-range" = "an `[analog.NAME]` on CAN"))]
+    pub analog: String,
+    /// The input.
+    #[schemars(extend("x-range" = "of its `temperature_channels`"))]
+    pub channel: u8,
+    /// The lowest that can be, and that the coefficients are known for.
+    #[schemars(range(min = -273.15, max = 1000.0), extend("x-range" = "below `high_c`"))]
+    pub low_c: f64,
+    /// The highest.
+    #[schemars(range(min = -273.15, max = 1000.0))]
+    pub high_c: f64,
+    /// How fast it can change; more is not believed.
+    #[schemars(range(min = 1e-06, max = 10000.0))]
+    pub rate_max_k_per_min: f64,
+    /// How far apart two samples of one temperature can be; more is not believed.
+    #[schemars(range(min = 1e-06, max = 1000.0))]
+    pub noise_max_k: f64,
+    /// An older sample says nothing about now.
+    #[schemars(extend("x-range" = "at least two sampling periods"))]
+    pub age_max_ms: f64,
+    /// So many equal samples in a row, and it is stuck; with noise of a third of a step, 1000.
+    #[schemars(range(min = 10, max = 1000000))]
+    pub stuck_samples: Option<NonZeroU32>,
+    /// Of a change since the calibration; an offset that the sensor keeps does not matter.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub standard_uncertainty_k: f64,
+    /// Expansion of the x, y and z scale; negative where the workpiece expands. `calibrate` with
+    /// warm lines finds it anew and its value is used instead, for an axis by the mean of those
+    /// thermometers where this is not 0; it finds none for an axis where all are 0.
+    #[serde(default)]
+    #[schemars(extend("x-magnitude" = [0.0, 1000]))]
+    pub expansion_ppm_per_k: [f64; 3],
+    /// Displacement of the tool.
+    #[serde(default)]
+    #[schemars(extend("x-magnitude" = [0.0, 1e4]))]
+    pub growth_um_per_k: [f64; 3],
+    /// Change of the squareness y to x, z to x, z to y.
+    #[serde(default)]
+    #[schemars(extend("x-magnitude" = [0.0, 1e4]))]
+    pub squareness_arcsec_per_k: [f64; 3],
+}
