@@ -168,7 +168,7 @@ pub(crate) fn node_settings(
     heartbeat_ms: (u16, u16, u16),
     patience: Patience,
 ) -> NodeSettings {
-    let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
+    let sync_period = bus.sync_period();
     let (producer, consumer, watch_master) = heartbeat_ms;
     let usual = NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period);
     NodeSettings {

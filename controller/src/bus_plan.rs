@@ -24,8 +24,7 @@ const LATCH_PDO_BYTES: u8 = 8;
 pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError> {
     let bus = &config.can[name];
     let ms = |ms: u16| Duration::from_millis(ms.into());
-    let sync_period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
-    let mut plan = BusPlan::new(bus.bitrate_bit_per_s, sync_period)
+    let mut plan = BusPlan::new(bus.bitrate_bit_per_s, bus.sync_period())
         .with_heartbeat(ms(bus.master_heartbeat_ms));
     let axes = config.axis.values();
     let axes = axes.filter_map(|axis| Some((axis.can()?, axis.cyclic().is_some())));

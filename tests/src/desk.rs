@@ -37,7 +37,7 @@ impl<D: Device> Desk<D> {
         let port = assemble::ports(config)[name];
         let mut transport = emulator.transport();
         let heartbeat = config.can.get(name).map(|bus| {
-            let sync = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
+            let sync = bus.sync_period();
             let started = transport.set_sync(port, Some(sync));
             started.unwrap_or_else(|error| panic!("{error}"));
             let node = NodeId::new(bus.master_node_id).expect("the configuration was checked");

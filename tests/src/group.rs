@@ -64,7 +64,7 @@ impl Group {
         let members = members.collect();
         let mut sync_period = None;
         let heartbeats = config.can.iter().map(|(name, bus)| {
-            let period = Duration::from_secs_f64(bus.sync_period_ms * 1e-3);
+            let period = bus.sync_period();
             sync_period = Some(period);
             let started = transport.set_sync(ports[name], Some(period));
             started.unwrap_or_else(|error| panic!("{error}"));

@@ -61,7 +61,7 @@ fn bus(
         name: name.clone(),
         port: ports[name],
         bitrate: can.bitrate_bit_per_s,
-        sync_period: sync_period(can),
+        sync_period: can.sync_period(),
         master: node_id(can.master_node_id),
         heartbeat: Duration::from_millis(can.master_heartbeat_ms.into()),
         drives: drives.map(|it| it.node).collect(),
@@ -102,10 +102,6 @@ fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
     axes.chain(rotaries).chain(analogs).collect()
 }
 
-fn sync_period(can: &CanBus) -> Duration {
-    Duration::from_secs_f64(can.sync_period_ms * 1e-3)
-}
-
 fn axis_settings(axis: &AxisConfig, config: &MachineConfig) -> AxisSettings {
     AxisSettings {
         soft_min: Metres::from_mm(axis.soft_min_mm),
@@ -125,6 +121,6 @@ fn cyclic(axis: &AxisConfig, config: &MachineConfig) -> Option<CyclicSettings> {
     Some(CyclicSettings {
         limits,
         correction,
-        period: sync_period(&config.can[&can.bus]),
+        period: config.can[&can.bus].sync_period(),
     })
 }

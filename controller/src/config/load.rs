@@ -1,14 +1,13 @@
 //! Reading a configuration file: syntax, structure, then sense.
 
-use core::ops::Range;
 use std::path::Path;
-use toml::de::{DeTable, DeValue};
 
 use machine::records::ConfigHash;
 
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::model::MachineConfig;
+use super::place::span_of;
 use super::schema;
 use super::structure::{self, Part};
 use super::validate::{Finding, validate};
@@ -52,7 +51,7 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     let document: toml::Table = toml::from_str(text).map_err(|error| syntax(text, file, &error))?;
-    let mut findings = structure::judge(&document, &schema::inline());
+    let mut findings = structure::judge(&document, schema::inline());
     let is_readable = findings.iter().all(|(_, part)| *part == Part::Size);
     let config: MachineConfig = match toml::from_str(text) {
         Ok(config) if is_readable => config,
@@ -60,9 +59,10 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
         Err(error) if findings.is_empty() => return Err(syntax(text, file, &error)),
         Ok(_) | Err(_) => return Err(invalid(text, file, findings)),
     };
+    let impossible: Vec<_> = findings.iter().map(|(it, _)| it.key.clone()).collect();
     for finding in validate(&config) {
-        // What is impossible by itself is told once.
-        if findings.iter().all(|(it, _)| it.key != finding.key) {
+        // What is impossible by itself is told once, and not again of the section around it.
+        if !impossible.iter().any(|key| is_within(key, &finding.key)) {
             findings.push((finding, Part::Value));
         }
     }
@@ -74,6 +74,12 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
         config,
         patience: Patience::NONE,
     })
+}
+
+/// Whether `key` is `section` or stands in it.
+fn is_within(key: &str, section: &str) -> bool {
+    let rest = key.strip_prefix(section);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
 fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
@@ -94,41 +100,6 @@ fn invalid(text: &str, file: &str, findings: Vec<(Finding, Part)>) -> ConfigErro
     let mut findings: Vec<_> = placed.collect();
     findings.sort_by_key(|it| (it.line, it.column));
     ConfigError::Invalid { findings }
-}
-
-/// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it
-/// is absent.
-fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>> {
-    let document = DeTable::parse(text).ok()?;
-    let mut table = document.get_ref();
-    let mut span = None;
-    let mut parts = key.split('.').peekable();
-    while let Some(own) = parts.next() {
-        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
-            break;
-        };
-        span = Some(match value.get_ref() {
-            DeValue::Table(_) => name.span(),
-            _ if part == Part::Name => name.span(),
-            _ => value.span(),
-        });
-        match value.get_ref() {
-            DeValue::Table(inner) => table = inner,
-            DeValue::Array(items) => {
-                let at = parts.next().and_then(|it| it.parse::<usize>().ok());
-                let Some(item) = at.and_then(|at| items.get(at)) else {
-                    break;
-                };
-                span = Some(item.span());
-                match item.get_ref() {
-                    DeValue::Table(inner) => table = inner,
-                    _ => break,
-                }
-            }
-            _ => break,
-        }
-    }
-    span
 }
 
 #[cfg(test)]

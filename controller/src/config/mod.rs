@@ -9,10 +9,13 @@ mod camera;
 mod dependence;
 mod diagnostic;
 mod drive;
+#[cfg(test)]
+mod impossible_tests;
 mod instrument;
 pub(crate) mod judge;
 mod load;
 mod model;
+mod place;
 pub mod reference;
 pub mod schema;
 mod structure;

@@ -1,5 +1,6 @@
 //! The configuration file's structure, version 1. Each key's suffix is its unit.
 
+use core::time::Duration;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -112,4 +113,11 @@ pub struct SerialLine {
     /// Baud rate.
     #[schemars(range(min = 50, max = 4000000))]
     pub baud_bit_per_s: u32,
+}
+
+impl CanBus {
+    /// The SYNC period; nothing for one that is no span of time, which the judgement of the file tells.
+    pub fn sync_period(&self) -> Duration {
+        Duration::try_from_secs_f64(self.sync_period_ms * 1e-3).unwrap_or_default()
+    }
 }

@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use serde_json::Value;
 use units::Short;
 
-use super::schema;
+use super::schema::{self, DEVICE, type_of, without_null};
 
 /// Every section with its keys, as Markdown.
 pub fn markdown() -> String {
@@ -33,9 +33,7 @@ struct Row {
 impl<'a> Reference<'a> {
     /// What a part of the schema refers to.
     fn resolved(&self, part: &'a Value) -> &'a Value {
-        let choices = part["anyOf"].as_array();
-        let real = choices.and_then(|it| it.iter().find(|it| it["type"] != "null"));
-        let part = real.unwrap_or(part);
+        let part = without_null(part);
         let name = part["$ref"]
             .as_str()
             .and_then(|it| it.strip_prefix("#/$defs/"));
@@ -182,12 +180,12 @@ impl<'a> Reference<'a> {
 /// What a section is for each device, where it is about one.
 fn variants(section: &Value) -> impl Iterator<Item = &Value> {
     let choices = section["oneOf"].as_array().into_iter().flatten();
-    choices.filter(|it| it["properties"]["device"].is_object())
+    choices.filter(|it| it["properties"][DEVICE].is_object())
 }
 
 /// What `device` calls it.
 fn word(variant: &Value) -> &str {
-    let word = &variant["properties"]["device"]["const"];
+    let word = &variant["properties"][DEVICE]["const"];
     word.as_str().unwrap_or_default()
 }
 
@@ -222,14 +220,6 @@ fn ordered(section: &Value) -> Vec<String> {
 fn is_required(section: &Value, key: &str) -> bool {
     let required = section["required"].as_array();
     required.is_some_and(|it| it.iter().any(|it| it == key))
-}
-
-fn type_of(part: &Value) -> &str {
-    let one = match &part["type"] {
-        Value::Array(types) => types.iter().find(|it| *it != "null"),
-        one => Some(one),
-    };
-    one.and_then(Value::as_str).unwrap_or("object")
 }
 
 /// The words that a value is one of, and what each means.

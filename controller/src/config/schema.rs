@@ -11,14 +11,20 @@
 //! | `x-above` | the value is greater than this |
 //! | `x-range` | what else holds, in words; judged by code |
 
+use std::sync::LazyLock;
+
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
 use super::model::MachineConfig;
 
-/// The schema, each part where it is used.
-pub(super) fn inline() -> Value {
-    settings_of(true)
+/// The key that says which device a section is about.
+pub(super) const DEVICE: &str = "device";
+
+/// The schema, each part where it is used; made once, because a program may read many files.
+pub(super) fn inline() -> &'static Value {
+    static INLINE: LazyLock<Value> = LazyLock::new(|| settings_of(true));
+    &INLINE
 }
 
 /// The schema as editors take it, each part once.
@@ -32,4 +38,20 @@ fn settings_of(inline: bool) -> Value {
         .into_generator()
         .into_root_schema_for::<MachineConfig>();
     schema.to_value()
+}
+
+/// What may be left out is, where it is there, what it is otherwise.
+pub(super) fn without_null(part: &Value) -> &Value {
+    let choices = part["anyOf"].as_array();
+    let real = choices.and_then(|it| it.iter().find(|it| it["type"] != "null"));
+    real.unwrap_or(part)
+}
+
+/// The type of what may be left out, too.
+pub(super) fn type_of(part: &Value) -> &str {
+    let one = match &part["type"] {
+        Value::Array(types) => types.iter().find(|it| *it != "null"),
+        one => Some(one),
+    };
+    one.and_then(Value::as_str).unwrap_or("object")
 }

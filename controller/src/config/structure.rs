@@ -7,6 +7,7 @@ use toml::{Table, Value};
 use units::Short;
 
 use super::judge::Finding;
+use super::schema::{DEVICE, type_of, without_null};
 
 /// What is wrong with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +58,7 @@ fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
         return name(path, value, &names, findings);
     }
     let seen = kind(value);
-    match (expected(schema), value) {
+    match (type_of(schema), value) {
         ("object", Value::Table(inner)) => table(path, inner, schema, findings),
         ("array", Value::Array(items)) => array(path, items, schema, findings),
         ("number", Value::Float(it)) => number(path, *it, schema, findings),
@@ -69,21 +70,6 @@ fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
             say(findings, path, cause, correction(expected, value));
         }
     }
-}
-
-/// What may be left out is, where it is there, what it is otherwise.
-fn without_null(schema: &Schema) -> &Schema {
-    let choices = schema["anyOf"].as_array();
-    let real = choices.and_then(|it| it.iter().find(|it| it["type"] != "null"));
-    real.unwrap_or(schema)
-}
-
-fn expected(schema: &Schema) -> &str {
-    let one = match &schema["type"] {
-        Schema::Array(types) => types.iter().find(|it| *it != "null"),
-        one => Some(one),
-    };
-    one.and_then(Schema::as_str).unwrap_or("object")
 }
 
 fn in_words(expected: &str) -> &'static str {
@@ -220,11 +206,8 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The key that says which device a section is about.
-const DEVICE: &str = "device";
-
 fn missing(path: &str, key: &str, schema: &Schema, findings: &mut Findings) {
-    let what = match expected(without_null(schema)) {
+    let what = match type_of(without_null(schema)) {
         "object" if names(schema).is_none() => format!("the section `{}`", below(path, key)),
         _ => format!("`{key}`"),
     };
@@ -259,8 +242,20 @@ fn array(path: &str, items: &[Value], schema: &Schema, findings: &mut Findings) 
             Value::Table(_) => below(path, &at.to_string()),
             _ => path.to_owned(),
         };
+        let found = findings.len();
         any(&own, item, &schema["items"], findings);
-        above(&own, item, schema, findings);
+        // Our own words stand at the list; they hold for each number of it.
+        if let (Some(seen), true) = (figure(item), findings.len() == found) {
+            number(&own, seen, schema, findings);
+        }
+    }
+}
+
+fn figure(value: &Value) -> Option<f64> {
+    match value {
+        Value::Float(it) => Some(*it),
+        Value::Integer(it) => Some(*it as f64),
+        _ => None,
     }
 }
 
@@ -276,7 +271,7 @@ fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
     };
     // A comparison with NaN, which TOML can write, is false.
     let is_within = low.is_none_or(|it| value >= it) && high.is_none_or(|it| value <= it);
-    let is_whole = expected(schema) != "integer" || seen.fract() == 0.0;
+    let is_whole = type_of(schema) != "integer" || seen.fract() == 0.0;
     if !(is_within && is_whole && seen.is_finite()) {
         let help = match (low, high) {
             (Some(low), Some(high)) => format!("give {} to {}", Short(low), Short(high)),
@@ -287,21 +282,7 @@ fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
         say_size(findings, path, seen, help);
         return;
     }
-    above(path, &Value::Float(seen), schema, findings);
-}
-
-/// What must be more than something.
-fn above(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
-    let Some(limit) = schema["x-above"].as_f64() else {
-        return;
-    };
-    let seen = match value {
-        Value::Float(it) => *it,
-        Value::Integer(it) => *it as f64,
-        _ => return,
-    };
-    let is_above = seen > limit;
-    if !is_above {
+    if let Some(limit) = schema["x-above"].as_f64().filter(|it| seen <= *it) {
         let help = format!("give more than {}", Short(limit));
         say_size(findings, path, seen, help);
     }

@@ -264,7 +264,7 @@ impl AlignmentPlatform<'_> {
     fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
         let drive = self.core.config.axis[axis].can();
         let bus = drive.and_then(|it| self.core.config.can.get(&it.bus));
-        Ok(bus.map(|bus| Duration::from_secs_f64(bus.sync_period_ms * 1e-3)))
+        Ok(bus.map(|bus| bus.sync_period()))
     }
 
     fn start_skew(&self, moving: &[(String, usize)]) -> Result<Option<Duration>, Failure> {

@@ -2,15 +2,22 @@
 
 use std::path::Path;
 
-use truestage::store::{CalibrationRecord, Content};
+use truestage::store::{CalibrationRecord, Content, Store};
 use truestage::{Failure, store_of_journal};
 
 /// The calibrations of a kind that were made from the journal at `path`.
 pub(crate) fn made_from<C: Content>(
     path: &Path,
 ) -> Result<Vec<(String, CalibrationRecord<C>)>, Failure> {
-    Ok(match (store_of_journal(path), path.file_name()) {
-        (Some(store), Some(name)) => store.made_from(&name.to_string_lossy())?,
-        _ => Vec::new(),
+    Ok(match source(path) {
+        Some((store, name)) => store.made_from(&name)?,
+        None => Vec::new(),
     })
+}
+
+/// The store that the journal at `path` lies in, and what calibrations call the journal; `None` when it
+/// lies elsewhere.
+pub(crate) fn source(path: &Path) -> Option<(Store, String)> {
+    let name = path.file_name()?.to_string_lossy().into_owned();
+    Some((store_of_journal(path)?, name))
 }

@@ -3,7 +3,7 @@
 use super::line_speed;
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::config::validate::drive::{check_axis_name, check_heartbeat, check_watch};
+use crate::config::validate::drive::{check_axis_name, check_node};
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
 
 pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -153,15 +153,14 @@ fn check_verify(
 }
 
 fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
-    judge.known("bus", &rotary.bus, &config.can, "CAN bus");
     let speed_max = rotary.speed_max_deg_per_s;
     judge.within("speed_deg_per_s", rotary.speed_deg_per_s, 0.0, speed_max);
-    check_heartbeat(
-        judge,
+    let heartbeats = [
         rotary.heartbeat_producer_ms,
         rotary.heartbeat_consumer_ms,
-    );
-    check_watch(judge, config, &rotary.bus, rotary.watch_master_ms);
+        rotary.watch_master_ms,
+    ];
+    check_node(judge, config, &rotary.bus, heartbeats);
 }
 
 /// What the drive's 32 bits can hold.

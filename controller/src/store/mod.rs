@@ -4,6 +4,8 @@
 mod golden_tests;
 #[cfg(test)]
 pub(crate) mod record_tests;
+#[cfg(test)]
+pub(crate) mod test_run;
 
 pub use machine::records::{
     ActivePointer, AnyLog, CalibrationRecord, ClosureEntry, ConfigHash, Content, ContentKind,

@@ -99,7 +99,8 @@ impl Store {
                 seen: tag.kind,
             });
         }
-        let record: CalibrationRecord<C> = parse_versioned(&path, &bytes)?;
+        let record: CalibrationRecord<C> =
+            serde_json::from_slice(&bytes).map_err(format_error(&path))?;
         record.judge().map_err(unsound(&path, None))?;
         Ok(record)
     }

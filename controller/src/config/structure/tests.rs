@@ -3,6 +3,7 @@ use crate::config::{ConfigError, Diagnostic, parse};
 
 const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
 const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
+const VOLUMETRIC: &str = include_str!("../../../../configs/machines/volumetric.toml");
 
 fn findings(text: &str) -> Vec<Diagnostic> {
     match parse(text, "m.toml") {
@@ -138,4 +139,26 @@ fn a_section_that_is_missing_is_named() {
         found[0].cause.contains("the section `platform.zero`"),
         "{found:#?}"
     );
+}
+
+#[test]
+fn each_number_of_a_list_is_judged() {
+    let from = "mm_per_v = [0.1, 0.1]";
+    let key = "volumetric.roll.mm_per_v";
+    let says = ["0 is impossible", "0.000000001 to 1000"];
+    check(VOLUMETRIC, from, "mm_per_v = [0.1, 0.0]", key, says);
+    let from = "expansion_ppm_per_k = [5.0,";
+    let key = "volumetric.temperature.0.expansion_ppm_per_k";
+    for (to, says) in [
+        ("1500.0", ["1500 is impossible", "0 to 1000"]),
+        ("-1500.0", ["-1500 is impossible", "0 to 1000"]),
+        ("nan", ["NaN is impossible", "give a number"]),
+    ] {
+        let to = format!("expansion_ppm_per_k = [{to},");
+        check(VOLUMETRIC, from, &to, key, says);
+    }
+    let to = "gain = [1.0, 1.0, 0.0, 1.0]\nlayout = ";
+    let says = ["0 is impossible", "more than 0"];
+    let key = "volumetric.beam.x.slider.gain";
+    check(VOLUMETRIC, "layout = ", to, key, says);
 }

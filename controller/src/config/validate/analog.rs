@@ -1,6 +1,6 @@
 //! Whether an analog module makes sense, and its device has what it needs and nothing else.
 
-use super::drive::{check_heartbeat, check_watch};
+use super::drive;
 use crate::assemble;
 use crate::config::judge::Judge;
 use crate::config::{
@@ -36,15 +36,13 @@ pub(super) fn check_analog(judge: &mut Judge<'_>, config: &MachineConfig, analog
     }
 }
 
-/// What every module on CAN needs.
 fn check_node(judge: &mut Judge<'_>, config: &MachineConfig, node: &NodeConfig) {
-    judge.known("bus", &node.bus, &config.can, "CAN bus");
-    check_heartbeat(
-        judge,
+    let heartbeats = [
         node.heartbeat_producer_ms,
         node.heartbeat_consumer_ms,
-    );
-    check_watch(judge, config, &node.bus, node.watch_master_ms);
+        node.watch_master_ms,
+    ];
+    drive::check_node(judge, config, &node.bus, heartbeats);
 }
 
 fn check_cia401(

@@ -1,13 +1,12 @@
 //! Whether an axis makes sense, and its device has what it needs and nothing else.
 
-use core::time::Duration;
 use std::collections::BTreeMap;
 
 use drivers::device::cia402::{interpolation_period, period_from};
 
 use units::Short;
 
-use super::drive::{check_heartbeat, check_watch};
+use super::drive::check_node;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, Cia402AxisConfig, CopleyAxisConfig, DriveConfig, MachineConfig};
 
@@ -105,10 +104,9 @@ fn check_cyclic(judge: &mut Judge<'_>, drive: &Cia402AxisConfig) {
 /// Every drive is told the SYNC period as so many units of a power of ten.
 fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402AxisConfig) {
     let bus = config.can.get(&drive.bus);
-    let Some(period_ms) = bus.map(|it| it.sync_period_ms) else {
+    let Some((period_ms, period)) = bus.map(|it| (it.sync_period_ms, it.sync_period())) else {
         return;
     };
-    let period = Duration::try_from_secs_f64(period_ms * 1e-3).unwrap_or_default();
     if interpolation_period(period).is_some() {
         return;
     }
@@ -134,13 +132,12 @@ fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402Axi
         check_cyclic(judge, drive);
         check_period(judge, config, drive);
     }
-    judge.known("bus", &drive.bus, &config.can, "CAN bus");
-    check_heartbeat(
-        judge,
+    let heartbeats = [
         drive.heartbeat_producer_ms,
         drive.heartbeat_consumer_ms,
-    );
-    check_watch(judge, config, &drive.bus, drive.watch_master_ms);
+        drive.watch_master_ms,
+    ];
+    check_node(judge, config, &drive.bus, heartbeats);
 }
 
 fn check_copley(

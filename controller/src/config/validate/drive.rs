@@ -15,7 +15,19 @@ pub(crate) fn check_axis_name(findings: &mut Vec<Finding>, section: &str, name: 
     }
 }
 
-pub(crate) fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u16) {
+/// What every node on CAN needs; its producer's, its consumer's and the master's heartbeat in ms.
+pub(crate) fn check_node(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    bus: &str,
+    [producer, consumer, watch_master]: [u16; 3],
+) {
+    judge.known("bus", bus, &config.can, "CAN bus");
+    check_heartbeat(judge, producer, consumer);
+    check_watch(judge, config, bus, watch_master);
+}
+
+fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u16) {
     if consumer < producer.saturating_mul(2) {
         judge.say(
             "heartbeat_consumer_ms",
@@ -25,12 +37,7 @@ pub(crate) fn check_heartbeat(judge: &mut Judge<'_>, producer: u16, consumer: u1
     }
 }
 
-pub(crate) fn check_watch(
-    judge: &mut Judge<'_>,
-    config: &MachineConfig,
-    bus: &str,
-    watch_master_ms: u16,
-) {
+fn check_watch(judge: &mut Judge<'_>, config: &MachineConfig, bus: &str, watch_master_ms: u16) {
     let Some(bus) = config.can.get(bus) else {
         return;
     };

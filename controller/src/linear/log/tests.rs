@@ -1,30 +1,7 @@
 use super::*;
-use crate::store::{
-    ConfigHash, EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, SCHEMA_VERSION,
-    read_journal,
-};
+use crate::store::test_run::{hash, header};
+use crate::store::{EnvironmentRecord, Journal, read_journal};
 use std::fs;
-
-fn hash() -> ConfigHash {
-    ConfigHash::recorded("h")
-}
-
-fn header() -> JournalHeader {
-    JournalHeader {
-        schema_version: SCHEMA_VERSION,
-        verb: "calibrate".into(),
-        machine: "m".into(),
-        stage_serial: "A".into(),
-        config_hash: "h".into(),
-        axis: "x".into(),
-        drive: IdentityRecord::default(),
-        instrument: InstrumentRecord::default(),
-        started: "2026-01-01T00:00:00Z".into(),
-        calibration: None,
-        targets_m: vec![0.0, 0.003],
-        runs: 3,
-    }
-}
 
 fn point(run: u32) -> LinearEntry {
     LinearEntry::Point(PointEntry {

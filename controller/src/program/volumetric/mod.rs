@@ -8,13 +8,14 @@ pub(crate) mod verbs;
 
 use std::path::Path;
 
+use truestage::Failure;
 use truestage::store::{Log, read_journal};
 use truestage::volumetric::report::Made;
 use truestage::volumetric::{
     BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog,
 };
-use truestage::{Failure, store_of_journal};
 
+use super::made_from::source;
 use super::show::Shown;
 use super::verbs::Verbs;
 
@@ -44,8 +45,8 @@ fn html(path: &Path) -> Result<String, Failure> {
 
 /// What was made from the journal at `path`.
 fn made_from(path: &Path) -> Result<Made, Failure> {
-    Ok(match (store_of_journal(path), path.file_name()) {
-        (Some(store), Some(name)) => Made::of(&store, &name.to_string_lossy())?,
-        _ => Made::default(),
+    Ok(match source(path) {
+        Some((store, name)) => Made::of(&store, &name)?,
+        None => Made::default(),
     })
 }

@@ -1,28 +1,6 @@
 use super::*;
-use crate::store::{
-    ConfigHash, IdentityRecord, InstrumentRecord, Journal, SCHEMA_VERSION, read_journal,
-};
-
-fn hash() -> ConfigHash {
-    ConfigHash::recorded("h")
-}
-
-fn header() -> JournalHeader {
-    JournalHeader {
-        schema_version: SCHEMA_VERSION,
-        verb: "calibrate".into(),
-        machine: "m".into(),
-        stage_serial: "A".into(),
-        config_hash: "h".into(),
-        axis: "x".into(),
-        drive: IdentityRecord::default(),
-        instrument: InstrumentRecord::default(),
-        started: "2026-01-01T00:00:00Z".into(),
-        calibration: None,
-        targets_m: vec![0.0, 0.003],
-        runs: 3,
-    }
-}
+use crate::store::test_run::{hash, header};
+use crate::store::{Journal, read_journal};
 
 #[test]
 fn of_a_plate_whole_placements_are_kept_that_lay_where_they_should() {

@@ -1,0 +1,41 @@
+//! Where a key stands in the file.
+
+use core::ops::Range;
+use toml::de::{DeTable, DeValue};
+
+use super::structure::Part;
+
+/// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it
+/// is absent.
+pub(super) fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>> {
+    let document = DeTable::parse(text).ok()?;
+    let mut table = document.get_ref();
+    let mut span = None;
+    let mut parts = key.split('.');
+    while let Some(own) = parts.next() {
+        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
+            break;
+        };
+        span = Some(match value.get_ref() {
+            DeValue::Table(_) => name.span(),
+            _ if part == Part::Name => name.span(),
+            _ => value.span(),
+        });
+        match value.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            DeValue::Array(items) => {
+                let at = parts.next().and_then(|it| it.parse::<usize>().ok());
+                let Some(item) = at.and_then(|at| items.get(at)) else {
+                    break;
+                };
+                span = Some(item.span());
+                match item.get_ref() {
+                    DeValue::Table(inner) => table = inner,
+                    _ => break,
+                }
+            }
+            _ => break,
+        }
+    }
+    span
+}

@@ -1,0 +1,24 @@
+//! A run that the journals of all kinds are tried with.
+
+use super::{ConfigHash, IdentityRecord, InstrumentRecord, JournalHeader, SCHEMA_VERSION};
+
+pub(crate) fn hash() -> ConfigHash {
+    ConfigHash::recorded("h")
+}
+
+pub(crate) fn header() -> JournalHeader {
+    JournalHeader {
+        schema_version: SCHEMA_VERSION,
+        verb: "calibrate".into(),
+        machine: "m".into(),
+        stage_serial: "A".into(),
+        config_hash: "h".into(),
+        axis: "x".into(),
+        drive: IdentityRecord::default(),
+        instrument: InstrumentRecord::default(),
+        started: "2026-01-01T00:00:00Z".into(),
+        calibration: None,
+        targets_m: vec![0.0, 0.003],
+        runs: 3,
+    }
+}
