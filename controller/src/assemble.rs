@@ -3,7 +3,6 @@
 //! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
 //! which do not know each other, meet. A further kind of device is one arm of a `match`.
 
-mod cia404;
 mod copley;
 mod cyclic;
 mod parts;
@@ -12,48 +11,31 @@ mod patience;
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-pub use cia404::cia404_settings;
-pub(crate) use cia404::voltage_digits;
 pub use copley::copley_settings;
 pub(crate) use parts::parts;
 pub(crate) use patience::patient_drive;
 pub(crate) use patience::patient_search;
-use patience::{patient_node, patient_pdos};
 
-use compensator::hall_zero;
-use compensator::length_correction::{
-    self, Cosine, DeadPath, EnvironmentUncertainty, MaterialExpansion,
-};
-use drivers::device::canopen_node::{ExpectedIdentity, NodeSettings};
-use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
+use compensator::{hall_zero, length_correction};
 use drivers::device::cia402::{
     Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes,
 };
-use drivers::device::cia404::Cia404Analog;
 use drivers::device::copley::CopleyAxis;
-use drivers::device::dcon::{Dcon, DconSettings, InputRange};
-use drivers::device::umd2::{Direction, Umd2, Umd2Settings};
-use drivers::device::{AnalogInput, Axis, DisplacementInstrument, Environment};
+use drivers::device::{Axis, Environment};
 use machine::{Patience, Unit};
 use units::{
-    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, Radians, RelativeHumidity,
-    Scale, Volts,
+    Celsius, Metres, MetresPerSecond, MetresPerSecondSquared, Pascals, RelativeHumidity, Scale,
+    Volts,
 };
 use wire::Port;
-use wire::canopen::NodeId;
 
 use crate::config::{
-    AnalogConfig, AxisConfig, CanBus, Cia402AxisConfig, DconConfig, DriveConfig, HomeOffsetName,
-    IdentityConfig, InstrumentConfig, InstrumentDevice, MachineConfig, ModuleConfig, NodeConfig,
+    AxisConfig, CanBus, Cia402AxisConfig, DriveConfig, HomeOffsetName, MachineConfig,
     OptionCodesConfig,
 };
+use crate::hardware::node::node_settings;
+use crate::hardware::{CHECKED, millis};
 use crate::linear::ZeroConfig;
-
-/// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
-const CO2_UMOL_PER_MOL: f64 = 450.0;
-/// Relative standard uncertainty of a stabilised HeNe laser's wavelength.
-const WAVELENGTH_U: f64 = 2e-8;
-pub(crate) const CHECKED: &str = "the configuration was checked when it was loaded";
 
 /// Port numbers by name: CAN buses first, then serial lines, each in the order of names.
 pub fn ports(config: &MachineConfig) -> BTreeMap<String, Port> {
@@ -96,100 +78,6 @@ pub fn axis_device(axis: &AxisConfig, config: &MachineConfig, patience: Patience
             let settings = copley_settings(axis, drive, &config.serial[&drive.line], patience);
             Box::new(CopleyAxis::new(settings))
         }
-    }
-}
-
-pub(crate) fn analogs(
-    config: &MachineConfig,
-    ports: &BTreeMap<String, Port>,
-    patience: Patience,
-) -> Vec<Unit<dyn AnalogInput>> {
-    config
-        .analog
-        .iter()
-        .map(|(name, analog)| {
-            let device: Box<dyn AnalogInput> = match &analog.module {
-                ModuleConfig::Cia401(node) => {
-                    let bus = &config.can[&node.bus];
-                    let settings = cia401_settings(analog, node, bus, patience);
-                    Box::new(Cia401Analog::new(settings))
-                }
-                ModuleConfig::Cia404(module) => {
-                    let bus = &config.can[&module.node.bus];
-                    let settings = cia404_settings(analog, module, bus, patience);
-                    Box::new(Cia404Analog::new(settings))
-                }
-                ModuleConfig::Dcon(module) => {
-                    Box::new(Dcon::new(dcon_settings(analog, module, patience)))
-                }
-            };
-            Unit {
-                name: name.clone(),
-                port: ports[analog.port()],
-                device,
-            }
-        })
-        .collect()
-}
-
-pub(crate) fn instruments(
-    config: &MachineConfig,
-    ports: &BTreeMap<String, Port>,
-    patience: Patience,
-) -> Vec<Unit<dyn DisplacementInstrument>> {
-    config
-        .instrument
-        .iter()
-        .map(|(name, instrument)| {
-            let device: Box<dyn DisplacementInstrument> = match instrument.device {
-                InstrumentDevice::Umd2 => Box::new(Umd2::new(umd2_settings(instrument, patience))),
-            };
-            Unit {
-                name: name.clone(),
-                port: ports[&instrument.line],
-                device,
-            }
-        })
-        .collect()
-}
-
-fn node_id(raw: u8) -> NodeId {
-    NodeId::new(raw).expect(CHECKED)
-}
-
-pub(crate) const fn millis(ms: u16) -> Duration {
-    Duration::from_millis(ms as u64)
-}
-
-pub(crate) fn node_settings(
-    node: u8,
-    bus: &CanBus,
-    identity: &IdentityConfig,
-    heartbeat_ms: (u16, u16, u16),
-    patience: Patience,
-) -> NodeSettings {
-    let sync_period = bus.sync_period();
-    let (producer, consumer, watch_master) = heartbeat_ms;
-    let usual = NodeSettings::new(node_id(node), node_id(bus.master_node_id), sync_period);
-    NodeSettings {
-        expected: expected_identity(identity),
-        heartbeat_period: millis(producer),
-        consumer_time: patience.of(millis(consumer)),
-        // 0x1016 has 16 bits of milliseconds.
-        master_consumer_time: patience.of(millis(watch_master)).min(millis(u16::MAX)),
-        missed_pdos_max: patient_pdos(&usual, millis(consumer), patience),
-        timeouts: patient_node(usual.timeouts, patience),
-        ..usual
-    }
-}
-
-fn expected_identity(identity: &IdentityConfig) -> ExpectedIdentity {
-    ExpectedIdentity {
-        device_type: Some(identity.device_type),
-        vendor: Some(identity.vendor_id),
-        product: Some(identity.product_code),
-        revision: identity.revision,
-        serial: identity.serial_number,
     }
 }
 
@@ -263,85 +151,6 @@ pub fn cia402_settings(
     }
 }
 
-/// What every module on CAN is told; the configuration has been checked.
-pub(crate) fn module_settings(node: &NodeConfig, bus: &CanBus, patience: Patience) -> NodeSettings {
-    let heartbeats = (
-        node.heartbeat_producer_ms,
-        node.heartbeat_consumer_ms,
-        node.watch_master_ms,
-    );
-    node_settings(node.node_id, bus, &node.identity, heartbeats, patience)
-}
-
-/// A CiA 401 module, as its driver is told; the configuration has been checked.
-///
-/// # Panics
-/// With more channels than a process data object has.
-pub fn cia401_settings(
-    analog: &AnalogConfig,
-    node: &NodeConfig,
-    bus: &CanBus,
-    patience: Patience,
-) -> Cia401Settings {
-    let common = module_settings(node, bus, patience);
-    let channels: Vec<_> = analog
-        .channels
-        .iter()
-        .zip(&analog.full_scale_v)
-        .map(|(channel, volts)| ChannelSettings {
-            input: channel + 1,
-            full_scale: Volts(*volts),
-        })
-        .collect();
-    Cia401Settings::new(common, &channels).expect(CHECKED)
-}
-
-/// The one input range that all channels of a DCON module have.
-pub(crate) fn dcon_range(full_scale_v: &[f64]) -> Option<InputRange> {
-    let (first, rest) = full_scale_v.split_first()?;
-    let all_same = rest.iter().all(|volts| volts == first);
-    InputRange::ending_at(Volts(*first)).filter(|_| all_same)
-}
-
-/// A DCON module, as its driver is told; the configuration has been checked.
-///
-/// # Panics
-/// When its channels have different ranges.
-pub fn dcon_settings(
-    analog: &AnalogConfig,
-    module: &DconConfig,
-    patience: Patience,
-) -> DconSettings {
-    let (period, address) = (module.poll_period_ms, module.address);
-    let range = dcon_range(&analog.full_scale_v).expect(CHECKED);
-    let usual = DconSettings::new(address, range, analog.channels.clone());
-    DconSettings {
-        checksum: module.checksum,
-        period: Duration::from_secs_f64(period * 1e-3),
-        answer_timeout: patience.of(usual.answer_timeout),
-        stale_after: patience.of(usual.stale_after),
-        ..usual
-    }
-}
-
-/// A µMD interferometer, as its driver is told.
-pub fn umd2_settings(instrument: &InstrumentConfig, patience: Patience) -> Umd2Settings {
-    let usual = Umd2Settings::default();
-    Umd2Settings {
-        optics_factor: instrument.optics_factor,
-        direction: if instrument.reverse {
-            Direction::Reversed
-        } else {
-            Direction::AsCounted
-        },
-        sample_rate_hz: instrument.sample_rate_hz,
-        stream_timeout: patience.of(usual.stream_timeout),
-        start_timeout: patience.of(usual.start_timeout),
-        environment_age_max: patience.of(usual.environment_age_max),
-        ..usual
-    }
-}
-
 /// The search's settings, in a frame whose zero is the nominal zero.
 pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::Settings {
     let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
@@ -363,43 +172,6 @@ pub(crate) fn hall_settings(zero: &ZeroConfig, axis: &AxisConfig) -> hall_zero::
         rail_high: Volts(zero.rail_high_v),
         noise: Volts(zero.noise_mv * 1e-3),
         ..hall_zero::Settings::default()
-    }
-}
-
-/// What an instrument's counter counts.
-pub(crate) fn half_wavelength(instrument: &InstrumentConfig) -> Metres {
-    Umd2Settings::default().vacuum_wavelength / (2.0 * f64::from(instrument.optics_factor))
-}
-
-/// Which corrections an instrument's readings get.
-pub(crate) fn correction_settings(instrument: &InstrumentConfig) -> length_correction::Settings {
-    let material = MaterialExpansion {
-        per_kelvin: instrument.expansion_per_kelvin,
-        u_per_kelvin: instrument.expansion_per_kelvin.abs() * 0.1,
-    };
-    let dead_path = DeadPath {
-        length: Metres::from_mm(instrument.dead_path_mm),
-        u_length: Metres::from_mm(1.0),
-    };
-    let cosine = Cosine {
-        angle: Radians(instrument.misalignment_mrad * 1e-3),
-        u_angle: Radians(0.2e-3),
-    };
-    length_correction::Settings {
-        air: instrument.correct_air,
-        vacuum_wavelength: Umd2Settings::default().vacuum_wavelength,
-        u_relative_wavelength: WAVELENGTH_U,
-        co2_umol_per_mol: CO2_UMOL_PER_MOL,
-        material_expansion: instrument.correct_material.then_some(material),
-        dead_path: (instrument.correct_dead_path && instrument.correct_air).then_some(dead_path),
-        cosine: instrument.correct_cosine.then_some(cosine),
-        u_environment: EnvironmentUncertainty {
-            air_temperature: Celsius(0.1),
-            pressure: Pascals(20.0),
-            humidity: RelativeHumidity(0.03),
-            material_temperature: Celsius(0.1),
-            co2_umol_per_mol: 100.0,
-        },
     }
 }
 

@@ -11,7 +11,7 @@ use compensator::hall_zero::{RefineError, SearchFailure};
 use machine::{EngineFailure, Layered};
 use units::Metres;
 
-use crate::config::ConfigError;
+use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
 use crate::platform::PlatformFailure;
@@ -135,10 +135,9 @@ pub enum Failure {
     },
     /// The interferometer's count slipped.
     #[error(
-        "axis {axis}: run {run}, between {} and {} mm the interferometer jumped by {:.3} µm \
-         against the encoder, {half_wavelengths} half wavelengths: fringes were lost or gained; \
-         keep the beam free and steady, set a new datum and measure again",
-        units::Short(from.mm()), units::Short(to.mm()), jump.um()
+        "axis {axis}: run {run}, between {} and {} mm the instrument jumped by {:.3} µm \
+         against the encoder, {counts} {}: {}; set a new datum and measure again",
+        units::Short(from.mm()), units::Short(to.mm()), jump.um(), of.name, of.slipped
     )]
     FringeJump {
         /// Which axis.
@@ -146,7 +145,9 @@ pub enum Failure {
         /// By how much.
         jump: Metres,
         /// The same, counted.
-        half_wavelengths: i64,
+        counts: i64,
+        /// What its counter counts.
+        of: Count,
         /// In which run it was noticed.
         run: u32,
         /// The target before it.

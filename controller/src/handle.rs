@@ -36,13 +36,14 @@ impl Core<'_> {
     /// What the records say of the instrument `name`.
     pub(crate) fn instrument_record(&self, name: &str) -> InstrumentRecord {
         let config = &self.config.instrument[name];
+        let corrections = config.corrections();
         InstrumentRecord {
             name: name.to_owned(),
             identity: self.identity(name).unwrap_or_default().name,
-            air_corrected: config.correct_air,
-            material_corrected: config.correct_material,
-            dead_path_corrected: config.correct_dead_path,
-            cosine_corrected: config.correct_cosine,
+            air_corrected: corrections.air,
+            material_corrected: corrections.material_expansion.is_some(),
+            dead_path_corrected: corrections.dead_path.is_some(),
+            cosine_corrected: corrections.cosine.is_some(),
             standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
         }
     }

@@ -44,6 +44,7 @@ mod edit;
 pub mod emulated;
 pub mod failure;
 mod handle;
+mod hardware;
 pub mod json;
 pub mod linear;
 pub mod page;

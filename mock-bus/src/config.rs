@@ -1,21 +1,17 @@
 //! What an emulated machine is made of: TOML, every key ending in its unit, unknown keys refused.
 
 mod checks;
+pub(crate) mod error;
 
 use core::time::Duration;
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+pub use error::ConfigError;
 
 use crate::fault::FaultConfig;
-use crate::node::Node;
-use crate::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
-use crate::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
-use crate::node::cia404_analog::{Cia404AnalogConfig, Cia404AnalogNode};
-use crate::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode};
-use crate::node::dcon_module::{DconModuleConfig, DconModuleNode};
-use crate::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
-use crate::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
+pub use crate::node::DeviceConfig;
 use crate::plant::config::PlantConfig;
 
 /// One emulated machine.
@@ -121,107 +117,6 @@ pub struct NodeConfig {
     pub device: DeviceConfig,
 }
 
-/// Which device, and how it is set.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum DeviceConfig {
-    /// CiA 402 servo drive, on a CAN bus.
-    Cia402Drive(Cia402DriveConfig),
-    /// CiA 401 analog inputs, on a CAN bus.
-    Cia401Analog(Cia401AnalogConfig),
-    /// CiA 404 measuring module, on a CAN bus.
-    Cia404Analog(Cia404AnalogConfig),
-    /// µMD2 laser interferometer, on a serial line.
-    Umd2Interferometer(Umd2InterferometerConfig),
-    /// ADAM or I-7000 analog module, on a serial line.
-    DconModule(DconModuleConfig),
-    /// In-Sight vision system, on a serial line.
-    InSightController(InSightControllerConfig),
-    /// Copley Controls servo amplifiers, on one serial line.
-    CopleyAmps(CopleyAmpsConfig),
-}
-
-impl DeviceConfig {
-    /// The device, without power yet.
-    pub(crate) fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
-        match self {
-            Self::Cia402Drive(config) => Box::new(Cia402DriveNode::new(config.clone())),
-            Self::Cia401Analog(config) => Box::new(Cia401AnalogNode::new(config.clone())),
-            Self::Cia404Analog(config) => Box::new(Cia404AnalogNode::new(config.clone())),
-            Self::Umd2Interferometer(config) => Box::new(Umd2InterferometerNode::new(config)),
-            Self::DconModule(config) => Box::new(DconModuleNode::new(config, seed, name)),
-            Self::InSightController(config) => {
-                Box::new(InSightControllerNode::new(config, seed, name))
-            }
-            Self::CopleyAmps(config) => Box::new(CopleyAmpsNode::new(config, seed, name)),
-        }
-    }
-
-    const fn wants_can(&self) -> bool {
-        match self {
-            Self::Cia402Drive(_) | Self::Cia401Analog(_) | Self::Cia404Analog(_) => true,
-            Self::Umd2Interferometer(_)
-            | Self::DconModule(_)
-            | Self::InSightController(_)
-            | Self::CopleyAmps(_) => false,
-        }
-    }
-}
-
-/// Why a configuration is no machine.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// Which file.
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
-    /// The file is not TOML of this form.
-    #[error("{0}")]
-    Syntax(#[from] toml::de::Error),
-    /// Two ports or two nodes have the same name.
-    #[error("the name \"{name}\" is given twice")]
-    NameTwice {
-        /// Which name.
-        name: String,
-    },
-    /// A port is named that is not there.
-    #[error("{user} is on port \"{port}\", which is not among the ports")]
-    NoPort {
-        /// Who names it.
-        user: String,
-        /// What it names.
-        port: String,
-    },
-    /// A node is named that is not there.
-    #[error("a fault names node \"{node}\", which is not among the nodes")]
-    NoNode {
-        /// What it names.
-        node: String,
-    },
-    /// A CAN device on a serial line, or the reverse.
-    #[error("{user} does not fit port \"{port}\": one is CAN, the other serial")]
-    WrongKind {
-        /// Which node or fault.
-        user: String,
-        /// Which port.
-        port: String,
-    },
-    /// A number that cannot be.
-    #[error("{key} = {seen}, expected {expected}")]
-    Value {
-        /// Which key.
-        key: &'static str,
-        /// What it was.
-        seen: f64,
-        /// What it may be.
-        expected: &'static str,
-    },
-}
-
 impl MachineConfig {
     /// From a file.
     ///
@@ -264,7 +159,7 @@ impl MachineConfig {
         unique(self.ports.iter().map(PortConfig::name))?;
         unique(self.nodes.iter().map(|node| node.name.as_str()))?;
         for node in &self.nodes {
-            self.check_port(&node.name, &node.port, node.device.wants_can())?;
+            self.check_port(&node.name, &node.port, node.device.is_on_can())?;
         }
         for fault in &self.faults {
             self.check_fault(fault, |node| self.node(node).is_some())?;

@@ -10,7 +10,6 @@ The caller pins this process to one core; what it starts inherits that.
 """
 
 import contextlib
-import importlib.util
 import json
 import os
 import re
@@ -168,13 +167,6 @@ def judge_sync(case, runs):
     }
 
 
-def scipy_grid():
-    """What scipy takes for a point of the same grids; nothing without scipy."""
-    if importlib.util.find_spec("scipy") is None:
-        return []
-    return run([sys.executable, os.path.join(HERE, "scipy_grid.py")])["cases"]
-
-
 def instructions(program):
     """Instructions per call, as the difference of two runs; nothing without valgrind."""
     if not shutil.which("valgrind"):
@@ -216,7 +208,6 @@ def main(place, programs):
             "table": run([programs["table"], "times"]),
             "rotary": run([programs["rotary"], "times"]),
             "volumetric": run([programs["volumetric"], "times"]),
-            "scipy_grid": scipy_grid(),
             "table_instructions": instructions(programs["table"]),
             "sync": sync(programs["sync"], "pipe", HOST_PERIODS_US),
             "cycle": cycle(programs["cycle"], "pty", [("screws", False), ("screws", True)]),

@@ -16,8 +16,6 @@ OTHER = "(bisected)"
 POINT_GOALS_NS = {
     "model of splines": 80.0,
     "model of splines, inverse": 250.0,
-    "trilinear, 13 x 11 x 9": 45.0,
-    "tricubic, 13 x 11 x 9": 85.0,
 }
 
 
@@ -87,7 +85,7 @@ def show_rotary(rotary):
         line((f"set-point of 3600 lines, {case['interpolation']}: {time}", 0))
 
 
-def show_volumetric(volumetric, scipy):
+def show_volumetric(volumetric):
     print("\nCorrection of a point of three axes: ns per point, median (least)")
     line(("case", 46), ("in a row", 18), ("alone", 0))
     for case in volumetric["cases"]:
@@ -97,12 +95,6 @@ def show_volumetric(volumetric, scipy):
                 (f"{case[key]:.1f} ({case[key + '_min']:.1f})", 18)
                 for key in ("in_a_row_ns", "alone_ns")
             ),
-        )
-    for case in scipy:
-        line(
-            (case["case"], 46),
-            (f"array {case['array_ns']:.0f}", 18),
-            (f"single {case['single_ns']:.0f}", 0),
         )
 
 
@@ -189,7 +181,7 @@ def main(vcan_host, host_file, bus_file=None):
         measured["host"]["table"], measured["host"]["table_instructions"], measured["growth"]
     )
     show_rotary(measured["host"]["rotary"])
-    show_volumetric(measured["host"]["volumetric"], measured["host"]["scipy_grid"])
+    show_volumetric(measured["host"]["volumetric"])
     show_sync("on the host, without CAN", measured["host"]["sync"])
     show_cycle("on a pseudo-terminal", measured["host"]["cycle"])
     show_cycle_cost(measured["host"]["cycle_cost"])

@@ -1,8 +1,7 @@
-//! How long the correction of a point in space takes: model and maps, exact inverse included.
+//! How long the correction of a point in space takes, exact inverse included.
 //!
 //! `volumetric times` prints one JSON object: for each case the nanoseconds per point of three
-//! components, as median and minimum of the repetitions; beside them the interpolators of the
-//! crate `interpn` on the same grids and values, called once for each component.
+//! components, as median and minimum of the repetitions.
 //! `volumetric calls CASE CALLS` does that many calls and nothing else, for who counts
 //! instructions.
 
@@ -11,20 +10,17 @@ use std::time::Instant;
 
 use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::grid::{GridMap, GridShape};
 use compensator::volumetric::model::{
     AxisErrors, Conditions, Machine, Squareness, Thermal, ThermalBend, ThermalChannel,
     VolumetricModel,
 };
 use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point, Volume};
-use interpn::{MultiBsplineRectilinear, MulticubicRectilinear, MultilinearRectilinear};
 use serde_json::{Value, json};
 use tests::random;
 use units::{Celsius, Metres, MetresPerSecond, Radians};
 
 const SPAN_M: [f64; 3] = [0.6, 0.5, 0.4];
-const GRIDS: [[usize; 3]; 2] = [[13, 11, 9], [41, 31, 21]];
 const NODES: usize = 25;
 const REPETITIONS: usize = 25;
 const CALLS: usize = 100_000;
@@ -37,8 +33,7 @@ fn main() {
     match words[..] {
         ["times"] => println!("{}", times()),
         ["calls", name, calls] => {
-            let fields = GRIDS.map(Field::new);
-            let cases = cases(&fields);
+            let cases = cases();
             let case = cases
                 .iter()
                 .find(|it| it.name == name)
@@ -63,10 +58,6 @@ fn volume() -> Volume {
 
 fn point(v: [f64; 3]) -> Point {
     Point::new(Metres(v[0]), Metres(v[1]), Metres(v[2]))
-}
-
-fn array(p: Point) -> [f64; 3] {
-    [p.x.value(), p.y.value(), p.z.value()]
 }
 
 fn targets() -> Vec<Point> {
@@ -154,89 +145,17 @@ fn conditions(model: &VolumetricModel, temperature: f64) -> Conditions {
     model.conditions(tool, &temperatures, &live).unwrap()
 }
 
-/// The same nodes and values for all maps: waves with some noise, at uneven distances.
-struct Field {
-    size: [usize; 3],
-    nodes: [Vec<f64>; 3],
-    components: [Vec<f64>; 3],
-    splines: [Vec<f64>; 3],
-}
+type Run = Box<dyn Fn(&[Point], bool) -> Point>;
 
-impl Field {
-    fn new(size: [usize; 3]) -> Self {
-        let mut state = size[0] as u64;
-        let nodes: [Vec<f64>; 3] = core::array::from_fn(|axis| {
-            let last = size[axis] - 1;
-            let mut uneven = |n: usize| match n {
-                0 => 0.0,
-                n if n == last => SPAN_M[axis],
-                n => SPAN_M[axis] * (n as f64 + 0.3 * random(&mut state)) / last as f64,
-            };
-            (0..size[axis]).map(&mut uneven).collect()
-        });
-        let mut components: [Vec<f64>; 3] = Default::default();
-        for x in &nodes[0] {
-            for y in &nodes[1] {
-                for z in &nodes[2] {
-                    for (k, component) in components.iter_mut().enumerate() {
-                        let wave = (7.0 * x + k as f64).sin() * (5.0 * y).cos() + (6.0 * z).sin();
-                        component.push(1e-5 * wave + 1e-7 * random(&mut state));
-                    }
-                }
-            }
-        }
-        let grids = nodes.each_ref().map(Vec::as_slice);
-        let splines = components.each_ref().map(|values| {
-            let mut coefficients = vec![0.0; values.len()];
-            let mut scratch =
-                vec![0.0; MultiBsplineRectilinear::<f64, 3>::construction_scratch_len(size)];
-            interpn::multibspline::rectilinear::coefficients(
-                &grids,
-                values,
-                &mut coefficients,
-                &mut scratch,
-            )
-            .unwrap();
-            coefficients
-        });
-        Self {
-            size,
-            nodes,
-            components,
-            splines,
-        }
-    }
-
-    fn map(&self, shape: GridShape) -> GridMap {
-        let metres = self
-            .nodes
-            .each_ref()
-            .map(|it| it.iter().copied().map(Metres).collect::<Vec<_>>());
-        let [x, y, z] = &self.components;
-        let deviations: Vec<Point> = (0..x.len())
-            .map(|at| point([x[at], y[at], z[at]]))
-            .collect();
-        let nodes = metres.each_ref().map(Vec::as_slice);
-        GridMap::new(nodes, &deviations, shape, limits()).unwrap()
-    }
-
-    fn named(&self, name: &str) -> String {
-        let [x, y, z] = self.size;
-        format!("{name}, {x} x {y} x {z}")
-    }
-}
-
-type Run<'a> = Box<dyn Fn(&[Point], bool) -> Point + 'a>;
-
-struct Case<'a> {
+struct Case {
     name: String,
-    run: Run<'a>,
+    run: Run,
     alone_ns: Vec<f64>,
     in_a_row_ns: Vec<f64>,
 }
 
 /// The loops are compiled for each case, so that a call is not hidden behind a pointer.
-fn case<'a>(name: String, correct: impl Fn(Point) -> Point + 'a) -> Case<'a> {
+fn case(name: String, correct: impl Fn(Point) -> Point + 'static) -> Case {
     let run = move |targets: &[Point], wait: bool| {
         let mut last = Point::ZERO;
         for target in targets {
@@ -258,7 +177,7 @@ fn case<'a>(name: String, correct: impl Fn(Point) -> Point + 'a) -> Case<'a> {
     }
 }
 
-fn cases(fields: &[Field]) -> Vec<Case<'_>> {
+fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (name, shape) in [("tables", Shape::Linear), ("splines", Shape::Spline)] {
         let (own, now) = model(shape);
@@ -277,64 +196,7 @@ fn cases(fields: &[Field]) -> Vec<Case<'_>> {
         "model, new conditions each time".into(),
         with_conditions,
     ));
-    for field in fields {
-        for (name, shape) in [
-            ("trilinear", GridShape::Trilinear),
-            ("tricubic", GridShape::Tricubic),
-        ] {
-            let (own, other) = (field.map(shape), field.map(shape));
-            let deviation = move |at| own.deviation(at).expect("within the map");
-            cases.push(case(field.named(name), deviation));
-            let command = move |at| other.command(at).expect("within the map");
-            cases.push(case(field.named(&format!("{name}, inverse")), command));
-        }
-        cases.extend(others(field));
-    }
     cases
-}
-
-/// The same by `interpn`: its linear, its cubic of continuous slope, its B-splines.
-fn others(field: &Field) -> [Case<'_>; 3] {
-    let grids: &'static [&'static [f64]; 3] = Box::leak(Box::new(
-        field
-            .nodes
-            .each_ref()
-            .map(|it| &*Box::leak(it.clone().into_boxed_slice())),
-    ));
-    let each = field.components.each_ref();
-    let linear = each.map(|it| MultilinearRectilinear::new(grids, it).unwrap());
-    let cubic = each.map(|it| MulticubicRectilinear::new(grids, it, false).unwrap());
-    let each = field.splines.each_ref();
-    let spline = each.map(|it| MultiBsplineRectilinear::new(grids, it, false).unwrap());
-    let linear = move |at| {
-        point(
-            linear
-                .each_ref()
-                .map(|it| it.interp_one(array(at)).unwrap()),
-        )
-    };
-    let cubic = move |at| point(cubic.each_ref().map(|it| it.interp_one(array(at)).unwrap()));
-    let spline = move |at| {
-        point(
-            spline
-                .each_ref()
-                .map(|it| it.interp_one(array(at)).unwrap()),
-        )
-    };
-    check_alike(&field.map(GridShape::Trilinear), &linear);
-    [
-        case(field.named("(interpn) multilinear"), linear),
-        case(field.named("(interpn) multicubic"), cubic),
-        case(field.named("(interpn) multibspline"), spline),
-    ]
-}
-
-/// Both interpolate the same: otherwise there is nothing to compare.
-fn check_alike(map: &GridMap, other: &impl Fn(Point) -> Point) {
-    for target in targets() {
-        let off = map.deviation(target).unwrap() - other(target);
-        assert!(off.distance().value() < 1e-15, "at {target:?}: {off:?}");
-    }
 }
 
 fn in_a_row(run: &dyn Fn(&[Point], bool) -> Point, targets: &[Point], calls: usize) -> Point {
@@ -362,8 +224,7 @@ fn median_and_least(values: &mut [f64]) -> (f64, f64) {
 /// Repetitions go round all cases, so that a disturbance hits each of them.
 fn times() -> Value {
     let targets = targets();
-    let fields = GRIDS.map(Field::new);
-    let mut cases = cases(&fields);
+    let mut cases = cases();
     for _ in 0..REPETITIONS {
         for case in &mut cases {
             let alone = nanoseconds(case, &targets, true);

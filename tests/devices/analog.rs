@@ -8,7 +8,7 @@ use drivers::device::{Alarm, AnalogInput, AnalogReading, Device};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::{Desk, Emulator, Rig, Setup, rigs};
-use truestage::assemble;
+use truestage::config::ModuleConfig;
 use units::Volts;
 
 /// How long a module may be silent.
@@ -17,8 +17,11 @@ const SILENCE: Duration = Duration::from_millis(1500);
 fn cia401(rig: Rig) -> Desk<Cia401Analog> {
     let emulator = Emulator::new(rig, &Setup::new(22));
     let loaded = &emulator.loaded;
-    let (analog, bus) = (&loaded.config.analog["hall"], &loaded.config.can["can0"]);
-    let settings = assemble::cia401_settings(analog, analog.node().unwrap(), bus, loaded.patience);
+    let analog = &loaded.config.analog["hall"];
+    let ModuleConfig::Cia401(module) = &analog.module else {
+        panic!("{:?}", analog.module)
+    };
+    let settings = module.settings(analog, loaded.config.wiring(), loaded.patience);
     Desk::new(emulator, "can0", Cia401Analog::new(settings))
 }
 
@@ -26,7 +29,10 @@ fn dcon(rig: Rig) -> Desk<Dcon> {
     let emulator = Emulator::new(rig, &Setup::new(22).over_dcon());
     let loaded = &emulator.loaded;
     let analog = &loaded.config.analog["hall"];
-    let mut settings = assemble::dcon_settings(analog, analog.dcon().unwrap(), loaded.patience);
+    let ModuleConfig::Dcon(module) = &analog.module else {
+        panic!("{:?}", analog.module)
+    };
+    let mut settings = module.settings(analog, loaded.patience);
     settings.stale_after = SILENCE;
     Desk::new(emulator, "adc", Dcon::new(settings))
 }

@@ -8,7 +8,7 @@ use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::plant::{LineOptics, LineSetUp};
 use mock_bus::simulation::Simulation;
 use tests::{Desk, Emulator, Setup, rigs};
-use truestage::assemble;
+use truestage::config::InstrumentDevice;
 use units::{Metres, Pascals};
 
 type Laser = Desk<Umd2>;
@@ -28,7 +28,8 @@ fn check(procedure: impl Fn(&mut Laser)) {
 fn laser(emulator: Emulator) -> Laser {
     let loaded = &emulator.loaded;
     let instrument = &loaded.config.instrument["laser"];
-    let settings = assemble::umd2_settings(instrument, loaded.patience);
+    let InstrumentDevice::Umd2(umd2) = &instrument.device;
+    let settings = umd2.settings(instrument, loaded.patience);
     Desk::new(emulator, "laser", Umd2::new(settings))
 }
 

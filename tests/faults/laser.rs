@@ -167,11 +167,7 @@ fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) {
         rest: WHOLE,
     };
     let played = check(scene, &wanted);
-    let Err(Failure::FringeJump {
-        half_wavelengths: seen,
-        ..
-    }) = &played.result
-    else {
+    let Err(Failure::FringeJump { counts: seen, .. }) = &played.result else {
         unreachable!("checked above")
     };
     // The stage's own deviation from point to point blurs a large jump by some counts.

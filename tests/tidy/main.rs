@@ -2,6 +2,7 @@
 
 mod circles;
 mod documents;
+mod hardware;
 mod imports;
 mod kinds;
 mod licences;

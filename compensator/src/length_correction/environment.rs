@@ -131,7 +131,15 @@ pub enum EnvironmentError {
 /// # Errors
 /// The first channel outside 0–40 °C, 60–120 kPa or 0–1 humidity, or NaN.
 pub fn check_environment(environment: &Environment) -> Result<(), EnvironmentError> {
-    for channel in Channel::ALL {
+    check_channels(&Channel::ALL, environment)
+}
+
+/// Likewise of some channels only: of those that a correction uses.
+pub(super) fn check_channels(
+    channels: &[Channel],
+    environment: &Environment,
+) -> Result<(), EnvironmentError> {
+    for channel in channels.iter().copied() {
         let (seen, (low, high, unit)) = (channel.read(environment), channel.range());
         if !(seen >= low && seen <= high) {
             return Err(EnvironmentError::OutOfRange {

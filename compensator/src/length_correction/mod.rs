@@ -31,6 +31,7 @@ use units::{Celsius, Metres, Pascals, Radians, RelativeHumidity};
 
 use crate::air;
 use crate::uncertainty::combine;
+use environment::check_channels;
 pub use environment::{
     Channel, Environment, EnvironmentError, EnvironmentWatch, check_environment,
 };
@@ -315,10 +316,19 @@ fn replace(length: &mut Metres, new: Metres) -> Metres {
 }
 
 fn index(settings: &Settings, environment: &Environment) -> Result<f64, EnvironmentError> {
-    check_environment(environment)?;
+    // What no correction uses need not be measured, either.
+    if settings.material_expansion.is_some() {
+        check_channels(&[Channel::MaterialTemperature], environment)?;
+    }
     if !settings.air {
         return Ok(1.0);
     }
+    let air = [
+        Channel::AirTemperature,
+        Channel::Pressure,
+        Channel::Humidity,
+    ];
+    check_channels(&air, environment)?;
     Ok(air::refractive_index(
         settings.vacuum_wavelength,
         environment.air_temperature,

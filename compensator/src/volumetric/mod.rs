@@ -9,7 +9,6 @@
 //! |---|---|
 //! | [`online`] | what do the machine's own detectors say now (the patent's parts)? |
 //! | [`model`] | what do 21 error functions, tool, temperatures and detectors make of a command? |
-//! | [`grid`] | the same as a map of measured deviations in space |
 //! | [`identify`] | which error functions made these measured deviations, and how sure is that? |
 //! | [`function`] | one error function of a position, as a table or a spline |
 //!
@@ -20,7 +19,6 @@
 
 mod find;
 pub mod function;
-pub mod grid;
 pub mod identify;
 mod inverse;
 pub mod model;

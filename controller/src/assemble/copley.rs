@@ -6,8 +6,9 @@ use drivers::device::copley::{CopleySettings, CopleyTimeouts};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 use wire::copley::Address;
 
-use super::{CHECKED, millis, reference_limit};
+use super::reference_limit;
 use crate::config::{AxisConfig, CopleyAxisConfig, SerialLine};
+use crate::hardware::{CHECKED, millis};
 use machine::Patience;
 
 /// A Copley amplifier, as its driver is told; the configuration has been checked.

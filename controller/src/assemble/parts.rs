@@ -3,15 +3,16 @@
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use machine::{AxisSettings, Bus, Camera, CyclicSettings, ExpectedNode, LinearAxis, Parts};
+use machine::{AxisSettings, Bus, Camera, CyclicSettings, ExpectedNode, LinearAxis, Parts, Unit};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 use wire::Port;
 use wire::canopen::NodeId;
 
 use super::cyclic::cyclic_settings;
-use super::{analogs, axes, expected_identity, instruments, node_id, ports};
+use super::{axes, ports};
 use crate::camera::{cameras, inspection_timeout};
 use crate::config::{AxisConfig, CanBus, IdentityConfig, Loaded, MachineConfig};
+use crate::hardware::node::{expected_identity, node_id};
 use crate::rotary::settings::rotaries;
 
 /// Everything of a machine but its transport, whose ports are numbered as [`ports`] says.
@@ -36,8 +37,24 @@ pub(crate) fn parts(loaded: &Loaded) -> Parts {
             .map(|(unit, settings)| LinearAxis { unit, settings })
             .collect(),
         rotaries: rotaries(config, &ports, patience),
-        analogs: analogs(config, &ports, patience),
-        instruments: instruments(config, &ports, patience),
+        analogs: config
+            .analog
+            .iter()
+            .map(|(name, it)| Unit {
+                name: name.clone(),
+                port: ports[it.port()],
+                device: it.driver(config.wiring(), patience),
+            })
+            .collect(),
+        instruments: config
+            .instrument
+            .iter()
+            .map(|(name, it)| Unit {
+                name: name.clone(),
+                port: ports[&it.line],
+                device: it.driver(patience),
+            })
+            .collect(),
         cameras: cameras
             .zip(config.camera.values())
             .map(|(unit, camera)| Camera {

@@ -4,39 +4,10 @@
 use core::time::Duration;
 
 use compensator::hall_zero;
-use drivers::device::canopen_node::{NodeSettings, NodeTimeouts};
 use drivers::device::cia402::Cia402Timeouts;
-use drivers::protocol::sdo_client::Timeouts as SdoTimeouts;
 use units::Metres;
 
 use machine::Patience;
-
-/// Where the clock is faster than the wall's, a pause of the host silences process data and
-/// heartbeats alike, so they are waited for alike.
-pub(super) fn patient_pdos(
-    usual: &NodeSettings,
-    consumer_time: Duration,
-    patience: Patience,
-) -> u32 {
-    if patience == Patience::NONE {
-        return usual.missed_pdos_max;
-    }
-    let periods = patience.of(consumer_time).as_nanos() / usual.sync_period.as_nanos().max(1);
-    u32::try_from(periods).map_or(u32::MAX, |it| it.max(usual.missed_pdos_max))
-}
-
-/// See [`crate::config::Loaded::patience`].
-pub(super) fn patient_node(usual: NodeTimeouts, patience: Patience) -> NodeTimeouts {
-    NodeTimeouts {
-        boot: patience.of(usual.boot),
-        sdo: SdoTimeouts {
-            response: patience.of(usual.sdo.response),
-            block_segment: patience.of(usual.sdo.block_segment),
-            ..usual.sdo
-        },
-        operational: patience.of(usual.operational),
-    }
-}
 
 pub(crate) fn patient_drive(usual: Cia402Timeouts, patience: Patience) -> Cia402Timeouts {
     Cia402Timeouts {

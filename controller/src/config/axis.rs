@@ -4,7 +4,8 @@ use drivers::device::Identity;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
+use super::drive::{HomeOffsetName, OptionCodesConfig};
+use crate::hardware::node::IdentityConfig;
 use crate::linear::{CalibrateConfig, CompensationConfig, VerifyConfig, ZeroConfig};
 
 /// The servo drive of an axis, by what `device` calls it.

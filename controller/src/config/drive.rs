@@ -1,38 +1,7 @@
-//! What the sections of several drives and modules have in common.
+//! What the sections of CiA 402 drives have in common, whatever they move.
 
-use drivers::device::Identity;
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-/// Who a CANopen node must be.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct IdentityConfig {
-    /// 0x1000.
-    pub device_type: u32,
-    /// 0x1018:01.
-    pub vendor_id: u32,
-    /// 0x1018:02.
-    pub product_code: u32,
-    /// 0x1018:03.
-    pub revision: Option<u32>,
-    /// 0x1018:04.
-    pub serial_number: Option<u32>,
-}
-
-impl IdentityConfig {
-    /// The same as a driver says it, as far as the configuration does.
-    pub fn configured(&self) -> Identity {
-        Identity {
-            device_type: self.device_type,
-            vendor: self.vendor_id,
-            product: self.product_code,
-            revision: self.revision.unwrap_or(0),
-            serial: self.serial_number.unwrap_or(0),
-            name: String::new(),
-        }
-    }
-}
 
 /// What a drive takes its home offset (0x607C) for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]

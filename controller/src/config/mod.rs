@@ -3,7 +3,6 @@
 //! Micrometres and millimetres live here and on the screen only; every key carries its unit
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
-mod analog;
 mod axis;
 mod camera;
 mod dependence;
@@ -11,7 +10,6 @@ mod diagnostic;
 mod drive;
 #[cfg(test)]
 mod impossible_tests;
-mod instrument;
 pub(crate) mod judge;
 mod load;
 mod model;
@@ -21,15 +19,21 @@ pub mod schema;
 mod structure;
 pub(crate) mod validate;
 
-pub use analog::{AnalogConfig, Cia404Config, DconConfig, ModuleConfig, NodeConfig};
+pub use crate::hardware::analog::cia401::Cia401Config;
+pub use crate::hardware::analog::cia404::Cia404Config;
+pub use crate::hardware::analog::dcon::DconConfig;
+pub use crate::hardware::analog::{AnalogConfig, ModuleConfig};
+pub use crate::hardware::bus::{CanBus, CanTransport, SerialLine, Wiring};
+pub use crate::hardware::instrument::umd2::Umd2Config;
+pub use crate::hardware::instrument::{Count, InstrumentConfig, InstrumentDevice, OpticsConfig};
+pub use crate::hardware::node::{IdentityConfig, NodeConfig};
 pub use axis::{
     AmplifierConfig, AxisConfig, Cia402AxisConfig, CopleyAxisConfig, CyclicConfig, DriveConfig,
 };
 pub use camera::{CameraConfig, CameraDevice};
 pub use dependence::hash_of;
 pub use diagnostic::{ConfigError, Diagnostic};
-pub use drive::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
-pub use instrument::{InstrumentConfig, InstrumentDevice, OpticsConfig};
+pub use drive::{HomeOffsetName, OptionCodesConfig};
 pub use load::{Loaded, load, parse};
 pub use machine::records::ConfigHash;
-pub use model::{CanBus, CanTransport, MachineConfig, MachineSection, SerialLine};
+pub use model::{MachineConfig, MachineSection};

@@ -9,6 +9,7 @@
 
 use units::Metres;
 
+use crate::config::Count;
 use crate::failure::Failure;
 use crate::linear::PointEntry;
 use crate::store::ClosureEntry;
@@ -31,7 +32,7 @@ pub(super) struct Plausible {
     /// Largest relative difference of instrument and encoder believed, in millionths.
     pub(super) scale_limit_ppm: f64,
     /// What the instrument's counter counts.
-    pub(super) half_wavelength: Metres,
+    pub(super) count: Count,
 }
 
 /// Whether samples of one reading that scatter so much say nothing of the place.
@@ -108,8 +109,8 @@ impl CrossCheck {
     /// # Errors
     /// When the count slipped in one of them.
     pub(super) fn compare(&self, before: &Run<'_>, run: &Run<'_>) -> Result<(), Failure> {
-        let half_wavelength_m = self.plausible.half_wavelength.value();
-        let quiet = |point: &PointEntry| point.scatter_m < half_wavelength_m;
+        let count_m = self.plausible.count.length.value();
+        let quiet = |point: &PointEntry| point.scatter_m < count_m;
         let (places, changes): (Vec<usize>, Vec<f64>) = before
             .points
             .iter()
@@ -125,7 +126,7 @@ impl CrossCheck {
         let start = [run.closure.start_m - before.closure.start_m; SIDE];
         let end = [run.closure.closure_m - before.closure.closure_m; SIDE];
         let changes = [&start, changes.as_slice(), &end].concat();
-        let Some(slip) = find_slip(&changes, SIDE, half_wavelength_m) else {
+        let Some(slip) = find_slip(&changes, SIDE, count_m) else {
             return Ok(());
         };
         // Up to there both runs agree or differ alike: the slip is in the later run when the
@@ -136,11 +137,12 @@ impl CrossCheck {
     }
 
     fn fringe_jump(&self, jump_m: f64, from: &PointEntry, to: &PointEntry) -> Failure {
-        let count = jump_m / self.plausible.half_wavelength.value();
+        let count = jump_m / self.plausible.count.length.value();
         Failure::FringeJump {
             axis: self.axis.clone(),
             jump: Metres(jump_m),
-            half_wavelengths: count.round() as i64,
+            counts: count.round() as i64,
+            of: self.plausible.count,
             run: to.run,
             from: Metres(from.target_m),
             to: Metres(to.target_m),
@@ -318,7 +320,11 @@ mod tests {
         let plausible = Plausible {
             slope: 0.01,
             step: Metres::from_um(50.0),
-            half_wavelength: Metres(HALF),
+            count: Count {
+                length: Metres(HALF),
+                name: "half wavelengths",
+                slipped: "fringes were lost",
+            },
             scale_limit_ppm,
         };
         let mut check = CrossCheck::new("x", plausible);

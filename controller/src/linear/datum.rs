@@ -48,10 +48,12 @@ impl LinearStage<'_> {
         let environment = self.core.instrument(&plan.instrument)?.environment();
         let config = &self.core.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
-        let length = LengthCorrection::new(assemble::correction_settings(config), &environment)
-            .map_err(|source| Failure::Correction {
-                instrument: plan.instrument.clone(),
-                source,
+        let length =
+            LengthCorrection::new(config.corrections(), &environment).map_err(|source| {
+                Failure::Correction {
+                    instrument: plan.instrument.clone(),
+                    source,
+                }
             })?;
         Ok(Datum { length, offset })
     }
@@ -81,7 +83,7 @@ impl LinearStage<'_> {
         plan: &RunPlan,
     ) -> Result<DisplacementReading, Failure> {
         self.core.stand_still(self.axis, plan.settle)?;
-        let rate_hz = self.core.config.instrument[&plan.instrument].sample_rate_hz;
+        let rate_hz = self.core.config.instrument[&plan.instrument].readings_per_s();
         Ok(self
             .core
             .average(&plan.instrument, plan.average_samples, rate_hz)?)

@@ -106,7 +106,7 @@ struct Session<'a> {
     journal: &'a mut Journal<LinearLog>,
     counter: Counter,
     check: CrossCheck,
-    watch: EnvironmentWatch,
+    watch: Option<EnvironmentWatch>,
 }
 
 /// Values that the instrument's sensors sent are never older than this.
@@ -278,24 +278,25 @@ impl LinearStage<'_> {
             slope: limits.map_or(SLOPE_MAX, |it| it.slope_limit),
             step: limits.map_or(SIZE_MAX, |it| Metres::from_um(it.size_limit_um)),
             scale_limit_ppm: plan.scale_limit_ppm,
-            half_wavelength: assemble::half_wavelength(
-                &self.core.config.instrument[&plan.instrument],
-            ),
+            count: self.core.config.instrument[&plan.instrument].count(),
         })
     }
 
-    fn environment_watch(&self, plan: &RunPlan) -> EnvironmentWatch {
+    fn environment_watch(&self, plan: &RunPlan) -> Option<EnvironmentWatch> {
         let config = &self.core.config.instrument[&plan.instrument];
-        let frozen = Duration::from_secs_f64(config.environment_frozen_s);
-        EnvironmentWatch::new(frozen, ENVIRONMENT_STALE)
+        let frozen = config.environment_frozen()?;
+        Some(EnvironmentWatch::new(frozen, ENVIRONMENT_STALE))
     }
 
     /// The environment, as long as its sensors can be believed.
     fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
         let instrument = &session.plan.instrument;
         let environment = self.core.instrument(instrument)?.environment();
+        let Some(watch) = &mut session.watch else {
+            return Ok(environment);
+        };
         let reading = assemble::correction_environment(&environment);
-        match session.watch.observe(self.core.now(), reading) {
+        match watch.observe(self.core.now(), reading) {
             Ok(()) => Ok(environment),
             Err(source) => Err(Failure::Correction {
                 instrument: instrument.clone(),

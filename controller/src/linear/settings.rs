@@ -1,12 +1,12 @@
 //! Tables of linear axes: what of a table is believed, and how it is applied.
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
-use drivers::device::umd2::Umd2Settings;
 use units::{Metres, MetresPerSecond};
 
-use crate::assemble::{CHECKED, half_wavelength};
 use crate::config::MachineConfig;
 use crate::failure::Failure;
+use crate::hardware::CHECKED;
+use crate::hardware::instrument::umd2::half_wavelength;
 use crate::linear::{CompensationConfig, EndPolicyName, InterpolationName};
 
 /// How far a position of `axis` may stand off its neighbours whatever the others do: what the
@@ -18,10 +18,7 @@ pub fn harmless(config: &MachineConfig, axis: &str) -> Metres {
         .map_or(Metres::ZERO, Metres::from_um);
     let instrument =
         of_axis.and_then(|it| config.instrument.get(&it.calibrate.as_ref()?.instrument));
-    let count = instrument.map_or(
-        Umd2Settings::default().vacuum_wavelength / 2.0,
-        half_wavelength,
-    );
+    let count = instrument.map_or_else(half_wavelength, |it| it.count().length);
     configured.max(count / 2.0)
 }
 

@@ -269,7 +269,7 @@ impl LinearStage<'_> {
         let bus = &can.expect("the check asks for a drive on CAN").bus;
         let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
         let module = &self.core.config.analog[&config.analog];
-        let poll_s = module.dcon().map_or(0.0, |it| it.poll_period_ms * 1e-3);
+        let poll_s = module.poll_period().as_secs_f64();
         let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
         Ok(Pairing {
             window,

@@ -3,7 +3,8 @@
 use super::line_speed;
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::config::validate::drive::{check_axis_name, check_node};
+use crate::config::validate::drive::check_axis_name;
+use crate::hardware::node::check_node;
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
 
 pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -160,7 +161,7 @@ fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryCon
         rotary.heartbeat_consumer_ms,
         rotary.watch_master_ms,
     ];
-    check_node(judge, config, &rotary.bus, heartbeats);
+    check_node(judge, &config.can, &rotary.bus, heartbeats);
 }
 
 /// What the drive's 32 bits can hold.

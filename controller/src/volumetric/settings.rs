@@ -13,7 +13,7 @@ use compensator::volumetric::online::{
 use compensator::volumetric::{Axis, Point, Volume, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Radians, Volts};
 
-use crate::assemble::CHECKED;
+use crate::hardware::CHECKED;
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, FeedConfig, InfluenceConfig, LayoutName,
     ReactionName, RollConfig, ShapeName, TemperatureConfig, VolumeAxisName,

@@ -115,6 +115,13 @@ pub enum Alarm {
     /// Lines that are not understood came in a row: wrong baud rate?
     #[error("{lines} lines in a row not understood; wrong baud rate?")]
     Garbage { lines: u64 },
+    /// Something that only one family of devices can say.
+    #[error("{device}: {what}; {remedy}")]
+    Own {
+        device: DeviceName,
+        what: &'static str,
+        remedy: &'static str,
+    },
     /// An analog channel's sample is too old.
     #[error("analog input: no sample for {}", units::ShortSpan(*waited))]
     StaleSample { waited: Duration },

@@ -4,12 +4,14 @@
 //! controller owns the loop (`truestage::tick`) that feeds them.
 
 mod alarm;
+mod average;
 pub mod canopen_node;
 pub mod cia401;
 pub mod cia402;
 pub mod cia404;
 pub mod copley;
 pub mod dcon;
+mod direction;
 mod error;
 #[cfg(test)]
 mod fake_node;
@@ -30,6 +32,7 @@ use wire::Payload;
 use wire::cia402::PowerState;
 
 pub use alarm::{Alarm, AmplifierTrouble};
+pub use direction::Direction;
 pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use name::DeviceName;

@@ -11,7 +11,6 @@
 //! Absent: axes 2 and 3; the cross-check with the encoder (fringe jumps), which needs both
 //! and is the controller's.
 
-mod average;
 mod health;
 mod sequence;
 mod settings;
@@ -24,11 +23,11 @@ use wire::Payload;
 use wire::umd2::{Line, LowSpeed, Sample};
 use wire::{Input, LinkState};
 
-use self::average::{Averaging, RunningAverage};
 use self::health::fault_of;
 use self::sequence::{Continuity, Sequence};
-pub use self::settings::{Direction, Umd2Settings};
+pub use self::settings::Umd2Settings;
 use self::weather::Weather;
+use super::average::{Averaging, RunningAverage};
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{
     Alarm, Device, DeviceError, DeviceName, DisplacementInstrument, DisplacementReading,

@@ -1,9 +1,7 @@
 //! Numbers that make no machine.
 
-use super::{ConfigError, DeviceConfig, MachineConfig, PortConfig};
-use crate::node::cia402_drive::Cia402DriveConfig;
-use crate::node::cia404_analog::{Cia404AnalogConfig, INPUTS_MAX};
-use crate::node::copley_amp::{CopleyAmpsConfig, addresses_fit};
+use super::error::positive;
+use super::{ConfigError, MachineConfig, PortConfig};
 use crate::plant::config::PlantConfig;
 use crate::plant::platform::config::PlatformConfig;
 use crate::plant::volumetric::config::VolumetricConfig;
@@ -123,47 +121,6 @@ fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
     })
 }
 
-impl DeviceConfig {
-    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
-        match self {
-            Self::Cia402Drive(Cia402DriveConfig {
-                rotary: Some(rotary),
-                ..
-            }) => {
-                let turn = plant.table.as_ref().map(|it| it.encoder.counts_per_turn);
-                if turn == Some(rotary.counts_per_turn) {
-                    return Ok(());
-                }
-                Err(ConfigError::Value {
-                    key: "counts_per_turn",
-                    seen: rotary.counts_per_turn.into(),
-                    expected: "the plant's table's counts_per_turn",
-                })
-            }
-            Self::Cia402Drive(config) if config.encoder_resolution_nm != plant.resolution_nm() => {
-                Err(ConfigError::Value {
-                    key: "encoder_resolution_nm",
-                    seen: config.encoder_resolution_nm,
-                    expected: "the plant's resolution_nm",
-                })
-            }
-            Self::Cia402Drive(_) | Self::Cia401Analog(_) => Ok(()),
-            Self::Cia404Analog(config) => check_inputs(config),
-            Self::Umd2Interferometer(config) => {
-                positive("sample_rate_hz", config.sample_rate_hz)?;
-                positive("batch_samples", f64::from(config.batch_samples))
-            }
-            Self::DconModule(config) => positive("channels", config.channels as f64),
-            Self::InSightController(config) => {
-                positive("length_unit_um", config.length_unit_um)?;
-                positive("angle_unit_arcsec", config.angle_unit_arcsec)?;
-                positive("exposure_ms", config.exposure_ms)
-            }
-            Self::CopleyAmps(config) => check_amps(config, plant.resolution_nm()),
-        }
-    }
-}
-
 fn check_volumetric(volumetric: &VolumetricConfig) -> Result<(), ConfigError> {
     for (key, seen) in volumetric.positive_numbers() {
         positive(key, seen)?;
@@ -175,49 +132,5 @@ fn check_volumetric(volumetric: &VolumetricConfig) -> Result<(), ConfigError> {
         key: "chain and roll.axis",
         seen: volumetric.roll.axis as f64,
         expected: "F, X, Y and Z once each, and an axis from 0 to 2",
-    })
-}
-
-fn check_inputs(config: &Cia404AnalogConfig) -> Result<(), ConfigError> {
-    let inputs = config.plant_channels.len();
-    if inputs > INPUTS_MAX {
-        return Err(ConfigError::Value {
-            key: "plant_channels",
-            seen: inputs as f64,
-            expected: "at most 8 inputs",
-        });
-    }
-    positive("full_scale_v", config.full_scale_v)
-}
-
-fn check_amps(config: &CopleyAmpsConfig, resolution_nm: f64) -> Result<(), ConfigError> {
-    if !addresses_fit(config) {
-        return Err(ConfigError::Value {
-            key: "amps",
-            seen: config.amps.len() as f64,
-            expected: "amplifiers with different addresses up to 127, one of them 0",
-        });
-    }
-    let odd = config
-        .amps
-        .iter()
-        .find(|amp| amp.encoder_resolution_nm != resolution_nm);
-    odd.map_or(Ok(()), |amp| {
-        Err(ConfigError::Value {
-            key: "encoder_resolution_nm",
-            seen: amp.encoder_resolution_nm,
-            expected: "the plant's resolution_nm",
-        })
-    })
-}
-
-fn positive(key: &'static str, seen: f64) -> Result<(), ConfigError> {
-    if seen.is_finite() && seen > 0.0 {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key,
-        seen,
-        expected: "a positive number",
     })
 }

@@ -21,6 +21,9 @@ use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
 use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
+use super::{Node, Section};
+use crate::config::error::ConfigError;
+use crate::plant::config::PlantConfig;
 
 /// CiA 401 with analog inputs.
 const DEVICE_TYPE: u32 = 0x0004_0191;
@@ -206,6 +209,20 @@ fn description(config: &Cia401AnalogConfig, node: NodeId) -> Description {
             tpdo(Function::Tpdo2, 0, mapped(1).collect()),
             tpdo(Function::Tpdo3, third, mapped(PER_PDO + 1).collect()),
         ],
+    }
+}
+
+impl Section for Cia401AnalogConfig {
+    fn is_on_can(&self) -> bool {
+        true
+    }
+
+    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
+    fn build(&self, _: u64, _: &str) -> Box<dyn Node> {
+        Box::new(Cia401AnalogNode::new(self.clone()))
     }
 }
 

@@ -26,6 +26,9 @@ use super::analog_module::{AnalogModule, Module, Profile, Wires};
 use super::canopen_server::dictionary::{Bounds, Dictionary, Entry, Kind, Mapping};
 use super::canopen_server::{CanopenServer, Description, Identity, Manners, PdoDefault};
 use super::cia402_drive::checked_node_id;
+use super::{Node, Section};
+use crate::config::error::{ConfigError, positive};
+use crate::plant::config::PlantConfig;
 
 /// Inputs of one module.
 pub const INPUTS_MAX: usize = 8;
@@ -269,6 +272,28 @@ fn description(config: &Cia404AnalogConfig, node: NodeId) -> Description {
         heartbeat_ms: config.heartbeat_ms,
         rpdos: Vec::new(),
         tpdos: tpdos.collect(),
+    }
+}
+
+impl Section for Cia404AnalogConfig {
+    fn is_on_can(&self) -> bool {
+        true
+    }
+
+    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        let inputs = self.plant_channels.len();
+        if inputs > INPUTS_MAX {
+            return Err(ConfigError::Value {
+                key: "plant_channels",
+                seen: inputs as f64,
+                expected: "at most 8 inputs",
+            });
+        }
+        positive("full_scale_v", self.full_scale_v)
+    }
+
+    fn build(&self, _: u64, _: &str) -> Box<dyn Node> {
+        Box::new(Cia404AnalogNode::new(self.clone()))
     }
 }
 

@@ -13,8 +13,10 @@ use wire::dcon::{CR, Command, format_volts, frame, unframe};
 
 use units::Time;
 
-use super::Node;
+use super::{Node, Section};
+use crate::config::error::{ConfigError, positive};
 use crate::plant::Plant;
+use crate::plant::config::PlantConfig;
 use crate::random::Stream;
 
 /// How a module is set.
@@ -172,6 +174,16 @@ impl DconModuleNode {
         self.sampled.clear();
         self.replies.clear();
         self.outbox.clear();
+    }
+}
+
+impl Section for DconModuleConfig {
+    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        positive("channels", self.channels as f64)
+    }
+
+    fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
+        Box::new(DconModuleNode::new(self, seed, name))
     }
 }
 

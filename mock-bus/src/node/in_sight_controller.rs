@@ -20,7 +20,9 @@ use wire::in_sight::{
 use units::Time;
 use units::portable::{atan2, sin_cos};
 
-use super::Node;
+use super::{Node, Section};
+use crate::config::error::{ConfigError, positive};
+use crate::plant::config::PlantConfig;
 use crate::plant::{Mark, Plant};
 use crate::random::Stream;
 
@@ -355,6 +357,18 @@ fn motion(marks: &[Mark]) -> [f64; 3] {
         is[1] - (sin * was[0] + cos * was[1]),
         angle,
     ]
+}
+
+impl Section for InSightControllerConfig {
+    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        positive("length_unit_um", self.length_unit_um)?;
+        positive("angle_unit_arcsec", self.angle_unit_arcsec)?;
+        positive("exposure_ms", self.exposure_ms)
+    }
+
+    fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
+        Box::new(InSightControllerNode::new(self, seed, name))
+    }
 }
 
 impl Node for InSightControllerNode {

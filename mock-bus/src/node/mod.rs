@@ -15,10 +15,81 @@ pub mod umd2_interferometer;
 
 use core::any::Any;
 
+use serde::Deserialize;
 use units::Time;
 use wire::Payload;
 
+use crate::config::error::ConfigError;
 use crate::plant::Plant;
+use crate::plant::config::PlantConfig;
+use cia401_analog::Cia401AnalogConfig;
+use cia402_drive::Cia402DriveConfig;
+use cia404_analog::Cia404AnalogConfig;
+use copley_amp::CopleyAmpsConfig;
+use dcon_module::DconModuleConfig;
+use in_sight_controller::InSightControllerConfig;
+use umd2_interferometer::Umd2InterferometerConfig;
+
+/// Which device, and how it is set.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum DeviceConfig {
+    /// CiA 402 servo drive, on a CAN bus.
+    Cia402Drive(Cia402DriveConfig),
+    /// CiA 401 analog inputs, on a CAN bus.
+    Cia401Analog(Cia401AnalogConfig),
+    /// CiA 404 measuring module, on a CAN bus.
+    Cia404Analog(Cia404AnalogConfig),
+    /// µMD2 laser interferometer, on a serial line.
+    Umd2Interferometer(Umd2InterferometerConfig),
+    /// ADAM or I-7000 analog module, on a serial line.
+    DconModule(DconModuleConfig),
+    /// In-Sight vision system, on a serial line.
+    InSightController(InSightControllerConfig),
+    /// Copley Controls servo amplifiers, on one serial line.
+    CopleyAmps(CopleyAmpsConfig),
+}
+
+/// What the section of a device is to a machine.
+pub(crate) trait Section {
+    /// Whether it is on a CAN bus; otherwise it is on a serial line.
+    fn is_on_can(&self) -> bool {
+        false
+    }
+
+    /// Refuses numbers that make no device of this plant.
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError>;
+
+    /// The device, without power yet; `seed` and `name` choose what is by chance.
+    fn build(&self, seed: u64, name: &str) -> Box<dyn Node>;
+}
+
+impl DeviceConfig {
+    fn section(&self) -> &dyn Section {
+        match self {
+            Self::Cia402Drive(section) => section,
+            Self::Cia401Analog(section) => section,
+            Self::Cia404Analog(section) => section,
+            Self::Umd2Interferometer(section) => section,
+            Self::DconModule(section) => section,
+            Self::InSightController(section) => section,
+            Self::CopleyAmps(section) => section,
+        }
+    }
+
+    pub(crate) fn is_on_can(&self) -> bool {
+        self.section().is_on_can()
+    }
+
+    pub(crate) fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
+        self.section().check(plant)
+    }
+
+    /// The device, without power yet.
+    pub(crate) fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
+        self.section().build(seed, name)
+    }
+}
 
 /// One emulated device.
 ///

@@ -15,7 +15,9 @@ use wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, LowSpeed, PHASE_STEPS, Sample};
 
 use units::Time;
 
-use super::Node;
+use super::{Node, Section};
+use crate::config::error::{ConfigError, positive};
+use crate::plant::config::PlantConfig;
 use crate::plant::{Beam, Fringes, Plant};
 
 /// What an interferometer is set to.
@@ -191,6 +193,17 @@ fn split(count: f64) -> (i64, u16) {
 
 fn scaled(value: f64, factor: f64) -> i32 {
     (value * factor).round() as i32
+}
+
+impl Section for Umd2InterferometerConfig {
+    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        positive("sample_rate_hz", self.sample_rate_hz)?;
+        positive("batch_samples", f64::from(self.batch_samples))
+    }
+
+    fn build(&self, _: u64, _: &str) -> Box<dyn Node> {
+        Box::new(Umd2InterferometerNode::new(self))
+    }
 }
 
 impl Node for Umd2InterferometerNode {

@@ -44,6 +44,19 @@ pub struct Fringes {
     pub too_fast: bool,
 }
 
+/// What a scanning head sees of a scale at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scanned {
+    /// Where it is along the scale, which is exact.
+    pub position: Metres,
+    /// How fast it moves along it.
+    pub speed_m_per_s: f64,
+    /// Whether it sees the scale.
+    pub is_clean: bool,
+    /// Counts slipped by an injected jump.
+    pub slipped: i64,
+}
+
 /// Optics and sensors.
 #[derive(Clone, Debug)]
 pub(super) struct Interferometer {
@@ -92,6 +105,16 @@ impl Interferometer {
             half_wavelengths_per_s: speed * per_m,
             beam: if is_lit { self.beam } else { Beam::Blocked },
             too_fast: speed.abs() > self.config.speed_max_m_per_s,
+        }
+    }
+
+    /// Dirt on a scale is what a hand in the beam is to an interferometer.
+    pub(super) fn scanned(&self, seen: &Sighting) -> Scanned {
+        Scanned {
+            position: Metres(seen.path_m),
+            speed_m_per_s: seen.speed_m_per_s,
+            is_clean: seen.is_lit && self.beam != Beam::Blocked,
+            slipped: self.slipped,
         }
     }
 

@@ -33,7 +33,7 @@ use units::{Celsius, Metres, Radians, Time};
 pub use analog::InputFault;
 pub use camera::{Mark, Target};
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
-pub use instrument::{Beam, Fringes};
+pub use instrument::{Beam, Fringes, Scanned};
 pub use platform::{PlatformTruth, Pose};
 pub use pulse::{IndexPulse, ProbeEdge};
 pub use table::TableTruth;
@@ -49,7 +49,7 @@ use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
 use machine::Machine;
 use thermal::Climate;
-use volumetric::{BeamTrouble, Signal, TERMINALS};
+use volumetric::{BeamTrouble, Sighting, Signal, TERMINALS};
 
 /// Inputs 0 and 1 are the Hall sensors; the others are spare. Three axes have their own.
 const ANALOG_INPUTS: usize = 8;
@@ -210,17 +210,26 @@ impl Plant {
     /// The interferometer's signal now, noise included.
     pub fn fringes(&mut self) -> Fringes {
         let air = self.environment();
-        let seen = match self.machine.volumetric() {
-            Some(volumetric) => volumetric.sighting(self.now),
-            None => {
-                let stage_c = air.stage_temperature.value();
-                let position_m = self.true_position_at(stage_c).value();
-                let stage = self.machine.stage();
-                let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
-                Some(self.interferometer.reflector(position_m, speed))
-            }
-        };
+        let seen = self.sighting(&air);
         self.interferometer.fringes(seen, &air)
+    }
+
+    /// What a scanning head in the reflector's place reads from a scale along the same line; `None` where
+    /// nobody has set a line up.
+    pub fn scanned(&self) -> Option<Scanned> {
+        let seen = self.sighting(&self.environment())?;
+        Some(self.interferometer.scanned(&seen))
+    }
+
+    fn sighting(&self, air: &Environment) -> Option<Sighting> {
+        if let Some(volumetric) = self.machine.volumetric() {
+            return volumetric.sighting(self.now);
+        }
+        let stage_c = air.stage_temperature.value();
+        let position_m = self.true_position_at(stage_c).value();
+        let stage = self.machine.stage();
+        let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
+        Some(self.interferometer.reflector(position_m, speed))
     }
 
     /// What the interferometer's own sensors say about air and stage now.

@@ -7,9 +7,9 @@
 
 use core::fmt::{Debug, Formatter, Result};
 
-use super::super::drive::IdentityConfig;
 use crate::config::axis::{AxisConfig, DriveConfig};
 use crate::config::model::MachineConfig;
+use crate::hardware::node::IdentityConfig;
 use crate::rotary::{DirectionName, RotaryConfig};
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, CurvePointConfig, LayoutName, RollConfig,

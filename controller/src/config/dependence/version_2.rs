@@ -4,11 +4,11 @@
 //! for, so that writing a default out changes nothing. A key that a later program adds gets a line
 //! only where it says something else than what machines did before there was that key.
 
-use super::super::drive::IdentityConfig;
 use super::text::{Place, Value, quoted};
-use crate::config::analog::AnalogConfig;
 use crate::config::axis::AxisConfig;
 use crate::config::model::MachineConfig;
+use crate::hardware::analog::AnalogConfig;
+use crate::hardware::node::IdentityConfig;
 use crate::platform::config::ActuatorConfig;
 use crate::rotary::{DirectionName, RotaryConfig, RotaryDevice};
 use crate::volumetric::{
@@ -155,11 +155,11 @@ fn say_roll(mut place: Place<'_>, config: &MachineConfig, roll: &RollConfig) {
 fn say_module(mut place: Place<'_>, config: &MachineConfig, name: &str) {
     let module: Option<&AnalogConfig> = config.analog.get(name);
     let Some(module) = module else { return };
-    let (node, dcon) = (module.node(), module.dcon());
+    let node = module.node();
     place.say("bus", node.map(|it| &it.bus));
     place.say("node_id", node.map(|it| it.node_id));
-    place.say("line", dcon.map(|it| &it.line));
-    place.say("address", dcon.map(|it| it.address));
+    place.say("line", node.is_none().then(|| module.port().to_owned()));
+    place.say("address", module.address());
     if let Some(node) = node {
         say_identity(place.at("identity"), &node.identity);
     }

@@ -6,9 +6,9 @@ use drivers::device::cia402::{interpolation_period, period_from};
 
 use units::Short;
 
-use super::drive::check_node;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, Cia402AxisConfig, CopleyAxisConfig, DriveConfig, MachineConfig};
+use crate::hardware::node::check_node;
 
 /// The rates that both amplifiers and serial ports have.
 const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
@@ -137,7 +137,7 @@ fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402Axi
         drive.heartbeat_consumer_ms,
         drive.watch_master_ms,
     ];
-    check_node(judge, config, &drive.bus, heartbeats);
+    check_node(judge, &config.can, &drive.bus, heartbeats);
 }
 
 fn check_copley(
@@ -188,7 +188,8 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let analogs = config
         .analog
         .iter()
-        .filter_map(|(name, it)| Some((&*it.dcon()?.line, format!("analog.{name}.line"))));
+        .filter(|(_, it)| it.node().is_none())
+        .map(|(name, it)| (it.port(), format!("analog.{name}.line")));
     let instruments = config
         .instrument
         .iter()

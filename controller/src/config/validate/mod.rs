@@ -1,13 +1,11 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
-mod analog;
 pub(crate) mod axis;
 mod camera;
 pub(crate) mod drive;
 
 use std::collections::BTreeMap;
 
-use self::analog::check_analog;
 use self::axis::{check_axis, check_lines};
 use self::camera::check_cameras;
 use self::drive::check_axis_name;
@@ -18,9 +16,9 @@ use crate::rotary::check::check_rotaries;
 use drivers::device::cia402::period_from;
 use drivers::protocol::bus_load::BusLoadError;
 
-use super::instrument::InstrumentConfig;
-use super::model::{CanBus, CanTransport, MachineConfig};
+use super::model::MachineConfig;
 use crate::bus_plan;
+use crate::hardware::bus::{CanBus, CanTransport};
 
 /// The version of the file format this program reads.
 const SCHEMA_VERSION: u32 = 1;
@@ -39,14 +37,6 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     for (name, bus) in &config.can {
         check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
     }
-    for (name, line) in &config.serial {
-        Judge::at(format!("serial.{name}"), &mut findings).within(
-            "baud_bit_per_s",
-            line.baud_bit_per_s.into(),
-            50.0,
-            4e6,
-        );
-    }
     for (name, axis) in &config.axis {
         check_axis_name(&mut findings, "axis", name);
         check_axis(
@@ -58,18 +48,12 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     }
     check_rotaries(config, &mut findings);
     for (name, analog) in &config.analog {
-        check_analog(
-            &mut Judge::at(format!("analog.{name}"), &mut findings),
-            config,
-            analog,
-        );
+        let mut judge = Judge::at(format!("analog.{name}"), &mut findings);
+        analog.check(&mut judge, config.wiring());
     }
     for (name, instrument) in &config.instrument {
-        check_instrument(
-            &mut Judge::at(format!("instrument.{name}"), &mut findings),
-            config,
-            instrument,
-        );
+        let mut judge = Judge::at(format!("instrument.{name}"), &mut findings);
+        instrument.check(&mut judge, config.wiring());
     }
     check_cameras(config, &mut findings);
     crate::platform::check::check(config, &mut findings);
@@ -131,10 +115,6 @@ fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
             "CiA 301 has 10000, 20000, 50000, 125000, 250000, 500000, 800000, 1000000",
         );
     }
-}
-
-fn check_instrument(judge: &mut Judge<'_>, config: &MachineConfig, instrument: &InstrumentConfig) {
-    judge.known("line", &instrument.line, &config.serial, "serial line");
 }
 
 /// Node ids by bus: the master's, the drives', the modules'.

@@ -138,7 +138,7 @@ fn module<'a>(
     }
     judge.say(
         "analog",
-        format!("a {} module does not sample at SYNC", analog.device()),
+        "this module does not sample at SYNC",
         "use a module on CAN",
     );
     None

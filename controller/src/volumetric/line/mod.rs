@@ -249,7 +249,7 @@ impl WorkVolume<'_> {
         let config = config.ok_or_else(|| VolumetricFailure::NoInstrument {
             instrument: named(),
         })?;
-        let measure = Measure::new(optics, &config.optics);
+        let measure = Measure::new(optics, &config.optics());
         Ok(measure.map_err(|key| VolumetricFailure::NoOptics {
             instrument: named(),
             key,
@@ -280,7 +280,7 @@ impl WorkVolume<'_> {
     /// Lets the machine stand, then averages.
     fn read_path(&mut self, readout: &LineReadout) -> Result<DisplacementReading, Failure> {
         self.rest_all(readout.settle)?;
-        let rate_hz = self.core.config.instrument[&readout.instrument].sample_rate_hz;
+        let rate_hz = self.core.config.instrument[&readout.instrument].readings_per_s();
         Ok(self
             .core
             .average(&readout.instrument, readout.samples, rate_hz)?)

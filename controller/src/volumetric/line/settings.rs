@@ -16,7 +16,7 @@ pub(crate) fn line_corrections(
     instrument: &InstrumentConfig,
     has_two_beams: bool,
 ) -> length_correction::Settings {
-    let usual = crate::assemble::correction_settings(instrument);
+    let usual = instrument.corrections();
     if !has_two_beams {
         return usual;
     }

@@ -4,24 +4,7 @@ use core::time::Duration;
 use units::Metres;
 use wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, VACUUM_WAVELENGTH_M};
 
-/// Which way the displacement counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Direction {
-    /// As the instrument counts.
-    #[default]
-    AsCounted,
-    /// The other way: the beam's path shortens while the axis goes forward.
-    Reversed,
-}
-
-impl Direction {
-    pub(super) const fn sign(self) -> f64 {
-        match self {
-            Self::AsCounted => 1.0,
-            Self::Reversed => -1.0,
-        }
-    }
-}
+use crate::device::Direction;
 
 /// How an interferometer is used.
 #[derive(Clone, Copy, Debug, PartialEq)]

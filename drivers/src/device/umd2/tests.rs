@@ -1,6 +1,7 @@
 //! What the interferometer must and must not make of its stream.
 
 use super::*;
+use crate::device::Direction;
 use proptest::prelude::*;
 
 const REFERENCE: u32 = 2_458;

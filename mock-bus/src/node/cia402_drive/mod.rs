@@ -44,10 +44,12 @@ use wire::cia402::{Controlword, HomingStatus, PowerState};
 pub(in crate::node) use config::checked_node_id;
 pub use config::{Cia402DriveConfig, DriveQuirks, RotaryDriveConfig, TouchProbeConfig};
 
-use super::Node;
 use super::canopen_server::{CanopenServer, Deliveries, Manners, ServerEvent};
 use super::profile::Profile;
+use super::{Node, Section};
+use crate::config::error::ConfigError;
 use crate::plant::Plant;
+use crate::plant::config::PlantConfig;
 use cyclic::Cyclic;
 use mechanism::{Mechanism, PlantAxis};
 use motion::Activity;
@@ -125,6 +127,43 @@ impl Cia402DriveNode {
     fn axis<'a>(&self, plant: &'a mut Plant) -> PlantAxis<'a> {
         let axis = self.drive.config.axis;
         PlantAxis { plant, axis }
+    }
+}
+
+impl Section for Cia402DriveConfig {
+    fn is_on_can(&self) -> bool {
+        true
+    }
+
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
+        let (key, seen, expected) = match &self.rotary {
+            Some(rotary) => {
+                let turn = plant.table.as_ref().map(|it| it.encoder.counts_per_turn);
+                if turn == Some(rotary.counts_per_turn) {
+                    return Ok(());
+                }
+                let seen = f64::from(rotary.counts_per_turn);
+                (
+                    "counts_per_turn",
+                    seen,
+                    "the plant's table's counts_per_turn",
+                )
+            }
+            None if self.encoder_resolution_nm == plant.resolution_nm() => return Ok(()),
+            None => {
+                let seen = self.encoder_resolution_nm;
+                ("encoder_resolution_nm", seen, "the plant's resolution_nm")
+            }
+        };
+        Err(ConfigError::Value {
+            key,
+            seen,
+            expected,
+        })
+    }
+
+    fn build(&self, _: u64, _: &str) -> Box<dyn Node> {
+        Box::new(Cia402DriveNode::new(self.clone()))
     }
 }
 

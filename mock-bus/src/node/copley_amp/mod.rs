@@ -31,8 +31,10 @@ use wire::{LineControl, Payload};
 
 pub use config::{AmpQuirks, CopleyAmpConfig, CopleyAmpsConfig, LineQuirks};
 
-use super::Node;
+use super::{Node, Section};
+use crate::config::error::ConfigError;
 use crate::plant::Plant;
+use crate::plant::config::PlantConfig;
 use crate::random::Stream;
 use amp::Amp;
 
@@ -360,6 +362,34 @@ fn with_a_wrong_digit(value: &str) -> String {
             },
         )
         .collect()
+}
+
+impl Section for CopleyAmpsConfig {
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
+        if !addresses_fit(self) {
+            return Err(ConfigError::Value {
+                key: "amps",
+                seen: self.amps.len() as f64,
+                expected: "amplifiers with different addresses up to 127, one of them 0",
+            });
+        }
+        let resolution_nm = plant.resolution_nm();
+        let odd = self
+            .amps
+            .iter()
+            .find(|amp| amp.encoder_resolution_nm != resolution_nm);
+        odd.map_or(Ok(()), |amp| {
+            Err(ConfigError::Value {
+                key: "encoder_resolution_nm",
+                seen: amp.encoder_resolution_nm,
+                expected: "the plant's resolution_nm",
+            })
+        })
+    }
+
+    fn build(&self, seed: u64, name: &str) -> Box<dyn Node> {
+        Box::new(CopleyAmpsNode::new(self, seed, name))
+    }
 }
 
 impl Node for CopleyAmpsNode {

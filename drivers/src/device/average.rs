@@ -1,6 +1,6 @@
 //! Mean and standard deviation of a run of samples.
 
-use super::super::DisplacementReading;
+use super::DisplacementReading;
 use units::{Metres, Time};
 
 /// The last average asked for.
