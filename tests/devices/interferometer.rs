@@ -28,7 +28,9 @@ fn check(procedure: impl Fn(&mut Laser)) {
 fn laser(emulator: Emulator) -> Laser {
     let loaded = &emulator.loaded;
     let instrument = &loaded.config.instrument["laser"];
-    let InstrumentDevice::Umd2(umd2) = &instrument.device;
+    let InstrumentDevice::Umd2(umd2) = &instrument.device else {
+        panic!("{:?}", instrument.device)
+    };
     let settings = umd2.settings(instrument, loaded.patience);
     Desk::new(emulator, "laser", Umd2::new(settings))
 }

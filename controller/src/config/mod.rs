@@ -19,13 +19,10 @@ pub mod schema;
 mod structure;
 pub(crate) mod validate;
 
-pub use crate::hardware::analog::cia401::Cia401Config;
-pub use crate::hardware::analog::cia404::Cia404Config;
-pub use crate::hardware::analog::dcon::DconConfig;
-pub use crate::hardware::analog::{AnalogConfig, ModuleConfig};
+// What a family brings is public as soon as its section names it.
+pub use crate::hardware::analog::*;
 pub use crate::hardware::bus::{CanBus, CanTransport, SerialLine, Wiring};
-pub use crate::hardware::instrument::umd2::Umd2Config;
-pub use crate::hardware::instrument::{Count, InstrumentConfig, InstrumentDevice, OpticsConfig};
+pub use crate::hardware::instrument::*;
 pub use crate::hardware::node::{IdentityConfig, NodeConfig};
 pub use axis::{
     AmplifierConfig, AxisConfig, Cia402AxisConfig, CopleyAxisConfig, CyclicConfig, DriveConfig,

@@ -99,7 +99,12 @@ impl<'a> Reference<'a> {
         }
         self.rows(section, &mut text);
         for variant in variants {
-            let _ = write!(text, "\nWith `device = \"{}\"`:\n\n{HEAD}", word(variant));
+            let _ = write!(text, "\nWith `device = \"{}\"`:\n\n", word(variant));
+            let about = variant["description"].as_str().unwrap_or_default();
+            if let Some((_, more)) = about.split_once("\n\n") {
+                let _ = write!(text, "{}\n\n", paragraphs(more));
+            }
+            text += HEAD;
             self.rows(self.resolved(variant), &mut text);
         }
         text
@@ -240,6 +245,7 @@ fn choices(part: &Value) -> Option<Vec<(&str, &str)>> {
 fn described(choices: &[(&str, &str)]) -> String {
     let known = choices.iter().filter(|(_, about)| !about.is_empty());
     known.fold(String::new(), |text, (word, about)| {
+        let about = about.split("\n\n").next().unwrap_or_default();
         let about = uncapital(about.trim_end_matches('.').replace('\n', " "));
         text + &format!(" `\"{word}\"`: {about}.")
     })

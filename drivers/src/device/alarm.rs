@@ -116,12 +116,8 @@ pub enum Alarm {
     #[error("{lines} lines in a row not understood; wrong baud rate?")]
     Garbage { lines: u64 },
     /// Something that only one family of devices can say.
-    #[error("{device}: {what}; {remedy}")]
-    Own {
-        device: DeviceName,
-        what: &'static str,
-        remedy: &'static str,
-    },
+    #[error("{}: {}; {}", .0.device, .0.what, .0.remedy)]
+    Own(&'static OwnAlarm),
     /// An analog channel's sample is too old.
     #[error("analog input: no sample for {}", units::ShortSpan(*waited))]
     StaleSample { waited: Duration },
@@ -148,6 +144,17 @@ pub enum Alarm {
         jump: LengthOrAngle,
         limit: LengthOrAngle,
     },
+}
+
+/// What only one family of devices can say; its file has them as constants.
+#[derive(Debug, PartialEq, Eq)]
+pub struct OwnAlarm {
+    /// Who says it.
+    pub device: DeviceName,
+    /// What is wrong.
+    pub what: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
 }
 
 /// What an amplifier on a serial line can say of itself.

@@ -31,7 +31,7 @@ use wire::Input;
 use wire::Payload;
 use wire::cia402::PowerState;
 
-pub use alarm::{Alarm, AmplifierTrouble};
+pub use alarm::{Alarm, AmplifierTrouble, OwnAlarm};
 pub use direction::Direction;
 pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};

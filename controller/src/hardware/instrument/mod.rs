@@ -13,7 +13,7 @@ use units::{Metres, Radians};
 
 use super::bus::Wiring;
 use crate::config::judge::Judge;
-use umd2::Umd2Config;
+pub use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
 const ANGLE_U: Radians = Radians(0.2e-3);
