@@ -15,6 +15,7 @@ pub mod copley;
 pub mod dcon;
 pub mod in_sight;
 pub mod lockstep;
+pub mod nd287;
 pub mod slcan;
 pub mod umd2;
 

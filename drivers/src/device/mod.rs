@@ -18,6 +18,7 @@ mod fake_node;
 pub mod in_sight;
 mod latch;
 mod name;
+pub mod nd287;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;

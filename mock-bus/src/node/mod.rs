@@ -10,6 +10,7 @@ pub mod cia404_analog;
 pub mod copley_amp;
 pub mod dcon_module;
 pub mod in_sight_controller;
+pub mod nd287_display;
 pub mod profile;
 pub mod umd2_interferometer;
 
@@ -28,6 +29,7 @@ use cia404_analog::Cia404AnalogConfig;
 use copley_amp::CopleyAmpsConfig;
 use dcon_module::DconModuleConfig;
 use in_sight_controller::InSightControllerConfig;
+use nd287_display::Nd287DisplayConfig;
 use umd2_interferometer::Umd2InterferometerConfig;
 
 /// Which device, and how it is set.
@@ -44,6 +46,8 @@ pub enum DeviceConfig {
     Umd2Interferometer(Umd2InterferometerConfig),
     /// ADAM or I-7000 analog module, on a serial line.
     DconModule(DconModuleConfig),
+    /// HEIDENHAIN ND 287 position display, on a serial line.
+    Nd287Display(Nd287DisplayConfig),
     /// In-Sight vision system, on a serial line.
     InSightController(InSightControllerConfig),
     /// Copley Controls servo amplifiers, on one serial line.
@@ -72,6 +76,7 @@ impl DeviceConfig {
             Self::Cia404Analog(section) => section,
             Self::Umd2Interferometer(section) => section,
             Self::DconModule(section) => section,
+            Self::Nd287Display(section) => section,
             Self::InSightController(section) => section,
             Self::CopleyAmps(section) => section,
         }

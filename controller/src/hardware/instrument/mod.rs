@@ -1,5 +1,6 @@
 //! Displacement instruments: `[instrument.NAME]`.
 
+pub(crate) mod nd287;
 pub(crate) mod umd2;
 
 use core::time::Duration;
@@ -13,6 +14,7 @@ use units::{Metres, Radians};
 
 use super::bus::Wiring;
 use crate::config::judge::Judge;
+pub use nd287::Nd287Config;
 pub use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
@@ -24,6 +26,12 @@ const ANGLE_U: Radians = Radians(0.2e-3);
 pub enum InstrumentDevice {
     /// A µMD1 or µMD2 interferometer interface.
     Umd2(Umd2Config),
+    /// A HEIDENHAIN ND 287 position display over the encoder of a comparator.
+    ///
+    /// The display is set to 8 data bits, no parity and 1 stop bit, to millimetres or inches, to one input,
+    /// its actual value and no scaling. Its scale stands at the machine's temperature: nothing is corrected
+    /// for the expansion of either.
+    Nd287(Nd287Config),
 }
 
 /// What a family of displacement instruments is to a machine.
@@ -72,6 +80,7 @@ impl InstrumentDevice {
     fn family(&self) -> &dyn Family {
         match self {
             Self::Umd2(family) => family,
+            Self::Nd287(family) => family,
         }
     }
 }
