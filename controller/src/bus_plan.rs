@@ -27,7 +27,7 @@ pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError>
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, bus.sync_period())
         .with_heartbeat(ms(bus.master_heartbeat_ms));
     let axes = config.axis.values();
-    let axes = axes.filter_map(|axis| Some((axis.can()?, axis.cyclic().is_some())));
+    let axes = axes.filter_map(|axis| Some((axis.node()?, axis.cyclic().is_some())));
     for (axis, is_cyclic) in axes.filter(|(axis, _)| axis.bus == name) {
         if is_cyclic {
             plan = plan.with_pdos(&[SET_POINT_PDO_BYTES]);

@@ -54,7 +54,7 @@ pub(crate) fn this_machine(
         config_hash: hash.as_str().to_owned(),
         axis: axis.to_owned(),
         drive: drive_record(machine, axis),
-        resolution_m: linear.map(|axis| axis.resolution_nm * 1e-9),
+        resolution_m: linear.map(|axis| axis.motion.resolution_nm * 1e-9),
         resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
         created: String::new(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),

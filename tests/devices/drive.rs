@@ -5,8 +5,7 @@ use core::time::Duration;
 use drivers::device::cia402::Cia402Drive;
 use drivers::device::{Alarm, Axis, AxisCommand, Device, DeviceError, DriveCommand, ServoDrive};
 use mock_bus::fault::{Fault, FaultConfig};
-use tests::{Desk, Emulator, Rig, Setup, rigs};
-use truestage::assemble;
+use tests::{Desk, Emulator, Rig, Setup, rigs, cia402_settings};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 use wire::cia402::PowerState;
 
@@ -18,8 +17,7 @@ const SILENCE: Duration = Duration::from_millis(1500);
 fn drive(rig: Rig) -> Drive {
     let emulator = Emulator::new(rig, &Setup::new(21));
     let loaded = &emulator.loaded;
-    let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
-    let mut settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
+    let mut settings = cia402_settings(loaded, "x");
     settings.common.master_consumer_time = SILENCE;
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
@@ -219,8 +217,7 @@ fn a_drive_that_is_another_one_is_refused_before_anything_is_set() {
             Setup::new(21).emulated("product_code = 0x42_0001", "product_code = 0x42_0002");
         let emulator = Emulator::new(rig, &change);
         let loaded = &emulator.loaded;
-        let (axis, bus) = (&loaded.config.axis["x"], &loaded.config.can["can0"]);
-        let settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
+        let settings = cia402_settings(loaded, "x");
         let mut drive = Desk::new(emulator, "can0", Cia402Drive::new(settings));
         let refused = drive.start();
         let seen = 0x42_0002;

@@ -5,8 +5,7 @@ use core::time::Duration;
 use drivers::device::cia402::Cia402Drive;
 use drivers::device::{AxisCommand, Device, DriveCommand};
 use mock_bus::plant::HallDrift;
-use tests::{Desk, Emulator, Setup, rigs};
-use truestage::assemble;
+use tests::{Desk, Emulator, Setup, rigs, cia402_settings};
 use units::{Metres, MetresPerSecond};
 
 /// The first mark off the negative switch, at -5 mm, of a screw with a lead of 2 mm.
@@ -29,8 +28,7 @@ fn after_every_power_cycle_the_index_pulse_gives_the_same_origin() {
     for rig in rigs() {
         let emulator = Emulator::new(rig, &Setup::uvw(41));
         let loaded = &emulator.loaded;
-        let (axis, bus) = (&loaded.config.axis["u"], &loaded.config.can["can0"]);
-        let settings = assemble::cia402_settings(axis, axis.can().unwrap(), bus, loaded.patience);
+        let settings = cia402_settings(loaded, "u");
         let mut drive = Desk::new(emulator, "can0", Cia402Drive::new(settings));
         for cycle in 0..3 {
             let homed = drive

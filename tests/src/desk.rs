@@ -2,12 +2,14 @@
 
 use core::time::Duration;
 
+use drivers::device::cia402::Cia402Settings;
 use drivers::device::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, LatchCommand, PositionLatch,
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
 use truestage::assemble;
+use truestage::config::{DriveConfig, Loaded};
 use units::{Coordinate, Time};
 use wire::canopen::NodeId;
 use wire::{Payload, Port};
@@ -199,4 +201,16 @@ impl<D: Device> Desk<D> {
     {
         self.device.reading().expect("the drive was started")
     }
+}
+
+/// What the driver of `axis`, a drive of CiA 402, is told.
+///
+/// # Panics
+/// When it is no such drive.
+pub fn cia402_settings(loaded: &Loaded, axis: &str) -> Cia402Settings {
+    let axis = &loaded.config.axis[axis];
+    let DriveConfig::Cia402(drive) = &axis.drive else {
+        panic!("{:?}", axis.drive)
+    };
+    drive.settings(axis.task(), loaded.config.wiring(), loaded.patience)
 }

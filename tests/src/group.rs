@@ -54,7 +54,7 @@ impl Group {
         let patience = emulator.loaded.patience;
         let mut transport = emulator.transport();
         let members = config.axis.values().map(|axis| {
-            let device = assemble::axis_device(axis, config, patience);
+            let device = axis.driver(config.wiring(), patience);
             let name = axis.port();
             Member {
                 axis: device,

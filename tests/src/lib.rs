@@ -21,7 +21,7 @@ mod stand;
 pub mod stream;
 pub mod volume;
 
-pub use desk::Desk;
+pub use desk::{Desk, cia402_settings};
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use four_screws::{four_cyclic_axes, with_fourth_drive, with_fourth_screw};
 pub use group::{Group, Start};

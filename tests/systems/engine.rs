@@ -233,9 +233,11 @@ fn four_axes_at_two_milliseconds_follow_a_circle_on_every_bus() {
     });
 }
 
+/// In which period the loop of the next test is held up.
+const HELD_UP_AT: u32 = 100;
+
 #[test]
 fn a_loop_that_is_held_up_in_real_time_drops_its_path_and_stops_all_axes_together() {
-    const AT: u32 = 100;
     // From shortly after a SYNC: one is missed, and the drives do not stop by themselves yet.
     const HELD_UP: Duration = Duration::from_millis(21);
     let setup = with_period(&Setup::four_cyclic_axes(2).in_real_time(), "10.0");
@@ -247,7 +249,7 @@ fn a_loop_that_is_held_up_in_real_time_drops_its_path_and_stops_all_axes_togethe
             let run = zero(&mut stand).and_then(|()| {
                 along_a_circle(&mut stand, 3.0, &mut |periods| {
                     let begin = Instant::now();
-                    while periods == AT && begin.elapsed() < HELD_UP {}
+                    while periods == HELD_UP_AT && begin.elapsed() < HELD_UP {}
                 })
             });
             let done = dropped_its_path(run, rig);
@@ -272,8 +274,13 @@ fn dropped_its_path(run: Result<Run, Failure>, rig: Rig) -> bool {
         }
     };
     assert!(!judged(&run, rig, WINDOW), "an overrun went unflagged");
-    let last = run.writer.lives.last().expect("it ran");
-    assert!(last.cycle < 200, "the path went on: {last:?}");
+    let last = run.writer.lives.last().map(|it| it.cycle);
+    // Who is late before that has not come to what is tried here.
+    let Some(last) = last.filter(|cycle| *cycle >= u64::from(HELD_UP_AT)) else {
+        println!("{rig:?}: again, late in cycle {last:?}");
+        return false;
+    };
+    assert!(last < 200, "the path went on to cycle {last}");
     true
 }
 

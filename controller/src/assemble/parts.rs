@@ -8,10 +8,10 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 use wire::Port;
 use wire::canopen::NodeId;
 
-use super::cyclic::cyclic_settings;
-use super::{axes, ports};
+use super::ports;
 use crate::camera::{cameras, inspection_timeout};
 use crate::config::{AxisConfig, CanBus, IdentityConfig, Loaded, MachineConfig};
+use crate::hardware::drive::cyclic_settings;
 use crate::hardware::node::{expected_identity, node_id};
 use crate::rotary::settings::rotaries;
 
@@ -20,7 +20,12 @@ pub(crate) fn parts(loaded: &Loaded) -> Parts {
     let (config, patience) = (&loaded.config, loaded.patience);
     let ports = ports(config);
     let settings = config.axis.values().map(|axis| axis_settings(axis, config));
-    let units = axes(config, &ports, patience).into_iter().zip(settings);
+    let axes = config.axis.iter().map(|(name, axis)| Unit {
+        name: name.clone(),
+        port: ports[axis.port()],
+        device: axis.driver(config.wiring(), patience),
+    });
+    let units = axes.zip(settings);
     let cameras = cameras(config, &ports, patience).into_iter();
     Parts {
         buses: config
@@ -104,7 +109,7 @@ fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
     };
     let axes = config.axis.iter();
     let axes = axes
-        .filter_map(|(name, axis)| Some((name, axis.can()?)))
+        .filter_map(|(name, axis)| Some((name, axis.node()?)))
         .filter(|(_, axis)| axis.bus == bus)
         .map(|(name, axis)| node(axis.node_id, true, name, &axis.identity));
     let rotaries = config.rotary.iter();
@@ -121,23 +126,23 @@ fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
 
 fn axis_settings(axis: &AxisConfig, config: &MachineConfig) -> AxisSettings {
     AxisSettings {
-        soft_min: Metres::from_mm(axis.soft_min_mm),
-        soft_max: Metres::from_mm(axis.soft_max_mm),
-        speed: MetresPerSecond(axis.speed_mm_per_s * 1e-3),
-        acceleration: MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3),
-        position_window: Metres::from_um(axis.position_window_um),
-        move_timeout: Duration::from_secs_f64(axis.move_timeout_s),
+        soft_min: Metres::from_mm(axis.motion.soft_min_mm),
+        soft_max: Metres::from_mm(axis.motion.soft_max_mm),
+        speed: MetresPerSecond(axis.motion.speed_mm_per_s * 1e-3),
+        acceleration: MetresPerSecondSquared(axis.motion.acceleration_mm_per_s2 * 1e-3),
+        position_window: Metres::from_um(axis.motion.position_window_um),
+        move_timeout: Duration::from_secs_f64(axis.motion.move_timeout_s),
         cyclic: cyclic(axis, config),
     }
 }
 
 /// `None` for an axis without the section, and for one on a serial line.
 fn cyclic(axis: &AxisConfig, config: &MachineConfig) -> Option<CyclicSettings> {
-    let (can, cyclic) = axis.can().zip(axis.cyclic())?;
-    let (limits, correction) = cyclic_settings(axis, cyclic);
+    let (node, cyclic) = axis.node().zip(axis.cyclic())?;
+    let (limits, correction) = cyclic_settings(&axis.motion, cyclic);
     Some(CyclicSettings {
         limits,
         correction,
-        period: config.can[&can.bus].sync_period(),
+        period: config.can[&node.bus].sync_period(),
     })
 }

@@ -416,16 +416,15 @@ mod tests {
 
     #[test]
     fn what_a_drive_does_on_its_own_is_written_only_where_the_file_says_so() {
+        use crate::config::DriveConfig;
         use drivers::device::cia402::HomeOffset;
         let settings = |text: &str| {
             let config = parse(text, "m").unwrap().config;
-            let (axis, bus) = (&config.axis["x"], &config.can["can0"]);
-            crate::assemble::cia402_settings(
-                axis,
-                axis.can().expect("it is on CAN"),
-                bus,
-                Patience::NONE,
-            )
+            let axis = &config.axis["x"];
+            let DriveConfig::Cia402(drive) = &axis.drive else {
+                panic!("{:?}", axis.drive)
+            };
+            drive.settings(axis.task(), config.wiring(), Patience::NONE)
         };
         let usual = settings(LINEAR);
         assert_eq!(usual.options.quick_stop, None);

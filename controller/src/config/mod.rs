@@ -7,7 +7,6 @@ mod axis;
 mod camera;
 mod dependence;
 mod diagnostic;
-mod drive;
 #[cfg(test)]
 mod impossible_tests;
 pub(crate) mod judge;
@@ -22,15 +21,14 @@ pub(crate) mod validate;
 // What a family brings is public as soon as its section names it.
 pub use crate::hardware::analog::*;
 pub use crate::hardware::bus::{CanBus, CanTransport, SerialLine, Wiring};
+pub use crate::hardware::drive::cia402::{HomeOffsetName, OptionCodesConfig};
+pub use crate::hardware::drive::*;
 pub use crate::hardware::instrument::*;
 pub use crate::hardware::node::{IdentityConfig, NodeConfig};
-pub use axis::{
-    AmplifierConfig, AxisConfig, Cia402AxisConfig, CopleyAxisConfig, CyclicConfig, DriveConfig,
-};
+pub use axis::AxisConfig;
 pub use camera::{CameraConfig, CameraDevice};
 pub use dependence::hash_of;
 pub use diagnostic::{ConfigError, Diagnostic};
-pub use drive::{HomeOffsetName, OptionCodesConfig};
 pub use load::{Loaded, load, parse};
 pub use machine::records::ConfigHash;
 pub use model::{MachineConfig, MachineSection};

@@ -45,25 +45,26 @@ impl IdentityConfig {
     }
 }
 
-/// What every module on CAN has.
+/// What every node on CAN has.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 pub struct NodeConfig {
-    /// The bus that the module is on.
+    /// The bus that it is on.
     #[schemars(extend("x-range" = "a `[can.NAME]`"))]
     pub bus: String,
-    /// Its number there.
+    /// Its number there; no two nodes of a bus have the same.
     #[schemars(range(min = 1, max = 127))]
     pub node_id: u8,
-    /// Period of the module's heartbeat (0x1017).
+    /// Period of its heartbeat (0x1017).
     #[schemars(range(min = 5, max = 10000))]
     pub heartbeat_producer_ms: u16,
-    /// Without a heartbeat for this long the module counts as lost.
+    /// Without a heartbeat for this long it counts as lost.
     #[schemars(extend("x-range" = "at least 2 × `heartbeat_producer_ms`"))]
     pub heartbeat_consumer_ms: u16,
-    /// Without the controller's heartbeat for this long the module knows (0x1016).
+    /// Without the controller's heartbeat for this long (0x1016) a drive stops by itself, and a
+    /// module knows.
     #[schemars(extend("x-range" = "at least 2 × `master_heartbeat_ms`"))]
     pub watch_master_ms: u16,
-    /// Who the module must be.
+    /// Who it must be.
     pub identity: IdentityConfig,
 }
 

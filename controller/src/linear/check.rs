@@ -98,23 +98,23 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig, 
 
 /// Wrong signs here send an axis into its limit switch, or beyond it.
 fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig) {
-    let is_beyond = zero.negative_limit_mm < axis.soft_min_mm;
+    let is_beyond = zero.negative_limit_mm < axis.motion.soft_min_mm;
     if !is_beyond || zero.negative_limit_mm.is_infinite() {
         judge.say(
             "negative_limit_mm",
             format!(
                 "the limit switch at {} mm is not beyond the soft limit of {} mm",
-                zero.negative_limit_mm, axis.soft_min_mm
+                zero.negative_limit_mm, axis.motion.soft_min_mm
             ),
             "give the switch's place seen from the zero, below soft_min_mm: usually negative",
         );
     }
-    if !(axis.soft_min_mm..=axis.soft_max_mm).contains(&0.0) {
+    if !(axis.motion.soft_min_mm..=axis.motion.soft_max_mm).contains(&0.0) {
         judge.say(
             "",
             format!(
                 "the zero lies outside the soft limits {} to {} mm: the axis cannot go there",
-                axis.soft_min_mm, axis.soft_max_mm
+                axis.motion.soft_min_mm, axis.motion.soft_max_mm
             ),
             "soft limits are seen from the zero",
         );
@@ -122,7 +122,7 @@ fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig)
 }
 
 fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig) {
-    let speed_max = axis.speed_max_mm_per_s;
+    let speed_max = axis.motion.speed_max_mm_per_s;
     for (key, value) in [
         ("reference_speed_mm_per_s", zero.reference_speed_mm_per_s),
         ("search_speed_mm_per_s", zero.search_speed_mm_per_s),
@@ -136,7 +136,7 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
             "the flanks lie well below the peak",
         );
     } else if (0.1..=1e5).contains(&zero.time_limit_s)
-        && let Err(error) = assemble::hall_settings(zero, axis).validate()
+        && let Err(error) = assemble::hall_settings(zero, &axis.motion).validate()
     {
         judge.say(
             "",
@@ -173,7 +173,7 @@ fn check_rails(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig)
 fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, overrun: f64) {
     judge.below(("start_mm", start), ("end_mm", end));
     // Without it the first and the last target have no approach of their own.
-    let reachable = axis.soft_min_mm..=axis.soft_max_mm;
+    let reachable = axis.motion.soft_min_mm..=axis.motion.soft_max_mm;
     if !reachable.contains(&-overrun) {
         judge.say(
             "overrun_mm",
@@ -191,8 +191,8 @@ fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, o
                 format!("with its overrun reaches {} mm", Short(value)),
                 format!(
                     "stay within {} to {} mm",
-                    Short(axis.soft_min_mm),
-                    Short(axis.soft_max_mm)
+                    Short(axis.motion.soft_min_mm),
+                    Short(axis.motion.soft_max_mm)
                 ),
             );
         }

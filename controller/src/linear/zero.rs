@@ -99,7 +99,7 @@ impl LinearStage<'_> {
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, 2, STEPS);
-        let usual = assemble::hall_settings(config, self.config);
+        let usual = assemble::hall_settings(config, &self.config.motion);
         let settings = assemble::patient_search(usual, self.core.patience());
         let outcome = self.search(config, settings)?;
         self.core
@@ -118,7 +118,7 @@ impl LinearStage<'_> {
     /// Coarse reference on the negative limit switch.
     fn reference(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
-        let limit = assemble::reference_limit(config, self.config);
+        let limit = self.config.reference_limit().unwrap_or_default();
         let position = Metres::from_mm(config.negative_limit_mm);
         self.core.command(
             self.axis,
@@ -265,8 +265,8 @@ impl LinearStage<'_> {
     }
 
     fn pairing(&self, config: &ZeroConfig) -> Result<Pairing, Failure> {
-        let can = self.config.can();
-        let bus = &can.expect("the check asks for a drive on CAN").bus;
+        let node = self.config.node();
+        let bus = &node.expect("the check asks for a drive on CAN").bus;
         let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
         let module = &self.core.config.analog[&config.analog];
         let poll_s = module.poll_period().as_secs_f64();

@@ -212,7 +212,7 @@ impl AlignmentPlatform<'_> {
         let section = "compensation";
         let limits = config.compensation.as_ref();
         let limits = limits.ok_or(PlatformFailure::NotConfigured { section })?;
-        let resolution = Metres(self.core.config.axis[axis].resolution_nm.abs() * 1e-9);
+        let resolution = Metres(self.core.config.axis[axis].motion.resolution_nm.abs() * 1e-9);
         ScrewCompensation::new(model, limits_of(limits, resolution), rule_of(limits)).map_err(
             |source| {
                 let axis = axis.clone();

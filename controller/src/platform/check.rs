@@ -91,7 +91,7 @@ fn check_references(
         let [x, y] = actuator.direction;
         judge.within("direction", hypot(x, y), 1e-6, 1e6);
         if let Some(axis) = config.axis.get(&actuator.axis) {
-            if actuator.index_mm >= axis.soft_max_mm {
+            if actuator.index_mm >= axis.motion.soft_max_mm {
                 judge.say(
                     "index_mm",
                     "the index lies beyond the upper soft limit",
@@ -102,7 +102,7 @@ fn check_references(
                 "axis speed",
                 platform.speed_mm_per_s,
                 0.0,
-                axis.speed_max_mm_per_s,
+                axis.motion.speed_max_mm_per_s,
             );
         }
     }
@@ -135,14 +135,14 @@ fn check_calibrate(
         let Some(axis) = config.axis.get(&actuator.axis) else {
             continue;
         };
-        let fits = run.first_mm - run.overrun_mm >= axis.soft_min_mm
-            && run.last_mm + run.overrun_mm <= axis.soft_max_mm;
+        let fits = run.first_mm - run.overrun_mm >= axis.motion.soft_min_mm
+            && run.last_mm + run.overrun_mm <= axis.motion.soft_max_mm;
         if !fits {
             judge.say(
                 "",
                 format!(
                     "strokes and overrun leave the soft limits of axis {} ({} to {} mm)",
-                    actuator.axis, axis.soft_min_mm, axis.soft_max_mm
+                    actuator.axis, axis.motion.soft_min_mm, axis.motion.soft_max_mm
                 ),
                 "shorten the strokes or the overrun",
             );

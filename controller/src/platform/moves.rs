@@ -262,7 +262,7 @@ impl AlignmentPlatform<'_> {
     }
 
     fn sync_period(&self, axis: &str) -> Result<Option<Duration>, Failure> {
-        let drive = self.core.config.axis[axis].can();
+        let drive = self.core.config.axis[axis].node();
         let bus = drive.and_then(|it| self.core.config.can.get(&it.bus));
         Ok(bus.map(|bus| bus.sync_period()))
     }

@@ -96,8 +96,8 @@ pub(crate) fn kinematics(
                     y: Metres::from_mm(it.point_mm[1]),
                 },
                 direction: [x / length, y / length],
-                stroke_min: Metres::from_mm(limits.map_or(-1.0, |axis| axis.soft_min_mm)),
-                stroke_max: Metres::from_mm(limits.map_or(1.0, |axis| axis.soft_max_mm)),
+                stroke_min: Metres::from_mm(limits.map_or(-1.0, |axis| axis.motion.soft_min_mm)),
+                stroke_max: Metres::from_mm(limits.map_or(1.0, |axis| axis.motion.soft_max_mm)),
             }
         })
         .collect();

@@ -30,7 +30,7 @@ pub(crate) fn head_of(
     let axes = &loaded.config.axis;
     let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
     Ok(RecordHead {
-        resolution_m: Some(it.resolution_nm * 1e-9),
+        resolution_m: Some(it.motion.resolution_nm * 1e-9),
         ..head(loaded, axis, &it.configured_identity(), data)
     })
 }

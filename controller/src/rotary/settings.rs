@@ -13,9 +13,9 @@ use drivers::device::cia402::{
 use units::{Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale};
 use wire::Port;
 
-use crate::assemble::{home_offset, option_codes, patient_drive};
 use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
+use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
 use crate::hardware::node::node_settings;
 use crate::hardware::{CHECKED, millis};
 use crate::rotary::{

@@ -96,7 +96,8 @@ fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volu
             continue;
         };
         let (low, high) = (volumetric.low_mm[at], volumetric.high_mm[at]);
-        let fits = low - room_mm >= axis.soft_min_mm && high + room_mm <= axis.soft_max_mm;
+        let fits =
+            low - room_mm >= axis.motion.soft_min_mm && high + room_mm <= axis.motion.soft_max_mm;
         if !fits {
             judge.say(
                 "low_mm",
@@ -104,8 +105,8 @@ fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volu
                     "{low} to {high} mm with corrections of {} mm leave the soft limits \
                      of axis {name}, {} to {} mm",
                     Short(room_mm),
-                    axis.soft_min_mm,
-                    axis.soft_max_mm
+                    axis.motion.soft_min_mm,
+                    axis.motion.soft_max_mm
                 ),
                 "make the volume smaller, or the soft limits wider",
             );
@@ -131,9 +132,9 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             "zero.search_speed_mm_per_s",
             zero.search_speed_mm_per_s,
             1e-3,
-            axis.speed_max_mm_per_s,
+            axis.motion.speed_max_mm_per_s,
         );
-        let inside = index_mm >= axis.soft_min_mm && index_mm < axis.soft_max_mm;
+        let inside = index_mm >= axis.motion.soft_min_mm && index_mm < axis.motion.soft_max_mm;
         if !inside {
             judge.say(
                 "zero.index_mm",

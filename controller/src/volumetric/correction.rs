@@ -381,7 +381,7 @@ fn check_speed(
     let axes = volumetric
         .axes
         .iter()
-        .map(|it| config.axis[it].speed_max_mm_per_s);
+        .map(|it| config.axis[it].motion.speed_max_mm_per_s);
     let axes = MetresPerSecond(axes.fold(0.0, f64::max) * 1e-3);
     let seen = model.speed_max();
     if seen < axes {

@@ -7,8 +7,9 @@
 
 use core::fmt::{Debug, Formatter, Result};
 
-use crate::config::axis::{AxisConfig, DriveConfig};
+use crate::config::axis::AxisConfig;
 use crate::config::model::MachineConfig;
+use crate::hardware::drive::DriveConfig;
 use crate::hardware::node::IdentityConfig;
 use crate::rotary::{DirectionName, RotaryConfig};
 use crate::volumetric::{
@@ -39,10 +40,10 @@ pub(super) fn text(config: &MachineConfig) -> String {
 fn axis(name: &str, axis: &AxisConfig) -> String {
     let zero = axis.zero.as_ref();
     let zero = zero.map(|zero| (&zero.analog, zero.level_below_peak_v));
-    let resolution_nm = axis.resolution_nm;
+    let resolution_nm = axis.motion.resolution_nm;
     match &axis.drive {
         DriveConfig::Cia402(drive) => {
-            let (node_id, identity) = (drive.node_id, Identity(&drive.identity));
+            let (node_id, identity) = (drive.node.node_id, Identity(&drive.node.identity));
             format!("{name} Cia402 {node_id} {resolution_nm} {identity:?} {zero:?}")
         }
         DriveConfig::Copley(drive) => {

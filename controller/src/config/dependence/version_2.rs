@@ -8,6 +8,7 @@ use super::text::{Place, Value, quoted};
 use crate::config::axis::AxisConfig;
 use crate::config::model::MachineConfig;
 use crate::hardware::analog::AnalogConfig;
+use crate::hardware::drive::DriveConfig;
 use crate::hardware::node::IdentityConfig;
 use crate::platform::config::ActuatorConfig;
 use crate::rotary::{DirectionName, RotaryConfig, RotaryDevice};
@@ -41,15 +42,19 @@ pub(super) fn text(config: &MachineConfig) -> String {
 }
 
 fn say_axis(mut place: Place<'_>, axis: &AxisConfig) {
-    let (can, serial) = (axis.can(), axis.serial());
-    place.say("device", axis.device());
-    place.say("node_id", can.map(|it| it.node_id));
-    place.say("address", serial.map(|it| it.address));
-    place.say("resolution_nm", axis.resolution_nm);
-    if let Some(drive) = can {
-        say_identity(place.at("identity"), &drive.identity);
+    let (device, amplifier) = match &axis.drive {
+        DriveConfig::Cia402(_) => ("cia402", None),
+        DriveConfig::Copley(drive) => ("copley", drive.amplifier.as_ref()),
+    };
+    let node = axis.node();
+    place.say("device", device);
+    place.say("node_id", node.map(|it| it.node_id));
+    place.say("address", axis.address());
+    place.say("resolution_nm", axis.motion.resolution_nm);
+    if let Some(node) = node {
+        say_identity(place.at("identity"), &node.identity);
     }
-    if let Some(amplifier) = serial.and_then(|it| it.amplifier.as_ref()) {
+    if let Some(amplifier) = amplifier {
         let mut place = place.at("amplifier");
         place.say("model", &amplifier.model);
         place.say("serial_number", amplifier.serial_number);

@@ -2,35 +2,35 @@
 
 use std::collections::BTreeMap;
 
-use drivers::device::cia402::{interpolation_period, period_from};
-
 use units::Short;
 
 use crate::config::judge::{Finding, Judge};
-use crate::config::{AxisConfig, Cia402AxisConfig, CopleyAxisConfig, DriveConfig, MachineConfig};
-use crate::hardware::node::check_node;
-
-/// The rates that both amplifiers and serial ports have.
-const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
+use crate::config::{AxisConfig, MachineConfig};
 
 pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
+    let motion = &axis.motion;
     judge.below(
-        ("soft_min_mm", axis.soft_min_mm),
-        ("soft_max_mm", axis.soft_max_mm),
+        ("soft_min_mm", motion.soft_min_mm),
+        ("soft_max_mm", motion.soft_max_mm),
     );
     judge.within(
         "speed_mm_per_s",
-        axis.speed_mm_per_s,
+        motion.speed_mm_per_s,
         1e-3,
-        axis.speed_max_mm_per_s,
+        motion.speed_max_mm_per_s,
     );
-    match &axis.drive {
-        DriveConfig::Cia402(drive) => check_cia402(judge, config, drive),
-        DriveConfig::Copley(drive) => check_copley(judge, config, axis, drive),
+    let drive = axis.drive.family();
+    drive.check(judge, config.wiring());
+    if axis.zero.is_some() && !drive.samples_at_sync() {
+        judge.say(
+            "zero",
+            "the Hall search needs positions and voltages of one SYNC; this drive has none",
+            "remove the section, or use a drive on CAN",
+        );
     }
     let counts =
-        axis.soft_min_mm.abs().max(axis.soft_max_mm.abs()) * 1e6 / axis.resolution_nm.abs();
-    if axis.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
+        motion.soft_min_mm.abs().max(motion.soft_max_mm.abs()) * 1e6 / motion.resolution_nm.abs();
+    if motion.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
         judge.say(
             "resolution_nm",
             format!("the soft limits need {counts:.0} counts, a drive has 2147483647"),
@@ -42,17 +42,14 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
 
 /// Drives hold speeds and accelerations in 32 bits, in units of their counts.
 fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
-    // What an amplifier counts in: 0.1 counts/s and 10 counts/s².
-    let (speed_counts, acceleration_counts) = match axis.drive {
-        DriveConfig::Cia402(_) => (1.0, 1.0),
-        DriveConfig::Copley(_) => (0.1, 10.0),
-    };
-    let largest_mm = f64::from(i32::MAX) * axis.resolution_nm.abs() * 1e-6;
+    let [speed_counts, acceleration_counts] = axis.drive.family().register_units();
+    let motion = &axis.motion;
+    let largest_mm = f64::from(i32::MAX) * motion.resolution_nm.abs() * 1e-6;
     let reference_speed = axis.zero.as_ref().map(|it| it.reference_speed_mm_per_s);
     for (key, value, counts, unit) in [
         (
             "speed_mm_per_s",
-            Some(axis.speed_mm_per_s),
+            Some(motion.speed_mm_per_s),
             speed_counts,
             "mm/s",
         ),
@@ -64,13 +61,13 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
         ),
         (
             "acceleration_mm_per_s2",
-            Some(axis.acceleration_mm_per_s2),
+            Some(motion.acceleration_mm_per_s2),
             acceleration_counts,
             "mm/s²",
         ),
         (
             "quick_stop_deceleration_mm_per_s2",
-            Some(axis.quick_stop_deceleration_mm_per_s2),
+            Some(motion.quick_stop_deceleration_mm_per_s2),
             acceleration_counts,
             "mm/s²",
         ),
@@ -83,86 +80,11 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
                     "{} {unit} do not fit the drive's 32 bits: with a resolution of {} nm it takes \
                      {largest:.0} {unit} at most",
                     Short(value),
-                    Short(axis.resolution_nm)
+                    Short(motion.resolution_nm)
                 ),
                 "lower it, or let the drive count more coarsely",
             );
         }
-    }
-}
-
-fn check_cyclic(judge: &mut Judge<'_>, drive: &Cia402AxisConfig) {
-    if !drive.synchronous_start {
-        judge.say(
-            "synchronous_start",
-            "is not true, but the axis follows cyclic set-points",
-            "set `synchronous_start = true`: all axes must take their set-points at one SYNC",
-        );
-    }
-}
-
-/// Every drive is told the SYNC period as so many units of a power of ten.
-fn check_period(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402AxisConfig) {
-    let bus = config.can.get(&drive.bus);
-    let Some((period_ms, period)) = bus.map(|it| (it.sync_period_ms, it.sync_period())) else {
-        return;
-    };
-    if interpolation_period(period).is_some() {
-        return;
-    }
-    let help = match period_from(period) {
-        Some(next) => format!(
-            "set sync_period_ms of its bus to {}",
-            next.as_nanos() as f64 / 1e6
-        ),
-        None => "shorten sync_period_ms of its bus".into(),
-    };
-    judge.say(
-        "cyclic",
-        format!(
-            "the SYNC period of {period_ms} ms cannot be told to a drive: 0x60C2 takes 1 to 255 times \
-             1, 0.1, 0.01 or 0.001 ms"
-        ),
-        help,
-    );
-}
-
-fn check_cia402(judge: &mut Judge<'_>, config: &MachineConfig, drive: &Cia402AxisConfig) {
-    if drive.cyclic.is_some() {
-        check_cyclic(judge, drive);
-        check_period(judge, config, drive);
-    }
-    let heartbeats = [
-        drive.heartbeat_producer_ms,
-        drive.heartbeat_consumer_ms,
-        drive.watch_master_ms,
-    ];
-    check_node(judge, &config.can, &drive.bus, heartbeats);
-}
-
-fn check_copley(
-    judge: &mut Judge<'_>,
-    config: &MachineConfig,
-    axis: &AxisConfig,
-    drive: &CopleyAxisConfig,
-) {
-    if axis.zero.is_some() {
-        judge.say(
-            "zero",
-            "the Hall search needs positions and voltages of one SYNC; a copley axis has none",
-            "remove the section, or use a drive on CAN",
-        );
-    }
-    let name = &drive.line;
-    judge.known("line", name, &config.serial, "serial line");
-    if let Some(line) = config.serial.get(name)
-        && !AMPLIFIER_RATES.contains(&line.baud_bit_per_s)
-    {
-        judge.say(
-            "line",
-            format!("{} bit/s is no rate of an amplifier", line.baud_bit_per_s),
-            format!("give serial.{name}.baud_bit_per_s one of {AMPLIFIER_RATES:?}"),
-        );
     }
 }
 
@@ -171,10 +93,10 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let mut taken: BTreeMap<(&str, u8), String> = BTreeMap::new();
     let mut owned: BTreeMap<&str, String> = BTreeMap::new();
     for (name, axis) in &config.axis {
-        let Some(drive) = axis.serial() else {
+        let Some(address) = axis.address() else {
             continue;
         };
-        let (line, address) = (&*drive.line, drive.address);
+        let line = axis.port();
         let key = format!("axis.{name}.address");
         owned.entry(line).or_insert_with(|| key.clone());
         if let Some(other) = taken.insert((line, address), key.clone()) {

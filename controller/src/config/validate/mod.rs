@@ -129,7 +129,7 @@ fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let axes = config
         .axis
         .iter()
-        .filter_map(|(name, it)| Some((name, it.can()?)))
+        .filter_map(|(name, it)| Some((name, it.node()?)))
         .map(|(name, it)| (&*it.bus, it.node_id, format!("axis.{name}")));
     let rotaries = config
         .rotary

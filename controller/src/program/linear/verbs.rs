@@ -217,8 +217,8 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         let (min, max) = {
             let config = session.machine.linear(axis)?.config();
             (
-                Metres::from_mm(config.soft_min_mm),
-                Metres::from_mm(config.soft_max_mm),
+                Metres::from_mm(config.motion.soft_min_mm),
+                Metres::from_mm(config.motion.soft_max_mm),
             )
         };
         if !(*target >= min && *target <= max) {

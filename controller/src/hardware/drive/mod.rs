@@ -1,0 +1,179 @@
+//! Drives of linear axes: `[axis.NAME]`.
+
+pub(crate) mod cia402;
+pub(crate) mod copley;
+
+use core::time::Duration;
+
+use drivers::device::{Axis, Identity};
+use machine::Patience;
+use machine::engine::{AxisLimits, CorrectionLimits};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
+
+use super::bus::Wiring;
+use super::node::NodeConfig;
+use crate::config::judge::Judge;
+pub use cia402::Cia402AxisConfig;
+pub use copley::{AmplifierConfig, CopleyAxisConfig};
+
+/// The servo drive of an axis, by what `device` calls it.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(tag = "device", rename_all = "lowercase")]
+pub enum DriveConfig {
+    /// A CiA 402 drive on CAN.
+    Cia402(Cia402AxisConfig),
+    /// A Copley Controls amplifier on a serial line (ASCII interface).
+    Copley(CopleyAxisConfig),
+}
+
+/// What a family of drives is to a machine.
+pub(crate) trait Family {
+    /// The bus or line that it is on.
+    fn port(&self) -> &str;
+
+    /// Where it is on CAN, if it is.
+    fn node(&self) -> Option<&NodeConfig> {
+        None
+    }
+
+    /// Its address on a serial line that it shares with others of its family.
+    fn address(&self) -> Option<u8> {
+        None
+    }
+
+    /// How it follows cyclic set-points, if it does.
+    fn cyclic(&self) -> Option<&CyclicConfig> {
+        None
+    }
+
+    /// Who it is, as far as the configuration says it.
+    fn identity(&self) -> Identity;
+
+    /// In how many counts its registers hold speeds (counts/s) and accelerations (counts/s²).
+    fn register_units(&self) -> [f64; 2];
+
+    /// Whether its positions and voltages of other devices can be of one moment, as the Hall search needs.
+    fn samples_at_sync(&self) -> bool;
+
+    /// Judges what its keys must keep to together.
+    fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>);
+
+    /// Its driver; the configuration has been checked.
+    fn driver(&self, task: Task<'_>, wiring: Wiring<'_>, patience: Patience) -> Box<dyn Axis>;
+}
+
+/// What a drive is for.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// How its axis counts and moves.
+    pub motion: &'a MotionConfig,
+    /// How long it may look for its limit switch, where it does.
+    pub homing: Option<Duration>,
+}
+
+impl DriveConfig {
+    pub(crate) fn family(&self) -> &dyn Family {
+        match self {
+            Self::Cia402(family) => family,
+            Self::Copley(family) => family,
+        }
+    }
+}
+
+/// How an axis counts and moves.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+pub struct MotionConfig {
+    /// One encoder count; negative when the drive counts against the axis. The soft limits must fit
+    /// 31 bits of counts.
+    #[schemars(extend("x-magnitude" = [0.01, 1e6]))]
+    pub resolution_nm: f64,
+    /// Soft limit; also written to the drive (0x607D), to an amplifier after homing (0xb8).
+    #[schemars(extend("x-range" = "below `soft_max_mm`"))]
+    pub soft_min_mm: f64,
+    /// Likewise (0xb9).
+    pub soft_max_mm: f64,
+    /// Speed of ordinary moves.
+    #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_mm_per_s`"))]
+    pub speed_mm_per_s: f64,
+    /// Fastest possible: faster moves are refused, faster changes of position not believed.
+    #[schemars(range(min = 0.001, max = 100000.0))]
+    pub speed_max_mm_per_s: f64,
+    /// Acceleration and deceleration of moves.
+    #[schemars(range(min = 0.01, max = 1000000.0))]
+    pub acceleration_mm_per_s2: f64,
+    /// Written to the drive (0x6085; 0xcf).
+    #[schemars(range(min = 0.01, max = 10000000.0))]
+    pub quick_stop_deceleration_mm_per_s2: f64,
+    /// Following error window (0x6065; 0xba).
+    #[schemars(range(min = 0.001, max = 100000.0))]
+    pub following_error_limit_um: f64,
+    /// How near its target the axis must be (0x6067; 0xbc).
+    #[schemars(range(min = 0.0001, max = 10000.0))]
+    pub position_window_um: f64,
+    /// For how long it must be there (0x6068; 0xbd).
+    pub position_window_time_ms: u16,
+    /// Longest time of one move.
+    #[schemars(range(min = 0.01, max = 100000.0))]
+    pub move_timeout_s: f64,
+}
+
+/// An axis that follows a set-point at every SYNC, together with others.
+///
+/// It needs `synchronous_start = true`, and its set-points count in the bus load.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CyclicConfig {
+    /// Greatest jerk of paths, moves and controlled stops; speed and acceleration are limited to
+    /// `speed_max_mm_per_s` and `acceleration_mm_per_s2`.
+    #[schemars(range(min = 1.0, max = 1000000000.0))]
+    pub jerk_mm_per_s3: f64,
+    /// This far outside its last set-points, twice running, the axis counts as blocked or astray.
+    #[schemars(range(min = 0.01, max = 100000.0))]
+    pub deviation_limit_um: f64,
+    /// A correction is cut off beyond this.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 10000.0))]
+    pub correction_limit_um: f64,
+    /// A correction changes no faster; a path may be as fast as `speed_max_mm_per_s` less this and
+    /// 2 %.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000000.0))]
+    pub correction_rate_um_per_s: f64,
+}
+
+/// The share of a drive's speed that is left to catch up what a SYNC that came early left short.
+const CATCHING_UP: f64 = 0.02;
+/// A correction never takes more than this share.
+const CORRECTING_MAX: f64 = 0.5;
+
+/// How fast a path may be: the drive itself goes no faster than its 0x607F, and what is added to
+/// the path and what jitter leaves short must fit below that too, or they pile up as following
+/// error.
+fn path_speed(axis: &MotionConfig, cyclic: &CyclicConfig) -> MetresPerSecond {
+    let own_mm_per_s = axis.speed_max_mm_per_s;
+    let correcting = cyclic.correction_rate_um_per_s * 1e-3;
+    let correcting = correcting.min(own_mm_per_s * CORRECTING_MAX);
+    MetresPerSecond((own_mm_per_s * (1.0 - CATCHING_UP) - correcting) * 1e-3)
+}
+
+/// The limits of an axis and of what is added to its set-points.
+pub(crate) fn cyclic_settings(
+    axis: &MotionConfig,
+    cyclic: &CyclicConfig,
+) -> (AxisLimits, CorrectionLimits) {
+    let limits = AxisLimits {
+        min: Metres::from_mm(axis.soft_min_mm),
+        max: Metres::from_mm(axis.soft_max_mm),
+        speed: path_speed(axis, cyclic),
+        acceleration: MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3),
+        jerk: MetresPerSecondCubed(cyclic.jerk_mm_per_s3 * 1e-3),
+        deviation: Metres::from_um(cyclic.deviation_limit_um),
+    };
+    let correction = CorrectionLimits {
+        size: Metres::from_um(cyclic.correction_limit_um),
+        rate: MetresPerSecond(cyclic.correction_rate_um_per_s * 1e-6),
+    };
+    (limits, correction)
+}
