@@ -35,7 +35,6 @@
 
 pub mod assemble;
 pub mod bus_plan;
-pub mod camera;
 pub mod config;
 mod connected;
 mod correction;

@@ -9,7 +9,7 @@ use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::in_sight_controller::InSightControllerNode;
 use mock_bus::plant::Pose;
 use tests::{Desk, Emulator, Rig, Setup, on_every_rig, rigs};
-use truestage::camera::in_sight_settings;
+use truestage::config::CameraDevice;
 
 type Eye = Desk<InSight>;
 
@@ -18,7 +18,9 @@ const NODE: &str = "image_controller";
 fn desk(rig: Rig, setup: &Setup) -> Eye {
     let emulator = Emulator::new(rig, setup);
     let loaded = &emulator.loaded;
-    let settings = in_sight_settings(&loaded.config.camera["eye"], loaded.patience);
+    let camera = &loaded.config.camera["eye"];
+    let CameraDevice::InSight(in_sight) = &camera.device;
+    let settings = in_sight.settings(camera, loaded.patience);
     Desk::new(emulator, "vision", InSight::new(settings))
 }
 

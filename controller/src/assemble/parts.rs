@@ -9,7 +9,6 @@ use wire::Port;
 use wire::canopen::NodeId;
 
 use super::ports;
-use crate::camera::{cameras, inspection_timeout};
 use crate::config::{AxisConfig, CanBus, IdentityConfig, Loaded, MachineConfig};
 use crate::hardware::drive::cyclic_settings;
 use crate::hardware::node::{expected_identity, node_id};
@@ -26,7 +25,6 @@ pub(crate) fn parts(loaded: &Loaded) -> Parts {
         device: axis.driver(config.wiring(), patience),
     });
     let units = axes.zip(settings);
-    let cameras = cameras(config, &ports, patience).into_iter();
     Parts {
         buses: config
             .can
@@ -60,12 +58,17 @@ pub(crate) fn parts(loaded: &Loaded) -> Parts {
                 device: it.driver(patience),
             })
             .collect(),
-        cameras: cameras
-            .zip(config.camera.values())
-            .map(|(unit, camera)| Camera {
-                unit,
-                inspection_timeout: inspection_timeout(camera),
-                rejects_max: camera.rejects_max,
+        cameras: config
+            .camera
+            .iter()
+            .map(|(name, it)| Camera {
+                unit: Unit {
+                    name: name.clone(),
+                    port: ports[&it.line],
+                    device: it.driver(patience),
+                },
+                inspection_timeout: it.inspection_timeout(),
+                rejects_max: it.rejects_max,
             })
             .collect(),
         patience,

@@ -4,7 +4,6 @@
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
 mod axis;
-mod camera;
 mod dependence;
 mod diagnostic;
 #[cfg(test)]
@@ -21,12 +20,12 @@ pub(crate) mod validate;
 // What a family brings is public as soon as its section names it.
 pub use crate::hardware::analog::*;
 pub use crate::hardware::bus::{CanBus, CanTransport, SerialLine, Wiring};
+pub use crate::hardware::camera::*;
 pub use crate::hardware::drive::cia402::{HomeOffsetName, OptionCodesConfig};
 pub use crate::hardware::drive::*;
 pub use crate::hardware::instrument::*;
 pub use crate::hardware::node::{IdentityConfig, NodeConfig};
 pub use axis::AxisConfig;
-pub use camera::{CameraConfig, CameraDevice};
 pub use dependence::hash_of;
 pub use diagnostic::{ConfigError, Diagnostic};
 pub use load::{Loaded, load, parse};

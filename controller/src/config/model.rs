@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::axis::AxisConfig;
-use super::camera::CameraConfig;
 use crate::hardware::analog::AnalogConfig;
 use crate::hardware::bus::{CanBus, SerialLine, Wiring};
+use crate::hardware::camera::CameraConfig;
 use crate::hardware::instrument::InstrumentConfig;
 use crate::platform::config::PlatformConfig;
 use crate::rotary::RotaryConfig;

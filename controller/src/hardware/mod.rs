@@ -7,6 +7,7 @@
 
 pub(crate) mod analog;
 pub(crate) mod bus;
+pub(crate) mod camera;
 pub(crate) mod drive;
 pub(crate) mod instrument;
 pub(crate) mod node;

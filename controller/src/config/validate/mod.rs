@@ -1,13 +1,11 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
 pub(crate) mod axis;
-mod camera;
 pub(crate) mod drive;
 
 use std::collections::BTreeMap;
 
 use self::axis::{check_axis, check_lines};
-use self::camera::check_cameras;
 use self::drive::check_axis_name;
 pub(super) use crate::config::judge::Finding;
 use crate::config::judge::Judge;
@@ -55,7 +53,17 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         let mut judge = Judge::at(format!("instrument.{name}"), &mut findings);
         instrument.check(&mut judge, config.wiring());
     }
-    check_cameras(config, &mut findings);
+    for (name, camera) in &config.camera {
+        let mut judge = Judge::at(format!("camera.{name}"), &mut findings);
+        if config.instrument.contains_key(name) {
+            judge.say(
+                "",
+                format!("an instrument is called `{name}`, too"),
+                "give every instrument a name of its own",
+            );
+        }
+        camera.check(&mut judge, config.wiring());
+    }
     crate::platform::check::check(config, &mut findings);
     crate::volumetric::check::check(config, &mut findings);
     check_node_ids(config, &mut findings);

@@ -1,0 +1,97 @@
+//! Cognex In-Sight vision systems in Native Mode.
+
+use drivers::device::PoseInstrument;
+use drivers::device::in_sight::{CameraFrame, InSight, InSightSettings};
+use machine::Patience;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use units::{Metres, Radians};
+use wire::in_sight::Cell;
+
+use super::{CameraConfig, Family};
+use crate::config::judge::Judge;
+use crate::hardware::CHECKED;
+
+/// What only an In-Sight vision system has.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+pub struct InSightConfig {
+    /// The job that must be active; each pose begins by asking for it.
+    #[schemars(extend("x-range" = "ends in `.job` or `.jobx`"))]
+    pub job: String,
+    /// What it must call itself.
+    pub serial_number: Option<String>,
+    /// The cell of text in which the job puts `count,found,judgement,x,y,angle,score`.
+    #[schemars(extend("x-range" = "a letter and a row, `\"A0\"` to `\"Z399\"`"))]
+    pub result_cell: String,
+    /// One unit of the job's x and y.
+    #[schemars(range(min = 1e-06, max = 1000000.0))]
+    pub length_um_per_unit: f64,
+    /// One unit of the job's angle; 3600 for degrees.
+    #[schemars(range(min = 1e-06, max = 1000000.0))]
+    pub angle_arcsec_per_unit: f64,
+    /// The cameras' x axis against the machine's, counter-clockwise.
+    #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub rotation_deg: f64,
+    /// The cameras' y axis goes the other way, as when they look from below; their angles then do,
+    /// too.
+    #[serde(default)]
+    pub mirrored: bool,
+    /// Marks that a good picture shows.
+    #[schemars(range(min = 1, max = 100))]
+    pub targets: u32,
+    /// A picture with a lower score is bad, whatever the job says.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub score_min_percent: f64,
+}
+
+impl InSightConfig {
+    /// What its driver is told; the configuration has been checked.
+    ///
+    /// # Panics
+    /// When the result cell is none.
+    pub fn settings(&self, common: &CameraConfig, patience: Patience) -> InSightSettings {
+        let cell = Cell::parse(&self.result_cell).expect(CHECKED);
+        let usual = InSightSettings::new(&self.job, cell);
+        InSightSettings {
+            serial_number: self.serial_number.clone(),
+            length_unit: Metres::from_um(self.length_um_per_unit),
+            angle_unit: Radians::from_arcsec(self.angle_arcsec_per_unit),
+            frame: CameraFrame {
+                rotation: Radians::from_degrees(self.rotation_deg),
+                mirrored: self.mirrored,
+            },
+            targets: self.targets,
+            score_min: self.score_min_percent / 100.0,
+            rejects_max: common.rejects_max,
+            start_timeout: patience.of(usual.start_timeout),
+            answer_timeout: patience.of(usual.answer_timeout),
+            inspection_timeout: patience.of(common.inspection_timeout()),
+            ..usual
+        }
+    }
+}
+
+impl Family for InSightConfig {
+    fn check(&self, judge: &mut Judge<'_>) {
+        let job = self.job.to_ascii_lowercase();
+        if !(job.ends_with(".job") || job.ends_with(".jobx")) {
+            judge.say(
+                "job",
+                format!("`{}` is no job", self.job),
+                "give the name that In-Sight Explorer shows, with `.job` or `.jobx`",
+            );
+        }
+        if Cell::parse(&self.result_cell).is_none() {
+            judge.say(
+                "result_cell",
+                format!("`{}` is no cell", self.result_cell),
+                "give a letter and a row, such as \"C7\"",
+            );
+        }
+    }
+
+    fn driver(&self, common: &CameraConfig, patience: Patience) -> Box<dyn PoseInstrument> {
+        Box::new(InSight::new(self.settings(common, patience)))
+    }
+}
