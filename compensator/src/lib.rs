@@ -22,6 +22,37 @@
 //! the exact inverse: the command `c` with `c + deviation(c) = target`.
 //!
 //! Absent: drivers, devices and files; model types are not (de)serialised here.
+//!
+//! # Example
+//!
+//! What was measured becomes a table, and a target the command that brings the stage there. `examples/fit.rs` says
+//! more.
+//!
+//! ```
+//! use compensator::error_table::{
+//!     Compensation, EndPolicy, FitOptions, Interpolation, Limits, LinearSeries, fit,
+//! };
+//! use units::{Approach, Metres, MetresPerSecond};
+//!
+//! // A stage that goes 1 µm too far in each millimetre.
+//! let mut rows = "run,approach,target_mm,measured_mm\n".to_owned();
+//! for run in 1..=3 {
+//!     for target_mm in [0.0, 10.0, 20.0, 30.0] {
+//!         rows += &format!("{run},+,{target_mm},{}\n", target_mm * 1.001);
+//!     }
+//! }
+//! let series = LinearSeries::from_csv(&rows, "measured.csv")?;
+//! let table = fit(&series, &FitOptions::default())?;
+//! let limits = Limits {
+//!     size: Metres::from_um(50.0),
+//!     slope: 0.01,
+//!     rate: MetresPerSecond(1.0),
+//! };
+//! let compensation = Compensation::new(table, Interpolation::Linear, limits, EndPolicy::Refuse)?;
+//! let command = compensation.set_point(Metres::from_mm(20.0), Approach::Forward)?;
+//! assert!((command.mm() * 1.001 - 20.0).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod air;
 pub mod apply;

@@ -60,6 +60,25 @@ impl Emulated {
     /// The machine that `toml` describes, with the noise and errors of `seed`, for a
     /// controller configured by `config`.
     ///
+    /// ```
+    /// use truestage::emulated::Emulated;
+    /// use truestage::{Failure, Machine, config};
+    /// use units::Metres;
+    ///
+    /// let machine = include_str!("../../configs/machines/linear.toml");
+    /// let stage = include_str!("../../configs/emulated/linear.toml");
+    /// let loaded = config::parse(machine, "linear.toml")?;
+    /// let emulated = Emulated::new(stage, 7, &loaded.config)?;
+    /// let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
+    /// let refused = machine.guarded(|machine| {
+    ///     machine.start()?;
+    ///     machine.linear("x")?.move_to(Metres::from_mm(10.0))
+    /// });
+    /// let Err(failure) = refused else { panic!("it has no origin yet") };
+    /// assert!(failure.to_string().contains("zero"), "{failure}");
+    /// # Ok::<(), Failure>(())
+    /// ```
+    ///
     /// # Errors
     /// When the description is wrong or lacks a port.
     pub fn new(toml: &str, seed: u64, config: &MachineConfig) -> Result<Self, EmulatedError> {

@@ -4,6 +4,7 @@ mod alone;
 mod calibrations;
 mod demo;
 mod example;
+mod examples;
 mod interrupted;
 mod platform;
 mod programs;

@@ -4,6 +4,20 @@
 //! arc-seconds exist only where a person writes or reads them (configuration, data files,
 //! screen). The package depends on no other of truestage's, so that everybody
 //! may import it.
+//!
+//! # Example
+//!
+//! Quantities of different kinds do not mix, and units stand in the names of what makes and shows them.
+//!
+//! ```
+//! use units::{Metres, MetresPerSecond, Time};
+//!
+//! let way = Metres::from_mm(12.5) - Metres::from_um(3.0);
+//! assert_eq!(format!("{:.3}", way.mm()), "12.497");
+//! let took = Time::from_seconds(2.0).since(Time::from_seconds(1.5));
+//! let speed = MetresPerSecond(way.value() / took.as_secs_f64());
+//! assert!(speed < MetresPerSecond(0.025));
+//! ```
 
 mod coordinate;
 mod counts;

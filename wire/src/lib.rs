@@ -4,6 +4,21 @@
 //! Every codec is `parse(bytes) -> Result` and `emit() -> bytes`. Codes that a standard does not
 //! name are kept as `Unknown(raw)`, never folded into a known one. Drivers and emulators share only
 //! this package, so every codec is pinned by golden bytes.
+//!
+//! # Example
+//!
+//! A codec has no state: bytes become a value or an error, and a value becomes bytes.
+//!
+//! ```
+//! use wire::dcon::{Command, frame, parse_volts, unframe};
+//!
+//! let asked = frame(&Command::ReadAll { address: 1 }.emit(), true);
+//! assert_eq!(asked, b"#0184\r");
+//! let volts = parse_volts(">+1.2345-0.0010")?;
+//! assert_eq!(volts, [1.2345, -0.001]);
+//! assert!(unframe(b">+1.2345AA", true).is_err(), "a wrong checksum");
+//! # Ok::<(), wire::dcon::DconError>(())
+//! ```
 
 mod bus;
 pub mod can;

@@ -47,6 +47,20 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 
 /// Reads and judges a configuration text; `file` is its name in findings.
 ///
+/// ```
+/// use truestage::config::{ConfigError, parse};
+///
+/// let text = include_str!("../../../configs/machines/linear.toml");
+/// assert_eq!(parse(text, "linear.toml")?.config.machine.name, "linear");
+///
+/// let wrong = text.replace("soft_min_mm", "soft_mim_mm");
+/// let Err(ConfigError::Invalid { findings }) = parse(&wrong, "linear.toml") else {
+///     panic!("the key is not known")
+/// };
+/// assert!(findings[0].help.contains("did you mean `soft_min_mm`?"));
+/// # Ok::<(), ConfigError>(())
+/// ```
+///
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {

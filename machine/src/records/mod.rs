@@ -10,6 +10,21 @@
 //! The structs of these files are their own and carry a version: model types are never
 //! (de)serialised, and a file from a newer program is refused. What a calibration says is a
 //! [`Content`] of its kind, what a journal says a [`Log`] of its kind; nothing here knows any.
+//!
+//! # Example
+//!
+//! What is wrong with a stored file is told by its place.
+//!
+//! ```
+//! use machine::records::{Store, StoreError};
+//!
+//! let folder = std::env::temp_dir().join("truestage-records-example");
+//! let store = Store::new(&folder, "stage", &[]);
+//! assert_eq!(store.list()?, Vec::<String>::new(), "a missing folder is an empty one");
+//! let refused = store.resolve("0123");
+//! assert!(matches!(refused, Err(StoreError::Unknown { .. })));
+//! # Ok::<(), StoreError>(())
+//! ```
 
 mod atomic;
 mod content;
