@@ -1,7 +1,5 @@
-//! From the configuration's words to the drivers' and the compensator's settings.
-//!
-//! Here, and nowhere else, units of configuration become SI, and drivers and compensator,
-//! which do not know each other, meet. A further kind of device is one arm of a `match`.
+//! From the configuration's words to a machine's parts and the compensator's settings; what a device is told
+//! is in its family's file (`hardware/`).
 
 mod parts;
 mod patience;

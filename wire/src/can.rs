@@ -106,6 +106,7 @@ impl CanFrame {
     }
 
     /// The payload; empty for a remote frame.
+    #[inline]
     pub fn data(&self) -> &[u8] {
         if self.remote {
             &[]

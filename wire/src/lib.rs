@@ -20,6 +20,7 @@
 //! # Ok::<(), wire::dcon::DconError>(())
 //! ```
 
+// What every frame of a cyclic loop passes is `#[inline]`: callers are in other packages.
 mod bus;
 pub mod can;
 pub mod candump;

@@ -9,6 +9,9 @@ use crate::hardware::CHECKED;
 use crate::hardware::instrument::umd2::half_wavelength;
 use crate::linear::{CompensationConfig, EndPolicyName, InterpolationName};
 
+/// Half of what a coarse encoder counts is much: so far off its neighbours a position is told, whatever reads it.
+const HARMLESS_MAX: Metres = Metres(1e-6);
+
 /// How far a position of `axis` may stand off its neighbours whatever the others do: what the
 /// configuration says, and half of what the instrument counts. Less than that is no lost count.
 pub fn harmless(config: &MachineConfig, axis: &str) -> Metres {
@@ -19,7 +22,7 @@ pub fn harmless(config: &MachineConfig, axis: &str) -> Metres {
     let instrument =
         of_axis.and_then(|it| config.instrument.get(&it.calibrate.as_ref()?.instrument));
     let count = instrument.map_or_else(half_wavelength, |it| it.count().length);
-    configured.max(count / 2.0)
+    configured.max((count / 2.0).min(HARMLESS_MAX))
 }
 
 /// A table made ready to be applied to `axis` within the limits of the configuration.

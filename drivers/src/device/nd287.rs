@@ -16,51 +16,35 @@
 //! Absent: whether the display shows a distance to go or a scaled value, which it does not say with its values;
 //! weather sensors, which it has not.
 
+mod alarms;
 mod exchange;
 mod settings;
+mod value;
 
+use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::{Metres, Time};
 use wire::nd287::{LF, MeasuredValue, Unit};
 use wire::{Input, LinkState, Payload};
 
+use self::alarms::{FAULTY, JUMPED, NAME, SET_OTHERWISE};
 use self::exchange::{Answer, Exchange, Question};
 pub use self::settings::Nd287Settings;
+use self::value::Good;
 use super::average::{Averaging, RunningAverage};
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{
-    Alarm, Device, DeviceError, DeviceName, DisplacementInstrument, DisplacementReading,
-    Environment, Identity, OwnAlarm, Seen,
+    Alarm, Device, DeviceError, DisplacementInstrument, DisplacementReading, Environment, Identity,
+    Seen,
 };
 
-const NAME: DeviceName = DeviceName::Serial("position display");
 /// Longer than any line of an answer.
 const LINE_MAX: usize = 64;
 /// How the displays of the family call themselves.
 const FAMILY: &str = "ND-28";
-const METRES_PER_MILLIMETRE: f64 = 1e-3;
-const METRES_PER_INCH: f64 = 25.4e-3;
 /// Impossible jumps in a row that are no damaged digits any more.
 const JUMPS_MAX: u32 = 3;
-/// A value that did not move may differ by its noise.
-const JUMP_FREE: Metres = Metres(1e-6);
-
-const FAULTY: Alarm = Alarm::Own(&OwnAlarm {
-    device: NAME,
-    what: "the encoder's signals are faulty, its count is lost",
-    remedy: "clean scale and scanning head, clear the error at the display, set a new datum",
-});
-const SET_OTHERWISE: Alarm = Alarm::Own(&OwnAlarm {
-    device: NAME,
-    what: "shows something else than before",
-    remedy: "set it back to one input, millimetres or inches, without a series; set a new datum",
-});
-const JUMPED: Alarm = Alarm::Own(&OwnAlarm {
-    device: NAME,
-    what: "its value jumped further than the stage can move",
-    remedy: "was it set to a value or to another datum? set a new datum",
-});
 
 /// Whether the count means anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,15 +68,6 @@ enum Progress {
     Running,
 }
 
-/// A value that can be believed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Good {
-    asked: Time,
-    position: Metres,
-    unit: Unit,
-    shown: u8,
-}
-
 /// A position display.
 #[derive(Debug)]
 pub struct Nd287 {
@@ -102,8 +77,12 @@ pub struct Nd287 {
     count: Count,
     lines: LineAssembler,
     newest: Option<Good>,
-    /// When the last good answer came.
-    heard: Time,
+    /// What it showed when it was started: unit and input.
+    set_to: Option<(Unit, u8)>,
+    /// Whether it has said who it is since something went wrong.
+    is_known: bool,
+    /// Since when it owes a value.
+    owes_since: Option<Time>,
     is_silent: bool,
     garbage_in_a_row: u64,
     jumps_in_a_row: u32,
@@ -125,7 +104,7 @@ struct Counts {
 
 impl Nd287 {
     /// A display that has not been started.
-    pub const fn new(settings: Nd287Settings) -> Self {
+    pub fn new(settings: Nd287Settings) -> Self {
         Self {
             exchange: Exchange::new(settings.answer_timeout),
             settings,
@@ -133,7 +112,9 @@ impl Nd287 {
             count: Count::Idle,
             lines: LineAssembler::new(LF, LINE_MAX),
             newest: None,
-            heard: Time::ZERO,
+            set_to: None,
+            is_known: false,
+            owes_since: None,
             is_silent: false,
             garbage_in_a_row: 0,
             jumps_in_a_row: 0,
@@ -141,21 +122,15 @@ impl Nd287 {
             identity: None,
             outcome: None,
             alarms: VecDeque::new(),
-            counts: Counts {
-                values: 0,
-                late: 0,
-                damaged: 0,
-                impossible_jumps: 0,
-                counts_lost: 0,
-            },
+            counts: Counts::default(),
         }
     }
 
     fn line(&mut self, now: Time, line: &[u8]) {
-        match self.exchange.take(line) {
+        match self.exchange.take(now, line) {
             Answer::Old => {}
             Answer::Damaged => self.damaged(),
-            Answer::TooEarly => self.exchange.ask(now, Question::Value),
+            Answer::TooEarly => self.ask(now),
             Answer::Identified(name) => self.identified(now, name),
             Answer::Value { asked, value } => self.value(now, asked, &value),
         }
@@ -173,53 +148,56 @@ impl Nd287 {
     }
 
     fn identified(&mut self, now: Time, name: String) {
-        self.heard(now);
         if !name.starts_with(FAMILY) {
             self.exchange.rest(now, self.settings.period);
             return self.refuse(SET_OTHERWISE, "a display that calls itself ND-28…");
         }
+        self.is_known = true;
         self.identity = Some(Identity {
             name,
             ..Identity::default()
         });
-        self.exchange.ask(now, Question::Value);
+        self.ask(now);
     }
 
-    fn heard(&mut self, now: Time) {
-        self.heard = now;
-        self.is_silent = false;
-        self.garbage_in_a_row = 0;
+    /// A value; who it is first, where that is not known.
+    fn ask(&mut self, now: Time) {
+        // Only a value ends this: a display that says who it is and gives no value is silent, too.
+        self.owes_since.get_or_insert(now);
+        let question = if self.is_known {
+            Question::Value
+        } else {
+            Question::Identification
+        };
+        self.exchange.ask(now, question);
     }
 
     fn value(&mut self, now: Time, asked: Time, value: &MeasuredValue) {
-        self.heard(now);
+        self.owes_since = None;
+        self.is_silent = false;
+        self.garbage_in_a_row = 0;
         self.counts.values += 1;
         self.exchange.rest(now, self.settings.period);
-        let position = match value.unit {
-            Unit::Millimetre => METRES_PER_MILLIMETRE * value.value,
-            Unit::Inch => METRES_PER_INCH * value.value,
+        match value.unit {
+            Unit::Millimetre | Unit::Inch => {}
             Unit::Fault => return self.refuse(FAULTY, "an encoder with good signals"),
             Unit::Other(_) => return self.refuse(SET_OTHERWISE, "millimetres or inches"),
-        };
+        }
         // X1 and X2 are encoders; everything else is made of several values.
         if !b" 12".contains(&value.shown) {
             return self.refuse(SET_OTHERWISE, "the value of one input, without a series");
         }
-        let good = Good {
-            asked,
-            position: Metres(position),
-            unit: value.unit,
-            shown: value.shown,
-        };
-        if let Some(before) = self.newest {
-            if (before.unit, before.shown) != (good.unit, good.shown) {
-                return self.lose_count(SET_OTHERWISE);
-            }
-            if self.is_impossible(&before, &good) {
-                return self.impossible();
-            }
+        let shown = (value.unit, value.shown);
+        if *self.set_to.get_or_insert(shown) != shown {
+            return self.lose_count(SET_OTHERWISE);
         }
-        self.good(good);
+        let good = Good::of(asked, value);
+        match self.newest {
+            Some(before) if good.is_impossible_after(&before, self.settings.speed_max) => {
+                self.impossible();
+            }
+            _ => self.good(good),
+        }
     }
 
     /// What ends a start, and voids the count of a display in service.
@@ -230,18 +208,19 @@ impl Nd287 {
         }
     }
 
-    fn is_impossible(&self, before: &Good, good: &Good) -> bool {
-        let seconds = good.asked.since(before.asked).as_secs_f64();
-        let possible = JUMP_FREE.value() + self.settings.speed_max.value() * seconds;
-        (good.position - before.position).abs().value() > possible
-    }
-
     /// One may be a digit that was damaged on the way; several are not.
     fn impossible(&mut self) {
         self.counts.impossible_jumps += 1;
         self.jumps_in_a_row += 1;
         if self.jumps_in_a_row >= JUMPS_MAX {
-            self.lose_count(JUMPED);
+            return self.lose_count(JUMPED);
+        }
+        if let Averaging::Running(average) = &mut self.averaging {
+            average.lacking += 1;
+            let lost = average.lacking;
+            if lost > u64::from(JUMPS_MAX) {
+                self.raise(Alarm::SamplesLost { lost });
+            }
         }
     }
 
@@ -313,6 +292,7 @@ impl Nd287 {
     /// An exchange failed: behind a new fence the next one begins.
     fn late(&mut self, now: Time, question: Question) {
         self.counts.late += 1;
+        self.is_known = false;
         self.lines.clear();
         if let Progress::Starting { since, failures } = self.progress {
             let failures = failures + 1;
@@ -321,7 +301,11 @@ impl Nd287 {
                 return self.end_start(now, since, question);
             }
         }
-        self.exchange.ask(now, Question::Identification);
+        match question {
+            Question::Value => self.ask(now),
+            // Two fences would look alike: nothing is asked until the line has been quiet.
+            Question::Identification => self.exchange.drain(now),
+        }
     }
 
     fn end_start(&mut self, now: Time, since: Time, question: Question) {
@@ -336,11 +320,19 @@ impl Nd287 {
 
     /// A display that was switched off and on again counts from elsewhere.
     fn silent(&mut self, now: Time) {
-        let waited = now.since(self.heard);
-        if self.watches_silence() && waited >= self.settings.silent_after {
+        if let Some(since) = self.silent_from()
+            && since <= now
+        {
+            let waited = self.settings.silent_after + now.since(since);
             self.is_silent = true;
             self.lose_count(Alarm::StreamSilent { waited });
         }
+    }
+
+    /// When it will have owed a value for too long.
+    fn silent_from(&self) -> Option<Time> {
+        let owes = self.owes_since.filter(|_| self.watches_silence())?;
+        Some(owes + self.settings.silent_after)
     }
 
     fn watches_silence(&self) -> bool {
@@ -353,9 +345,12 @@ impl Nd287 {
             return;
         }
         match state {
-            LinkState::Up => self.exchange.ask(now, Question::Identification),
+            LinkState::Up => {
+                self.is_known = false;
+                self.ask(now);
+            }
             _ => {
-                let waited = now.since(self.heard);
+                let waited = Duration::ZERO;
                 self.lose_count(Alarm::StreamSilent { waited });
             }
         }
@@ -385,17 +380,13 @@ impl Device for Nd287 {
         if let Some(question) = self.exchange.late(now) {
             self.late(now, question);
         } else if self.exchange.has_rested(now) {
-            self.exchange.ask(now, Question::Value);
+            self.ask(now);
         }
     }
 
     fn poll_timeout(&self) -> Time {
-        let next = self.exchange.next();
-        if self.watches_silence() {
-            next.min(self.heard + self.settings.silent_after)
-        } else {
-            next
-        }
+        let silent = self.silent_from().unwrap_or(Time::NEVER);
+        self.exchange.next().min(silent)
     }
 
     fn poll_transmit(&mut self) -> Option<Payload> {
@@ -411,6 +402,9 @@ impl Device for Nd287 {
         self.count = Count::Idle;
         self.averaging = Averaging::Never;
         self.newest = None;
+        self.set_to = None;
+        self.is_known = false;
+        self.owes_since = None;
         self.is_silent = false;
         self.garbage_in_a_row = 0;
         self.jumps_in_a_row = 0;
@@ -419,7 +413,7 @@ impl Device for Nd287 {
             since: now,
             failures: 0,
         };
-        self.exchange.ask(now, Question::Identification);
+        self.ask(now);
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
@@ -447,6 +441,7 @@ impl DisplacementInstrument for Nd287 {
         self.outcome = None;
         let needs = match self.count {
             Count::From(_) | Count::WantsDatum if samples == 0 => "at least one sample",
+            Count::From(_) | Count::WantsDatum if self.is_silent => "a display that answers",
             Count::From(_) | Count::WantsDatum => {
                 self.averaging = Averaging::Running(RunningAverage::new(now, samples));
                 return;
@@ -482,9 +477,12 @@ impl DisplacementInstrument for Nd287 {
     }
 
     /// The last value may be older than the last motion: the next one becomes the datum.
-    fn set_datum(&mut self, _: Time) {
+    fn set_datum(&mut self, now: Time) {
         if self.count != Count::Idle {
             self.count = Count::WantsDatum;
+            // One that is still silent is told of again.
+            self.is_silent = false;
+            self.owes_since = self.owes_since.map(|_| now);
             self.exchange.forget_asked();
         }
     }

@@ -3,8 +3,8 @@
 //! Source: HEIDENHAIN, ND 287 user's manual, parts II-5 and II-6 (see `wire::nd287` for the format); the times of
 //! the ND 281 B manual, p. 42: a value is stored at most 1 ms after it was asked and put out within 50 ms.
 //!
-//! A head that does not see its scale, or moves too fast over it, is a fault: the display shows it until
-//! somebody clears it, and `?` stands in place of the unit.
+//! A head that does not see its scale, or moves too fast over it, when a value is asked for, is a fault: the
+//! display shows it until it is switched off, and `?` stands in place of the unit.
 //!
 //! Absent: keys, functions, status, lists of parameters, the second input.
 
@@ -65,6 +65,8 @@ impl Default for Nd287DisplayConfig {
     }
 }
 
+/// More do not leave room for metres.
+const DECIMALS_MAX: usize = 6;
 const ESC: u8 = 0x1b;
 /// Longer commands are none.
 const COMMAND_MAX: usize = 16;
@@ -183,6 +185,13 @@ impl Nd287DisplayNode {
 
 impl Section for Nd287DisplayConfig {
     fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+        if self.decimals > DECIMALS_MAX {
+            return Err(ConfigError::Value {
+                key: "decimals",
+                seen: self.decimals as f64,
+                expected: "at most 6",
+            });
+        }
         positive("signal_period_um", self.signal_period_um)?;
         positive("speed_max_m_per_s", self.speed_max_m_per_s)
     }

@@ -111,6 +111,7 @@ impl Emergency {
     ///
     /// # Errors
     /// When the identifier is no node's emergency or the length is not 8.
+    #[inline]
     pub fn parse(frame: &CanFrame) -> Result<(NodeId, Self), WireError> {
         const MESSAGE: &str = "emergency";
         let wrong_id = WireError::Identifier {

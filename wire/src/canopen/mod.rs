@@ -107,6 +107,7 @@ impl Function {
     ];
 
     /// Which node's which message has this identifier, `None` for NMT, SYNC, TIME and others.
+    #[inline]
     pub fn of(cob_id: u16) -> Option<(Self, NodeId)> {
         let node = NodeId::new((cob_id & 0x7F) as u8)?;
         let function = Self::ALL

@@ -127,6 +127,7 @@ pub fn emit_heartbeat(node: NodeId, state: NmtState) -> CanFrame {
 ///
 /// # Errors
 /// When the identifier or the length is not error control's.
+#[inline]
 pub fn parse_heartbeat(frame: &CanFrame) -> Result<(NodeId, NmtState), WireError> {
     const MESSAGE: &str = "heartbeat";
     let wrong_id = WireError::Identifier {

@@ -100,6 +100,7 @@ impl Transmission {
 
 /// The little-endian unsigned value of `bits` bits that starts `bit_offset` bits into `payload`;
 /// `None` when the payload is too short or more than 64 bits are asked for.
+#[inline]
 pub fn extract(payload: &[u8], bit_offset: usize, bits: u8) -> Option<u64> {
     let end = bit_offset + usize::from(bits);
     if payload.len() > 8 || end > payload.len() * 8 || bits > 64 {
@@ -113,6 +114,7 @@ pub fn extract(payload: &[u8], bit_offset: usize, bits: u8) -> Option<u64> {
 
 /// Writes the low `bits` of `value` at `bit_offset`; `None` (and nothing written) when it
 /// does not fit.
+#[inline]
 pub fn insert(payload: &mut [u8; 8], bit_offset: usize, bits: u8, value: u64) -> Option<()> {
     if bit_offset + usize::from(bits) > 64 || bits == 0 {
         return None;

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use units::{Metres, Radians};
 
-use super::bus::Wiring;
+use super::bus::{SerialLine, Wiring};
 use crate::config::judge::Judge;
 pub use nd287::Nd287Config;
 pub use umd2::Umd2Config;
@@ -37,7 +37,7 @@ pub enum InstrumentDevice {
 /// What a family of displacement instruments is to a machine.
 pub(crate) trait Family {
     /// Judges what its keys must keep to together.
-    fn check(&self, _judge: &mut Judge<'_>) {}
+    fn check(&self, _judge: &mut Judge<'_>, _line: Option<&SerialLine>) {}
 
     /// Its driver; the configuration has been checked.
     fn driver(
@@ -117,7 +117,9 @@ impl InstrumentConfig {
     /// Judges what its keys must keep to together.
     pub(crate) fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
         judge.known("line", &self.line, wiring.serial, "serial line");
-        self.device.family().check(judge);
+        self.device
+            .family()
+            .check(judge, wiring.serial.get(&self.line));
     }
 
     /// Its driver; the configuration has been checked.

@@ -11,12 +11,19 @@ use serde::Deserialize;
 use units::{Metres, MetresPerSecond};
 
 use super::{Count, Family, InstrumentConfig};
+use crate::config::judge::Judge;
+use crate::hardware::bus::SerialLine;
+
+/// How long a value may take at 9600 baud, whatever period is asked for.
+const SLOWEST: Duration = Duration::from_millis(70);
+/// Below this an identification takes longer than its answer is waited for.
+const BAUD_MIN: u32 = 2400;
 
 /// What only a position display over an encoder has.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 pub struct Nd287Config {
     /// From one value to the next; a display at 9600 baud takes up to 70 ms for one.
-    #[schemars(range(min = 10.0, max = 10000.0))]
+    #[schemars(range(min = 10.0, max = 1000.0))]
     pub poll_period_ms: f64,
     /// Period of the encoder's signal: a count that slips is wrong by a multiple of it.
     #[schemars(range(min = 0.01, max = 1000.0))]
@@ -24,7 +31,8 @@ pub struct Nd287Config {
     /// The fastest that the stage moves under the encoder: a value farther away is not believed.
     #[schemars(range(min = 0.01, max = 100000.0))]
     pub speed_max_mm_per_s: f64,
-    /// Standard uncertainty of the scale's length, relative to it.
+    /// Standard uncertainty of the scale's length, relative to it. It enters the lines of three axes; the
+    /// table of one axis knows `instrument_standard_uncertainty_nm` alone.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub scale_standard_uncertainty_ppm: f64,
 }
@@ -37,8 +45,6 @@ impl Nd287Config {
     /// What its driver is told; the configuration has been checked.
     pub fn settings(&self, common: &InstrumentConfig, patience: Patience) -> Nd287Settings {
         let usual = Nd287Settings::default();
-        // A slow one is no silent one.
-        let silent_after = usual.silent_after.max(self.period() * 3);
         Nd287Settings {
             direction: if common.reverse {
                 Direction::Reversed
@@ -48,13 +54,26 @@ impl Nd287Config {
             period: self.period(),
             speed_max: MetresPerSecond(self.speed_max_mm_per_s * 1e-3),
             answer_timeout: patience.of(usual.answer_timeout),
-            silent_after: patience.of(silent_after),
+            silent_after: patience.of(usual.silent_after),
             ..usual
         }
     }
 }
 
 impl Family for Nd287Config {
+    fn check(&self, judge: &mut Judge<'_>, line: Option<&SerialLine>) {
+        if let Some(line) = line.filter(|it| it.baud_bit_per_s < BAUD_MIN) {
+            judge.say(
+                "line",
+                format!(
+                    "{} bit/s is too slow for a position display",
+                    line.baud_bit_per_s
+                ),
+                format!("set display and line to at least {BAUD_MIN}, better 9600"),
+            );
+        }
+    }
+
     fn driver(
         &self,
         common: &InstrumentConfig,
@@ -64,7 +83,7 @@ impl Family for Nd287Config {
     }
 
     fn readings_per_s(&self) -> f64 {
-        self.period().as_secs_f64().recip()
+        self.period().max(SLOWEST).as_secs_f64().recip()
     }
 
     fn count(&self) -> Count {

@@ -31,6 +31,8 @@ use crate::volumetric::handle::WorkVolume;
 
 /// How long the machine lives between two looks at the person, or at the light.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// The same in readings, of an instrument that gives few.
+const READINGS_OF_A_LOOK: f64 = 4.0;
 /// How long the light of a line that was set up may be away.
 const LIGHT_LIMIT: Duration = Duration::from_secs(10);
 /// How long every axis rests before it is switched off, or left to whoever reads.
@@ -262,10 +264,13 @@ impl WorkVolume<'_> {
         self.core.use_instrument(instrument)?;
         self.core.leave_instrument();
         let limit = self.core.now() + self.core.patience().of(LIGHT_LIMIT);
+        // A datum takes readings of its own, and each new one gives up those under way.
+        let readings_per_s = self.core.config.instrument[instrument].readings_per_s();
+        let look = LOOK_EVERY.max(Duration::from_secs_f64(READINGS_OF_A_LOOK / readings_per_s));
         loop {
             let now = self.core.now();
             self.core.set_instrument_datum(instrument)?;
-            self.core.run_until(now + LOOK_EVERY)?;
+            self.core.run_until(now + look)?;
             let is_lit = self.core.instrument(instrument)?.latest().is_some();
             if is_lit {
                 return Ok(self.core.use_instrument(instrument)?);

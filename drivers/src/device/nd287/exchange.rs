@@ -51,8 +51,10 @@ enum State {
         at: Time,
         deadline: Time,
     },
+    /// Until the next question, or until the line has been quiet.
     Resting {
         until: Time,
+        is_drain: bool,
     },
 }
 
@@ -109,7 +111,16 @@ impl Exchange {
             State::Idle | State::Resting { .. } => now,
         };
         let until = now.max(asked + period);
-        self.state = State::Resting { until };
+        let is_drain = false;
+        self.state = State::Resting { until, is_drain };
+    }
+
+    /// Asks nothing until nothing has come for as long as an answer may take: then none is left that could
+    /// be taken for the next one's.
+    pub(super) fn drain(&mut self, now: Time) {
+        let until = now + self.answer_timeout;
+        let is_drain = true;
+        self.state = State::Resting { until, is_drain };
     }
 
     /// What is under way is not used: what is asked from now on is.
@@ -118,12 +129,15 @@ impl Exchange {
     }
 
     /// Takes a line without its LF.
-    pub(super) fn take(&mut self, line: &[u8]) -> Answer {
+    pub(super) fn take(&mut self, now: Time, line: &[u8]) -> Answer {
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         // A refusal has no end of line; what comes next stands behind it.
         let refusals = line.iter().take_while(|byte| **byte == NAK).count();
         let line = &line[refusals..];
         let State::Asked { question, at, .. } = self.state else {
+            if let State::Resting { is_drain: true, .. } = self.state {
+                self.drain(now);
+            }
             return self.old();
         };
         match question {
@@ -185,14 +199,14 @@ impl Exchange {
 
     /// Whether the next question is due.
     pub(super) fn has_rested(&self, now: Time) -> bool {
-        matches!(self.state, State::Resting { until } if until <= now)
+        matches!(self.state, State::Resting { until, .. } if until <= now)
     }
 
     pub(super) const fn next(&self) -> Time {
         match self.state {
             State::Idle => Time::NEVER,
             State::Asked { deadline, .. } => deadline,
-            State::Resting { until } => until,
+            State::Resting { until, .. } => until,
         }
     }
 

@@ -16,11 +16,11 @@ pub struct Nd287Settings {
     pub speed_max: MetresPerSecond,
     /// How long an answer may take.
     pub answer_timeout: Duration,
-    /// How often a step of the start is asked again.
+    /// How many answers may be missing in a start.
     pub retries: u32,
     /// This many damaged lines in a row raise an alarm.
     pub garbage_lines_max: u64,
-    /// Without a good answer for this long the count is taken for lost.
+    /// A value that is owed for this long is no late one: the count is taken for lost.
     pub silent_after: Duration,
 }
 
@@ -33,7 +33,7 @@ impl Default for Nd287Settings {
             speed_max: MetresPerSecond(1.0),
             answer_timeout: Duration::from_millis(300),
             // Three seconds in all: who has just been switched on says nothing.
-            retries: 9,
+            retries: 5,
             garbage_lines_max: 5,
             silent_after: Duration::from_secs(1),
         }

@@ -156,10 +156,11 @@ fn a_display_that_is_another_or_set_otherwise_is_not_started() {
 #[test]
 fn a_start_without_an_answer_says_what_it_waited_for() {
     let mut bench = Bench::new(Nd287Settings::default());
-    for _ in 0..=Nd287Settings::default().retries {
+    while bench.device.poll_timeout() != Time::NEVER {
         assert_eq!(bench.device.poll_outcome(), None);
         bench.wait();
     }
+    assert!(bench.now >= Time::from_seconds(5.0), "three seconds");
     let Some(Err(error)) = bench.device.poll_outcome() else {
         panic!("no outcome")
     };
@@ -237,6 +238,7 @@ fn a_late_value_is_never_taken_for_the_present_one() {
 fn a_second_identification_is_an_old_answer() {
     let mut bench = Bench::new(Nd287Settings::default());
     bench.wait();
+    bench.wait();
     assert_eq!(bench.sent(), [ASKS_WHO], "asked again");
     bench.answer(IDENTIFICATION);
     assert_eq!(bench.sent(), [ASKS_VALUE]);
@@ -249,18 +251,71 @@ fn a_second_identification_is_an_old_answer() {
 #[test]
 fn a_display_that_falls_silent_has_lost_its_count() {
     let mut bench = Bench::running();
-    let heard = bench.now;
-    while bench.now < heard + Duration::from_secs(1) {
+    bench.wait();
+    let asked = bench.now;
+    while bench.now < asked + Duration::from_secs(1) {
         bench.wait();
     }
     let waited = Duration::from_secs(1);
     assert_eq!(bench.alarms(), [Alarm::StreamSilent { waited }]);
     assert_eq!(bench.device.latest(), None);
-    bench.sent();
+    while bench.sent() != [ASKS_WHO] {
+        bench.wait();
+    }
     bench.answer(IDENTIFICATION);
     bench.sent();
     bench.answer(&shows("+", "10.0000"));
     assert_eq!(bench.device.latest(), None, "it counts from elsewhere");
+}
+
+/// Fences that are answered are no values.
+#[test]
+fn a_display_that_says_who_it_is_and_gives_no_value_has_lost_its_count() {
+    let mut bench = Bench::running();
+    let read = bench.now;
+    while bench.now < read + Duration::from_secs(2) && bench.device.latest().is_some() {
+        bench.wait();
+        match &bench.sent()[..] {
+            [asked] if asked == ASKS_WHO => bench.answer(IDENTIFICATION),
+            [asked] if asked == ASKS_VALUE => bench.answer(b"+   10.0x00    \r\n"),
+            _ => {}
+        }
+    }
+    let silent = |it: &Alarm| matches!(it, Alarm::StreamSilent { .. });
+    assert!(bench.alarms().iter().any(silent));
+    assert_eq!(bench.device.latest(), None);
+}
+
+/// Two fences look alike: a second one is asked when nothing is left to come.
+#[test]
+fn a_fence_that_is_late_is_waited_out_and_no_value_is_taken_for_another() {
+    let mut bench = Bench::running();
+    bench.wait();
+    assert_eq!(bench.sent(), [ASKS_VALUE]);
+    bench.wait();
+    assert_eq!(bench.sent(), [ASKS_WHO]);
+    bench.wait();
+    assert_eq!(bench.sent(), Vec::<Vec<u8>>::new(), "nothing is asked");
+    let late = bench.now;
+    bench.answer(&shows("+", "10.0500"));
+    bench.answer(IDENTIFICATION);
+    bench.wait();
+    assert_eq!(bench.sent(), [ASKS_WHO]);
+    assert!(bench.now >= late + Duration::from_millis(300));
+    check_mm(bench.latest_mm(), 0.0);
+}
+
+#[test]
+fn another_setting_stays_refused_until_it_is_set_back_or_started_again() {
+    let mut bench = Bench::running();
+    bench.reads(b"+   10.0000   2\r\n");
+    bench.device.set_datum(bench.now);
+    bench.reads(b"+   10.0000   2\r\n");
+    assert_eq!(bench.device.latest(), None);
+    assert_eq!(bench.alarms(), [SET_OTHERWISE, SET_OTHERWISE]);
+    bench.device.set_datum(bench.now);
+    bench.reads(&shows("+", "10.0000"));
+    check_mm(bench.latest_mm(), 0.0);
 }
 
 #[test]
