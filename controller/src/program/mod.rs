@@ -78,21 +78,21 @@ enum Command {
     Reference(MachineArgs),
     /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
     ///
-    /// Between its rows each axis goes along the cubic spline through them, at rest at both ends, not
-    /// along straight lines: where rows turn a corner or suddenly end, it swings out. By how much at
-    /// most, and where, is said before anything moves. Everything that will be driven is judged
-    /// first (soft limits, speed, acceleration, jerk, calibrated volume), not only the rows.
+    /// Between the rows each axis follows the cubic spline through them, at rest at both ends, not
+    /// straight lines: at a corner, or where the rows suddenly end, it swings out. How far at most, and
+    /// where, is printed before anything moves. Everything that will be driven is judged first (soft
+    /// limits, speed, acceleration, jerk, calibrated volume), not only the rows.
     Run(RunArgs),
-    /// Deviations of three axes that are kept on purpose, so that all parts are alike.
+    /// Record or drop a state of three axes that is kept on purpose, so that all parts are alike.
     #[command(subcommand)]
     Memory(MemoryCommand),
     /// Stored calibrations.
     #[command(subcommand)]
     Cal(cal::CalCommand),
-    /// The same mathematics on data measured elsewhere.
+    /// Fit the same models to data measured elsewhere.
     #[command(subcommand)]
     Fit(data::FitCommand),
-    /// What to measure, before anything is measured.
+    /// Plan a measurement: what to measure, and what it will be able to tell.
     #[command(subcommand)]
     Plan(rotary::fit::PlanCommand),
     /// ISO 230-2 figures of measured data (columns run,approach,target_mm,measured_mm).
@@ -121,8 +121,8 @@ struct MachineArgs {
     /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
     #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "clock_speed")]
     clock: Option<PathBuf>,
-    /// Who does what people are asked for: the hand of the emulated machine at this socket
-    /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, who sits here.
+    /// Who acts where a person is asked to: the hand of the emulated machine at this socket
+    /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, whoever sits here.
     #[arg(long, value_name = "PATH")]
     hand: Option<PathBuf>,
     /// Write everything on the buses to this file, in candump's log format; it must not exist yet.
@@ -178,7 +178,7 @@ struct CalibrateArgs {
     /// an interferometer.
     #[arg(long)]
     yes: bool,
-    /// Three axes: let them go to and fro for so long, then measure again what warmth changes.
+    /// Three axes: let them run to and fro for this long, then measure again what heat has changed.
     #[arg(long, value_name = "MINUTES")]
     warm_up_min: Option<f64>,
 }
@@ -201,9 +201,9 @@ struct VerifyArgs {
 /// What is done with the state memories of three axes.
 #[derive(Debug, Subcommand)]
 enum MemoryCommand {
-    /// Zero, then record the present state at stops along each axis, before parts are made: all
-    /// parts from now on are made with the state of this hour. Nothing is corrected meanwhile, so
-    /// it is not the state of a part that was made before; `run --first-part` records that.
+    /// Zero, then record the present state at stops along each axis, before parts are made: from now
+    /// on all parts are made with it. Nothing is corrected while it is recorded, so it is not the state
+    /// in which an earlier part was made; `run --first-part` records that.
     Record(MemoryArgs),
     /// Forget a recorded state; parts are no longer made with it. Nothing moves.
     Clear(MemoryArgs),
@@ -277,7 +277,7 @@ struct MoveArgs {
     /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`, a rotary axis `c=90deg`.
     #[arg(value_name = "AXIS=PLACE")]
     targets: Vec<String>,
-    /// A platform moves on until the image agrees.
+    /// Keep moving a platform until the image agrees.
     #[arg(long)]
     align: bool,
     /// Which way round a rotary axis goes; the shortest when not given.

@@ -5,8 +5,8 @@
 
 use units::Time;
 
-use super::actuator::Actuator;
 use super::config::PlantConfig;
+use super::parts::actuator::Actuator;
 use super::platform::Platform;
 use super::stage::Stage;
 use super::table::Table;

@@ -4,21 +4,14 @@
 //! deterministic: the same seed and the same commands at the same times give the same bits,
 //! however often [`Plant::advance`] is called in between.
 
-mod actuator;
 mod analog;
 pub mod camera;
 pub mod config;
-mod deviation;
-mod drive_train;
-mod encoder;
 mod hall_field;
-mod index_mark;
 mod instrument;
-mod limit_switch;
 mod machine;
+mod parts;
 pub mod platform;
-mod pulse;
-mod servo;
 mod stage;
 pub mod table;
 mod thermal;
@@ -34,20 +27,21 @@ pub use analog::InputFault;
 pub use camera::{Mark, Target};
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes, Scanned};
+pub use parts::pulse::{IndexPulse, ProbeEdge};
+pub use parts::servo::Servo;
 pub use platform::{PlatformTruth, Pose};
-pub use pulse::{IndexPulse, ProbeEdge};
 pub use table::TableTruth;
 pub use thermal::Environment;
 pub use truth::Truth;
 pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 
-use actuator::Actuator;
 use analog::Input;
 use camera::Camera;
 use config::PlantConfig;
 use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
 use machine::Machine;
+use parts::actuator::Actuator;
 use thermal::Climate;
 use volumetric::{BeamTrouble, Sighting, Signal, TERMINALS};
 
@@ -55,19 +49,6 @@ use volumetric::{BeamTrouble, Sighting, Signal, TERMINALS};
 const ANALOG_INPUTS: usize = 8;
 /// What a resistance thermometer's input can show.
 const TEMPERATURE_RAIL_C: f64 = 850.0;
-
-/// How a servo drive acts on its axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Servo {
-    /// No torque: the axis coasts to a stop by friction.
-    Off,
-    /// The position controller follows this demand.
-    Follow {
-        /// Demanded encoder travel since the encoder was powered, in metres or, of a rotary
-        /// axis, radians.
-        demand: f64,
-    },
-}
 
 /// Everything physical of one machine. Its axes are numbered from 0; axes that are not there
 /// stand still and read 0.

@@ -5,14 +5,14 @@ use core::cell::Cell;
 use crate::random::Stream;
 use units::Time;
 
-use super::Servo;
-use super::actuator::Actuator;
 use super::config::StageConfig;
-use super::deviation::{Field, Path};
-use super::drive_train::DriveTrain;
-use super::encoder::Encoder;
-use super::limit_switch::LimitSwitch;
-use super::servo::Mass;
+use super::parts::actuator::Actuator;
+use super::parts::deviation::{Field, Path};
+use super::parts::drive_train::DriveTrain;
+use super::parts::encoder::Encoder;
+use super::parts::limit_switch::LimitSwitch;
+use super::parts::servo::Mass;
+use super::parts::servo::Servo;
 
 /// Scales are true at this temperature (ISO 1).
 const REFERENCE_C: f64 = 20.0;

@@ -397,6 +397,18 @@ impl Lockstep {
         let _ = sched_setaffinity(OWN, &set);
     }
 
+    /// Who has that port open. One that was killed while it waits for the time is not heard before that comes:
+    /// it is let go now, and heard of for the last time when it is heard next.
+    fn who_has(&mut self, place: usize) -> Option<String> {
+        let peers = &self.site.visitors.peers;
+        let other = peers.iter().position(|it| it.ports.contains_key(&place))?;
+        if peers[other].has_hung_up() && self.gone(other).is_ok() {
+            self.site.visitors.peers[other].doing = Doing::Nothing;
+            return None;
+        }
+        Some(self.site.visitors.peers[other].who())
+    }
+
     fn attach(&mut self, who: usize, port: Port, endpoint: &str) -> Reply {
         let place = self
             .site
@@ -410,16 +422,10 @@ impl Lockstep {
                 known.join(", ")
             ));
         };
-        let taken = self
-            .site
-            .visitors
-            .peers
-            .iter()
-            .find(|peer| peer.ports.contains_key(&place));
-        if let Some(other) = taken
-            && !self.site.endpoints[place].is_shared()
+        if !self.site.endpoints[place].is_shared()
+            && let Some(other) = self.who_has(place)
         {
-            return Reply::Refused(format!("{} has {endpoint} open", other.who()));
+            return Reply::Refused(format!("{other} has {endpoint} open"));
         }
         if let Err(error) = self.site.endpoints[place].attend(true) {
             return Reply::Refused(error.to_string());

@@ -203,6 +203,25 @@ fn a_machine_that_outlives_its_controllers_goes_on_with_the_next_one() {
 }
 
 #[test]
+fn the_port_of_one_that_was_killed_while_it_waited_is_free_for_the_next_one() {
+    let bench = Bench::new("killed", |options| options.outlive = true);
+    let attach = format!("attach 0 {}", bench.terminal());
+    // Time stands still for this one.
+    let mut other = bench.client();
+    other.ask("hello 1 0 other");
+    let mut client = bench.client();
+    client.ask("hello 1 0 a killed one");
+    assert_eq!(client.ask(&attach), "attached");
+    client.say("idle 3000000");
+    drop(client);
+    let mut next = bench.client();
+    next.ask("hello 1 0 the next one");
+    assert_eq!(next.ask(&attach), "attached");
+    next.say("bye");
+    other.say("bye");
+}
+
+#[test]
 fn somebody_who_hangs_is_named_and_ends_the_machine() {
     let bench = Bench::new("hangs", |options| {
         options.patience = Duration::from_millis(1);

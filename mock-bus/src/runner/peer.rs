@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Read, Write};
-use std::os::fd::{AsFd, BorrowedFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
+use nix::sys::socket::{MsgFlags, recv};
 use units::Time;
 use wire::Port;
 use wire::lockstep::{Entry, LINE_MAX, Passed, Reply, Request};
@@ -93,6 +94,12 @@ impl Peer {
             0 => format!("`{}`", self.name),
             pid => format!("`{}` (process {pid})", self.name),
         }
+    }
+
+    /// Whether its end of the connection is closed, and nothing that it said before is left.
+    pub(super) fn has_hung_up(&self) -> bool {
+        let flags = MsgFlags::MSG_PEEK | MsgFlags::MSG_DONTWAIT;
+        matches!(recv(self.stream.as_raw_fd(), &mut [0], flags), Ok(0))
     }
 
     /// Reads what has come, and takes the next line of it.

@@ -22,7 +22,7 @@ use units::{Metres, Radians, Time};
 
 pub use truth::PlatformTruth;
 
-use super::actuator::Actuator;
+use super::parts::actuator::Actuator;
 use config::PlatformConfig;
 use kinematics::Kinematics;
 use screw::Screw;

@@ -9,14 +9,14 @@
 use crate::random::Stream;
 use units::Time;
 
-use crate::plant::Servo;
-use crate::plant::actuator::Actuator;
-use crate::plant::deviation::StopError;
-use crate::plant::drive_train::DriveTrain;
-use crate::plant::encoder::Encoder;
-use crate::plant::index_mark::IndexMark;
-use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::servo::Mass;
+use crate::plant::parts::actuator::Actuator;
+use crate::plant::parts::deviation::StopError;
+use crate::plant::parts::drive_train::DriveTrain;
+use crate::plant::parts::encoder::Encoder;
+use crate::plant::parts::index_mark::IndexMark;
+use crate::plant::parts::limit_switch::LimitSwitch;
+use crate::plant::parts::servo::Mass;
+use crate::plant::parts::servo::Servo;
 
 use super::config::ScrewConfig;
 use super::lead_error::LeadError;

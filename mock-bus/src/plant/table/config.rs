@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::plant::servo::Dynamics;
+use crate::plant::parts::servo::Dynamics;
 
 const ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
 

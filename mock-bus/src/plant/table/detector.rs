@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use units::{Radians, Time};
 
-use crate::plant::pulse::ProbeEdge;
+use crate::plant::parts::pulse::ProbeEdge;
 use crate::random::Stream;
 
 use super::config::DetectorConfig;

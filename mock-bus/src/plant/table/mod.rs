@@ -30,13 +30,13 @@ use units::{Radians, Time};
 
 pub use truth::TableTruth;
 
-use crate::plant::Servo;
-use crate::plant::actuator::Actuator;
-use crate::plant::drive_train::DriveTrain;
-use crate::plant::encoder::Encoder;
-use crate::plant::index_mark::IndexMark;
-use crate::plant::pulse::ProbeEdge;
-use crate::plant::servo::{GRID_NS, Mass};
+use crate::plant::parts::actuator::Actuator;
+use crate::plant::parts::drive_train::DriveTrain;
+use crate::plant::parts::encoder::Encoder;
+use crate::plant::parts::index_mark::IndexMark;
+use crate::plant::parts::pulse::ProbeEdge;
+use crate::plant::parts::servo::Servo;
+use crate::plant::parts::servo::{GRID_NS, Mass};
 use crate::random::Stream;
 use config::TableConfig;
 use detector::{Detector, Passage};

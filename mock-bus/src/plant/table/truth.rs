@@ -2,7 +2,7 @@
 
 use units::{Radians, Time};
 
-use crate::plant::actuator::Actuator;
+use crate::plant::parts::actuator::Actuator;
 
 use super::Table;
 

@@ -36,7 +36,7 @@ pub(super) use laser::Sighting;
 pub use laser::{LineOptics, LineSetUp};
 pub use truth::{ErrorMotion, LineTruth, Point, VolumetricTruth};
 
-use super::actuator::Actuator;
+use super::parts::actuator::Actuator;
 use crate::random::Stream;
 use beam::{Beam, Place};
 use chain::{Chain, Stand};

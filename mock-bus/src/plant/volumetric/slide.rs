@@ -3,12 +3,12 @@
 use units::Time;
 
 use super::config::VolumetricConfig;
-use crate::plant::actuator::Actuator;
-use crate::plant::drive_train::DriveTrain;
-use crate::plant::encoder::Encoder;
-use crate::plant::index_mark::IndexMark;
-use crate::plant::limit_switch::LimitSwitch;
-use crate::plant::servo::Mass;
+use crate::plant::parts::actuator::Actuator;
+use crate::plant::parts::drive_train::DriveTrain;
+use crate::plant::parts::encoder::Encoder;
+use crate::plant::parts::index_mark::IndexMark;
+use crate::plant::parts::limit_switch::LimitSwitch;
+use crate::plant::parts::servo::Mass;
 use crate::random::Stream;
 
 #[derive(Clone, Debug)]

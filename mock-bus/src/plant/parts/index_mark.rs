@@ -7,7 +7,7 @@ use super::pulse::IndexPulse;
 
 /// One of the marks is where the scale has its zero.
 #[derive(Clone, Debug)]
-pub(super) struct IndexMark {
+pub(in crate::plant) struct IndexMark {
     /// The travel from one mark to the next.
     turn: f64,
     /// Standard deviation of where the pulse acts.
@@ -18,7 +18,7 @@ pub(super) struct IndexMark {
 
 impl IndexMark {
     /// Both in metres or both in radians.
-    pub(super) const fn new(turn: f64, repeatability: f64, stream: Stream) -> Self {
+    pub(in crate::plant) const fn new(turn: f64, repeatability: f64, stream: Stream) -> Self {
         Self {
             turn,
             repeatability,
@@ -28,17 +28,17 @@ impl IndexMark {
     }
 
     /// The last pulse since the encoder was powered.
-    pub(super) const fn last(&self) -> Option<IndexPulse> {
+    pub(in crate::plant) const fn last(&self) -> Option<IndexPulse> {
         self.last
     }
 
     /// The encoder's count is a new one.
-    pub(super) const fn forget(&mut self) {
+    pub(in crate::plant) const fn forget(&mut self) {
         self.last = None;
     }
 
     /// The scale has gone straight from one place to another.
-    pub(super) fn watch(&mut self, from: f64, to: f64, encoder: &Encoder) {
+    pub(in crate::plant) fn watch(&mut self, from: f64, to: f64, encoder: &Encoder) {
         let (before, after) = ((from / self.turn).floor(), (to / self.turn).floor());
         if before == after {
             return;

@@ -3,7 +3,7 @@
 
 /// Positions are those of its scale.
 #[derive(Clone, Debug)]
-pub(super) struct Encoder {
+pub(in crate::plant) struct Encoder {
     resolution: f64,
     /// Where its power came on, in counts of the scale.
     power_on_count: i64,
@@ -12,7 +12,7 @@ pub(super) struct Encoder {
 
 impl Encoder {
     /// Powered with the scale at `scale`; a count is `resolution`.
-    pub(super) fn new(resolution: f64, scale: f64) -> Self {
+    pub(in crate::plant) fn new(resolution: f64, scale: f64) -> Self {
         Self {
             resolution,
             power_on_count: (scale / resolution).round() as i64,
@@ -20,12 +20,12 @@ impl Encoder {
         }
     }
 
-    pub(super) const fn resolution(&self) -> f64 {
+    pub(in crate::plant) const fn resolution(&self) -> f64 {
         self.resolution
     }
 
     /// Loses or gets its power with the scale at `scale`; true when the count is a new one.
-    pub(super) fn power(&mut self, on: bool, scale: f64) -> bool {
+    pub(in crate::plant) fn power(&mut self, on: bool, scale: f64) -> bool {
         let comes_on = on && !self.powered;
         if comes_on {
             self.power_on_count = (scale / self.resolution).round() as i64;
@@ -35,7 +35,7 @@ impl Encoder {
     }
 
     /// The count with the scale at `scale`; 0 without power.
-    pub(super) fn counts(&self, scale: f64) -> i64 {
+    pub(in crate::plant) fn counts(&self, scale: f64) -> i64 {
         if !self.powered {
             return 0;
         }
@@ -43,7 +43,7 @@ impl Encoder {
     }
 
     /// Where on the scale the count is 0.
-    pub(super) fn count_zero(&self) -> f64 {
+    pub(in crate::plant) fn count_zero(&self) -> f64 {
         self.power_on_count as f64 * self.resolution
     }
 }

@@ -2,12 +2,12 @@
 
 use units::Time;
 
-use super::Servo;
 use super::drive_train::DriveTrain;
 use super::pulse::{IndexPulse, ProbeEdge};
+use super::servo::Servo;
 
 /// One driven direction as its drive is wired to it.
-pub(super) trait Actuator {
+pub(in crate::plant) trait Actuator {
     fn train(&self) -> &DriveTrain;
     fn train_mut(&mut self) -> &mut DriveTrain;
     /// What the drive does to it from `now` on.

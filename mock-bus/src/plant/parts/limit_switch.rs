@@ -2,10 +2,10 @@
 
 use crate::random::Stream;
 
-use super::config::LimitConfig;
+use crate::plant::config::LimitConfig;
 
 #[derive(Clone, Debug)]
-pub(super) struct LimitSwitch {
+pub(in crate::plant) struct LimitSwitch {
     /// +1 for the positive end, -1 for the negative one.
     side: f64,
     /// Distance from zero, along its side.
@@ -13,13 +13,13 @@ pub(super) struct LimitSwitch {
     config: LimitConfig,
     jitter_m: f64,
     pressed: bool,
-    pub(super) forced: Option<bool>,
+    pub(in crate::plant) forced: Option<bool>,
     stream: Stream,
 }
 
 impl LimitSwitch {
     /// The negative and the positive one; `whose` begins the names of their random streams.
-    pub(super) fn pair(config: &LimitConfig, seed: u64, whose: &str) -> [Self; 2] {
+    pub(in crate::plant) fn pair(config: &LimitConfig, seed: u64, whose: &str) -> [Self; 2] {
         let switch = |side: f64, at_mm: f64, name| Self {
             side,
             at_m: side * at_mm * 1e-3,
@@ -37,7 +37,7 @@ impl LimitSwitch {
 
     /// Whether it may change its state here, where the true place is within `error_m` of what the
     /// encoder shows; saves looking closer.
-    pub(super) fn is_near(&self, encoder_m: f64, error_m: f64) -> bool {
+    pub(in crate::plant) fn is_near(&self, encoder_m: f64, error_m: f64) -> bool {
         const MARGIN_M: f64 = 1e-6;
         let beyond_m = self.side * encoder_m - self.at_m - self.jitter_m;
         if self.pressed {
@@ -47,7 +47,7 @@ impl LimitSwitch {
         }
     }
 
-    pub(super) fn watch(&mut self, true_m: f64) {
+    pub(in crate::plant) fn watch(&mut self, true_m: f64) {
         let beyond_m = self.side * true_m - self.at_m - self.jitter_m;
         if !self.pressed && beyond_m >= 0.0 {
             self.pressed = true;
@@ -58,7 +58,7 @@ impl LimitSwitch {
         }
     }
 
-    pub(super) fn is_pressed(&self) -> bool {
+    pub(in crate::plant) fn is_pressed(&self) -> bool {
         self.forced.unwrap_or(self.pressed)
     }
 }

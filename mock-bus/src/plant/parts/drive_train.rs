@@ -3,26 +3,26 @@
 
 use units::Time;
 
-use super::Servo;
 use super::encoder::Encoder;
 use super::index_mark::IndexMark;
 use super::limit_switch::LimitSwitch;
 use super::pulse::IndexPulse;
+use super::servo::Servo;
 use super::servo::{Mass, Stroke};
 
 /// Metres of a linear one, radians of a rotary one.
 #[derive(Clone, Debug)]
-pub(super) struct DriveTrain {
-    pub(super) mass: Mass,
-    pub(super) encoder: Encoder,
-    pub(super) index: Option<IndexMark>,
+pub(in crate::plant) struct DriveTrain {
+    pub(in crate::plant) mass: Mass,
+    pub(in crate::plant) encoder: Encoder,
+    pub(in crate::plant) index: Option<IndexMark>,
     /// The negative one and the positive one; what turns endlessly has no ends.
-    pub(super) switches: Option<[LimitSwitch; 2]>,
+    pub(in crate::plant) switches: Option<[LimitSwitch; 2]>,
 }
 
 impl DriveTrain {
     /// Runs the next grid step if it ends by `now`; returns where it led from and to.
-    pub(super) fn step_until(&mut self, now: Time) -> Option<Stroke> {
+    pub(in crate::plant) fn step_until(&mut self, now: Time) -> Option<Stroke> {
         let stroke = self.mass.step_until(now, self.encoder.count_zero());
         if let (Some((from, to)), Some(index)) = (stroke, &mut self.index)
             && from != to
@@ -33,7 +33,7 @@ impl DriveTrain {
     }
 
     /// After the last step by `now`: the grid is skipped while the mass rests. Whether it does.
-    pub(super) fn settle(&mut self, now: Time) -> bool {
+    pub(in crate::plant) fn settle(&mut self, now: Time) -> bool {
         let resting = self.mass.resting();
         if resting {
             self.mass.skip_to(now);
@@ -43,7 +43,7 @@ impl DriveTrain {
 
     /// Lets the switches see where the mass is; `true_of` is the place they act by, never further
     /// than `error_m` from the scale's.
-    pub(super) fn watch_switches(&mut self, error_m: f64, true_of: impl Fn(f64) -> f64) {
+    pub(in crate::plant) fn watch_switches(&mut self, error_m: f64, true_of: impl Fn(f64) -> f64) {
         let scale = self.mass.position_at(Time::ZERO);
         let near = self.switches.iter_mut().flatten();
         for switch in near.filter(|it| it.is_near(scale, error_m)) {
@@ -52,13 +52,13 @@ impl DriveTrain {
     }
 
     /// Returns whether the servo has taken a mass along that rested.
-    pub(super) fn set_servo(&mut self, now: Time, servo: Servo) -> bool {
+    pub(in crate::plant) fn set_servo(&mut self, now: Time, servo: Servo) -> bool {
         let rested = self.mass.resting();
         self.mass.set_servo(now, servo);
         rested && !self.mass.resting()
     }
 
-    pub(super) fn encoder_power(&mut self, on: bool) {
+    pub(in crate::plant) fn encoder_power(&mut self, on: bool) {
         let scale = self.mass.position_at(Time::ZERO);
         if self.encoder.power(on, scale)
             && let Some(index) = &mut self.index
@@ -67,26 +67,26 @@ impl DriveTrain {
         }
     }
 
-    pub(super) fn counts(&self, now: Time) -> i64 {
+    pub(in crate::plant) fn counts(&self, now: Time) -> i64 {
         self.encoder.counts(self.mass.position_at(now))
     }
 
-    pub(super) fn counts_per_s(&self, now: Time) -> f64 {
+    pub(in crate::plant) fn counts_per_s(&self, now: Time) -> f64 {
         self.mass.speed_at(now) / self.encoder.resolution()
     }
 
-    pub(super) fn index_pulse(&self) -> Option<IndexPulse> {
+    pub(in crate::plant) fn index_pulse(&self) -> Option<IndexPulse> {
         self.index.as_ref().and_then(IndexMark::last)
     }
 
-    pub(super) fn limit_switches(&self) -> (bool, bool) {
+    pub(in crate::plant) fn limit_switches(&self) -> (bool, bool) {
         let pressed = |[negative, positive]: &[LimitSwitch; 2]| {
             (negative.is_pressed(), positive.is_pressed())
         };
         self.switches.as_ref().map_or((false, false), pressed)
     }
 
-    pub(super) fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
+    pub(in crate::plant) fn force_switch(&mut self, positive: bool, forced: Option<bool>) {
         if let Some(switches) = &mut self.switches {
             switches[usize::from(positive)].forced = forced;
         }

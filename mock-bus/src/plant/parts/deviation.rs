@@ -14,7 +14,7 @@ use crate::random::Stream;
 use core::f64::consts::TAU;
 use units::portable::{exp, sin};
 
-use super::config::DeviationConfig;
+use crate::plant::config::DeviationConfig;
 
 const HARMONICS: usize = 5;
 /// The zero of the field lies within this share of its band from the middle.
@@ -37,7 +37,7 @@ impl Wave {
 
 /// The part that depends on the encoder position alone.
 #[derive(Clone, Debug)]
-pub(super) struct Field {
+pub(in crate::plant) struct Field {
     slope: f64,
     waves: [Wave; HARMONICS],
     at_zero_m: f64,
@@ -45,7 +45,7 @@ pub(super) struct Field {
 }
 
 impl Field {
-    pub(super) fn new(config: &DeviationConfig, seed: u64) -> Self {
+    pub(in crate::plant) fn new(config: &DeviationConfig, seed: u64) -> Self {
         let mut stream = Stream::new(seed, "deviation field");
         let (low, high) = (config.work_min_mm * 1e-3, config.work_max_mm * 1e-3);
         let mut field = Self::shape(&mut stream, config, high - low);
@@ -106,17 +106,17 @@ impl Field {
     }
 
     /// Without the cyclic term.
-    pub(super) fn smooth(&self, position_m: f64) -> f64 {
+    pub(in crate::plant) fn smooth(&self, position_m: f64) -> f64 {
         let waves: f64 = self.waves.iter().map(|wave| wave.at(position_m)).sum();
         self.slope * position_m + waves - self.at_zero_m
     }
 
-    pub(super) fn at(&self, position_m: f64) -> f64 {
+    pub(in crate::plant) fn at(&self, position_m: f64) -> f64 {
         self.smooth(position_m) + self.cyclic.at(position_m)
     }
 
     /// It is not larger at `position_m` than this, which costs less to tell.
-    pub(super) fn at_most(&self, position_m: f64) -> f64 {
+    pub(in crate::plant) fn at_most(&self, position_m: f64) -> f64 {
         let waves: f64 = self.waves.iter().map(|wave| wave.amplitude_m.abs()).sum();
         let periodic_m = waves + self.at_zero_m.abs() + self.cyclic.amplitude_m.abs();
         (self.slope * position_m).abs() + periodic_m
@@ -125,7 +125,7 @@ impl Field {
 
 /// The part that depends on the way the stage came.
 #[derive(Clone, Debug)]
-pub(super) struct Path {
+pub(in crate::plant) struct Path {
     half_lost_m: f64,
     take_up_m: f64,
     engagement_m: f64,
@@ -133,7 +133,7 @@ pub(super) struct Path {
 }
 
 impl Path {
-    pub(super) fn new(config: &DeviationConfig, seed: u64) -> Self {
+    pub(in crate::plant) fn new(config: &DeviationConfig, seed: u64) -> Self {
         Self {
             half_lost_m: config.lost_motion_um * 0.5e-6,
             take_up_m: config.lost_motion_take_up_um * 1e-6,
@@ -146,32 +146,32 @@ impl Path {
     }
 
     /// A stage that leaves its place will stop with another error.
-    pub(super) fn leave(&mut self) {
+    pub(in crate::plant) fn leave(&mut self) {
         self.stop_error.leave();
     }
 
     /// Moving forward the stage lags behind its encoder by half the lost motion, and moving
     /// back it leads by as much. The exponential makes the result independent of how a
     /// stroke is cut into pieces.
-    pub(super) fn travel(&mut self, by_m: f64) {
+    pub(in crate::plant) fn travel(&mut self, by_m: f64) {
         let goal_m = -self.half_lost_m * by_m.signum();
         self.engagement_m = approach(self.engagement_m, goal_m, by_m.abs() / self.take_up_m);
         self.stop_error.travel(by_m);
     }
 
-    pub(super) fn deviation_m(&self) -> f64 {
+    pub(in crate::plant) fn deviation_m(&self) -> f64 {
         self.engagement_m + self.stop_error.error_m()
     }
 
     /// Fully engaged in the direction of `sign`, without the stop's error.
-    pub(super) fn engaged_m(&self, sign: f64) -> f64 {
+    pub(in crate::plant) fn engaged_m(&self, sign: f64) -> f64 {
         -self.half_lost_m * sign
     }
 }
 
 /// The error of each single stop, which nothing can predict.
 #[derive(Clone, Debug)]
-pub(super) struct StopError {
+pub(in crate::plant) struct StopError {
     standard_deviation_m: f64,
     present_m: f64,
     next_m: f64,
@@ -182,7 +182,7 @@ impl StopError {
     /// It is carried along over this travel.
     const TRAVEL_M: f64 = 5e-6;
 
-    pub(super) fn new(standard_deviation_m: f64, stream: Stream) -> Self {
+    pub(in crate::plant) fn new(standard_deviation_m: f64, stream: Stream) -> Self {
         Self {
             standard_deviation_m,
             present_m: 0.0,
@@ -192,15 +192,15 @@ impl StopError {
     }
 
     /// What leaves its place will stop with another error.
-    pub(super) fn leave(&mut self) {
+    pub(in crate::plant) fn leave(&mut self) {
         self.next_m = self.standard_deviation_m * self.stream.gaussian();
     }
 
-    pub(super) fn travel(&mut self, by_m: f64) {
+    pub(in crate::plant) fn travel(&mut self, by_m: f64) {
         self.present_m = approach(self.present_m, self.next_m, by_m.abs() / Self::TRAVEL_M);
     }
 
-    pub(super) const fn error_m(&self) -> f64 {
+    pub(in crate::plant) const fn error_m(&self) -> f64 {
         self.present_m
     }
 }

@@ -12,31 +12,43 @@
 use crate::random::Stream;
 use units::Time;
 
-use super::Servo;
-use super::config::MotionConfig;
+use crate::plant::config::MotionConfig;
+
+/// How a servo drive acts on its axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Servo {
+    /// No torque: the axis coasts to a stop by friction.
+    Off,
+    /// The position controller follows this demand.
+    Follow {
+        /// Demanded encoder travel since the encoder was powered, in metres or, of a rotary
+        /// axis, radians.
+        demand: f64,
+    },
+}
 
 /// The servo samples and acts once in this time.
-pub(super) const GRID_NS: u64 = 250_000;
+pub(in crate::plant) const GRID_NS: u64 = 250_000;
 const GRID_S: f64 = GRID_NS as f64 * 1e-9;
 /// A demand older than this is not extrapolated: its sender has stopped.
 const DEMAND_STALE_NS: u64 = 20_000_000;
 
 /// Mass, servo and mechanical ends, in metres or radians and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Dynamics {
-    pub(super) servo_bandwidth_hz: f64,
-    pub(super) servo_damping: f64,
+pub(in crate::plant) struct Dynamics {
+    pub(in crate::plant) servo_bandwidth_hz: f64,
+    pub(in crate::plant) servo_damping: f64,
     /// 1 follows a constant speed without error.
-    pub(super) feed_forward_fraction: f64,
-    pub(super) acceleration_max: f64,
-    pub(super) friction_deceleration: f64,
+    pub(in crate::plant) feed_forward_fraction: f64,
+    pub(in crate::plant) acceleration_max: f64,
+    pub(in crate::plant) friction_deceleration: f64,
     /// Standard deviation of where the settled servo stands.
-    pub(super) rest_error: f64,
+    pub(in crate::plant) rest_error: f64,
     /// Mechanical ends; `None` for what turns endlessly.
-    pub(super) hard_stops: Option<(f64, f64)>,
+    pub(in crate::plant) hard_stops: Option<(f64, f64)>,
     /// Nearer and slower than this the loop is taken to have settled.
-    pub(super) settled: f64,
-    pub(super) settled_speed: f64,
+    pub(in crate::plant) settled: f64,
+    pub(in crate::plant) settled_speed: f64,
 }
 
 impl From<MotionConfig> for Dynamics {
@@ -82,7 +94,7 @@ impl Demand {
 
 /// Mass and servo. Positions are encoder travel; their zero is that of the scale as built.
 #[derive(Clone, Debug)]
-pub(super) struct Mass {
+pub(in crate::plant) struct Mass {
     dynamics: Dynamics,
     natural_rad_per_s: f64,
     demand: Demand,
@@ -97,11 +109,15 @@ pub(super) struct Mass {
 }
 
 /// The motion of one grid step: from, to.
-pub(super) type Stroke = (f64, f64);
+pub(in crate::plant) type Stroke = (f64, f64);
 
 impl Mass {
     /// `rest_jitter` is where the settled servo's noise comes from.
-    pub(super) fn new(dynamics: impl Into<Dynamics>, position: f64, rest_jitter: Stream) -> Self {
+    pub(in crate::plant) fn new(
+        dynamics: impl Into<Dynamics>,
+        position: f64,
+        rest_jitter: Stream,
+    ) -> Self {
         let dynamics = dynamics.into();
         Self {
             natural_rad_per_s: core::f64::consts::TAU * dynamics.servo_bandwidth_hz,
@@ -124,34 +140,34 @@ impl Mass {
         }
     }
 
-    pub(super) const fn resting(&self) -> bool {
+    pub(in crate::plant) const fn resting(&self) -> bool {
         self.resting
     }
 
     /// Puts the mass elsewhere, as a hand does while the power is off.
-    pub(super) fn push(&mut self, by: f64) {
+    pub(in crate::plant) fn push(&mut self, by: f64) {
         self.position += by;
         self.speed = 0.0;
         self.wake();
     }
 
     /// A blocked mass does not move, whatever pushes it.
-    pub(super) fn set_blocked(&mut self, blocked: bool) {
+    pub(in crate::plant) fn set_blocked(&mut self, blocked: bool) {
         self.blocked = blocked;
         self.wake();
     }
 
     /// Safe torque off: the servo has no effect.
-    pub(super) fn set_torque_off(&mut self, off: bool) {
+    pub(in crate::plant) fn set_torque_off(&mut self, off: bool) {
         self.torque_off = off;
         self.wake();
     }
 
-    pub(super) const fn torque_off(&self) -> bool {
+    pub(in crate::plant) const fn torque_off(&self) -> bool {
         self.torque_off
     }
 
-    pub(super) fn set_servo(&mut self, now: Time, servo: Servo) {
+    pub(in crate::plant) fn set_servo(&mut self, now: Time, servo: Servo) {
         if servo == self.demand.servo && now > self.demand.at && self.resting {
             self.demand.at = now;
             self.demand.speed = 0.0;
@@ -199,13 +215,13 @@ impl Mass {
     }
 
     /// Jumps over the grid steps up to `now` while at rest.
-    pub(super) fn skip_to(&mut self, now: Time) {
+    pub(in crate::plant) fn skip_to(&mut self, now: Time) {
         self.step = now.nanos() / GRID_NS;
     }
 
     /// Runs the next grid step if it ends by `now`; returns where it led from and to.
     /// `offset` is where the encoder's count 0 lies on its scale.
-    pub(super) fn step_until(&mut self, now: Time, offset: f64) -> Option<Stroke> {
+    pub(in crate::plant) fn step_until(&mut self, now: Time, offset: f64) -> Option<Stroke> {
         let end = (self.step + 1) * GRID_NS;
         if self.resting || end > now.nanos() {
             return None;
@@ -291,7 +307,7 @@ impl Mass {
     }
 
     /// Where the mass is `now`, at most one grid step after the last one.
-    pub(super) fn position_at(&self, now: Time) -> f64 {
+    pub(in crate::plant) fn position_at(&self, now: Time) -> f64 {
         if self.resting {
             return self.position;
         }
@@ -299,7 +315,7 @@ impl Mass {
         self.position + self.speed * s + self.acceleration * s * s / 2.0
     }
 
-    pub(super) fn speed_at(&self, now: Time) -> f64 {
+    pub(in crate::plant) fn speed_at(&self, now: Time) -> f64 {
         if self.resting {
             return 0.0;
         }
