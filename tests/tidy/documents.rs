@@ -18,6 +18,7 @@ const DOCUMENTS: &[&str] = &[
     "docs/glossary.md",
     "docs/lockstep.md",
     "docs/safety.md",
+    "docs/seeds.md",
     "tests/README.md",
 ];
 
