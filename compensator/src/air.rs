@@ -91,6 +91,21 @@ pub struct Sensitivities {
 ///
 /// # Errors
 /// When an input is outside 300…1700 nm, 0…100 °C, 10…140 kPa, 0…1, 0…2000 µmol/mol, or NaN.
+///
+/// # Example
+///
+/// ```
+/// use compensator::air::refractive_index;
+/// use units::{Celsius, Metres, Pascals, RelativeHumidity};
+///
+/// let (wavelength, half) = (Metres(633e-9), RelativeHumidity(0.5));
+/// let n = refractive_index(wavelength, Celsius(20.0), Pascals(101_325.0), half, 450.0)?;
+/// assert!((n - 1.000_271_373).abs() <= 1e-9, "NIST Engineering Metrology Toolbox");
+/// let hectopascals = Pascals(1013.25);
+/// let refused = refractive_index(wavelength, Celsius(20.0), hectopascals, half, 450.0);
+/// assert!(refused.is_err_and(|it| it.unit == "Pa"));
+/// # Ok::<(), compensator::air::OutOfRange>(())
+/// ```
 pub fn refractive_index(
     vacuum_wavelength: Metres,
     t: Celsius,
@@ -130,6 +145,19 @@ pub fn refractive_index(
 ///
 /// # Errors
 /// As [`refractive_index`].
+///
+/// # Example
+///
+/// ```
+/// use compensator::air::sensitivities;
+/// use units::{Celsius, Metres, Pascals, RelativeHumidity};
+///
+/// let (p, rh) = (Pascals(101_325.0), RelativeHumidity(0.5));
+/// let s = sensitivities(Metres(633e-9), Celsius(20.0), p, rh, 450.0)?;
+/// assert!((s.per_kelvin + 0.95e-6).abs() < 0.03e-6, "a length grows by 0.95 µm/m for 1 K");
+/// assert!((s.per_pascal - 2.68e-9).abs() < 0.03e-9);
+/// # Ok::<(), compensator::air::OutOfRange>(())
+/// ```
 pub fn sensitivities(
     vacuum_wavelength: Metres,
     t: Celsius,

@@ -45,6 +45,25 @@ enum Phase {
 }
 
 /// A correction that changes no faster and grows no larger than its limits.
+///
+/// # Example
+///
+/// ```
+/// use compensator::apply::{Alarm, SlewedCorrection};
+/// use units::{Metres, MetresPerSecond, Time};
+///
+/// let wanted = Metres::from_um(5.0);
+/// // Up to 10 µm, 1 µm each millisecond.
+/// let mut correction = SlewedCorrection::new(Metres::from_um(10.0), MetresPerSecond(1e-3));
+/// correction.enable();
+/// correction.advance(Time::ZERO, wanted);
+/// let soon = correction.advance(Time::from_seconds(0.002), wanted);
+/// assert!((soon.um() - 2.0).abs() < 1e-9 && !correction.is_settled());
+/// correction.advance(Time::from_seconds(0.005), wanted);
+/// assert_eq!((correction.is_settled(), correction.alarm()), (true, None));
+/// correction.advance(Time::from_seconds(0.006), -wanted);
+/// assert!(matches!(correction.alarm(), Some(Alarm::Rate { .. })), "a jump without notice");
+/// ```
 #[derive(Clone, Debug)]
 pub struct SlewedCorrection {
     size: Metres,
@@ -168,6 +187,19 @@ impl SlewedCorrection {
 ///
 /// Feed it commanded positions, not encoder noise: every change of sign counts as a reversal,
 /// there is no dead band.
+///
+/// # Example
+///
+/// ```
+/// use compensator::apply::ApproachTracker;
+/// use units::{Approach, Metres};
+///
+/// let mut tracker = ApproachTracker::new();
+/// assert_eq!(tracker.update(Metres(0.0)), None, "it has not moved yet");
+/// assert_eq!(tracker.update(Metres(1e-3)), Some(Approach::Forward));
+/// assert_eq!(tracker.update(Metres(1e-3)), Some(Approach::Forward), "standing still");
+/// assert_eq!(tracker.approach_of(Metres(0.0)), Some(Approach::Reverse));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ApproachTracker {
     last: Option<Metres>,

@@ -25,6 +25,18 @@ pub enum Interpolation {
 }
 
 /// value(t) = constant + t·(linear + t·(quadratic + t·cubic)), for t = x − start.
+///
+/// # Example
+///
+/// ```
+/// use compensator::interpolation::Segment;
+///
+/// // From 0 to 0 with the slopes 4 and −4: 4t(1 − t), which is 1 in the middle.
+/// let hump = Segment::hermite(0.0, 0.0, 4.0, 1.0, 0.0, -4.0);
+/// assert_eq!(hump.value(0.5), 1.0);
+/// assert!((hump.largest() - 1.0).abs() < 1e-15);
+/// assert_eq!(hump.steepest(), 4.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// Where the piece begins.
@@ -118,6 +130,18 @@ impl Segment {
 }
 
 /// The pieces between strictly increasing `nodes` (at least two) with their `values`.
+///
+/// # Example
+///
+/// ```
+/// use compensator::interpolation::{Interpolation, segments};
+///
+/// let (nodes, values) = ([0.0, 3.0, 6.0], [9.0, 1.0, 2.0]);
+/// let steps = segments(&nodes, &values, Interpolation::PiecewiseConstant);
+/// assert_eq!((steps[0].value(0.1), steps[1].value(2.9)), (1.0, 2.0));
+/// let lines = segments(&nodes, &values, Interpolation::Linear);
+/// assert_eq!(lines[0].value(1.5), 5.0);
+/// ```
 pub fn segments(nodes: &[f64], values: &[f64], kind: Interpolation) -> Vec<Segment> {
     debug_assert!(nodes.len() >= 2 && nodes.len() == values.len());
     let slopes = match kind {
@@ -139,6 +163,17 @@ pub fn segments(nodes: &[f64], values: &[f64], kind: Interpolation) -> Vec<Segme
 }
 
 /// The slope at each node that keeps the cubics monotone.
+///
+/// # Example
+///
+/// ```
+/// use compensator::interpolation::monotone_slopes;
+///
+/// let slopes = monotone_slopes(&[0.0, 1.0, 3.0], &[0.0, 1.0, 2.0]);
+/// for (slope, expected) in slopes.iter().zip([7.0 / 6.0, 9.0 / 13.0, 1.0 / 6.0]) {
+///     assert!((slope - expected).abs() < 1e-15);
+/// }
+/// ```
 pub fn monotone_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
     let last = nodes.len() - 1;
     let width = |i: usize| nodes[i + 1] - nodes[i];
@@ -163,6 +198,16 @@ pub fn monotone_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
 ///
 /// Source: C. de Boor, A Practical Guide to Splines (1978), chapter IV. Two nodes give a line,
 /// three a parabola. Unlike the monotone cubic it may leave the interval of its nodes' values.
+///
+/// # Example
+///
+/// ```
+/// use compensator::interpolation::spline_slopes;
+///
+/// // x² at 0, 1 and 3.
+/// let slopes = spline_slopes(&[0.0, 1.0, 3.0], &[0.0, 1.0, 9.0]);
+/// assert!(slopes.iter().zip([0.0, 2.0, 6.0]).all(|(seen, it)| (seen - it).abs() < 1e-14));
+/// ```
 pub fn spline_slopes(nodes: &[f64], values: &[f64]) -> Vec<f64> {
     let last = nodes.len() - 1;
     let width = |i: usize| nodes[i + 1] - nodes[i];

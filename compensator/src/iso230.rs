@@ -154,6 +154,27 @@ impl Figures {
 ///
 /// # Errors
 /// When an approach is missing altogether, or a target has fewer than two runs from one side.
+///
+/// # Example
+///
+/// Two targets, two runs: at 0 mm the mean reached forward is 2 µm and reached in reverse −1 µm, at 10 mm they
+/// are 4 µm and 5 µm.
+///
+/// ```
+/// use compensator::error_table::LinearSeries;
+/// use compensator::iso230::evaluate;
+///
+/// let csv = "run,approach,target_mm,measured_mm\n\
+///            1,+,0,0.001\n1,+,10,10.004\n1,-,10,10.004\n1,-,0,-0.001\n\
+///            2,+,0,0.003\n2,+,10,10.004\n2,-,10,10.006\n2,-,0,-0.001\n";
+/// let figures = evaluate(&LinearSeries::from_csv(csv, "measured.csv")?)?;
+/// assert!((figures.reversal_value.um() - 3.0).abs() < 1e-6, "B");
+/// assert!((figures.systematic_deviation.bidirectional.um() - 6.0).abs() < 1e-6, "E");
+/// let a = 6.0 + 2.0 * 2.0_f64.sqrt();
+/// assert!((figures.accuracy.bidirectional.um() - a).abs() < 1e-6, "A");
+/// assert!(!figures.conforms(), "the standard wants five runs and five targets");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn evaluate(series: &LinearSeries) -> Result<Figures, EvaluationError> {
     let first = series.measurements().first().map(|m| m.approach);
     if let Some(measured) = first

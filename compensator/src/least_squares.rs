@@ -66,10 +66,15 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// The sum of the squared residuals, in the observations' unit squared.
+    pub fn squares(&self) -> f64 {
+        self.residuals.iter().map(|r| r * r).sum()
+    }
+
     /// The noise's standard deviation estimated from the residuals; `None` without spare rows.
     pub fn residual_sd(&self) -> Option<f64> {
-        let squares: f64 = self.residuals.iter().map(|r| r * r).sum();
-        (self.degrees_of_freedom > 0).then(|| (squares / self.degrees_of_freedom as f64).sqrt())
+        let freedom = self.degrees_of_freedom;
+        (freedom > 0).then(|| (self.squares() / freedom as f64).sqrt())
     }
 
     /// The variance of `gradient · coefficients` for a noise of standard deviation `sigma`.
@@ -92,6 +97,22 @@ impl Fit {
 ///
 /// # Errors
 /// When the shape is wrong, a value is not finite, rows are missing or columns dependent.
+///
+/// # Example
+///
+/// ```
+/// use compensator::least_squares::{LeastSquaresError, solve};
+///
+/// // Observations 1, 2 and 6 of one constant: 3, with residuals −2, −1 and 3.
+/// let fit = solve(&[1.0, 1.0, 1.0], 1, &[1.0, 2.0, 6.0])?;
+/// assert!((fit.coefficients[0] - 3.0).abs() < 1e-14);
+/// let s = fit.residual_sd().expect("two rows to spare");
+/// assert!((s - 7.0_f64.sqrt()).abs() < 1e-14);
+/// // The second column is the first one doubled.
+/// let refused = solve(&[1.0, 2.0, 1.0, 2.0, 1.0, 2.0], 2, &[1.0, 2.0, 3.0]);
+/// assert_eq!(refused, Err(LeastSquaresError::Dependent { column: 1 }));
+/// # Ok::<(), LeastSquaresError>(())
+/// ```
 pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, LeastSquaresError> {
     check(design, columns, observed)?;
     let rows = observed.len();
@@ -176,6 +197,20 @@ pub fn powers(z: f64, degree: usize) -> impl Iterator<Item = f64> {
 ///
 /// # Errors
 /// As [`solve`]; too few distinct abscissae show as dependent columns.
+///
+/// # Example
+///
+/// ```
+/// use compensator::least_squares::polynomial;
+///
+/// let x = [-1.0, -0.5, 0.0, 0.5, 1.0];
+/// let y = x.map(|z| 2.0 - 3.0 * z + 4.0 * z * z);
+/// let fit = polynomial(&x, &y, 2)?;
+/// let close = |(seen, it): (&f64, f64)| (seen - it).abs() < 1e-14;
+/// assert!(fit.coefficients.iter().zip([2.0, -3.0, 4.0]).all(close));
+/// assert_eq!(fit.degrees_of_freedom, 2);
+/// # Ok::<(), compensator::least_squares::LeastSquaresError>(())
+/// ```
 pub fn polynomial(x: &[f64], y: &[f64], degree: usize) -> Result<Fit, LeastSquaresError> {
     let design: Vec<f64> = x.iter().flat_map(|&z| powers(z, degree)).collect();
     solve(&design, degree + 1, y)

@@ -63,6 +63,8 @@ pub mod interpolation;
 pub mod iso230;
 pub mod least_squares;
 pub mod length_correction;
+#[cfg(test)]
+mod noise;
 pub mod platform;
 pub mod rotary;
 pub mod screw;

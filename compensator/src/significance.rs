@@ -6,8 +6,9 @@
 //! | symbol | name here |
 //! |---|---|
 //! | Q(F, ν₁, ν₂) | [`f_tail`] |
+//! | t with P(\|t\| > t) given | [`student_limit`] |
 //!
-//! Absent: quantiles; a test compares the tail probability with its level.
+//! Absent: quantiles of F; a test compares the tail probability with its level.
 use units::portable::{exp, ln, ln_1p};
 
 /// Terms of the continued fraction at most; it needs about √max(a, b).
@@ -15,6 +16,16 @@ const TERMS_MAX: usize = 10_000;
 
 /// The probability that noise alone makes an F as large as `f` with `numerator` and
 /// `denominator` degrees of freedom: 1 for `f` of zero or less, 0 for infinity, NaN for NaN.
+///
+/// # Example
+///
+/// ```
+/// use compensator::significance::f_tail;
+///
+/// // The tables' 5 % point of 1 and 10 degrees of freedom.
+/// assert!((f_tail(4.965, 1, 10) - 0.05).abs() < 1e-4);
+/// assert_eq!(f_tail(f64::INFINITY, 3, 9), 0.0);
+/// ```
 pub fn f_tail(f: f64, numerator: usize, denominator: usize) -> f64 {
     if f.is_nan() {
         return f;
@@ -28,6 +39,24 @@ pub fn f_tail(f: f64, numerator: usize, denominator: usize) -> f64 {
         return exp(-0.5 * d2 * ln_1p(2.0 * f / d2));
     }
     incomplete_beta(d2 / (d2 + d1 * f), d2 / 2.0, d1 / 2.0)
+}
+
+/// The t that noise exceeds, to either side, with probability `chance` (over 0) and so many degrees of
+/// `freedom` (one or more).
+pub fn student_limit(chance: f64, freedom: usize) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    while f_tail(high * high, 1, freedom) > chance && high < 1e12 {
+        (low, high) = (high, high * 2.0);
+    }
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        if f_tail(middle * middle, 1, freedom) > chance {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
 }
 
 /// I_x(a, b).
@@ -128,6 +157,16 @@ mod tests {
             // The general way agrees with the short one for two.
             let general = incomplete_beta(7.0 / (7.0 + 2.0 * f), 3.5, 1.0);
             check(f, 2, 7, general, 1e-12);
+        }
+    }
+
+    #[test]
+    fn students_limits_are_those_of_the_tables() {
+        for (chance, freedom, expected) in
+            [(0.05, 4, 2.7764), (0.05, 1, 12.706), (0.01, 10, 3.1693)]
+        {
+            let seen = student_limit(chance, freedom);
+            assert!((seen / expected - 1.0).abs() < 1e-4, "{seen} {expected}");
         }
     }
 

@@ -22,6 +22,18 @@ pub fn mean(values: &[f64]) -> Option<f64> {
 }
 
 /// The sample standard deviation with n − 1; `None` for fewer than two values.
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::{mean, standard_deviation};
+///
+/// let sample = [1.0, 2.0, 4.0];
+/// assert_eq!(mean(&sample), Some(7.0 / 3.0));
+/// let s = standard_deviation(&sample).expect("two values and more");
+/// assert!((s - (7.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+/// assert_eq!(standard_deviation(&[1.0]), None);
+/// ```
 pub fn standard_deviation(values: &[f64]) -> Option<f64> {
     if values.len() < 2 {
         return None;
@@ -49,6 +61,16 @@ pub fn median(values: &[f64]) -> Option<f64> {
 
 /// The standard deviation estimated from the median absolute value of residuals that are
 /// already centred; up to half of them may be wild. `None` for an empty slice.
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::robust_sigma;
+///
+/// let tame = robust_sigma(&[-1.0, 0.5, 1.0, -0.5, 0.8]);
+/// let wild = robust_sigma(&[-1.0, 0.5, 1000.0, -0.5, 0.8]);
+/// assert_eq!(tame, wild);
+/// ```
 pub fn robust_sigma(residuals: &[f64]) -> Option<f64> {
     let magnitudes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
     median(&magnitudes).map(|m| m * MAD_TO_SIGMA)
@@ -63,6 +85,14 @@ pub fn rms(values: &[f64]) -> f64 {
 }
 
 /// The combined standard uncertainty of independent contributions: their root sum of squares.
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::combine;
+///
+/// assert_eq!(combine(&[3.0, 4.0]), 5.0);
+/// ```
 pub fn combine(contributions: &[f64]) -> f64 {
     contributions.iter().map(|u| u * u).sum::<f64>().sqrt()
 }
@@ -70,6 +100,16 @@ pub fn combine(contributions: &[f64]) -> f64 {
 /// The variance of a linear combination: gradient · covariance · gradientᵀ.
 ///
 /// `covariance` is square, row by row, of the gradient's length.
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::propagate;
+///
+/// let fully_correlated = [4.0, 4.0, 4.0, 4.0];
+/// assert_eq!(propagate(&[1.0, -1.0], &fully_correlated), 0.0, "of a difference");
+/// assert_eq!(propagate(&[1.0, 1.0], &fully_correlated), 16.0, "of a sum");
+/// ```
 pub fn propagate(gradient: &[f64], covariance: &[f64]) -> f64 {
     let n = gradient.len();
     debug_assert_eq!(covariance.len(), n * n);
@@ -84,6 +124,15 @@ pub fn propagate(gradient: &[f64], covariance: &[f64]) -> f64 {
 
 /// The upper limit of chi²/ν that a right model exceeds with the one-sided probability of
 /// `sigmas` standard deviations (Wilson and Hilferty 1931: 3 is about 0.13 %).
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::reduced_chi_square_limit;
+///
+/// // The tables' upper 0.135 % point of 10 degrees of freedom is 28.79.
+/// assert!((10.0 * reduced_chi_square_limit(10, 3.0) - 28.79).abs() < 0.3);
+/// ```
 pub fn reduced_chi_square_limit(degrees_of_freedom: usize, sigmas: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees_of_freedom.max(1) as f64);
     powi(1.0 - spread + sigmas * spread.sqrt(), 3)

@@ -104,8 +104,11 @@ pub enum Failure {
     },
     /// The zero was found, but not well enough.
     #[error(
-        "axis {axis}: hall zero found with a standard uncertainty of {:.4} µm, the limit is {:.4} µm",
-        seen.um(), limit.um()
+        "axis {axis}: hall zero found with a standard uncertainty of {:.4} µm, the limit is {:.4} µm; \
+         a single pass over the sensors repeats to {:.4} µm. Look for noise of the sensors, vibration and a \
+         servo that overshoots; where the stage repeats no better, \
+         `standard_uncertainty_limit_um = {:.2}` would let it pass",
+        seen.um(), limit.um(), scatter.um(), seen.um() * 1.5
     )]
     ZeroUncertain {
         /// Which axis.
@@ -114,6 +117,8 @@ pub enum Failure {
         seen: Metres,
         /// What is allowed.
         limit: Metres,
+        /// The standard deviation of a single pass.
+        scatter: Metres,
     },
     /// Interferometer and encoder disagree beyond reason.
     #[error(

@@ -130,5 +130,8 @@ pub fn zero(estimate: &ZeroEstimate) -> Value {
         "residual_rms_peak_mv": estimate.residual_rms_peak.value() * 1e3,
         "residual_rms_slope_mv": estimate.residual_rms_slope.value() * 1e3,
         "points": estimate.points,
+        "lost_motion_um": estimate.passes.map(|it| um(it.lost_motion)),
+        "pass_scatter_um": estimate.passes.map(|it| um(it.scatter)),
+        "degrees_of_freedom": estimate.passes.map(|it| it.degrees_of_freedom),
     })
 }

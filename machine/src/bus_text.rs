@@ -4,6 +4,16 @@ use wire::LinkState;
 use wire::can::CanId;
 
 /// With all the digits that it can have, as it stands in a log of the bus.
+///
+/// # Example
+///
+/// ```
+/// use machine::identifier_text;
+/// use wire::can::CanId;
+///
+/// assert_eq!(identifier_text(CanId::Standard(0x81)), "identifier 0x081");
+/// assert_eq!(identifier_text(CanId::Extended(0x81)), "29-bit identifier 0x00000081");
+/// ```
 pub fn identifier_text(id: CanId) -> String {
     match id {
         CanId::Standard(raw) => format!("identifier {raw:#05X}"),

@@ -17,6 +17,23 @@ const STOPPED_BY: u8 = 128;
 const SIGINT: u8 = 2;
 
 /// Everything that ends a procedure of a machine, whatever its kind.
+///
+/// # Example
+///
+/// ```
+/// use machine::Failure;
+/// use units::Metres;
+///
+/// let refused = Failure::SoftLimit {
+///     axis: "x".into(),
+///     target: Metres::from_mm(70.0),
+///     min: Metres::from_mm(-3.0),
+///     max: Metres::from_mm(63.0),
+/// };
+/// let text = "axis x: 70.000000 mm is outside the soft limits -3.000 to 63.000 mm; nothing was moved";
+/// assert_eq!(refused.to_string(), text);
+/// assert_eq!(refused.exit_code(), 3, "refused for safety");
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// The cyclic engine refused, or stopped every drive at once.

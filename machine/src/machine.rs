@@ -35,6 +35,35 @@ pub(crate) enum Supervision {
 }
 
 /// A machine that is connected.
+///
+/// # Example
+///
+/// A machine without devices, over a recording in which nothing happens: time passes in ticks, and a stop request ends
+/// whatever runs.
+///
+/// ```
+/// use drivers::transport::replay::Replay;
+/// use machine::{Failure, Machine, Parts, Patience};
+/// use units::Time;
+///
+/// let parts = Parts {
+///     buses: vec![],
+///     lines: Default::default(),
+///     axes: vec![],
+///     rotaries: vec![],
+///     analogs: vec![],
+///     instruments: vec![],
+///     cameras: vec![],
+///     patience: Patience::NONE,
+/// };
+/// let mut machine = Machine::new(parts, Box::new(Replay::parse("", &[])?));
+/// machine.run_until(Time::from_seconds(2.0))?;
+/// assert_eq!(machine.now(), Time::from_seconds(2.0));
+/// machine.stop_request().stop();
+/// let stopped = machine.run_until(Time::from_seconds(3.0));
+/// assert!(matches!(stopped, Err(Failure::Interrupted)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Machine {
     pub(crate) patience: Patience,
     pub(crate) transport: Box<dyn Transport>,

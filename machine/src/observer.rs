@@ -26,6 +26,25 @@ impl Stage {
 }
 
 /// Is told about progress.
+///
+/// # Example
+///
+/// ```
+/// use machine::{Observer, Stage};
+///
+/// struct Last(String);
+///
+/// impl Observer for Last {
+///     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64) {
+///         self.0 = format!("{} {axis}: {done} of {total}", stage.text());
+///     }
+/// }
+///
+/// let mut last = Last(String::new());
+/// last.progress(Stage::Calibrate, "x", 3, 21);
+/// last.warning("nobody has to listen to that");
+/// assert_eq!(last.0, "calibrate x: 3 of 21");
+/// ```
 pub trait Observer {
     /// `done` of `total` steps of `stage` on `axis` are done.
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64);

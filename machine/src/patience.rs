@@ -14,6 +14,19 @@ const SPEED_MAX: f64 = 1000.0;
 /// Whatever is waited for `t` in real time is waited for `t` and one second *on the wall*, however
 /// fast the machine lives: its computer pauses by the wall's clock. So trouble is never told more
 /// than a second later than it would be in real time.
+///
+/// # Example
+///
+/// ```
+/// use machine::Patience;
+/// use std::time::Duration;
+///
+/// let usual = Duration::from_secs(3);
+/// assert_eq!(Patience::NONE.of(usual), usual);
+/// let fast = Patience::with_clock(10.0);
+/// assert_eq!(fast.of(usual), Duration::from_secs(40), "4 s on the wall");
+/// assert_eq!(fast.on_the_wall(fast.of(usual)), Duration::from_secs(4));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patience {
     /// Seconds of the machine in one of the wall.

@@ -9,6 +9,21 @@ use crate::failure::Failure;
 const SIGINT: u8 = 2;
 
 /// Set from anywhere (a signal handler) to stop the machine in a controlled way.
+///
+/// # Example
+///
+/// ```
+/// use machine::StopRequest;
+/// use std::sync::atomic::Ordering;
+///
+/// let stop = StopRequest::default();
+/// let handler = stop.clone();
+/// // What the handler of SIGTERM does.
+/// handler.signal().store(15, Ordering::Relaxed);
+/// handler.stop();
+/// assert!(stop.is_requested());
+/// assert_eq!(stop.failure().exit_code(), 143, "128 and the signal's number");
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct StopRequest {
     asked: Arc<AtomicBool>,

@@ -28,6 +28,22 @@ struct Queued {
 }
 
 /// One bus.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::bus::{CanBus, Sender};
+/// use units::Time;
+/// use wire::can::CanFrame;
+///
+/// let mut bus = CanBus::new(500);
+/// bus.send(Sender::Host, CanFrame::standard(0x601, &[0; 8]));
+/// bus.send(Sender::Node(0), CanFrame::standard(0x181, &[0; 8]));
+/// bus.start(Time::ZERO);
+/// assert_eq!(bus.done_at(), Time(270_000), "135 bits of 2 µs");
+/// let first = bus.complete(bus.done_at()).map(|(sender, _)| sender);
+/// assert_eq!(first, Some(Sender::Node(0)), "the lower identifier wins");
+/// ```
 #[derive(Clone, Debug)]
 pub struct CanBus {
     bit_ns: u64,

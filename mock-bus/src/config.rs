@@ -15,6 +15,23 @@ pub use crate::node::DeviceConfig;
 use crate::plant::config::PlantConfig;
 
 /// One emulated machine.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::config::MachineConfig;
+///
+/// let machine = |key: &str| {
+///     let port = "[[ports]]\nkind = \"serial\"\nname = \"adc\"\n";
+///     let device = format!("device = {{ kind = \"dcon_module\", {key} }}\n");
+///     let node = format!("[[nodes]]\nname = \"adc\"\nport = \"adc\"\n{device}");
+///     MachineConfig::parse(&format!("name = \"bench\"\n{port}{node}"))
+/// };
+/// assert_eq!(machine("channels = 4")?.node("adc"), Some(0));
+/// let error = machine("chanels = 4").expect_err("a misprint");
+/// assert!(error.to_string().contains("unknown field `chanels`"));
+/// # Ok::<(), mock_bus::config::ConfigError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MachineConfig {

@@ -8,6 +8,19 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use units::portable::ln;
 
 /// One source of random numbers.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::random::Stream;
+///
+/// let mut noise = Stream::new(7, "adc");
+/// assert_eq!(Stream::new(7, "adc").bits(), noise.bits(), "the same run again");
+/// assert_ne!(Stream::new(7, "laser").bits(), Stream::new(7, "adc").bits());
+/// let share = noise.uniform();
+/// assert!((0.0..1.0).contains(&share));
+/// assert!(noise.chance(1.0) && !noise.chance(0.0));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Stream {
     generator: ChaCha8Rng,

@@ -90,7 +90,7 @@ fn a_line_that_falls_silent_stops_the_run() {
 fn a_line_without_an_interferometer_is_refused_before_anything_is_measured() {
     let wanted = Wanted {
         cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Device { .. })),
-        words: &["interferometer", "good samples in a row", "0 samples"],
+        words: &["interferometer", "good samples in a row", "last saw"],
         within: Duration::from_secs(5),
         rest: Duration::from_secs(5),
     };

@@ -29,7 +29,7 @@ pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use not_run::{left_out, not_run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
-pub use random::random;
+pub use random::{random, seeds};
 pub use rig::{
     Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC,
     machine_config, rigs, shipped_config, vcan_is_native,

@@ -8,3 +8,11 @@ pub fn random(state: &mut u64) -> f64 {
     mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
+
+/// The seeds from FIRST to LAST of the environment's `SEEDS=FIRST..LAST`, or of `usual`.
+pub fn seeds(usual: &str) -> impl Iterator<Item = u64> + Clone + use<> {
+    let given = std::env::var("SEEDS").unwrap_or_else(|_| usual.into());
+    let (first, last) = given.split_once("..").expect("SEEDS=FIRST..LAST");
+    let number = |text: &str| text.parse::<u64>().expect("SEEDS=FIRST..LAST");
+    number(first)..=number(last)
+}

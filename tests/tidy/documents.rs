@@ -76,6 +76,36 @@ fn every_path_that_a_document_names_is_there() {
     assert!(offences.is_empty(), "{}", offences.join("\n"));
 }
 
+/// The tests that stand in `text` as `FILE::TEST`, with the end of the file's path.
+fn named_tests(text: &str) -> Vec<(String, String)> {
+    let code = text.split('`').skip(1).step_by(2);
+    code.filter_map(|code| code.split_once(".rs::"))
+        .map(|(file, test)| (format!("/{file}.rs"), format!("fn {test}(")))
+        .collect()
+}
+
+#[test]
+fn every_test_that_a_document_names_is_there() {
+    let mut all = Vec::new();
+    everything(&root(), &mut all);
+    let has = |(file, test): &(String, String)| {
+        let mut files = all.iter().filter(|it| it.ends_with(file.as_str()));
+        files.any(|it| {
+            let text = fs::read_to_string(root().join(&it[1..])).unwrap();
+            text.contains(test.as_str())
+        })
+    };
+    let mut named = 0;
+    for document in DOCUMENTS {
+        let text = fs::read_to_string(root().join(document)).unwrap();
+        let tests = named_tests(&text);
+        named += tests.len();
+        let missing: Vec<_> = tests.into_iter().filter(|it| !has(it)).collect();
+        assert_eq!(missing, [], "{document}");
+    }
+    assert!(named > 40, "{named}: are they still written as FILE::TEST?");
+}
+
 #[test]
 fn paths_are_found_between_words() {
     let text = "see `a/{b,c}.rs`, `d.rs` and `e/`; not `f()`, `g.toml`, `../h.rs` or i.rs";

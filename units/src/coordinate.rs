@@ -15,6 +15,18 @@ mod sealed {
 
 /// The quantity that an axis positions: [`Metres`] of a linear axis, [`Radians`] of a rotary
 /// one. Nothing else moves, so nobody else can implement it.
+///
+/// # Example
+///
+/// ```
+/// use units::{Coordinate, Metres, Radians};
+///
+/// fn shown<Q: Coordinate>(position: Q) -> String {
+///     format!("{}{}", Q::in_unit(position.value()), Q::UNIT)
+/// }
+/// assert_eq!(shown(Radians::TURN), "360°");
+/// assert_eq!(shown(Metres(0.25)), "0.25m");
+/// ```
 pub trait Coordinate: Quantity + Into<LengthOrAngle> + sealed::Sealed {
     /// Its change in time.
     type Speed: Quantity;
@@ -63,6 +75,17 @@ impl Coordinate for Radians {
 ///
 /// Displayed in millimetres or degrees. The precision of the format counts the decimals of
 /// millimetres, degrees get one more; `+` shows the sign.
+///
+/// # Example
+///
+/// ```
+/// use units::{LengthOrAngle, Metres, Radians};
+///
+/// let length = LengthOrAngle::from(Metres::from_mm(12.5));
+/// let angle = LengthOrAngle::from(-Radians::TURN);
+/// assert_eq!(format!("{length:+.1}"), "+12.5 mm");
+/// assert_eq!(format!("{angle:.3}"), "-360.0000°");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LengthOrAngle {
     /// Of a linear axis.

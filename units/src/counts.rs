@@ -6,6 +6,16 @@ use core::ops::{Add, Neg, Sub};
 use crate::{Coordinate, Metres};
 
 /// A position or distance in encoder counts, exact.
+///
+/// # Example
+///
+/// ```
+/// use units::Counts;
+///
+/// let (from, to) = (Counts(1_000), Counts(-250));
+/// assert_eq!(to - from, Counts(-1_250));
+/// assert_eq!((to - from).to_string(), "-1250 counts");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Counts(pub i64);
 
@@ -38,6 +48,19 @@ impl fmt::Display for Counts {
 
 /// How much one count is: metres of a linear axis, radians of a rotary one. Its sign is the
 /// direction in which counts grow.
+///
+/// # Example
+///
+/// ```
+/// use units::{Counts, Metres, Radians, Scale};
+///
+/// let scale = Scale::new(Metres(10e-9)).expect("a count is some length");
+/// assert_eq!(scale.to_counts(Metres(-0.06)), Counts(-6_000_000));
+/// let reversed = Scale::new(Radians::from_arcsec(-0.01)).expect("a count is some angle");
+/// let quarter = reversed.to_coordinate(Counts(-32_400_000));
+/// assert!((quarter.degrees() - 90.0).abs() < 1e-12);
+/// assert_eq!(Scale::new(Metres(0.0)), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale<Q = Metres> {
     per_count: Q,

@@ -38,6 +38,17 @@ pub use time::Time;
 /// The direction from which a target is reached.
 ///
 /// ISO 230-2 writes it ↑ and ↓; data files write it `+` and `-`.
+///
+/// # Example
+///
+/// ```
+/// use units::{Approach, Metres};
+///
+/// let approach = Approach::of_move(Metres(0.2), Metres(0.1));
+/// assert_eq!(approach.map(Approach::symbol), Some('-'));
+/// assert_eq!(Approach::of_move(Metres(0.1), Metres(0.1)), None, "no move at all");
+/// assert_eq!(Approach::Reverse.sign(), -1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Approach {
     /// Coordinates increase on the way to the target (↑, `+`).

@@ -9,6 +9,14 @@
 //! library's. Arguments and results are those of the standard library's methods of the same names.
 
 /// The sine of an angle in radians.
+///
+/// # Example
+///
+/// ```
+/// use units::portable::sin;
+///
+/// assert_eq!(sin(1.0).to_bits(), 0x3FEA_ED54_8F09_0CEE, "on every computer");
+/// ```
 pub fn sin(angle: f64) -> f64 {
     libm::sin(angle)
 }
@@ -44,6 +52,15 @@ pub fn atan(tangent: f64) -> f64 {
 }
 
 /// The direction of (`x`, `y`) in radians, from −π to π.
+///
+/// # Example
+///
+/// ```
+/// use units::portable::atan2;
+///
+/// assert_eq!(atan2(1.0, 0.0).to_degrees(), 90.0);
+/// assert!(atan2(-1.0, -3.0) < 0.0, "below the axis of x");
+/// ```
 pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
@@ -75,6 +92,15 @@ pub fn hypot(x: f64, y: f64) -> f64 {
 
 /// `base` to a whole power, by multiplication alone: what the compiler makes of the standard library's
 /// depends on how hard it tries.
+///
+/// # Example
+///
+/// ```
+/// use units::portable::powi;
+///
+/// assert_eq!(powi(10.0, -6), 1e-6);
+/// assert_eq!(powi(-2.0, 3), -8.0);
+/// ```
 pub fn powi(base: f64, exponent: i32) -> f64 {
     let (mut result, mut square, mut left) = (1.0, base, exponent.unsigned_abs());
     while left > 0 {
@@ -88,6 +114,15 @@ pub fn powi(base: f64, exponent: i32) -> f64 {
 }
 
 /// The largest power of two that is no larger than a positive, normal `value`.
+///
+/// # Example
+///
+/// ```
+/// use units::portable::power_of_two_below;
+///
+/// assert_eq!(power_of_two_below(0.3), 0.25);
+/// assert_eq!(power_of_two_below(1024.0), 1024.0);
+/// ```
 pub fn power_of_two_below(value: f64) -> f64 {
     const MANTISSA: u64 = (1 << 52) - 1;
     f64::from_bits(value.to_bits() & !MANTISSA)

@@ -5,6 +5,18 @@ use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// What all quantities have in common, for code that is generic over them.
+///
+/// # Example
+///
+/// ```
+/// use units::{Metres, Quantity, Volts};
+///
+/// fn middle<Q: Quantity>(a: Q, b: Q) -> Q {
+///     (a + b) / 2.0
+/// }
+/// assert_eq!(middle(Metres(1.0), Metres(2.0)), Metres(1.5));
+/// assert_eq!(middle(Volts(-5.0), Volts(5.0)), Volts::ZERO);
+/// ```
 pub trait Quantity:
     Copy
     + fmt::Debug
@@ -166,11 +178,35 @@ macro_rules! quantity {
 
 quantity!(
     /// Length in metres.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use units::Metres;
+    ///
+    /// let lengths = [Metres::from_mm(12.5), Metres::from_um(500.0)];
+    /// let sum: Metres = lengths.into_iter().sum();
+    /// assert_eq!(format!("{sum:.3}"), "0.013 m");
+    /// assert!((sum.mm() - 13.0).abs() < 1e-12);
+    /// assert_eq!(Metres(6.0) / Metres(2.0), 3.0, "a ratio has no unit");
+    /// ```
     Metres,
     "m"
 );
 quantity!(
     /// Angle in radians.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use units::Radians;
+    ///
+    /// let angle = Radians::from_degrees(1.0);
+    /// assert!((angle.arcsec() - 3600.0).abs() < 1e-9);
+    /// let wound = Radians::from_degrees(725.0);
+    /// let within_a_turn = wound - wound.whole_turns();
+    /// assert!((within_a_turn.degrees() - 5.0).abs() < 1e-12);
+    /// ```
     Radians,
     "rad"
 );

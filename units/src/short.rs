@@ -5,6 +5,16 @@ use core::time::Duration;
 
 /// A number as people read it: nine significant digits at most, and no zeros behind the last one.
 /// 0.036 m in millimetres is 36, not 36.00000000000001.
+///
+/// # Example
+///
+/// ```
+/// use units::{Metres, Short};
+///
+/// let travel = Metres(0.1 + 0.2);
+/// assert_eq!(travel.to_string(), "0.30000000000000004 m");
+/// assert_eq!(Short(travel.value()).to_string(), "0.3");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Short(pub f64);
 
@@ -17,6 +27,16 @@ impl fmt::Display for Short {
 }
 
 /// A span of time as people read it: four significant digits at most, in the unit that fits.
+///
+/// # Example
+///
+/// ```
+/// use std::time::Duration;
+/// use units::ShortSpan;
+///
+/// assert_eq!(ShortSpan(Duration::from_nanos(1_234_567_890)).to_string(), "1.235s");
+/// assert_eq!(ShortSpan(Duration::from_nanos(750_000_177_210)).to_string(), "750s");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShortSpan(pub Duration);
 

@@ -7,6 +7,19 @@ use core::time::Duration;
 /// A moment of the machine's monotonic clock, in nanoseconds since that clock's start.
 ///
 /// In production the clock is `CLOCK_MONOTONIC`; in simulation it is virtual.
+///
+/// # Example
+///
+/// ```
+/// use std::time::Duration;
+/// use units::Time;
+///
+/// let asked = Time::from_seconds(1.5);
+/// let deadline = asked + Duration::from_millis(20);
+/// assert_eq!(deadline.to_string(), "1.520000 s");
+/// assert_eq!(asked.since(deadline), Duration::ZERO, "not yet");
+/// assert_eq!(Time::NEVER + Duration::from_secs(1), Time::NEVER);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Time(pub u64);
 

@@ -6,6 +6,16 @@ use bitflags::bitflags;
 use core::fmt;
 
 /// A CAN identifier.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanId;
+///
+/// assert_eq!(CanId::standard(0x181), Some(CanId::Standard(0x181)));
+/// assert_eq!(CanId::standard(0x800), None, "12 bits");
+/// assert_eq!(CanId::extended(0x800).map(CanId::raw), Some(0x800));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CanId {
     /// 11 bits.
@@ -48,6 +58,17 @@ impl CanId {
 }
 
 /// A data or remote frame of 0 to 8 bytes.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::{CanFrame, CanId};
+///
+/// let frame = CanFrame::standard(0x181, &[0x27, 0x02]);
+/// assert_eq!(frame.to_string(), "181#2702");
+/// assert_eq!((frame.standard_id(), frame.data()), (Some(0x181), &[0x27, 0x02][..]));
+/// assert_eq!(CanFrame::new(CanId::Standard(1), &[0; 9]), None, "nine bytes");
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: CanId,
@@ -141,6 +162,15 @@ impl CanFrame {
 }
 
 /// Worst-case wire bits of a frame with `payload_bits` of data, interframe space included.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::{CanFrame, worst_case_bits};
+///
+/// assert_eq!(worst_case_bits(64, true), 160);
+/// assert_eq!(CanFrame::standard(0x080, &[]).worst_case_bits(), 55, "a SYNC");
+/// ```
 pub const fn worst_case_bits(payload_bits: u32, extended: bool) -> u32 {
     let stuffable = if extended { 54 } else { 34 };
     payload_bits + stuffable + 13 + (stuffable + payload_bits - 1) / 4
@@ -215,6 +245,18 @@ bitflags! {
 }
 
 /// An error frame as SocketCAN reports it.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::{BusError, BusErrorClass, ControllerProblem};
+///
+/// let error = BusError::parse(0x204, &[0, 0x30, 0, 0, 0, 0, 0, 0]);
+/// assert!(error.class.contains(BusErrorClass::CONTROLLER));
+/// let passive = ControllerProblem::RX_PASSIVE | ControllerProblem::TX_PASSIVE;
+/// assert_eq!(error.controller, passive);
+/// assert_eq!(error.emit().0, 0x204);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BusError {
     /// What went wrong.

@@ -27,6 +27,19 @@ pub enum Direction {
 }
 
 /// One line of a log.
+///
+/// # Example
+///
+/// ```
+/// use wire::candump::{Content, Direction, Record};
+///
+/// let line = "(0000000012.000000) can0 705#7F T";
+/// let record = Record::parse(line).expect("a line of candump");
+/// assert_eq!((record.at.seconds(), record.direction), (12.0, Some(Direction::Transmitted)));
+/// assert!(matches!(record.content, Content::Frame(frame) if frame.data() == [0x7F]));
+/// assert_eq!(record.emit(), line);
+/// assert_eq!(Record::parse("can0 705#7F"), None, "no time");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Record {
     /// When, to the microsecond.

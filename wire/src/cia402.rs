@@ -5,6 +5,17 @@ use core::fmt;
 
 bitflags! {
     /// Object 0x6040.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use wire::cia402::Controlword;
+    ///
+    /// assert_eq!(Controlword::SHUTDOWN.bits(), 0x06);
+    /// assert_eq!(Controlword::ENABLE_COMMAND.bits(), 0x0F);
+    /// let begin = Controlword::ENABLE_COMMAND | Controlword::MODE_4;
+    /// assert_eq!(begin.bits(), 0x1F, "a new set-point");
+    /// ```
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct Controlword: u16 {
         /// Bit 0.
@@ -41,6 +52,17 @@ bitflags! {
 
 bitflags! {
     /// Object 0x6041.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use wire::cia402::{PowerState, Statusword};
+    ///
+    /// let status = Statusword::from_bits_retain(0x1637);
+    /// assert_eq!(status.state(), PowerState::OperationEnabled);
+    /// assert!(status.contains(Statusword::TARGET_REACHED));
+    /// assert_eq!(Statusword::from_bits_retain(0x0218).state(), PowerState::Fault);
+    /// ```
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct Statusword: u16 {
         /// Bit 0.
@@ -148,6 +170,16 @@ impl fmt::Display for PowerState {
 }
 
 /// Object 0x6060 and 0x6061.
+///
+/// # Example
+///
+/// ```
+/// use wire::cia402::OperationMode;
+///
+/// assert_eq!(OperationMode::from_raw(8), OperationMode::CyclicSynchronousPosition);
+/// assert_eq!(OperationMode::from_raw(-3), OperationMode::Unknown(-3), "a manufacturer's");
+/// assert_eq!(OperationMode::Homing.raw(), 6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OperationMode {
     /// No mode.
@@ -203,6 +235,17 @@ impl OperationMode {
 }
 
 /// What homing reports in bits 10, 12 and 13 of the statusword.
+///
+/// # Example
+///
+/// ```
+/// use wire::cia402::{HomingStatus, Statusword};
+///
+/// let status = Statusword::from_bits_retain(0x1637);
+/// assert_eq!(HomingStatus::of(status), HomingStatus::Done);
+/// let status = Statusword::from_bits_retain(0x2637);
+/// assert_eq!(HomingStatus::of(status), HomingStatus::ErrorStopped);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HomingStatus {
     /// Running.

@@ -37,6 +37,15 @@ pub const INTERRUPT_DELTA: u16 = 0x7133;
 pub const MODE_NORMAL: u8 = 1;
 
 /// What is wired to an input (0x6110).
+///
+/// # Example
+///
+/// ```
+/// use wire::cia404::SensorType;
+///
+/// assert_eq!(SensorType::from_raw(30), SensorType::Pt100);
+/// assert_eq!(SensorType::Voltage.raw(), 0x28);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SensorType {
     /// Nothing yet.
@@ -101,6 +110,18 @@ impl Unit {
 }
 
 /// A unit with its prefix (0x6131).
+///
+/// # Example
+///
+/// ```
+/// use wire::cia404::{PhysicalUnit, Unit};
+///
+/// let microvolt = PhysicalUnit::from_raw(0xFA26_0000);
+/// assert_eq!(microvolt, PhysicalUnit::of(-6, Unit::Volt));
+/// assert_eq!(PhysicalUnit::MILLIVOLT.raw(), 0xFD26_0000);
+/// let volts_per_count = PhysicalUnit::MILLIVOLT.per_count(1);
+/// assert!((volts_per_count - 1e-4).abs() < 1e-16);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PhysicalUnit {
     /// The power of ten that the prefix stands for.
@@ -149,6 +170,16 @@ impl PhysicalUnit {
 }
 
 /// What is wrong with an input (0x6150).
+///
+/// # Example
+///
+/// ```
+/// use wire::cia404::InputStatus;
+///
+/// let status = InputStatus(3);
+/// assert_eq!(status, InputStatus::NOT_VALID.and(InputStatus::POSITIVE_OVERLOAD));
+/// assert!(!status.contains(InputStatus::NEGATIVE_OVERLOAD));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct InputStatus(pub u8);
 

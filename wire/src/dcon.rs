@@ -10,6 +10,16 @@ pub const CR: u8 = b'\r';
 pub const CHANNEL_CHARACTERS: usize = 7;
 
 /// What the host asks.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::Command;
+///
+/// assert_eq!(Command::ReadAll { address: 0x1F }.emit(), "#1F");
+/// assert_eq!(Command::parse("#013"), Some(Command::ReadChannel { address: 1, channel: 3 }));
+/// assert_eq!(Command::parse("#018"), None, "a module has eight channels");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// `#AA`: all channels.
@@ -115,6 +125,18 @@ impl Command {
 }
 
 /// How a module is set: its answer `!AATTCCFF` to `$AA2`.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::Configuration;
+///
+/// let configuration = Configuration::parse("!01050600")?;
+/// assert_eq!((configuration.range, configuration.baud), (0x05, 0x06), "±2.5 V, 9600 baud");
+/// assert!(configuration.is_engineering() && !configuration.has_checksum());
+/// assert_eq!(configuration.emit(), "!01050600");
+/// # Ok::<(), wire::dcon::DconError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Configuration {
     /// Module address.
@@ -179,6 +201,16 @@ impl Configuration {
 ///
 /// # Errors
 /// When the line has another form, another address or refuses (`?AA`).
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::{DconError, parse_text};
+///
+/// assert_eq!(parse_text("!014117", 1), Ok("4117"));
+/// assert_eq!(parse_text("?01", 1), Err(DconError::Refused { address: 1 }));
+/// assert!(parse_text("!024117", 1).is_err(), "another module's");
+/// ```
 pub fn parse_text(line: &str, address: u8) -> Result<&str, DconError> {
     const FORM: DconError = DconError::Syntax { expected: "!AA…" };
     if line == format!("?{address:02X}") {
@@ -193,6 +225,15 @@ pub fn checksum(line: &str) -> u8 {
 }
 
 /// The bytes on the wire: the line, its checksum where in use, CR.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::frame;
+///
+/// assert_eq!(frame("$012", true), b"$012B7\r");
+/// assert_eq!(frame("$012", false), b"$012\r");
+/// ```
 pub fn frame(line: &str, with_checksum: bool) -> Vec<u8> {
     let digits = if with_checksum {
         format!("{:02X}", checksum(line))
@@ -206,6 +247,16 @@ pub fn frame(line: &str, with_checksum: bool) -> Vec<u8> {
 ///
 /// # Errors
 /// When the line is not ASCII, too short or its checksum differs.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::{DconError, unframe};
+///
+/// assert_eq!(unframe(b"$012B7", true), Ok("$012"));
+/// let wrong = DconError::Checksum { expected: 0xB7, seen: 0xB8 };
+/// assert_eq!(unframe(b"$012B8", true), Err(wrong));
+/// ```
 pub fn unframe(line: &[u8], with_checksum: bool) -> Result<&str, DconError> {
     let form = DconError::Syntax {
         expected: "printable ASCII with two checksum digits",
@@ -231,6 +282,16 @@ pub fn unframe(line: &[u8], with_checksum: bool) -> Result<&str, DconError> {
 
 /// One channel in volts as a module prints it for the ±10 V range: `+01.234` or, with
 /// `decimals` 4 (±1 V and ±5 V ranges), `+1.2345`.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::format_volts;
+///
+/// assert_eq!(format_volts(-1.5, 4), "-1.5000");
+/// assert_eq!(format_volts(2.5, 3), "+02.500");
+/// assert_eq!(format_volts(12.0, 4), "+9.9999", "out of range");
+/// ```
 pub fn format_volts(volts: f64, decimals: usize) -> String {
     let limit = if decimals >= 4 { 9.9999 } else { 99.999 };
     let shown = volts.clamp(-limit, limit);
@@ -241,6 +302,15 @@ pub fn format_volts(volts: f64, decimals: usize) -> String {
 ///
 /// # Errors
 /// When the line has another form, or a channel shows the all-nines of an over-range input.
+///
+/// # Example
+///
+/// ```
+/// use wire::dcon::{DconError, parse_volts};
+///
+/// assert_eq!(parse_volts(">+1.4567-0.0012"), Ok(vec![1.4567, -0.0012]));
+/// assert_eq!(parse_volts(">+9.9999"), Err(DconError::OutOfRange { channel: 0 }));
+/// ```
 pub fn parse_volts(line: &str) -> Result<Vec<f64>, DconError> {
     const FORM: DconError = DconError::Syntax {
         expected: ">±n.nnnn for each channel",

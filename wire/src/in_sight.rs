@@ -31,6 +31,16 @@ pub const COUNT_MAX: u32 = 9_999_999;
 pub const CELL_ERROR: &str = "#ERR";
 
 /// A cell of the spreadsheet.
+///
+/// # Example
+///
+/// ```
+/// use wire::in_sight::Cell;
+///
+/// let cell = Cell::parse("a2").expect("a letter and up to three digits");
+/// assert_eq!(cell.to_string(), "A002");
+/// assert_eq!(Cell::new('B', 400), None, "rows are 0 to 399");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cell {
     column: u8,
@@ -63,6 +73,16 @@ impl fmt::Display for Cell {
 }
 
 /// What the host says.
+///
+/// # Example
+///
+/// ```
+/// use wire::in_sight::{ACQUIRE, Command, Status};
+///
+/// assert_eq!(Command::SetEventAndWait(ACQUIRE).emit(), "SW8");
+/// assert_eq!(Command::parse("so1"), Ok(Command::SetOnline(true)));
+/// assert_eq!(Command::parse("SO2"), Err(Status::Invalid));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// `SW`: an event; the answer comes when everything that it causes is done.
@@ -116,6 +136,16 @@ impl Command {
 }
 
 /// How a command went.
+///
+/// # Example
+///
+/// ```
+/// use wire::in_sight::Status;
+///
+/// assert_eq!(Status::parse("-2"), Some(Status::NotExecuted));
+/// assert_eq!(Status::of(-2).to_string(), "status -2 (not executed; offline?)");
+/// assert_eq!(Status::parse("1.0"), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// 1: executed.
@@ -201,6 +231,20 @@ impl fmt::Display for Status {
 
 /// One picture as the job judges it: one cell of text with seven fields, separated by commas,
 /// `count,found,judgement,x,y,angle,score`. Numbers are decimal, with a point.
+///
+/// # Example
+///
+/// ```
+/// use wire::in_sight::{Inspection, InspectionError};
+///
+/// let line = "17,2,1,1234.567,-0.250,12.500,96.800";
+/// let inspection = Inspection::parse(line)?;
+/// assert_eq!((inspection.count, inspection.x, inspection.y), (17, 1234.567, -0.25));
+/// assert_eq!(inspection.emit(), line);
+/// let failed = Inspection::parse("17,2,1,#ERR,0,0,90");
+/// assert_eq!(failed, Err(InspectionError::Field { field: "x" }));
+/// # Ok::<(), InspectionError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inspection {
     /// How many pictures the job has taken: the function `Count` over the image.

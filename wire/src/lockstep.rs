@@ -38,6 +38,16 @@ pub const LINE_MAX: usize = 1 << 20;
 ///
 /// # Errors
 /// When it names something else.
+///
+/// # Example
+///
+/// ```
+/// use std::path::PathBuf;
+/// use wire::lockstep::path_of;
+///
+/// assert_eq!(path_of("lockstep:/run/clock"), Ok(PathBuf::from("/run/clock")));
+/// assert!(path_of("lockstep:").is_err(), "no path");
+/// ```
 pub fn path_of(clock: &str) -> Result<PathBuf, &'static str> {
     let path = clock.strip_prefix("lockstep:").filter(|it| !it.is_empty());
     path.map(PathBuf::from).ok_or("expected lockstep:PATH")
@@ -64,6 +74,20 @@ pub struct Entry {
 }
 
 /// What a participant says.
+///
+/// # Example
+///
+/// ```
+/// use units::Time;
+/// use wire::lockstep::{Entry, Passed, Request};
+/// use wire::Port;
+///
+/// let frame = Entry { port: Port(0), passed: Passed::Units(1) };
+/// let idle = Request::Idle { until: Time(1_500_000), sent: vec![frame] };
+/// assert_eq!(idle.to_string(), "idle 1500000 0:1");
+/// assert_eq!(Request::parse("idle 1500000 0:1"), Ok(idle));
+/// assert!(Request::parse("idle 5 0").is_err(), "what passed is not said");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Takes part.
@@ -110,6 +134,16 @@ pub enum Request {
 }
 
 /// What the emulator says.
+///
+/// # Example
+///
+/// ```
+/// use units::Time;
+/// use wire::lockstep::Reply;
+///
+/// assert_eq!(Reply::parse("go 135100"), Ok(Reply::Go { now: Time(135_100), sent: vec![] }));
+/// assert_eq!(Reply::Refused("no port".into()).to_string(), "refused no port");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// The participant takes part; the present time.

@@ -22,6 +22,15 @@ const NUMBER_CHARACTERS: usize = 10;
 const IDENTIFICATION_CHARACTERS: usize = 10;
 
 /// What the host can ask besides a measured value.
+///
+/// # Example
+///
+/// ```
+/// use wire::nd287::Command;
+///
+/// assert_eq!(Command::Identification.emit(), b"\x1bA0000\r");
+/// assert_eq!(Command::parse("A0301"), Some(Command::ErrorText));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Name, software and version: an [`Identification`].
@@ -93,6 +102,19 @@ pub struct Nd287Error {
 }
 
 /// A measured value.
+///
+/// # Example
+///
+/// ```
+/// use wire::nd287::{MeasuredValue, Unit};
+///
+/// let value = MeasuredValue::parse(b"-      5.23  =A")?;
+/// assert_eq!((value.value, value.decimals, value.unit), (-5.23, 2, Unit::Millimetre));
+/// assert_eq!(value.emit(), b"-      5.23  =A\r\n");
+/// let faulty = MeasuredValue::parse(b"+   12.3456 ?  ")?;
+/// assert_eq!(faulty.unit, Unit::Fault, "its number means nothing");
+/// # Ok::<(), wire::nd287::Nd287Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasuredValue {
     /// The number, in `unit`.
@@ -166,6 +188,21 @@ fn parse_number(characters: &[u8]) -> Option<(f64, usize)> {
 }
 
 /// Who a display is: three lines of ten characters, the first behind [`STX`].
+///
+/// # Example
+///
+/// ```
+/// use wire::nd287::Identification;
+///
+/// let answer = b"\x02ND-287    \r\n646118-01 \r\nV1-01     \r\n";
+/// assert_eq!(Identification::parse_line(&answer[1..11]), Ok("ND-287"));
+/// let own = Identification {
+///     name: "ND-287".into(),
+///     software: "646118-01".into(),
+///     version: "V1-01".into(),
+/// };
+/// assert_eq!(own.emit(), answer);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identification {
     /// What it is called, `ND-287`.

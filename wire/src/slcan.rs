@@ -17,6 +17,16 @@ pub const TIMESTAMP_PERIOD_MS: u16 = 60_000;
 const LINE_MAX: usize = 30;
 
 /// The bit rates that an adapter knows by a digit.
+///
+/// # Example
+///
+/// ```
+/// use wire::slcan::{BitrateCode, Command};
+///
+/// let code = BitrateCode::new(125_000).expect("one of nine");
+/// assert_eq!(Command::Bitrate(code).emit(), b"S4\r");
+/// assert_eq!(BitrateCode::new(123_456), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BitrateCode(u8);
 
@@ -60,6 +70,18 @@ bitflags! {
 }
 
 /// What the host sends.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanFrame;
+/// use wire::slcan::Command;
+///
+/// let frame = CanFrame::standard(0x100, &[0x11, 0x33]);
+/// assert_eq!(Command::Transmit(frame).emit(), b"t10021133\r");
+/// assert_eq!(Command::parse(b"t10021133"), Some(Command::Transmit(frame)));
+/// assert_eq!(Command::parse(b"t1002113"), Some(Command::Unknown(b't')), "half a byte");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// `Sn`: set the bit rate; only while closed.
@@ -85,6 +107,18 @@ pub enum Command {
 }
 
 /// What the adapter sends.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanFrame;
+/// use wire::slcan::Reply;
+///
+/// let reply = Reply::parse(b"t100211331234");
+/// let frame = CanFrame::standard(0x100, &[0x11, 0x33]);
+/// assert_eq!(reply, Reply::Received { frame, timestamp_ms: Some(0x1234) });
+/// assert_eq!(Reply::parse(b""), Reply::Done, "a CR alone");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// CR alone: done.
@@ -128,6 +162,16 @@ pub enum BusState {
 }
 
 /// Collects the bytes of a stream into lines.
+///
+/// # Example
+///
+/// ```
+/// use wire::slcan::{BEL, LineBuffer};
+///
+/// let mut buffer = LineBuffer::default();
+/// let lines: Vec<_> = b"z\rt1\x07".iter().filter_map(|byte| buffer.push(*byte)).collect();
+/// assert_eq!(lines, [b"z".to_vec(), vec![BEL]], "a refusal cuts the line");
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     line: Vec<u8>,

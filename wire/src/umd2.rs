@@ -27,6 +27,19 @@ bitflags! {
 }
 
 /// One sample of the stream.
+///
+/// # Example
+///
+/// ```
+/// use wire::umd2::{Line, LowSpeed};
+///
+/// let Ok(Line::Sample(sample)) = Line::parse("2456 2455 -12 3 64 1001 3 2150") else {
+///     unreachable!("eight fields are a sample");
+/// };
+/// assert_eq!(sample.low_speed, LowSpeed::Temperature1(2150), "21.5 °C");
+/// assert_eq!(sample.half_wavelengths(), -12.25);
+/// assert_eq!(sample.lost_since(998), 2, "999 and 1000");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// Reference frequency in counts per sample; 0 means no laser head.
@@ -125,6 +138,16 @@ pub enum Umd2Error {
 }
 
 /// A line of the stream.
+///
+/// # Example
+///
+/// ```
+/// use wire::umd2::{Line, Umd2Error};
+///
+/// assert_eq!(Line::parse("! boot"), Ok(Line::Debug));
+/// assert_eq!(Line::parse("2456 2455 -12 3"), Err(Umd2Error::FieldCount { seen: 4 }));
+/// assert_eq!(Line::parse("1 2 x 4 5 6 0 0"), Err(Umd2Error::Field { field: 3 }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
     /// A sample.

@@ -4,6 +4,20 @@ use core::error::Error;
 
 /// A data file that cannot be used: where, what was seen, what to do. `K` is what only data of its
 /// kind can have wrong.
+///
+/// # Example
+///
+/// ```
+/// use compensator::error_table::LinearSeries;
+///
+/// let csv = "run,approach,target_mm,measured_mm\n1,+,0,0.001\n1,up,3,3.002\n";
+/// let error = LinearSeries::from_csv(csv, "x.csv").expect_err("`up` is no approach");
+/// assert_eq!((error.line, error.column), (3, 3));
+/// assert_eq!(
+///     error.to_string(),
+///     "x.csv:3:3: `approach` is `up`; write + (coordinates increase) or -"
+/// );
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {fault}")]
 pub struct DataError<K: Error + 'static> {

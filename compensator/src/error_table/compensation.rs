@@ -145,6 +145,36 @@ struct Side {
 }
 
 /// A table made ready to be applied: no allocation and a constant time per call.
+///
+/// # Example
+///
+/// The patent's step function corrects by the interval that the target lies in.
+///
+/// ```
+/// use compensator::error_table::{
+///     Compensation, EndPolicy, ErrorTable, Interpolation, Limits, Node,
+/// };
+/// use units::{Approach, Metres, MetresPerSecond};
+///
+/// let nodes = [(0.0, 0.0), (3.0, 2.0), (6.0, -1.0)].map(|(mm, um)| Node {
+///     position: Metres::from_mm(mm),
+///     forward: Some(Metres::from_um(um)),
+///     reverse: None,
+///     u_forward: None,
+///     u_reverse: None,
+/// });
+/// let limits = Limits {
+///     size: Metres::from_um(50.0),
+///     slope: 0.05,
+///     rate: MetresPerSecond(1e-3),
+/// };
+/// let (steps, ends) = (Interpolation::PiecewiseConstant, EndPolicy::Refuse);
+/// let compensation = Compensation::new(ErrorTable::new(nodes.to_vec())?, steps, limits, ends)?;
+/// let command = compensation.set_point(Metres::from_mm(1.0), Approach::Forward)?;
+/// assert!((command.mm() - 0.998).abs() < 1e-12, "2 µm less");
+/// assert!(compensation.set_point(Metres::from_mm(7.0), Approach::Forward).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Compensation {
     table: ErrorTable,

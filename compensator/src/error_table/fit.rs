@@ -158,6 +158,21 @@ pub fn fit(series: &LinearSeries, options: &FitOptions) -> Result<ErrorTable, Fi
 ///
 /// # Errors
 /// Too many outliers, a target missing in one approach, or closure above its limit.
+///
+/// # Example
+///
+/// ```
+/// use compensator::error_table::{FitOptions, LinearSeries, analyse};
+///
+/// // Two runs, the second 1 µm below the first.
+/// let csv = "run,approach,target_mm,measured_mm\n\
+///            1,+,0,0.0005\n1,+,10,10.0005\n2,+,0,-0.0005\n2,+,10,9.9995\n";
+/// let fitted = analyse(&LinearSeries::from_csv(csv, "x.csv")?, &FitOptions::default())?;
+/// assert!((fitted.drift.closure.um() + 1.0).abs() < 1e-6, "last − first");
+/// let u = fitted.table.nodes()[0].u_forward.expect("each target was repeated");
+/// assert!((u.um() - 0.5).abs() < 1e-6, "s/√2, with s = 1 µm/√2");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, FitError> {
     let (bad, robust) = robust::find(series, options.outlier_threshold, options.scatter_floor);
     if robust.share > options.outlier_share_max {

@@ -24,6 +24,7 @@ mod curve;
 mod fit;
 mod robust;
 mod series;
+mod slip;
 mod stand_off;
 
 use units::{Approach, Metres};
@@ -35,6 +36,7 @@ pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Li
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};
 pub use robust::{MeasuredPoint, Robust};
 pub use series::{LinearFault, LinearSeries, Measurement, SeriesError};
+pub use slip::{Change, SLIP_FALSE_ALARMS, Slip, find_slip};
 pub use stand_off::{FALSE_ALARMS, StandOff};
 
 /// One position of the table. Plain data, so that a store can write its own form of it.
@@ -85,6 +87,26 @@ pub struct LostMotion {
 }
 
 /// The deviations of a linear axis at strictly increasing positions.
+///
+/// # Example
+///
+/// ```
+/// use compensator::error_table::{ErrorTable, Node};
+/// use units::{Approach, Metres};
+///
+/// let node = |mm: f64, forward_um: f64, reverse_um: f64| Node {
+///     position: Metres::from_mm(mm),
+///     forward: Some(Metres::from_um(forward_um)),
+///     reverse: Some(Metres::from_um(reverse_um)),
+///     u_forward: None,
+///     u_reverse: None,
+/// };
+/// let table = ErrorTable::new(vec![node(0.0, 1.0, 3.0), node(3.0, -1.0, 3.0)])?;
+/// let lost_motion = table.lost_motion().expect("both approaches are known");
+/// assert!((lost_motion.mean.um() - 3.0).abs() < 1e-12, "the mean of 2 µm and 4 µm");
+/// assert!(table.knows(Approach::Reverse));
+/// # Ok::<(), compensator::error_table::TableError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorTable {
     nodes: Vec<Node>,

@@ -168,6 +168,22 @@ impl From<Unbelievable> for LinearFault {
 
 /// Measurements of a linear axis: finite, no point twice, runs in order, and within one run and
 /// approach the targets in the sense of that approach.
+///
+/// # Example
+///
+/// ```
+/// use compensator::error_table::LinearSeries;
+/// use units::{Approach, Metres};
+///
+/// let csv = "run,approach,target_mm,measured_mm\n1,+,0,0\n1,+,3,3.0021\n1,+,6,6.0040\n";
+/// let series = LinearSeries::from_csv(csv, "x.csv")?;
+/// let (_, deviation) = series
+///     .deviations(Metres::from_mm(3.0), Approach::Forward)
+///     .next()
+///     .expect("one run");
+/// assert!((deviation.um() - 2.1).abs() < 1e-9, "actual − target");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearSeries {
     measurements: Vec<Measurement>,

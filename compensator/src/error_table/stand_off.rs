@@ -25,7 +25,7 @@
 use units::{Approach, Metres};
 
 use super::ErrorTable;
-use crate::significance::f_tail;
+use crate::significance::student_limit;
 
 /// The share of good tables in which a position is held for wrong.
 pub const FALSE_ALARMS: f64 = 1e-3;
@@ -87,6 +87,29 @@ impl ErrorTable {
     ///
     /// # Errors
     /// The position that stands off most.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use compensator::error_table::{ErrorTable, Node};
+    /// use units::Metres;
+    ///
+    /// let nodes = (0..=20).map(|at| {
+    ///     let knock_um = if at == 8 { 5.0 } else { 0.0 };
+    ///     let curve_um = 0.02 * f64::from(at * at) + 0.1 * f64::from(at * 7 % 5);
+    ///     Node {
+    ///         position: Metres::from_mm(3.0 * f64::from(at)),
+    ///         forward: Some(Metres::from_um(curve_um + knock_um)),
+    ///         reverse: None,
+    ///         u_forward: None,
+    ///         u_reverse: None,
+    ///     }
+    /// });
+    /// let table = ErrorTable::new(nodes.collect())?;
+    /// let wrong = table.judge_neighbours(Metres::ZERO).expect_err("5 µm are much");
+    /// assert_eq!(wrong.position, Metres::from_mm(24.0));
+    /// # Ok::<(), compensator::error_table::TableError>(())
+    /// ```
     pub fn judge_neighbours(&self, harmless: Metres) -> Result<Option<Metres>, StandOff> {
         let orders = ORDERS.into_iter();
         let differences: Vec<_> = orders.filter_map(|it| Differences::new(self, it)).collect();
@@ -266,23 +289,6 @@ fn weights(at: &[f64]) -> Vec<f64> {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The t that noise exceeds, to either side, with probability `chance`.
-fn student_limit(chance: f64, freedom: usize) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
-    while f_tail(high * high, 1, freedom) > chance && high < 1e12 {
-        (low, high) = (high, high * 2.0);
-    }
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if f_tail(middle * middle, 1, freedom) > chance {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 use super::*;
 use crate::error_table::Node;
+use crate::noise::Noise;
 
 /// A table of both approaches, from deviations in micrometres.
 fn table(positions_mm: &[f64], forward: &[f64], reverse: &[f64]) -> ErrorTable {
@@ -14,29 +15,12 @@ fn table(positions_mm: &[f64], forward: &[f64], reverse: &[f64]) -> ErrorTable {
     ErrorTable::new(nodes.collect()).unwrap()
 }
 
-/// SplitMix64, and the sum of twelve of its numbers for a normal one.
-struct Chance(u64);
-
-impl Chance {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.next()).sum::<f64>() - 6.0
-    }
-}
-
 /// Positions every 3 mm, a curve of ±`um` with waves of 60 to 24 mm, noise of `noise_um`.
 fn stage(seed: u64, count: usize, um: f64, noise_um: f64) -> (Vec<f64>, [Vec<f64>; 2]) {
-    let mut chance = Chance(seed);
+    let mut chance = Noise(seed);
     let waves: Vec<(f64, f64, f64)> = [60.0, 40.0, 30.0, 24.0]
         .into_iter()
-        .map(|mm| (um * chance.next() * mm / 60.0, mm, chance.next()))
+        .map(|mm| (um * chance.uniform() * mm / 60.0, mm, chance.uniform()))
         .collect();
     let positions: Vec<f64> = (0..count).map(|it| it as f64 * 3.0).collect();
     let curve = |x: &f64| -> f64 {
@@ -82,10 +66,10 @@ fn the_differences_leave_nothing_of_a_cubic() {
 fn stages_of_any_size_and_noise_are_believed_as_they_are() {
     let mut refused = 0;
     for seed in 0..2000 {
-        let mut chance = Chance(seed);
-        let um = 0.1 * 1000.0_f64.powf(chance.next());
-        let noise = um * 1e-3 * 1000.0_f64.powf(chance.next());
-        let count = 7 + (chance.next() * 40.0) as usize;
+        let mut chance = Noise(seed);
+        let um = 0.1 * 1000.0_f64.powf(chance.uniform());
+        let noise = um * 1e-3 * 1000.0_f64.powf(chance.uniform());
+        let count = 7 + (chance.uniform() * 40.0) as usize;
         let (positions, sides) = stage(seed, count, um, noise);
         refused += u32::from(judged(&positions, &sides).is_err());
     }

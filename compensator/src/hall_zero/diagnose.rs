@@ -92,6 +92,24 @@ fn voltage(point: &HallPoint, sensor: Sensor) -> f64 {
 /// Names what is wrong with the sensors that gave `points`, if it is recognisable.
 ///
 /// `nominal` is where the zero should be, in the points' coordinates.
+///
+/// # Example
+///
+/// ```
+/// use compensator::hall_zero::{HallPoint, SensorFault, Settings, diagnose};
+/// use units::{Metres, Volts};
+///
+/// let points: Vec<HallPoint> = (-100..=100)
+///     .map(|step| {
+///         let mm = 0.01 * f64::from(step);
+///         let (odd, even) = (2.0 * mm).sin_cos();
+///         // Each on the other's input.
+///         HallPoint { position: Metres::from_mm(mm), peak: Volts(2.5 + odd), slope: Volts(2.5 + even) }
+///     })
+///     .collect();
+/// let fault = diagnose(&points, Metres::ZERO, &Settings::default());
+/// assert_eq!(fault, Some(SensorFault::Swapped));
+/// ```
 pub fn diagnose(points: &[HallPoint], nominal: Metres, settings: &Settings) -> Option<SensorFault> {
     let sensors = [Sensor::Peak, Sensor::Slope];
     sensors

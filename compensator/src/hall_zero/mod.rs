@@ -28,6 +28,7 @@
 
 mod diagnose;
 mod failure;
+mod passes;
 mod profile;
 mod refine;
 mod search;
@@ -37,8 +38,9 @@ mod settings;
 
 pub use diagnose::{SensorFault, diagnose};
 pub use failure::{Reason, SearchFailure, Step};
+pub use passes::{Pass, refine_passes};
 pub use refine::{
-    Flank, Level, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
+    Flank, Level, Passes, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
     single_threshold_zero,
 };
 pub use search::{Held, Outcome, Progress, Sample, Search};

@@ -6,30 +6,8 @@
 use core::time::Duration;
 
 use super::*;
+pub(super) use crate::noise::Noise;
 use units::{Metres, MetresPerSecond, Time, Volts};
-
-/// Repeatable noise.
-pub(super) struct Noise(pub(super) u64);
-
-impl Noise {
-    pub(super) fn uniform(&mut self) -> f64 {
-        // splitmix64
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub(super) fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-
-    /// Uniform in ±`half`.
-    pub(super) fn within(&mut self, half: f64) -> f64 {
-        (2.0 * self.uniform() - 1.0) * half
-    }
-}
 
 /// Both sensors as they are today; positions in millimetres from the true zero.
 #[derive(Clone, Copy, Debug)]

@@ -37,6 +37,19 @@ pub struct HallPoint {
 }
 
 /// A sweep of the two Hall sensors in the order taken; positions may go back and forth.
+///
+/// # Example
+///
+/// ```
+/// use compensator::hall_zero::HallSeries;
+///
+/// let csv = "position_um,peak_v,slope_v\n-10,1.5,2.4\n10,1.5,2.6\n-10,1.5,2.4\n";
+/// let sweep = HallSeries::from_csv(csv, "hall.csv")?;
+/// assert_eq!(sweep.points().len(), 3, "back and forth");
+/// let other_unit = HallSeries::from_csv("position_mm,peak_v,slope_v\n1,1,1\n", "hall.csv");
+/// assert!(other_unit.is_err_and(|it| it.to_string().contains("name it `position_um`")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct HallSeries {
     points: Vec<HallPoint>,

@@ -145,6 +145,19 @@ impl Settings {
     ///
     /// # Errors
     /// The first setting that cannot, with its value and why.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use compensator::hall_zero::Settings;
+    /// use units::Volts;
+    ///
+    /// let sound = Settings::default();
+    /// assert_eq!(sound.validate(), Ok(()));
+    /// let narrow = Settings { delta3: Volts(0.5e-3), ..sound };
+    /// let error = narrow.validate().expect_err("0.2 mV of noise leave it");
+    /// assert!(error.to_string().contains("delta3 of 0.0005 V is narrower than 3 times the noise"));
+    /// ```
     pub fn validate(&self) -> Result<(), SettingsError> {
         let positive = [
             ("vc", self.vc.value()),

@@ -130,6 +130,22 @@ pub enum EnvironmentError {
 ///
 /// # Errors
 /// The first channel outside 0–40 °C, 60–120 kPa or 0–1 humidity, or NaN.
+///
+/// # Example
+///
+/// ```
+/// use compensator::length_correction::{Environment, check_environment};
+/// use units::{Celsius, Pascals, RelativeHumidity};
+///
+/// let in_hectopascals = Environment {
+///     air_temperature: Celsius(20.0),
+///     pressure: Pascals(1013.0),
+///     humidity: RelativeHumidity(0.5),
+///     material_temperature: Celsius(20.0),
+/// };
+/// let error = check_environment(&in_hectopascals).expect_err("no hall has so little");
+/// assert!(error.to_string().contains("air pressure is 1013 Pa, outside 60000 to 120000"));
+/// ```
 pub fn check_environment(environment: &Environment) -> Result<(), EnvironmentError> {
     check_channels(&Channel::ALL, environment)
 }
@@ -155,6 +171,28 @@ pub(super) fn check_channels(
 }
 
 /// Watches environment readings for sensors that freeze, fall silent or leave their range.
+///
+/// # Example
+///
+/// ```
+/// use compensator::length_correction::{Environment, EnvironmentError, EnvironmentWatch};
+/// use std::time::Duration;
+/// use units::{Celsius, Pascals, RelativeHumidity, Time};
+///
+/// let reading = Environment {
+///     air_temperature: Celsius(20.1),
+///     pressure: Pascals(101_300.0),
+///     humidity: RelativeHumidity(0.45),
+///     material_temperature: Celsius(20.3),
+/// };
+/// let (frozen_after, stale_after) = (Duration::from_secs(600), Duration::from_secs(10));
+/// let mut watch = EnvironmentWatch::new(frozen_after, stale_after);
+/// watch.observe(Time::from_seconds(1.0), reading)?;
+/// assert_eq!(watch.current(Time::from_seconds(5.0)), Ok(reading));
+/// let later = watch.current(Time::from_seconds(30.0));
+/// assert!(matches!(later, Err(EnvironmentError::Stale { .. })));
+/// # Ok::<(), EnvironmentError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct EnvironmentWatch {
     frozen_after: Duration,

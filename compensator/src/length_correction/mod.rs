@@ -161,6 +161,39 @@ pub struct Contribution {
 }
 
 /// Turns optical displacements since a datum into lengths at 20 °C.
+///
+/// # Example
+///
+/// ```
+/// use compensator::length_correction::{
+///     Environment, EnvironmentUncertainty, LengthCorrection, MaterialExpansion, Settings,
+/// };
+/// use units::{Celsius, Metres, Pascals, RelativeHumidity};
+///
+/// let environment = Environment {
+///     air_temperature: Celsius(20.0),
+///     pressure: Pascals(101_325.0),
+///     humidity: RelativeHumidity(0.5),
+///     material_temperature: Celsius(22.0),
+/// };
+/// let settings = Settings {
+///     air: true,
+///     vacuum_wavelength: Metres(633e-9),
+///     u_relative_wavelength: 2e-8,
+///     co2_umol_per_mol: 450.0,
+///     material_expansion: Some(MaterialExpansion { per_kelvin: 11.5e-6, u_per_kelvin: 1e-6 }),
+///     dead_path: None,
+///     cosine: None,
+///     u_environment: EnvironmentUncertainty::default(),
+/// };
+/// let correction = LengthCorrection::new(settings, &environment)?;
+/// let terms = correction.correct(Metres::from_mm(60.0), &environment)?.terms;
+/// let air = terms.air.map_or(0.0, Metres::nm);
+/// assert!((air + 16_277.96).abs() < 0.1, "60 mm/n − 60 mm");
+/// let material = terms.material.map_or(0.0, Metres::nm);
+/// assert!((material + 1379.6).abs() < 0.1, "2 K of steel");
+/// # Ok::<(), compensator::length_correction::EnvironmentError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LengthCorrection {
     settings: Settings,

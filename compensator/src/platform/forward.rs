@@ -81,6 +81,21 @@ impl Platform {
     ///
     /// # Errors
     /// When the strokes are not one finite value per actuator, or no pose has them.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use compensator::platform::{Platform, Pose};
+    /// use units::{Metres, Radians};
+    ///
+    /// let mm = Metres::from_mm;
+    /// let platform = Platform::xxy(mm(150.0), mm(10.0))?;
+    /// let wanted = Pose { x: mm(3.0), y: mm(-4.0), angle: Radians::from_degrees(0.3) };
+    /// let found = platform.forward(&platform.strokes(wanted))?;
+    /// assert!((found.pose.x - wanted.x).abs().nm() < 1e-6);
+    /// assert!((found.pose.angle - wanted.angle).abs().arcsec() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn forward(&self, strokes: &[Metres]) -> Result<Forward, ForwardError> {
         self.forward_near(strokes, Pose::default())
     }

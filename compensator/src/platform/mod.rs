@@ -205,6 +205,25 @@ impl Pose {
 }
 
 /// A platform whose strokes decide its pose, proven when it is made.
+///
+/// # Example
+///
+/// U, V and W of a platform turned by 90°: U's point goes from (0, 100) to (−100, 0).
+///
+/// ```
+/// use compensator::platform::{Platform, Pose};
+/// use units::{Metres, Radians};
+///
+/// let mm = Metres::from_mm;
+/// let platform = Platform::uvw(mm(200.0), mm(120.0), mm(10.0))?;
+/// let pose = Pose { x: mm(1.0), y: mm(2.0), angle: Radians::from_degrees(90.0) };
+/// for (stroke, expected) in platform.strokes(pose).iter().zip([-99.0, 101.0, 122.0]) {
+///     assert!((stroke.mm() - expected).abs() < 1e-9);
+/// }
+/// let refused = platform.check(pose).expect_err("each travels 10 mm");
+/// assert_eq!(refused.limits.len(), 4, "three strokes, and the turn");
+/// # Ok::<(), compensator::platform::PlatformError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Platform {
     actuators: Vec<Actuator>,

@@ -108,6 +108,22 @@ impl Platform {
 
     /// The corners of the reachable positions at this turn, counter-clockwise; none when no
     /// position is reachable.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use compensator::platform::Platform;
+    /// use units::{Metres, Radians};
+    ///
+    /// let mm = Metres::from_mm;
+    /// let platform = Platform::uvw(mm(200.0), mm(0.0), mm(10.0))?;
+    /// let corners = platform.reachable_area(Radians::ZERO);
+    /// assert_eq!(corners.len(), 4);
+    /// assert!(corners.iter().all(|it| (it.x.abs().mm() - 10.0).abs() < 1e-9));
+    /// // Far enough turned, u and v have nothing left.
+    /// assert!(platform.reachable_area(Radians::from_degrees(20.0)).is_empty());
+    /// # Ok::<(), compensator::platform::PlatformError>(())
+    /// ```
     pub fn reachable_area(&self, angle: Radians) -> Vec<Point> {
         let angle = angle.value();
         if !angle.is_finite() || self.angle_excess(angle).is_some() {
@@ -198,6 +214,21 @@ impl Platform {
     ///
     /// # Errors
     /// The worst limit in the way, and where on the path.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use compensator::platform::{Platform, Pose};
+    /// use units::Metres;
+    ///
+    /// let mm = Metres::from_mm;
+    /// let platform = Platform::uvw(mm(200.0), mm(120.0), mm(10.0))?;
+    /// let at = |x_mm: f64| Pose { x: mm(x_mm), ..Pose::default() };
+    /// assert_eq!(platform.check_path(at(-9.0), at(9.0)), Ok(()));
+    /// let error = platform.check_path(at(0.0), at(12.0)).expect_err("10 mm is all");
+    /// assert_eq!(error.fraction, 1.0);
+    /// # Ok::<(), compensator::platform::PlatformError>(())
+    /// ```
     pub fn check_path(&self, from: Pose, to: Pose) -> Result<(), PathError> {
         let (start, end) = (from.raw(), to.raw());
         if start.iter().chain(&end).any(|v| !v.is_finite()) {

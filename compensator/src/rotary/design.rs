@@ -67,6 +67,20 @@ pub enum DesignError {
 /// *Amplification of harmonic k*: the standard deviation of its coefficient in the table error, in
 /// units of that of the same coefficient in the readings of one placement. *rms amplification*:
 /// the standard uncertainty of one table error in units of that of one reading.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::{Design, DesignError};
+///
+/// let pair = Design::new(360, &[0, 1], f64::INFINITY)?;
+/// let (harmonic, amplification) = pair.worst();
+/// assert_eq!(harmonic, 1, "the patent's pair is worst for slow errors");
+/// assert!((amplification - 81.03).abs() < 0.01);
+/// let opposite = Design::new(360, &[0, 180], f64::INFINITY);
+/// assert!(matches!(opposite, Err(DesignError::Unobservable { harmonic: 2, .. })));
+/// # Ok::<(), DesignError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     lines: usize,
@@ -177,12 +191,28 @@ impl Design {
 }
 
 /// rms amplification of two placements that differ by one line: √((N² − 1)/(6N)).
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::rms_amplification_of_a_pair;
+///
+/// assert!((rms_amplification_of_a_pair(360) - 7.7459).abs() < 1e-4);
+/// ```
 pub fn rms_amplification_of_a_pair(lines: usize) -> f64 {
     let n = lines as f64;
     ((n * n - 1.0) / (6.0 * n)).sqrt()
 }
 
 /// rms amplification of a placement at every line: √(N − 1)/N.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::rms_amplification_of_all;
+///
+/// assert!((rms_amplification_of_all(360) - 0.0526).abs() < 1e-4);
+/// ```
 pub fn rms_amplification_of_all(lines: usize) -> f64 {
     let n = lines as f64;
     (n - 1.0).sqrt() / n

@@ -183,6 +183,27 @@ impl PeriodicTable {
 }
 
 /// A table made ready to be applied: no allocation and a constant time per call.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::{
+///     PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable,
+/// };
+/// use units::Radians;
+///
+/// // An error of 6″ once a turn, known at 36 lines.
+/// let error = |angle: f64| Radians::from_arcsec(6.0 * angle.to_radians().cos());
+/// let table = PeriodicTable::new((0..36).map(|line| error(10.0 * f64::from(line))).collect(), None)?;
+/// let limits = PeriodicLimits { size: Radians::from_arcsec(60.0), slope: 0.05 };
+/// let made = PeriodicCompensation::new(table, PeriodicInterpolation::BandLimited, limits)?;
+/// let target = Radians::from_degrees(725.0);
+/// let command = made.set_point(target)?;
+/// let reached = command + made.deviation(command)?;
+/// assert!((reached - target).arcsec().abs() < 1e-6, "on any turn");
+/// assert!((made.deviation(Radians::from_degrees(5.0))? - error(5.0)).arcsec().abs() < 2e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PeriodicCompensation {
     table: PeriodicTable,

@@ -65,6 +65,19 @@ const LINES_MAX: usize = 100_000;
 ///
 /// # Errors
 /// When there cannot be so many placements.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::{Criterion, plan};
+///
+/// // 7 lines have a perfect difference set of 3: every harmonic is amplified alike.
+/// let design = plan(7, 3, Criterion::Worst)?;
+/// let best = 1.0 / (3.0_f64 - 2.0 / 3.0).sqrt();
+/// assert!((design.worst().1 - best).abs() < 1e-9);
+/// assert!((design.amplification(1) - best).abs() < 1e-9);
+/// # Ok::<(), compensator::rotary::PlanError>(())
+/// ```
 pub fn plan(lines: usize, placements: usize, criterion: Criterion) -> Result<Design, PlanError> {
     if !(2..=LINES_MAX).contains(&lines) {
         return Err(PlanError::Lines {

@@ -2,27 +2,8 @@
 
 use units::Radians;
 
+pub(super) use crate::noise::Noise;
 use crate::rotary::{Placement, RotarySeries};
-
-/// A small generator: repeatable noise.
-pub(super) struct Noise(pub(super) u64);
-
-impl Noise {
-    pub(super) fn uniform(&mut self) -> f64 {
-        // splitmix64
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Normally distributed with standard deviation 1 (Box and Muller).
-    pub(super) fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (core::f64::consts::TAU * self.uniform()).cos()
-    }
-}
 
 /// Values less their mean.
 pub(super) fn centred(values: Vec<f64>) -> Vec<f64> {

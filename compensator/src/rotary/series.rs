@@ -187,6 +187,19 @@ pub enum RotaryFault {
 
 /// Readings of one plate in several placements: at least two, each at an offset of its own,
 /// every reading finite.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::RotarySeries;
+///
+/// let csv = "offset,line,deviation_arcsec\n0,0,8\n0,1,4\n0,2,3\n1,0,-2\n1,1,-3\n1,2,-1\n";
+/// let series = RotarySeries::from_csv(csv, "table.csv", None)?;
+/// assert_eq!((series.lines(), series.offsets()), (3, vec![0, 1]));
+/// let one_placement = "offset,line,deviation_arcsec\n0,0,8\n0,1,4\n0,2,3\n";
+/// assert!(RotarySeries::from_csv(one_placement, "table.csv", None).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotarySeries {
     lines: usize,

@@ -68,6 +68,44 @@ pub struct Correction {
 }
 
 /// A screw's model made ready to be applied.
+///
+/// # Example
+///
+/// After a reversal the screw crosses the lost motion before the nut follows.
+///
+/// ```
+/// use compensator::screw::{
+///     Engagement, Limits, Rule, ScrewCompensation, ScrewMemory, ScrewModel,
+/// };
+/// use units::{Approach, Metres};
+///
+/// let model = ScrewModel {
+///     offset: Metres::ZERO,
+///     slope: 0.0,
+///     lost_motion: Metres::from_um(2.3),
+///     lead: None,
+///     harmonics: vec![],
+///     first: Metres::from_mm(-5.0),
+///     last: Metres::from_mm(5.0),
+///     covariance: None,
+///     scatter: None,
+/// };
+/// let limits = Limits {
+///     size: Metres::from_um(50.0),
+///     slope: 0.05,
+///     extrapolation: Metres::ZERO,
+///     resolution: Metres::ZERO,
+/// };
+/// let screw = ScrewCompensation::new(model, limits, Rule::Engagement)?;
+/// let memory = ScrewMemory { set_point: Metres::ZERO, engagement: Engagement::Forward };
+/// let back = screw.correct(Metres::from_mm(-1.0), &memory)?;
+/// assert!((back.set_point.um() + 1002.3).abs() < 1e-6);
+/// assert_eq!(back.after.engagement, Engagement::Reverse);
+/// let further = screw.correct(Metres::from_mm(-2.0), &back.after)?;
+/// assert!((further.set_point.um() + 2002.3).abs() < 1e-6, "not twice");
+/// assert_eq!(further.approach, Some(Approach::Reverse));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ScrewCompensation {
     model: ScrewModel,

@@ -39,6 +39,19 @@ pub enum Engagement {
 }
 
 /// What must be remembered of a screw, also while power is off. Plain data.
+///
+/// # Example
+///
+/// ```
+/// use compensator::screw::{Engagement, ScrewMemory};
+/// use units::Metres;
+///
+/// let kept = ScrewMemory { set_point: Metres(0.01), engagement: Engagement::Forward };
+/// let tolerance = Metres::from_um(1.0);
+/// assert_eq!(kept.found_at(Metres(0.01), tolerance), kept);
+/// let pushed = kept.found_at(Metres(0.012), tolerance);
+/// assert_eq!(pushed.engagement, Engagement::Unknown);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ScrewMemory {
     /// Where the screw was last commanded to.

@@ -49,6 +49,26 @@ pub struct Fitted {
 ///
 /// # Errors
 /// When an option is none, or something is not observable in these strokes, by name.
+///
+/// # Example
+///
+/// ```
+/// use compensator::screw::{FitOptions, Stroke, fit};
+/// use units::{Approach, Metres};
+///
+/// // 0.6 µm/mm too long, and 2.3 µm of lost motion.
+/// let mut strokes = Vec::new();
+/// for (approach, play_um) in [(Approach::Forward, 0.0), (Approach::Reverse, 2.3)] {
+///     for mm in [-2.0, -1.0, 0.0, 1.0, 2.0] {
+///         let (stroke, um) = (Metres::from_mm(mm), 0.6 * mm + play_um);
+///         strokes.push(Stroke { approach, stroke, deviation: Metres::from_um(um) });
+///     }
+/// }
+/// let model = fit(&strokes, &FitOptions::default())?.model;
+/// assert!((model.slope * 1e3 - 0.6).abs() < 1e-9);
+/// assert!((model.lost_motion.um() - 2.3).abs() < 1e-9);
+/// # Ok::<(), compensator::screw::FitError>(())
+/// ```
 pub fn fit(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError> {
     check(strokes, options)?;
     let (candidates, _) = observable(strokes, options.lead, options.harmonics_max)?;

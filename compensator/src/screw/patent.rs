@@ -172,6 +172,22 @@ impl PatentEstimate {
 
 /// The patent's compensation step in its own terms: lengths of moves, and errors as what a move
 /// falls short by. This is the door between its sign and the project's.
+///
+/// # Example
+///
+/// The figures of the patent: means of 2.02 µm at 500 µm, 2.62 µm at 1500 µm and 2.29 µm over all.
+///
+/// ```
+/// use compensator::screw::patent::PatentRule;
+/// use units::{Approach, Metres};
+///
+/// let um = Metres::from_um;
+/// let rule = PatentRule::of_errors(um(500.0), um(1500.0), um(2.02), um(2.62), um(2.29));
+/// let forward = rule.addition(um(1600.0), Approach::Forward);
+/// assert!((forward.um() - 0.96).abs() < 1e-9);
+/// let reverse = rule.addition(um(1600.0), Approach::Reverse);
+/// assert!((reverse.um() - 3.25).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatentRule {
     /// k: shortfall per length of the move, dimensionless.

@@ -108,7 +108,7 @@ impl<'a> Problem<'a> {
 
     fn squares(&self, harmonics: &[u32]) -> Result<f64, LeastSquaresError> {
         let fit = self.solve(harmonics)?;
-        Ok(fit.residuals.iter().map(|r| r * r).sum())
+        Ok(fit.squares())
     }
 
     pub(super) fn noise(&self, harmonics: &[u32]) -> Result<Noise, LeastSquaresError> {

@@ -3,39 +3,10 @@
 use units::{Approach, Metres};
 
 use super::FitOptions;
+pub(super) use crate::noise::Noise;
 use crate::screw::Stroke;
 
 pub(super) const UM: f64 = 1e-6;
-
-/// Repeatable noise.
-pub(super) struct Noise(pub(super) u64);
-
-impl Noise {
-    pub(super) fn uniform(&mut self) -> f64 {
-        // splitmix64
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Normal with standard deviation 1, by the polar method: the tails matter to tests of tests.
-    pub(super) fn normal(&mut self) -> f64 {
-        loop {
-            let (a, b) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);
-            let square = a * a + b * b;
-            if square > 0.0 && square < 1.0 {
-                return a * (-2.0 * square.ln() / square).sqrt();
-            }
-        }
-    }
-
-    /// Uniform in ±`half`.
-    pub(super) fn within(&mut self, half: f64) -> f64 {
-        (2.0 * self.uniform() - 1.0) * half
-    }
-}
 
 /// Micrometres and millimetres, so that a mistake of units shows.
 #[derive(Clone, Debug)]

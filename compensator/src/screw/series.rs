@@ -140,6 +140,20 @@ pub enum StrokeError {
 
 /// Strokes of one axis or several, each axis with at least two different ones; repetitions are
 /// welcome.
+///
+/// # Example
+///
+/// ```
+/// use compensator::screw::StrokeSeries;
+///
+/// let csv = "axis,approach,stroke_um,deviation_um\nu,-,-500,2.02\nu,-,-1500,2.62\n";
+/// let series = StrokeSeries::from_csv(csv, "screw.csv")?;
+/// let [u] = series.axes() else { unreachable!("one axis") };
+/// assert_eq!((u.axis.as_str(), u.strokes.len()), ("u", 2));
+/// let error = StrokeSeries::from_csv("axis,approach,stroke_um,deviation_um\nu,-,-500,2\n", "it");
+/// assert!(error.is_err(), "one stroke says nothing of a slope");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrokeSeries {
     axes: Vec<AxisStrokes>,

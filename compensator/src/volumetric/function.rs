@@ -134,6 +134,22 @@ fn check(nodes: &[f64], values: &[f64]) -> Result<(), FunctionError> {
 }
 
 /// An error (a length or an angle) as a function of a position; constant time per call.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::function::{Function, Shape};
+/// use units::Metres;
+///
+/// // 1e-4·x², which a spline reproduces.
+/// let nodes = [0.0, 0.1, 0.3, 0.4].map(Metres);
+/// let values = [0.0, 1.0, 9.0, 16.0].map(Metres::from_um);
+/// let spline = Function::new(&nodes, &values, Shape::Spline)?;
+/// assert!((spline.at(Metres(0.2)).um() - 4.0).abs() < 1e-9);
+/// assert!((spline.at(Metres(9.0)).um() - 16.0).abs() < 1e-9, "held beyond the last node");
+/// assert!((spline.steepest() - 8e-5).abs() < 1e-15);
+/// # Ok::<(), compensator::volumetric::function::FunctionError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Function<Q> {
     pieces: Pieces,

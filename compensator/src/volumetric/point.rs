@@ -130,6 +130,19 @@ pub struct VolumeError {
 }
 
 /// A box of machine coordinates, ends included.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::{Axis, Point, Volume};
+///
+/// let volume = Volume::new(Point::ZERO, Point::from_mm(600.0, 500.0, 400.0))?;
+/// assert!(volume.contains(Point::from_mm(600.0, 0.0, 400.0)), "ends included");
+/// assert_eq!(volume.nearest(Point::from_mm(-1.0, 7.0, 9.0)), Point::from_mm(0.0, 7.0, 9.0));
+/// let flat = Volume::new(Point::ZERO, Point::from_mm(600.0, 0.0, 400.0));
+/// assert!(flat.is_err_and(|it| it.axis == Axis::Y));
+/// # Ok::<(), compensator::volumetric::VolumeError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
     low: Point,

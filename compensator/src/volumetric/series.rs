@@ -69,6 +69,19 @@ pub struct VolumeLine {
 }
 
 /// Lines that were read.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::VolumeSeries;
+///
+/// let csv = "line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u\n\
+///            1,linear_um,0,0,0,0,0,-100,0,0.1\n1,linear_um,300,400,0,0,0,-100,2.5,0.1\n";
+/// let series = VolumeSeries::from_csv(csv, "volume.csv")?;
+/// let [diagonal] = series.lines() else { unreachable!("one line") };
+/// assert_eq!((diagonal.points.len(), diagonal.tool.z.mm()), (2, -100.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct VolumeSeries {
     lines: Vec<VolumeLine>,

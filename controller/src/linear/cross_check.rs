@@ -7,17 +7,14 @@
 //! repeats to tens of nanometres, while a counter that has slipped stays slipped by a whole
 //! number of half wavelengths.
 
-use units::Metres;
+use compensator::error_table::{Change, Slip, find_slip};
+use units::{Approach, Metres};
 
 use crate::config::Count;
 use crate::failure::Failure;
 use crate::linear::PointEntry;
 use crate::store::ClosureEntry;
 
-/// Points on either side of a jump that make it believable.
-const SIDE: usize = 3;
-/// A jump is this near to a whole number of half wavelengths, in half wavelengths.
-const NEAR: f64 = 0.25;
 /// Samples of a stage at rest lie within nanometres; these are of one that is shaken.
 const SHAKEN: Metres = Metres(2.5e-6);
 
@@ -40,11 +37,53 @@ pub(super) fn is_shaken(scatter: Metres) -> bool {
     scatter > SHAKEN
 }
 
-/// A whole run, and its datum's place before and after it.
+/// What the datum's place read, approached from either side, in metres.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run<'a> {
-    pub(super) points: &'a [PointEntry],
-    pub(super) closure: ClosureEntry,
+pub(super) struct DatumReadings {
+    pub(super) forward_m: f64,
+    pub(super) reverse_m: Option<f64>,
+}
+
+impl DatumReadings {
+    pub(super) const fn forward(forward_m: f64) -> Self {
+        Self {
+            forward_m,
+            reverse_m: None,
+        }
+    }
+
+    /// By how much each has changed since `before`.
+    fn changes(&self, before: &Self) -> Vec<Change> {
+        let change = |approach, now_m: f64, before_m: f64| Change {
+            size: Metres(now_m - before_m),
+            approach,
+            is_after_turn: true,
+        };
+        let reverse = self.reverse_m.zip(before.reverse_m);
+        let reverse = reverse.map(|(now, before)| change(Approach::Reverse, now, before));
+        core::iter::once(change(Approach::Forward, self.forward_m, before.forward_m))
+            .chain(reverse)
+            .collect()
+    }
+}
+
+/// A whole run, and its datum before and after it.
+#[derive(Clone, Debug)]
+pub(super) struct WholeRun {
+    pub(super) points: Vec<PointEntry>,
+    pub(super) start: DatumReadings,
+    pub(super) end: DatumReadings,
+}
+
+impl WholeRun {
+    /// What is kept of its datum.
+    pub(super) const fn closure(&self, run: u32) -> ClosureEntry {
+        ClosureEntry {
+            run,
+            start_m: self.start.forward_m,
+            closure_m: self.end.forward_m,
+        }
+    }
 }
 
 /// The check of one measurement.
@@ -58,6 +97,12 @@ pub(super) struct CrossCheck {
 
 const fn deviation(point: &PointEntry) -> f64 {
     point.measured_m - point.encoder_m
+}
+
+/// Whether the stage had turned on the way to the point at `place`.
+fn is_after_turn(points: &[PointEntry], place: usize) -> bool {
+    let before = place.checked_sub(1).map(|it| points[it].approach);
+    before != Some(points[place].approach)
 }
 
 impl CrossCheck {
@@ -100,7 +145,7 @@ impl CrossCheck {
             let travel = travel.abs();
             return Err(scale_mismatch(&self.axis, travel, ratio, scale_limit_ppm));
         }
-        Err(self.fringe_jump(jump, &last, point))
+        Err(self.fringe_jump(jump, point.run, &last, point))
     }
 
     /// Judges a whole run against the run before: the same targets in the same order, and the
@@ -108,105 +153,59 @@ impl CrossCheck {
     ///
     /// # Errors
     /// When the count slipped in one of them.
-    pub(super) fn compare(&self, before: &Run<'_>, run: &Run<'_>) -> Result<(), Failure> {
+    pub(super) fn compare(&self, before: &WholeRun, run: &WholeRun) -> Result<(), Failure> {
         let count_m = self.plausible.count.length.value();
         let quiet = |point: &PointEntry| point.scatter_m < count_m;
-        let (places, changes): (Vec<usize>, Vec<f64>) = before
+        let pairs: Vec<(usize, f64)> = before
             .points
             .iter()
-            .zip(run.points)
+            .zip(&run.points)
             .enumerate()
             .filter(|(_, (a, b))| quiet(a) && quiet(b))
             .map(|(place, (a, b))| (place, deviation(b) - deviation(a)))
-            .unzip();
-        let Some(last) = places.len().checked_sub(1) else {
+            .collect();
+        let Some((last, _)) = pairs.last() else {
             return Ok(());
         };
-        // The datum is one place, but it bounds the run: it counts as much as a side needs.
-        let start = [run.closure.start_m - before.closure.start_m; SIDE];
-        let end = [run.closure.closure_m - before.closure.closure_m; SIDE];
-        let changes = [&start, changes.as_slice(), &end].concat();
-        let Some(slip) = find_slip(&changes, SIDE, count_m) else {
+        let start = run.start.changes(&before.start);
+        let started = start.len();
+        let changes = pairs.iter().map(|(place, size_m)| Change {
+            size: Metres(*size_m),
+            approach: run.points[*place].side(),
+            is_after_turn: is_after_turn(&run.points, *place),
+        });
+        let all: Vec<Change> = start
+            .into_iter()
+            .chain(changes)
+            .chain(run.end.changes(&before.end))
+            .collect();
+        let Some(slip) = find_slip(&all, self.plausible.count.length) else {
             return Ok(());
         };
-        // Up to there both runs agree or differ alike: the slip is in the later run when the
-        // change comes, in the earlier one when it goes; the place is the same.
-        let point = |at: usize| &run.points[places[at.saturating_sub(SIDE).min(last)]];
-        let (from, to) = (point(slip.at - 1), point(slip.at));
-        Err(self.fringe_jump(slip.jump_m * slip.sign(), from, to))
+        let point = |at: usize| {
+            let place = pairs.get(at.saturating_sub(started));
+            &run.points[place.map_or(*last, |(place, _)| *place)]
+        };
+        Err(self.slipped(&slip, point(slip.at - 1), point(slip.at)))
     }
 
-    fn fringe_jump(&self, jump_m: f64, from: &PointEntry, to: &PointEntry) -> Failure {
+    fn slipped(&self, slip: &Slip, from: &PointEntry, to: &PointEntry) -> Failure {
+        let run = to.run - u32::from(slip.is_in_the_earlier_run);
+        let jump_m = slip.counts as f64 * self.plausible.count.length.value();
+        self.fringe_jump(jump_m, run, from, to)
+    }
+
+    fn fringe_jump(&self, jump_m: f64, run: u32, from: &PointEntry, to: &PointEntry) -> Failure {
         let count = jump_m / self.plausible.count.length.value();
         Failure::FringeJump {
             axis: self.axis.clone(),
             jump: Metres(jump_m),
             counts: count.round() as i64,
             of: self.plausible.count,
-            run: to.run,
+            run,
             from: Metres(from.target_m),
             to: Metres(to.target_m),
         }
-    }
-}
-
-/// Where a row of changes from run to run has its step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Slip {
-    at: usize,
-    before_m: f64,
-    jump_m: f64,
-}
-
-impl Slip {
-    /// A slip in the run before shows as a change that goes away: 0 … 0 became s … s there, so
-    /// that the first part differs by s and the rest not at all.
-    fn sign(&self) -> f64 {
-        let after_m = self.before_m + self.jump_m;
-        if after_m.abs() < self.before_m.abs() {
-            -1.0
-        } else {
-            1.0
-        }
-    }
-}
-
-/// The step of a whole number of half wavelengths in `changes`, if that explains them. The first and
-/// last `repeated` are one reading each, which says nothing of how the readings scatter.
-fn find_slip(changes: &[f64], repeated: usize, half_wavelength_m: f64) -> Option<Slip> {
-    let candidates = (SIDE..changes.len().saturating_sub(SIDE - 1)).map(|at| {
-        let (before, after) = changes.split_at(at);
-        let (before_m, after_m) = (median(before), median(after));
-        let rest: Vec<f64> = before
-            .iter()
-            .map(|change| (change - before_m).abs())
-            .chain(after.iter().map(|change| (change - after_m).abs()))
-            .collect();
-        let slip = Slip {
-            at,
-            before_m,
-            jump_m: after_m - before_m,
-        };
-        (slip, rest)
-    });
-    let total = |rest: &[f64]| rest.iter().sum::<f64>();
-    let (slip, rest) = candidates.min_by(|a, b| total(&a.1).total_cmp(&total(&b.1)))?;
-    let count = slip.jump_m / half_wavelength_m;
-    let whole = count.round() != 0.0 && (count - count.round()).abs() < NEAR;
-    // What grows slowly is drift: it leaves a rest in proportion to itself.
-    let scatter = median(&rest[repeated..rest.len() - repeated]);
-    let quiet = 1.5 * scatter < 0.25 * slip.jump_m.abs();
-    (whole && quiet).then_some(slip)
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    if sorted.len().is_multiple_of(2) {
-        (sorted[middle - 1] + sorted[middle]) / 2.0
-    } else {
-        sorted[middle]
     }
 }
 
@@ -259,48 +258,6 @@ mod tests {
     use crate::store::EnvironmentRecord;
 
     const HALF: f64 = 316.4e-9;
-
-    #[track_caller]
-    fn check(changes: &[f64], expected: Option<(usize, f64)>) {
-        let changes: Vec<f64> = changes.iter().map(|nm| nm * 1e-9).collect();
-        let seen = find_slip(&changes, 0, HALF).map(|slip| (slip.at, slip.sign() * slip.jump_m));
-        match (seen, expected) {
-            (None, None) => {}
-            (Some((at, jump)), Some((wanted_at, wanted))) => {
-                assert_eq!(at, wanted_at);
-                assert!((jump - wanted * HALF).abs() < 0.1 * HALF, "{jump}");
-            }
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn a_step_of_whole_half_wavelengths_is_found_where_it_is() {
-        let s = 316.4;
-        check(
-            &[5.0, -9.0, 12.0, s + 3.0, s - 20.0, s, s + 8.0],
-            Some((3, 1.0)),
-        );
-        check(
-            &[5.0, -9.0, 12.0, 7.0, -2.0 * s, -2.0 * s, 4.0 - 2.0 * s],
-            Some((4, -2.0)),
-        );
-    }
-
-    /// A stage that repeats to 250 nm puts its datum a half wavelength off now and then.
-    #[test]
-    fn a_datum_that_scatters_like_its_points_is_no_slip() {
-        let points = [
-            310.0, -180.0, 40.0, -260.0, 400.0, 20.0, -90.0, 210.0, -330.0, 150.0,
-        ];
-        let row = |start: f64, points: &[f64]| -> Vec<f64> {
-            let all = [&[start; SIDE], points, &[30.0; SIDE]].concat();
-            all.iter().map(|nm| nm * 1e-9).collect()
-        };
-        assert_eq!(find_slip(&row(383.0, &points), SIDE, HALF), None);
-        let calm = points.map(|nm| nm / 10.0);
-        assert!(find_slip(&row(316.0, &calm), SIDE, HALF).is_some());
-    }
 
     fn point(approach: char, encoder_mm: f64, measured_mm: f64) -> PointEntry {
         PointEntry {
@@ -363,20 +320,5 @@ mod tests {
             judge(1000.0, &slipped),
             Err(Failure::FringeJump { .. })
         ));
-    }
-
-    #[test]
-    fn a_slip_in_the_run_before_shows_where_the_change_goes_away() {
-        let s = 316.4;
-        check(&[s, s - 8.0, s + 9.0, s, 3.0, -4.0, 6.0], Some((4, 1.0)));
-    }
-
-    #[test]
-    fn noise_single_outliers_and_drift_are_no_slips() {
-        check(&[20.0, -30.0, 15.0, 5.0, -22.0, 31.0, -8.0], None);
-        check(&[5.0, 9.0, 316.0, 5.0, -3.0, 4.0, 2.0, 1.0], None);
-        let ramp: Vec<f64> = (0..20).map(|k| f64::from(k) * 33.0).collect();
-        check(&ramp, None);
-        check(&[10.0, 5.0], None);
     }
 }

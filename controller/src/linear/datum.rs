@@ -39,29 +39,50 @@ impl LinearStage<'_> {
         self.correct(&plan, &reading, &environment, &datum)
     }
 
+    /// Goes to the far end of a run. The later runs begin there, too: what a stage remembers of its
+    /// last moves (lost motion taken up, a servo that is slow to settle) is the same in all.
+    pub(super) fn exercise(&mut self, plan: &RunPlan) -> Result<(), Failure> {
+        let last = plan.targets[plan.targets.len() - 1];
+        self.travel(last + plan.overrun, Correction::Off)?;
+        Ok(())
+    }
+
     /// Goes to the axis's zero, forward, and makes the instrument read zero there.
     pub(super) fn set_datum(&mut self, plan: &RunPlan) -> Result<Datum, Failure> {
         self.go_to_datum(plan)?;
         self.core.stand_still(self.axis, plan.settle)?;
         self.core.set_instrument_datum(&plan.instrument)?;
         let offset = self.read_calm(plan)?.vacuum;
+        let length = self.length_correction(plan)?;
+        Ok(Datum { length, offset })
+    }
+
+    fn length_correction(&mut self, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
         let environment = self.core.instrument(&plan.instrument)?.environment();
         let config = &self.core.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
-        let length =
-            LengthCorrection::new(config.corrections(), &environment).map_err(|source| {
-                Failure::Correction {
-                    instrument: plan.instrument.clone(),
-                    source,
-                }
-            })?;
-        Ok(Datum { length, offset })
+        LengthCorrection::new(config.corrections(), &environment).map_err(|source| {
+            Failure::Correction {
+                instrument: plan.instrument.clone(),
+                source,
+            }
+        })
     }
 
     pub(super) fn go_to_datum(&mut self, plan: &RunPlan) -> Result<(), Failure> {
         self.travel(Metres::ZERO - plan.overrun, Correction::Off)?;
         self.travel(Metres::ZERO, Correction::Off)?;
         Ok(())
+    }
+
+    /// Goes to the datum's place in reverse, where a run has come from there; whether it has.
+    pub(super) fn go_to_datum_in_reverse(&mut self, plan: &RunPlan) -> Result<bool, Failure> {
+        let is_passed = plan.targets[plan.targets.len() - 1] >= Metres::ZERO;
+        if is_passed {
+            self.travel(plan.overrun, Correction::Off)?;
+            self.travel(Metres::ZERO, Correction::Off)?;
+        }
+        Ok(is_passed)
     }
 
     /// A reading of an axis that is not shaken, or the last one of many that are.

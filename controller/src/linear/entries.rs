@@ -1,6 +1,7 @@
 //! What a journal says of a linear axis.
 
 use serde::{Deserialize, Serialize};
+use units::Approach;
 
 use crate::store::EnvironmentRecord;
 
@@ -26,6 +27,16 @@ pub struct PointEntry {
     pub at_s: f64,
     /// The environment then.
     pub environment: EnvironmentRecord,
+}
+
+impl PointEntry {
+    /// From which side the stage had come.
+    pub(super) const fn side(&self) -> Approach {
+        match self.approach {
+            '-' => Approach::Reverse,
+            _ => Approach::Forward,
+        }
+    }
 }
 
 /// What a zero search found.

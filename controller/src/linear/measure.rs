@@ -11,7 +11,7 @@ use crate::assemble;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::PointEntry;
-use crate::linear::cross_check::{CrossCheck, Plausible, Run, judge_scale};
+use crate::linear::cross_check::{CrossCheck, DatumReadings, Plausible, WholeRun, judge_scale};
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::stage::LinearStage;
@@ -34,15 +34,6 @@ pub struct MeasureOptions {
 pub(crate) struct EarlierRuns {
     pub(crate) points: Vec<PointEntry>,
     pub(crate) closures: Vec<ClosureEntry>,
-}
-
-impl EarlierRuns {
-    fn last(&self) -> Option<Run<'_>> {
-        let closure = *self.closures.last()?;
-        let begin = self.points.partition_point(|it| it.run < closure.run);
-        let points = &self.points[begin..];
-        Some(Run { points, closure })
-    }
 }
 
 /// A measured series.
@@ -75,7 +66,7 @@ pub fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
         .iter()
         .map(|point| Measurement {
             run: point.run,
-            approach: approach_of(point.approach),
+            approach: point.side(),
             target: Metres(point.target_m),
             measured: Metres(point.measured_m),
         })
@@ -83,10 +74,16 @@ pub fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
     Ok(LinearSeries::new(measurements)?)
 }
 
-const fn approach_of(symbol: char) -> Approach {
-    match symbol {
-        '-' => Approach::Reverse,
-        _ => Approach::Forward,
+impl EarlierRuns {
+    /// The last of them; what its datum read in reverse was not kept.
+    fn last(&self) -> Option<WholeRun> {
+        let closure = self.closures.last()?;
+        let begin = self.points.partition_point(|it| it.run < closure.run);
+        Some(WholeRun {
+            points: self.points[begin..].to_vec(),
+            start: DatumReadings::forward(closure.start_m),
+            end: DatumReadings::forward(closure.closure_m),
+        })
     }
 }
 
@@ -109,6 +106,34 @@ struct Session<'a> {
     watch: Option<EnvironmentWatch>,
 }
 
+impl Session<'_> {
+    /// Judges a run by the one before it and by its datum; one after which that has moved is worth
+    /// nothing.
+    fn close(
+        &mut self,
+        run: u32,
+        before: Option<&WholeRun>,
+        whole: &WholeRun,
+    ) -> Result<ClosureEntry, Failure> {
+        if let Some(before) = before {
+            self.check.compare(before, whole)?;
+        }
+        let closure = whole.closure(run);
+        let seen = Metres(closure.closure_m);
+        // A comparison with NaN is false, so that it is refused too.
+        let is_closed = |limit| seen.abs() <= limit;
+        if let Some(limit) = self.plan.closure_limit.filter(|it| !is_closed(*it)) {
+            return Err(Failure::Closure {
+                axis: self.axis.to_owned(),
+                seen,
+                limit,
+            });
+        }
+        self.journal.write(&LinearEntry::Closed(closure))?;
+        Ok(closure)
+    }
+}
+
 /// Values that the instrument's sensors sent are never older than this.
 const ENVIRONMENT_STALE: Duration = Duration::from_secs(60);
 /// What a stage can do at most where the configuration says nothing.
@@ -120,7 +145,8 @@ impl LinearStage<'_> {
     /// The runs of an interrupted measurement are kept (`earlier`).
     ///
     /// The datum is the axis's zero, approached forward; the same place is measured again at
-    /// the end of each run.
+    /// the end of each run. Before it the axis goes to the far end, so that the first run has the
+    /// same travel behind it as the later ones.
     ///
     /// # Errors
     /// Whatever stops the machine, a datum that drifted, and an instrument that disagrees
@@ -139,6 +165,7 @@ impl LinearStage<'_> {
         }
         self.core.use_instrument(&plan.instrument)?;
         let plausible = self.plausible(plan)?;
+        self.exercise(plan)?;
         let datum = self.set_datum(plan)?;
         self.memory.datum = Some((plan.clone(), datum));
         let counter = Counter {
@@ -162,13 +189,20 @@ impl LinearStage<'_> {
             watch: self.environment_watch(plan),
         };
         let first = runs.points.last().map_or(1, |point| point.run + 1);
-        let mut start = Metres::ZERO;
+        let mut start = DatumReadings {
+            forward_m: 0.0,
+            reverse_m: self.read_datum_in_reverse(&mut session)?,
+        };
+        let mut before = runs.last();
         for run in first..=plan.runs {
             let points = self.measure_run(&mut session, run)?;
-            let closure = self.close_run(&mut session, run, start, &runs, &points)?;
-            start = Metres(closure.closure_m);
-            runs.points.extend(points);
+            let end = self.read_datum(&mut session)?;
+            let whole = WholeRun { points, start, end };
+            let closure = session.close(run, before.as_ref(), &whole)?;
+            start = whole.end;
+            runs.points.extend(&whole.points);
             runs.closures.push(closure);
+            before = Some(whole);
         }
         session.journal.complete()?;
         session.journal.flush_to_disk()?;
@@ -237,38 +271,27 @@ impl LinearStage<'_> {
         Ok(point)
     }
 
-    /// Measures the datum's place again; a run after which it has moved is worth nothing.
-    fn close_run(
-        &mut self,
-        session: &mut Session<'_>,
-        run: u32,
-        start: Metres,
-        earlier: &EarlierRuns,
-        points: &[PointEntry],
-    ) -> Result<ClosureEntry, Failure> {
+    /// What the datum's place reads at the end of a run.
+    fn read_datum(&mut self, session: &mut Session<'_>) -> Result<DatumReadings, Failure> {
         self.go_to_datum(session.plan)?;
+        Ok(DatumReadings {
+            forward_m: self.read_at_datum(session)?,
+            reverse_m: self.read_datum_in_reverse(session)?,
+        })
+    }
+
+    /// Nobody can tell from a single reading whether the count slipped beside it or the stage came to rest
+    /// elsewhere; one that arrives badly from one side does not arrive in the same way from the other.
+    fn read_datum_in_reverse(&mut self, session: &mut Session<'_>) -> Result<Option<f64>, Failure> {
+        let is_there = self.go_to_datum_in_reverse(session.plan)?;
+        is_there.then(|| self.read_at_datum(session)).transpose()
+    }
+
+    fn read_at_datum(&mut self, session: &mut Session<'_>) -> Result<f64, Failure> {
         let reading = self.read_calm(session.plan)?;
         let environment = self.watched_environment(session)?;
         let seen = self.correct(session.plan, &reading, &environment, &session.datum)?;
-        let closure = ClosureEntry {
-            run,
-            start_m: start.value(),
-            closure_m: seen.value(),
-        };
-        if let Some(before) = earlier.last() {
-            session.check.compare(&before, &Run { points, closure })?;
-        }
-        // A comparison with NaN is false, so that it is refused too.
-        let is_closed = |limit| seen.abs() <= limit;
-        if let Some(limit) = session.plan.closure_limit.filter(|it| !is_closed(*it)) {
-            return Err(Failure::Closure {
-                axis: session.axis.to_owned(),
-                seen,
-                limit,
-            });
-        }
-        session.journal.write(&LinearEntry::Closed(closure))?;
-        Ok(closure)
+        Ok(seen.value())
     }
 
     /// What a stage like this can do from one point to the next.

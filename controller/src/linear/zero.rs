@@ -1,17 +1,19 @@
 //! Zero: find the drift-free origin with the two Hall sensors (system S5).
 //!
 //! Coarse: the drive homes on its negative limit switch (repeatable to tens of micrometres),
-//! which says where the nominal zero is. Fine: the patent's search with its regression. Last:
-//! the drive's coordinates are set so that the origin found is zero (homing method 37).
+//! which says where the nominal zero is. Fine: the patent's search, then passes over both flanks in either
+//! direction, with a regression of each. Last: the drive's coordinates are set so that the origin found is
+//! zero (homing method 37).
 
 use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::hall_zero::{
-    Outcome, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
+    HallPoint, Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate,
+    single_threshold_zero,
 };
 use drivers::device::{AxisCommand, DriveCommand};
-use units::{Metres, MetresPerSecond, Time, Volts};
+use units::{Approach, Metres, MetresPerSecond, Time, Volts};
 
 use crate::assemble;
 use crate::correction::Correction;
@@ -53,8 +55,13 @@ impl Zeroed {
 
 /// How long the axis stands before its drive's coordinates are set.
 const REST: Duration = Duration::from_millis(30);
-/// The steps of zeroing that progress counts.
-const STEPS: u64 = 4;
+/// How often both flanks are passed, half of them in reverse; two in each direction would do.
+const PASSES: u32 = 6;
+/// A pass begins and ends this share of the distance of G1 and G2 beyond them.
+const PASS_MARGIN: f64 = 0.1;
+/// The steps of zeroing that progress counts: up to the search, its passes, and the new origin.
+const SEARCHED: u64 = 3;
+const STEPS: u64 = SEARCHED + PASSES as u64 + 1;
 
 impl LinearStage<'_> {
     /// Finds the origin of the axis and makes it the drive's zero; the axis is enabled and
@@ -104,8 +111,9 @@ impl LinearStage<'_> {
         let outcome = self.search(config, settings)?;
         self.core
             .observer()
-            .progress(Stage::Zero, self.axis, 3, STEPS);
-        let estimate = self.estimate(config, &settings, &outcome)?;
+            .progress(Stage::Zero, self.axis, SEARCHED, STEPS);
+        let passes = self.passes(config, &settings, &outcome)?;
+        let estimate = self.estimate(config, &settings, &outcome, &passes)?;
         let entry = self.zero_entry(&estimate);
         journal.write(&LinearEntry::Zero(entry))?;
         self.adopt_zero(estimate.origin)?;
@@ -165,6 +173,72 @@ impl LinearStage<'_> {
         }
     }
 
+    /// Passes over both flanks, forward and in reverse by turns: what lost motion and repeatability do to
+    /// an origin shows between them.
+    fn passes(
+        &mut self,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> Result<Vec<Pass>, Failure> {
+        let (low, high) = pass_ends(settings, outcome);
+        let speed = self.pass_speed(config, settings);
+        self.pass(config, low, speed)?;
+        (0..PASSES)
+            .map(|number| {
+                let (approach, end) = match number % 2 {
+                    0 => (Approach::Forward, high),
+                    _ => (Approach::Reverse, low),
+                };
+                let points = self.pass(config, end, speed)?;
+                let done = SEARCHED + u64::from(number) + 1;
+                let observer = self.core.observer();
+                observer.progress(Stage::Zero, self.axis, done, STEPS);
+                Ok(Pass { approach, points })
+            })
+            .collect()
+    }
+
+    /// Voltages that are sampled with the position are as good in twice the speed; those that are asked
+    /// for are not, as nobody knows the delay of each.
+    fn pass_speed(&self, config: &ZeroConfig, settings: &Settings) -> MetresPerSecond {
+        let module = &self.core.config.analog[&config.analog];
+        if module.poll_period() == Duration::ZERO {
+            settings.speed * 2.0
+        } else {
+            settings.speed
+        }
+    }
+
+    /// Goes to `end`; what was read on the way.
+    fn pass(
+        &mut self,
+        config: &ZeroConfig,
+        end: Metres,
+        speed: MetresPerSecond,
+    ) -> Result<Vec<HallPoint>, Failure> {
+        let acceleration = self.core.axis_settings(self.axis)?.acceleration;
+        let command = AxisCommand::MoveTo {
+            target: end,
+            speed,
+            acceleration,
+        };
+        let mut pairing = self.pairing(config)?;
+        let mut points = Vec::new();
+        self.core.begin(self.axis, command)?;
+        loop {
+            let deadline = self.core.now() + Duration::from_millis(100);
+            self.core.tick(deadline)?;
+            let arrived = self.core.outcome(self.axis)?;
+            let sample = self.paired_sample(config, &mut pairing)?;
+            points.extend(sample.map(|it| it.point()));
+            if let Some(outcome) = arrived {
+                outcome?;
+                return Ok(points);
+            }
+        }
+    }
+
     /// Turns the search's wish into a profile move or a halt, when it differs from the last.
     fn obey(
         &mut self,
@@ -199,8 +273,10 @@ impl LinearStage<'_> {
         config: &ZeroConfig,
         settings: &Settings,
         outcome: &Outcome,
+        passes: &[Pass],
     ) -> Result<ZeroEstimate, Failure> {
-        let estimate = outcome.refine(settings).map_err(|source| Failure::Refine {
+        let refined = outcome.refine_by_passes(passes, settings);
+        let estimate = refined.map_err(|source| Failure::Refine {
             axis: self.axis.to_owned(),
             source,
         })?;
@@ -211,6 +287,7 @@ impl LinearStage<'_> {
                 axis: self.axis.to_owned(),
                 seen,
                 limit,
+                scatter: estimate.passes.map_or(seen, |it| it.scatter),
             });
         }
         Ok(estimate)
@@ -312,6 +389,17 @@ impl LinearStage<'_> {
             standing: position.standing,
         }))
     }
+}
+
+/// Where passes begin and end: beyond both flanks, within the bounds of the search.
+fn pass_ends(settings: &Settings, outcome: &Outcome) -> (Metres, Metres) {
+    let margin = (outcome.g2.position - outcome.g1.position) * PASS_MARGIN;
+    let low = settings.soft_min.max(Metres::ZERO - settings.search_limit);
+    let high = settings.soft_max.min(settings.search_limit);
+    (
+        low.max(outcome.g1.position - margin),
+        high.min(outcome.g2.position + margin),
+    )
 }
 
 /// The newest zero on record. A trend is worth having but never worth failing for: a journal

@@ -12,6 +12,19 @@ use wire::copley::Faults;
 use super::DeviceName;
 
 /// Something that must stop the machine, or at least be told.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::Alarm;
+/// use std::time::Duration;
+/// use wire::canopen::NodeId;
+///
+/// let node = NodeId::new(5).expect("1 to 127");
+/// let alarm = Alarm::HeartbeatLost { node, waited: Duration::from_millis(150) };
+/// let text = "node 5: no heartbeat for 150ms; power, cable or drive lost";
+/// assert_eq!(alarm.to_string(), text);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[expect(
     missing_docs,
@@ -147,6 +160,19 @@ pub enum Alarm {
 }
 
 /// What only one family of devices can say; its file has them as constants.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::{Alarm, DeviceName, OwnAlarm};
+///
+/// static FLAT: OwnAlarm = OwnAlarm {
+///     device: DeviceName::Serial("caliper"),
+///     what: "its battery is nearly flat",
+///     remedy: "change it",
+/// };
+/// assert_eq!(Alarm::Own(&FLAT).to_string(), "caliper: its battery is nearly flat; change it");
+/// ```
 #[derive(Debug, PartialEq, Eq)]
 pub struct OwnAlarm {
     /// Who says it.

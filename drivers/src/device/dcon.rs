@@ -138,6 +138,20 @@ enum Progress {
 }
 
 /// An analog input module.
+///
+/// ```
+/// use drivers::device::{AnalogInput, Device, dcon::{Dcon, DconSettings, InputRange}};
+/// use units::{Time, Volts};
+/// use wire::{Input, Payload};
+/// let mut module = Dcon::new(DconSettings::new(1, InputRange::V5, vec![0, 1]));
+/// module.start(Time::ZERO);
+/// for answer in ["!014117\r", "!01090600\r", ">+1.0000-2.5000\r"] {
+///     let input = Input::Payload(Payload::Bytes(answer.into()));
+///     module.handle(Time::from_seconds(0.005), &input);
+/// }
+/// let volts = module.reading().map(|it| it.volts.clone());
+/// assert_eq!(volts, Some(vec![Volts(1.0), Volts(-2.5)]));
+/// ```
 #[derive(Debug)]
 pub struct Dcon {
     settings: DconSettings,

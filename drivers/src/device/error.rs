@@ -13,6 +13,22 @@ use wire::copley::{ErrorCode, EventStatus, Faults, Parameter};
 use super::{Alarm, DeviceName};
 
 /// Why a command of a device failed.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::{DeviceError, DeviceName, Seen};
+/// use std::time::Duration;
+///
+/// let error = DeviceError::Timeout {
+///     device: DeviceName::Serial("caliper"),
+///     awaited: "the answer to P",
+///     waited: Duration::from_millis(200),
+///     seen: Seen::Nothing,
+/// };
+/// let text = "caliper: waited 200ms for the answer to P, last saw nothing";
+/// assert_eq!(error.to_string(), text);
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the Display text says what each field is")]
 pub enum DeviceError {

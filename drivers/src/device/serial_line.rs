@@ -2,6 +2,16 @@
 
 /// Collects bytes up to a terminator; bounded, and in step again after one message of
 /// garbage.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::serial_line::{AssembledLine, LineAssembler};
+///
+/// let mut lines = LineAssembler::new(b'\n', 4);
+/// let seen: Vec<_> = b"abcd\nabcdefgh\n".iter().filter_map(|byte| lines.push(*byte)).collect();
+/// assert_eq!(seen, [AssembledLine::Whole(b"abcd".to_vec()), AssembledLine::Overlong]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct LineAssembler {
     terminator: u8,

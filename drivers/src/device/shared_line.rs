@@ -22,6 +22,19 @@ pub enum Urgency {
 }
 
 /// What a device wants of its line.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::{LineUse, Urgency};
+/// use units::Time;
+///
+/// let poll = LineUse::Wants { urgency: Urgency::Poll, since: Time(1) };
+/// let stop = LineUse::Wants { urgency: Urgency::Stop, since: Time(9) };
+/// assert!(stop.may_speak([(poll, true)]), "more urgent, though later");
+/// assert!(!poll.may_speak([(stop, false)]));
+/// assert!(!stop.may_speak([(LineUse::Holds, false)]), "an exchange is under way");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineUse {
     /// The line is the device's own, or a bus that needs no turns.

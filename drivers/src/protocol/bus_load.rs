@@ -11,6 +11,23 @@ use core::time::Duration;
 use wire::can::worst_case_bits;
 
 /// What is on one bus.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::bus_load::BusPlan;
+/// use std::time::Duration;
+///
+/// let four_axes = |ms| BusPlan::new(1_000_000, Duration::from_millis(ms)).with_pdos(&[8; 8]);
+/// let error = four_axes(1).load().expect_err("8 PDOs of 135 bits and a SYNC of 55");
+/// assert_eq!(
+///     error.to_string(),
+///     "bus load 114 % (limit 80 %): SYNC and PDOs take 1.135ms of every 1ms; \
+///      a SYNC period of 1.419ms would fit"
+/// );
+/// assert!((four_axes(2).load()?.load - 0.5675).abs() < 1e-9);
+/// # Ok::<(), drivers::protocol::bus_load::BusLoadError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusPlan {
     /// Bits per second.

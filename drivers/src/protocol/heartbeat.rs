@@ -28,6 +28,24 @@ pub enum HeartbeatEvent {
 ///
 /// As CiA 301 wants it, a node is watched from its first heartbeat on, not before: see
 /// [`HeartbeatConsumer::expect`] for one that must be alive now.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::heartbeat::{HeartbeatConsumer, HeartbeatEvent};
+/// use std::time::Duration;
+/// use units::Time;
+/// use wire::can::CanFrame;
+/// use wire::canopen::{NodeId, nmt::NmtState};
+///
+/// let (node, waited) = (NodeId::new(5).expect("1 to 127"), Duration::from_millis(150));
+/// let mut consumer = HeartbeatConsumer::new(node, waited);
+/// let heard = consumer.handle_frame(Time::ZERO, &CanFrame::standard(0x705, &[0x05]));
+/// let to = NmtState::Operational;
+/// assert_eq!(heard, Some(HeartbeatEvent::Changed { from: None, to }));
+/// let silent = consumer.handle_timeout(Time::from_seconds(0.15));
+/// assert_eq!(silent, Some(HeartbeatEvent::Lost { waited }));
+/// ```
 #[derive(Debug)]
 pub struct HeartbeatConsumer {
     node: NodeId,
@@ -112,6 +130,22 @@ impl HeartbeatConsumer {
 }
 
 /// Sends our own heartbeat, which the drives watch (0x1016): when it stops, they stop.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::heartbeat::HeartbeatProducer;
+/// use std::time::Duration;
+/// use units::Time;
+/// use wire::canopen::NodeId;
+///
+/// let master = NodeId::new(0x7F).expect("1 to 127");
+/// let mut producer = HeartbeatProducer::new(master, Duration::from_millis(50));
+/// producer.handle_timeout(Time::ZERO);
+/// assert_eq!(producer.poll_transmit().map(|it| it.to_string()), Some("77F#05".into()));
+/// assert_eq!(producer.poll_transmit(), None);
+/// assert_eq!(producer.poll_timeout(), Time::from_seconds(0.05));
+/// ```
 #[derive(Debug)]
 pub struct HeartbeatProducer {
     node: NodeId,

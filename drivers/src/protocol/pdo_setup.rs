@@ -18,6 +18,23 @@ pub enum PdoDirection {
 }
 
 /// One PDO of a node, numbered 1 to 4 as in the predefined connection set.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::pdo_setup::{Pdo, PdoDirection};
+/// use wire::canopen::NodeId;
+/// use wire::canopen::pdo::{MappedObject, Transmission};
+///
+/// let node = NodeId::new(5).expect("1 to 127");
+/// let pdo = Pdo::new(PdoDirection::Transmit, 1).expect("1 to 4");
+/// assert_eq!(pdo.cob_id(node), 0x185);
+/// let mapped = [MappedObject::new(0x6041, 0, 16), MappedObject::new(0x6064, 0, 32)];
+/// let steps = pdo.configure(node, &mapped, Transmission::Synchronous(1))?;
+/// assert_eq!(steps[0].object.to_string(), "0x1800:01", "first of all it is switched off");
+/// assert!(pdo.configure(node, &[mapped[1]; 3], Transmission::Event).is_err(), "96 bits");
+/// # Ok::<(), drivers::protocol::pdo_setup::PdoTooLong>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Pdo {
     direction: PdoDirection,

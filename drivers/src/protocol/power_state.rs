@@ -63,6 +63,23 @@ pub enum PowerStep {
 const CHANGES_MAX: u8 = 16;
 
 /// One way to one goal.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::power_state::{Goal, PowerSequence, PowerStep};
+/// use std::time::Duration;
+/// use units::Time;
+/// use wire::cia402::{Controlword, Statusword};
+///
+/// let patience = Duration::from_millis(500);
+/// let mut sequence = PowerSequence::new(Time::ZERO, Goal::OperationEnabled, patience);
+/// let mut next = |raw| sequence.next(Time::ZERO, Statusword::from_bits_retain(raw), true);
+/// assert_eq!(next(0x0250), PowerStep::Command(Controlword::SHUTDOWN));
+/// assert_eq!(next(0x0231), PowerStep::Command(Controlword::SWITCH_ON_COMMAND));
+/// assert_eq!(next(0x0233), PowerStep::Command(Controlword::ENABLE_COMMAND));
+/// assert_eq!(next(0x0237), PowerStep::Done(Controlword::ENABLE_COMMAND));
+/// ```
 #[derive(Debug)]
 pub struct PowerSequence {
     goal: Goal,

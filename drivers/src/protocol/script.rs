@@ -181,6 +181,29 @@ enum Phase {
 }
 
 /// A script on its way.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::script::{Script, ScriptCause, Step};
+/// use drivers::protocol::sdo_client::{SdoClient, Timeouts};
+/// use units::Time;
+/// use wire::can::CanFrame;
+/// use wire::canopen::{NodeId, Object};
+///
+/// let node = NodeId::new(5).expect("1 to 127");
+/// let mut client = SdoClient::new(node, Timeouts::default());
+/// let window = Object::new(0x6067, 0);
+/// let mut script = Script::new([Step::check(window, 9_u32, "setting the position window")]);
+/// // Written, and read back as 8.
+/// for answer in [[0x60, 0x67, 0x60, 0, 0, 0, 0, 0], [0x43, 0x67, 0x60, 0, 8, 0, 0, 0]] {
+///     assert_eq!(script.poll(Time::ZERO, &mut client), None);
+///     client.poll_transmit();
+///     client.handle_frame(Time::ZERO, &CanFrame::standard(0x585, &answer));
+/// }
+/// let failure = script.poll(Time::ZERO, &mut client).and_then(Result::err);
+/// assert_eq!(failure.map(|it| it.cause), Some(ScriptCause::Differs { expected: 9, seen: 8 }));
+/// ```
 #[derive(Debug)]
 pub struct Script {
     steps: VecDeque<Step>,

@@ -13,6 +13,19 @@ use super::lockstep::Participant;
 /// An emulated machine may live ten times as fast as the wall; controller and emulator then
 /// use the same factor, and every time-out and period means the same to both. With a shared
 /// clock nothing depends on the wall's.
+///
+/// # Example
+///
+/// ```
+/// use drivers::transport::clock::Clock;
+/// use std::time::Duration;
+///
+/// let clock = Clock::scaled(10.0);
+/// assert_eq!(clock.wall_span(Duration::from_secs(5)), Duration::from_millis(500));
+/// assert_eq!(clock.span_of_wall(Duration::from_millis(3)), Duration::from_millis(30));
+/// let earlier = clock.now();
+/// assert_eq!(clock.until(earlier), Duration::ZERO, "that moment is over");
+/// ```
 #[derive(Clone, Debug)]
 pub struct Clock(Pace);
 

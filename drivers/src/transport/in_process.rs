@@ -12,6 +12,46 @@ use super::{SendError, Transport};
 const EINVAL: i32 = 22;
 
 /// What is at the other end of the ports: emulated devices and their machine.
+///
+/// # Example
+///
+/// A world in which every frame comes back 300 µs later.
+///
+/// ```
+/// use drivers::transport::in_process::{InProcess, World};
+/// use drivers::transport::{SendError, Transport};
+/// use std::time::Duration;
+/// use units::Time;
+/// use wire::can::CanFrame;
+/// use wire::{Arrival, Input, Payload, Port};
+///
+/// #[derive(Default)]
+/// struct Echo(Option<Arrival>, Time);
+///
+/// impl World for Echo {
+///     fn next_event(&self) -> Time {
+///         self.0.as_ref().map_or(Time::NEVER, |it| it.at)
+///     }
+///     fn advance(&mut self, to: Time) {
+///         self.1 = to;
+///     }
+///     fn deliver(&mut self, at: Time, port: Port, it: &Payload) -> Result<(), SendError> {
+///         let at = at + Duration::from_micros(300);
+///         self.0 = Some(Arrival { port, at, input: Input::Payload(it.clone()) });
+///         Ok(())
+///     }
+///     fn collect(&mut self) -> Option<Arrival> {
+///         self.0.take_if(|it| it.at <= self.1)
+///     }
+/// }
+///
+/// let mut bus = InProcess::new(Echo::default());
+/// bus.send(Port(2), &Payload::Frame(CanFrame::standard(0x601, &[1])))?;
+/// let answer = bus.receive(Time::from_seconds(1.0));
+/// assert_eq!(answer.map(|it| (it.port, it.at)), Some((Port(2), Time(300_000))));
+/// assert_eq!(bus.now(), Time(300_000), "no time is waited for in vain");
+/// # Ok::<(), SendError>(())
+/// ```
 pub trait World {
     /// The world's present time. Ahead of the host's when the host was held up.
     fn now(&self) -> Time {

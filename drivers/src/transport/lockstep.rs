@@ -62,6 +62,16 @@ pub enum LockstepError {
 ///
 /// # Errors
 /// When nobody listens there, or the machine does not know how.
+///
+/// # Example
+///
+/// ```
+/// use drivers::transport::lockstep::{LockstepError, lend_hand};
+///
+/// let nobody = std::env::temp_dir().join("no-such-machine");
+/// let refused = lend_hand(&nobody, "turn-plate 73");
+/// assert!(matches!(refused, Err(LockstepError::NoClock { .. })));
+/// ```
 pub fn lend_hand(path: &Path, words: &str) -> Result<String, LockstepError> {
     let request = Request::Do {
         words: words.to_owned(),

@@ -42,6 +42,22 @@ pub(super) const fn rounded(at: Time) -> Time {
 }
 
 /// A transport that writes down what passes.
+///
+/// # Example
+///
+/// ```
+/// use drivers::transport::{Transport, record::Recorder, replay::Replay};
+/// use wire::{Payload, Port};
+///
+/// let (nothing, names) = (Replay::parse("", &[])?, [(Port(3), "laser")]);
+/// let mut recorder = Recorder::new(nothing, Vec::new(), &names)?;
+/// recorder.send(Port(3), &Payload::Bytes(b"#01\r".to_vec()))?;
+/// let (_, text) = recorder.finish()?;
+/// let text = String::from_utf8(text)?;
+/// let bytes = "# (0000000000.000000) laser T 2330310D";
+/// assert_eq!(text.lines().collect::<Vec<_>>(), ["# truestage recording 1", "# port 3 laser", bytes]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Recorder<T, W> {
     inner: T,

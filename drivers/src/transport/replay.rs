@@ -81,6 +81,23 @@ pub struct ReplayReport {
 }
 
 /// A recording as a transport.
+///
+/// # Example
+///
+/// ```
+/// use drivers::transport::{Transport, replay::Replay};
+/// use units::Time;
+/// use wire::{Payload, Port, can::CanFrame};
+///
+/// let log = "(0000000010.000000) can0 705#00 R\n(0000000010.000100) can0 000#0105 T\n";
+/// let mut replay = Replay::parse(log, &[(Port(4), "can0")])?;
+/// let boot_up = replay.receive(Time::NEVER).expect("one frame arrived");
+/// assert_eq!((boot_up.port, boot_up.at), (Port(4), Time::from_seconds(10.0)));
+/// replay.send(Port(4), &Payload::Frame(CanFrame::standard(0, &[0x81, 5])))?;
+/// let report = replay.report();
+/// assert_eq!((report.matched, report.mismatched), (0, 1), "a reset instead of a start");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Replay {
     now: Time,

@@ -84,6 +84,22 @@ pub struct Departure {
 ///
 /// # Errors
 /// The first line that cannot be used.
+///
+/// # Example
+///
+/// ```
+/// use machine::engine::read_path;
+/// use std::time::Duration;
+///
+/// let axes = ["x", "y"].map(str::to_owned);
+/// let text = "time_s,y_mm,x_mm\n0,5,1\n0.010,5,3\n";
+/// let path = read_path(text, &axes, Duration::from_millis(1))?;
+/// assert_eq!(path.points.len(), 11);
+/// // 1 + 2·(3u² − 2u³): from rest to rest.
+/// assert!((path.points[5][0].mm() - 2.0).abs() < 1e-12);
+/// assert!((path.points[1][0].mm() - 1.056).abs() < 1e-12);
+/// # Ok::<(), machine::engine::CsvError>(())
+/// ```
 pub fn read_path(text: &str, axes: &[String], period: Duration) -> Result<CsvPath, CsvError> {
     let rows = read_rows(text, axes)?;
     let last = rows.times.last().copied().unwrap_or_default();

@@ -13,6 +13,19 @@ const DOUBLINGS: u32 = 21;
 const CLASSES: usize = (STEPS * (DOUBLINGS + 1)) as usize;
 
 /// How often which time came up.
+///
+/// # Example
+///
+/// ```
+/// use machine::engine::Histogram;
+/// use std::time::Duration;
+///
+/// let mut histogram = Histogram::default();
+/// (1..=100).for_each(|micros| histogram.note(Duration::from_micros(micros)));
+/// assert_eq!(histogram.percentile(0.5), Duration::from_micros(52), "the end of its class");
+/// assert_eq!(histogram.percentile(1.0), Duration::from_micros(100));
+/// assert!(histogram.to_string().starts_with("p50 52 us, p99 "));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histogram {
     counts: [u64; CLASSES],

@@ -51,6 +51,30 @@ impl From<Refusal> for MotionError {
 }
 
 /// Plans and looks up one motion at a time.
+///
+/// # Example
+///
+/// ```
+/// use machine::engine::{AXES_MAX, AxisLimits, Moment, Motion, MotionError};
+/// use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
+///
+/// let x = AxisLimits {
+///     max: Metres(0.1),
+///     speed: MetresPerSecond(0.1),
+///     acceleration: MetresPerSecondSquared(1.0),
+///     jerk: MetresPerSecondCubed(10.0),
+///     ..AxisLimits::default()
+/// };
+/// let mut motion = Motion::new(1, [x; AXES_MAX]);
+/// let (rest, target) = (Moment::default(), [Metres(0.05); AXES_MAX]);
+/// let takes = motion.plan_to(&rest, &target)?;
+/// // 0.05 m at 0.1 m/s, a tenth of a second more to get there, and another for the jerk.
+/// assert!((takes.as_secs_f64() - 0.7).abs() < 1e-9);
+/// assert!((motion.at(takes / 2).position[0].mm() - 25.0).abs() < 1e-9);
+/// let refused = motion.plan_to(&rest, &[Metres(0.2); AXES_MAX]);
+/// assert!(matches!(refused, Err(MotionError::SoftLimit { axis: 0, .. })));
+/// # Ok::<(), MotionError>(())
+/// ```
 pub struct Motion {
     axes: usize,
     limits: PerAxis<AxisLimits>,

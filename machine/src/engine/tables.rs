@@ -12,6 +12,39 @@ use units::{Approach, Metres};
 use super::{AXES_MAX, Corrected, Correction, Observed, Validity};
 
 /// Corrects each axis by its own table.
+///
+/// # Example
+///
+/// ```
+/// use compensator::error_table::{
+///     Compensation, EndPolicy, ErrorTable, Interpolation, Limits, Node,
+/// };
+/// use machine::engine::{Correction, Observed, TableCorrection};
+/// use units::{Metres, MetresPerSecond, Time};
+///
+/// let nodes = [(0.0, 0.0), (10.0, 10.0)].map(|(mm, um)| Node {
+///     position: Metres::from_mm(mm),
+///     forward: Some(Metres::from_um(um)),
+///     reverse: None,
+///     u_forward: Some(Metres::from_um(0.5)),
+///     u_reverse: None,
+/// });
+/// let (size, rate) = (Metres::from_um(50.0), MetresPerSecond(1.0));
+/// let limits = Limits { size, slope: 0.01, rate };
+/// let table = ErrorTable::new(nodes.to_vec())?;
+/// let table = Compensation::new(table, Interpolation::Linear, limits, EndPolicy::Hold)?;
+/// let place = [Metres::from_mm(5.005)];
+/// let said = TableCorrection::new([Some(table)]).correct(&Observed {
+///     now: Time::ZERO,
+///     nominal: &place,
+///     actual: &place,
+///     channels: &[],
+///     temperatures: &[],
+/// });
+/// assert!((said.offset[0].um() + 5.0).abs() < 1e-6, "5 mm brings it to 5.005 mm");
+/// assert!((said.uncertainty[0].um() - 0.5).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct TableCorrection {
     axes: Vec<Option<AxisTable>>,

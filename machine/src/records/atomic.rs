@@ -14,6 +14,19 @@ const ORDINARY_MODE: u32 = 0o666;
 /// folder. Whatever happens, `path` holds the old content or the whole new one. A file that is
 /// replaced keeps its mode; a new one has the ordinary one, because a calibration is for everybody
 /// who uses the machine, while a temporary file is for its maker only.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::write_new_or_replace;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("active/x.json");
+/// write_new_or_replace(&path, b"one")?;
+/// write_new_or_replace(&path, b"two")?;
+/// assert_eq!(std::fs::read(&path)?, b"two");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;

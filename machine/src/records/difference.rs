@@ -25,6 +25,19 @@ impl Difference {
 }
 
 /// The first difference of what `expected` and `seen` look like in a file, if there is one.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::first_difference;
+/// use serde_json::json;
+///
+/// let before = json!({"drives": [{"serial": 1}, {"serial": 2}], "step": 0.5});
+/// let now = json!({"drives": [{"serial": 1}, {"serial": 7}], "step": 0.6});
+/// let first = first_difference(&before, &now).expect("they differ twice");
+/// assert_eq!(first.in_what("the machine"), "the machine, drives[1].serial");
+/// assert_eq!((first.expected.as_str(), first.seen.as_str()), ("2", "7"));
+/// ```
 pub fn first_difference<T: Serialize + ?Sized>(expected: &T, seen: &T) -> Option<Difference> {
     let value = |it: &T| serde_json::to_value(it).expect("plain data always serialises");
     below("", &value(expected), &value(seen))

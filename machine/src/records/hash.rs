@@ -2,6 +2,17 @@
 
 /// BLAKE3 of what a calibration depends on, in hexadecimal: as it is written today, and as earlier
 /// programs wrote it.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::ConfigHash;
+///
+/// let earlier = ConfigHash::of_texts("scale 10 nm", &[]);
+/// let now = ConfigHash::of_texts("scale 0.00001 mm", &["scale 10 nm".to_owned()]);
+/// assert!(now.is(earlier.as_str()), "the same values, written otherwise");
+/// assert!(!now.is(ConfigHash::of_texts("scale 20 nm", &[]).as_str()));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConfigHash {
     current: String,

@@ -8,6 +8,21 @@ use nix::fcntl::{Flock, FlockArg};
 use super::{Store, StoreError, io_error};
 
 /// The right to use a machine; given back when dropped, or by the kernel when the process dies.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::{Lease, Store, StoreError};
+///
+/// let folder = tempfile::tempdir()?;
+/// let store = Store::new(folder.path(), "stage", &[]);
+/// let lease = Lease::take(&store, "calibrate")?;
+/// let second = Lease::take(&store, "move");
+/// assert!(matches!(second, Err(StoreError::Leased { owner }) if owner.contains("calibrate")));
+/// drop(lease);
+/// Lease::take(&store, "move")?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Lease {
     _lock: Flock<File>,

@@ -83,6 +83,17 @@ pub const PASSES_MAX: usize = 10_000;
 ///
 /// # Errors
 /// When it is not so.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::sound::{CELSIUS, number};
+///
+/// assert_eq!(number("air", 21.5, &CELSIUS), Ok(()));
+/// let unsound = number("air", -300.0, &CELSIUS).expect_err("colder than anything is");
+/// assert_eq!((unsound.place.as_str(), unsound.seen.as_str()), ("air", "-3e2"));
+/// assert!(number("air", f64::NAN, &CELSIUS).is_err());
+/// ```
 pub fn number(place: impl fmt::Display, seen: f64, limits: &Limits) -> Judged {
     // A NaN is in no range.
     if limits.range.contains(&seen) {
@@ -200,6 +211,15 @@ pub fn approach(place: &str, seen: char) -> Judged {
 ///
 /// # Errors
 /// When it is not so.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::sound::file_name;
+///
+/// assert_eq!(file_name("axis", "x"), Ok(()));
+/// assert!(file_name("axis", "../other/x").is_err(), "it would lead elsewhere");
+/// ```
 pub fn file_name(place: &str, seen: &str) -> Judged {
     let is_name = !seen.is_empty() && seen.len() <= 200 && seen != "." && seen != "..";
     let is_plain = seen.chars().all(|it| it != '/' && !it.is_control());
@@ -216,6 +236,16 @@ const STEP_MIN_M: f64 = 1e-10;
 ///
 /// # Errors
 /// When it is not so.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::sound::increasing;
+///
+/// assert_eq!(increasing("nodes_m", &[0.0, 0.003, 0.006]), Ok(()));
+/// let unsound = increasing("nodes_m", &[0.0, 0.003, 0.003]).expect_err("one place twice");
+/// assert_eq!(unsound.place, "nodes_m[2]");
+/// ```
 pub fn increasing(place: &str, seen: &[f64]) -> Judged {
     // A comparison with NaN is false.
     let follows = |it: &[f64]| it[1] - it[0] >= STEP_MIN_M;

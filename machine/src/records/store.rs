@@ -21,6 +21,41 @@ pub struct ActivePointer {
 }
 
 /// One machine's folder.
+///
+/// # Example
+///
+/// ```
+/// use machine::records::sound::{Judged, counted};
+/// use machine::records::{CalibrationRecord, Content, ContentKind, RecordHead, Store};
+/// use serde::{Deserialize, Serialize};
+///
+/// #[derive(Debug, PartialEq, Serialize, Deserialize)]
+/// struct Note {
+///     lines: usize,
+/// }
+///
+/// impl Content for Note {
+///     const KIND: &'static str = "note";
+///
+///     fn summary(&self) -> String {
+///         format!("{} lines", self.lines)
+///     }
+///
+///     fn judge(&self) -> Judged {
+///         counted("lines", self.lines, 1..=10)
+///     }
+/// }
+///
+/// let folder = tempfile::tempdir()?;
+/// let store = Store::new(folder.path(), "stage", const { &[ContentKind::of::<Note>()] });
+/// let head = RecordHead { schema_version: 1, axis: "x".into(), ..RecordHead::default() };
+/// let id = store.save(&CalibrationRecord { head, content: Note { lines: 2 } })?;
+/// assert_eq!(store.resolve(&id[..6])?, id, "the beginning of its name is enough");
+/// assert_eq!(store.glance(&id)?.summary, "2 lines");
+/// store.activate("x", &id)?;
+/// assert_eq!(store.active("x")?.current, Some(id));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Store {
     root: PathBuf,

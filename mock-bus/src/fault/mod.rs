@@ -20,6 +20,18 @@ mod tests;
 pub(crate) use plan::{Edge, Plan};
 
 /// A fault, when it is there and how often it strikes.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::fault::{Fault, FaultConfig};
+/// use std::time::Duration;
+///
+/// let once = FaultConfig::times(Fault::BeamBlocked, 1);
+/// assert_eq!((once.count_max, once.duration_s), (Some(1), None));
+/// let for_a_while = FaultConfig::lasting(Fault::BeamBlocked, Duration::from_millis(250));
+/// assert_eq!(for_a_while.duration_s, Some(0.25));
+/// ```
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultConfig {

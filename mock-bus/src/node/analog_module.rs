@@ -79,6 +79,21 @@ pub trait Profile {
 }
 
 /// An emulated analog module on the bus.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::cia401_analog::{Cia401AnalogConfig, Cia401AnalogNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::{Payload, can::CanFrame};
+///
+/// let mut module = Cia401AnalogNode::new(Cia401AnalogConfig { node_id: 5, ..Default::default() });
+/// module.advance(Time::from_seconds(0.1), &mut Plant::default());
+/// let boot_up = Payload::Frame(CanFrame::standard(0x705, &[0]));
+/// assert_eq!(module.poll_transmit(), Some(boot_up));
+/// ```
 #[derive(Debug)]
 pub struct AnalogModule<P> {
     profile: P,

@@ -129,6 +129,25 @@ enum Doing {
 }
 
 /// The emulated vision system.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::in_sight_controller::{InSightControllerConfig, InSightControllerNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::Payload;
+///
+/// let (config, mut plant) = (InSightControllerConfig::default(), Plant::default());
+/// let mut camera = InSightControllerNode::new(&config, 1, "eye");
+/// camera.power_on(Time::ZERO, &mut plant);
+/// let asked = Payload::Bytes(b"GF\r".to_vec());
+/// camera.handle(Time::from_seconds(2.0), &asked, &mut plant);
+/// camera.advance(camera.next_event(), &mut plant);
+/// let answer = b"1\rplatform.job\r".to_vec();
+/// assert_eq!(camera.poll_transmit(), Some(Payload::Bytes(answer)));
+/// ```
 #[derive(Clone, Debug)]
 pub struct InSightControllerNode {
     config: InSightControllerConfig,

@@ -99,6 +99,26 @@ impl DeviceConfig {
 /// One emulated device.
 ///
 /// It is [`Any`], so that a test can reach a device's own faults through the simulation.
+///
+/// # Example
+///
+/// Whoever runs a node hands it what was sent, advances it when it wants to be, and takes what it sends.
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::dcon_module::{DconModuleConfig, DconModuleNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::Payload;
+///
+/// let config = DconModuleConfig { checksum: false, boot_ms: 0.0, ..DconModuleConfig::default() };
+/// let (mut module, mut plant) = (DconModuleNode::new(&config, 1, "adc"), Plant::default());
+/// module.power_on(Time::ZERO, &mut plant);
+/// module.handle(Time::ZERO, &Payload::Bytes(b"$01M\r".to_vec()), &mut plant);
+/// assert_eq!(module.poll_transmit(), None, "not yet");
+/// module.advance(module.next_event(), &mut plant);
+/// assert_eq!(module.poll_transmit(), Some(Payload::Bytes(b"!014117\r".to_vec())));
+/// ```
 pub trait Node: Any {
     /// Whether what was sent on the node's port means anything to it; what does not changes nothing
     /// about the node, and is not handed to it.

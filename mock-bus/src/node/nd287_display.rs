@@ -72,6 +72,25 @@ const ESC: u8 = 0x1b;
 const COMMAND_MAX: usize = 16;
 
 /// The emulated display.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::nd287_display::{Nd287DisplayConfig, Nd287DisplayNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::Payload;
+///
+/// let (config, mut plant) = (Nd287DisplayConfig::default(), Plant::default());
+/// let mut display = Nd287DisplayNode::new(&config, 1, "nd");
+/// display.power_on(Time::ZERO, &mut plant);
+/// let asked = Payload::Bytes(b"\x1bA0000\r".to_vec());
+/// display.handle(Time::from_seconds(2.0), &asked, &mut plant);
+/// display.advance(display.next_event(), &mut plant);
+/// let answer = b"\x02ND-287    \r\n646118-01 \r\nV1-01     \r\n".to_vec();
+/// assert_eq!(display.poll_transmit(), Some(Payload::Bytes(answer)));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Nd287DisplayNode {
     config: Nd287DisplayConfig,

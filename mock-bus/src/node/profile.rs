@@ -50,6 +50,21 @@ impl Phase {
 }
 
 /// A demand over time, at rest before nothing and after its end.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::profile::{MotionLimits, MotionState, Profile};
+/// use units::Time;
+///
+/// let rest = MotionState { position: 0.0, velocity: 0.0 };
+/// let limits = MotionLimits { velocity: 100.0, acceleration: 100.0, deceleration: 100.0 };
+/// let profile = Profile::to_target(Time::ZERO, rest, 300.0, limits);
+/// // A second each to speed up and to slow down, and 200 counts between them.
+/// assert_eq!(profile.end(), Time::from_seconds(4.0));
+/// let half = profile.at(Time::from_seconds(2.0));
+/// assert_eq!((half.position, half.velocity), (150.0, 100.0));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     start: Time,

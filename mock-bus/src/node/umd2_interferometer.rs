@@ -60,6 +60,30 @@ const STRONG: i32 = 87;
 const WEAK: i32 = 9;
 
 /// The emulated interferometer.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::umd2_interferometer::{Umd2InterferometerConfig, Umd2InterferometerNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::Payload;
+/// use wire::umd2::Line;
+///
+/// let config = Umd2InterferometerConfig { batch_samples: 1, ..Default::default() };
+/// let (mut laser, mut plant) = (Umd2InterferometerNode::new(&config), Plant::default());
+/// laser.power_on(Time::ZERO, &mut plant);
+/// laser.advance(laser.next_event(), &mut plant);
+/// let greeting = Payload::Bytes(b"! uMD2 firmware 141\n".to_vec());
+/// assert_eq!(laser.poll_transmit(), Some(greeting));
+/// laser.advance(laser.next_event(), &mut plant);
+/// let Some(Payload::Bytes(line)) = laser.poll_transmit() else { unreachable!("it streams") };
+/// let line = String::from_utf8(line)?;
+/// let Ok(Line::Sample(sample)) = Line::parse(line.trim_end()) else { unreachable!("{line}") };
+/// assert_eq!(sample.reference_count, 2458, "1500 kHz at 610.35 samples a second");
+/// # Ok::<(), std::string::FromUtf8Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Umd2InterferometerNode {
     config: Umd2InterferometerConfig,

@@ -32,6 +32,19 @@ pub struct SensorDrift {
 }
 
 /// How both sensors have drifted since the machine was built.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::plant::{DriftLimits, HallDrift};
+/// use units::Volts;
+///
+/// let limits = DriftLimits { offset: Volts(0.1), gain: 0.03, gain_per_m: 0.0 };
+/// let drift = HallDrift::random(7, 1, limits);
+/// assert_eq!(drift, HallDrift::random(7, 1, limits));
+/// assert!(drift.sensors.iter().all(|it| it.offset.abs() <= Volts(0.1) && it.gain.abs() <= 0.03));
+/// assert_ne!(drift, HallDrift::random(7, 2, limits), "the next night");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HallDrift {
     /// Sensor 1 (even curve) and sensor 2 (odd curve).

@@ -52,6 +52,24 @@ const TEMPERATURE_RAIL_C: f64 = 850.0;
 
 /// Everything physical of one machine. Its axes are numbered from 0; axes that are not there
 /// stand still and read 0.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::plant::config::PlantConfig;
+/// use mock_bus::plant::{Beam, Plant};
+/// use units::Time;
+///
+/// let (config, now) = (PlantConfig::default(), Time::from_seconds(1.0));
+/// let mut machines = [Plant::new(&config, 7), Plant::new(&config, 7)];
+/// machines.iter_mut().for_each(|it| it.advance(now));
+/// let [a, b] = machines.each_mut().map(|it| it.analog_volts(0));
+/// assert_eq!(a, b, "the same noise");
+/// let plant = &mut machines[0];
+/// plant.set_beam(Beam::Blocked);
+/// assert_eq!(plant.fringes().beam, Beam::Blocked);
+/// assert_eq!(plant.encoder_counts(99), 0, "an axis that is not there");
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plant {
     now: Time,

@@ -18,6 +18,19 @@ pub const WORDS: &str = "turn-plate LINES | fix-plate OFFSET | place-plate OFFSE
                          end-fault NUMBER | power off | power on | truth";
 
 /// What a hand does.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::fault::Fault;
+/// use mock_bus::runner::hand::Deed;
+///
+/// assert_eq!(Deed::parse("turn-plate 73"), Ok(Deed::TurnPlate(73.0)));
+/// let deed = Deed::parse("fault from_s = 2.0, fault = { kind = \"beam_blocked\" }")?;
+/// assert!(matches!(deed, Deed::Fault(it) if it.from_s == 2.0 && it.fault == Fault::BeamBlocked));
+/// assert!(Deed::parse("power up").is_err(), "on or off");
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Deed {
     /// Turns the table's plate by so many lines and fixes it again.
@@ -118,6 +131,21 @@ impl Deed {
 }
 
 /// The hands of one machine, and what they remember.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::config::MachineConfig;
+/// use mock_bus::runner::hand::Hands;
+/// use mock_bus::simulation::Simulation;
+///
+/// let config = MachineConfig::parse("name = \"bench\"\nports = []\nnodes = []\n")?;
+/// let (mut hands, mut machine) = (Hands::default(), Simulation::new(&config, 1)?);
+/// let fault = hands.do_words("fault fault = { kind = \"beam_blocked\" }", &mut machine);
+/// assert_eq!(fault, Ok("fault 0".into()));
+/// assert!(hands.do_words("turn-plate 1", &mut machine).is_err(), "it has no plate");
+/// # Ok::<(), mock_bus::config::ConfigError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Hands {
     /// What the place is called where the plate lies, in lines.

@@ -168,6 +168,26 @@ pub struct Running {
 ///
 /// # Errors
 /// When the configuration contradicts itself or a terminal cannot be opened.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::config::MachineConfig;
+/// use mock_bus::runner::spawn_on_ptys;
+///
+/// let config = MachineConfig::parse(
+///     r#"
+///     name = "bench"
+///     ports = [{ kind = "serial", name = "adc", baud_bit_per_s = 9600 }]
+///     nodes = [{ name = "adc", port = "adc", device = { kind = "dcon_module" } }]
+///     "#,
+/// )?;
+/// let machine = spawn_on_ptys(&config, 7, 1.0)?;
+/// assert_eq!(machine.ports().len(), 1, "a terminal for somebody's driver");
+/// assert!(machine.ports()[0].exists());
+/// machine.stop()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn spawn_on_ptys(config: &MachineConfig, seed: u64, speed: f64) -> Result<Running, RunError> {
     spawn(
         config,

@@ -118,6 +118,34 @@ pub struct Guest {
 }
 
 /// One emulated machine in virtual time.
+///
+/// # Example
+///
+/// An analog module is asked for its name; the same seed gives the same log, bit by bit.
+///
+/// ```
+/// use mock_bus::config::MachineConfig;
+/// use mock_bus::simulation::{Event, Simulation};
+/// use units::Time;
+/// use wire::{Payload, Port};
+///
+/// let config = MachineConfig::parse(
+///     r#"
+///     name = "bench"
+///     ports = [{ kind = "serial", name = "adc", baud_bit_per_s = 9600 }]
+///     nodes = [{ name = "adc", port = "adc", device = { kind = "dcon_module", checksum = false } }]
+///     "#,
+/// )?;
+/// let mut simulations = [Simulation::new(&config, 7)?, Simulation::new(&config, 7)?];
+/// for simulation in &mut simulations {
+///     let asked = Payload::Bytes(b"$01M\r".to_vec());
+///     simulation.deliver(Time::from_seconds(1.0), Port(0), &asked)?;
+///     let answer = simulation.advance_to_delivery(Time::from_seconds(2.0)).map(|it| it.event);
+///     assert_eq!(answer, Some(Event::Payload(Payload::Bytes(b"!014117\r".to_vec()))));
+/// }
+/// assert_eq!(simulations[0].log_hash(), simulations[1].log_hash());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Simulation {
     config: MachineConfig,
     now: Time,
@@ -273,6 +301,31 @@ impl Simulation {
     ///
     /// # Errors
     /// When it names a port or a node that is not there.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use mock_bus::config::MachineConfig;
+    /// use mock_bus::fault::{Fault, FaultConfig};
+    /// use mock_bus::simulation::Simulation;
+    /// use units::Time;
+    ///
+    /// let config = MachineConfig::parse(
+    ///     r#"
+    ///     name = "bench"
+    ///     ports = [{ kind = "can", name = "can0", bitrate_kbit_per_s = 1000 }]
+    ///     nodes = [{ name = "drive", port = "can0", device = { kind = "cia402_drive" } }]
+    ///     "#,
+    /// )?;
+    /// let mut simulation = Simulation::new(&config, 7)?;
+    /// let mute = Fault::Mute { node: "drive".into() };
+    /// let fault = simulation.inject(FaultConfig::permanent(mute))?;
+    /// assert_eq!(simulation.advance_to_delivery(Time::from_seconds(5.0)), None, "no boot-up message");
+    /// assert_eq!(simulation.fault_deliveries(fault), 1, "it was kept back");
+    /// let nobody = Fault::Mute { node: "laser".into() };
+    /// assert!(simulation.inject(FaultConfig::permanent(nobody)).is_err());
+    /// # Ok::<(), mock_bus::config::ConfigError>(())
+    /// ```
     pub fn inject(&mut self, fault: FaultConfig) -> Result<FaultId, ConfigError> {
         self.config
             .check_fault(&fault, |node| self.slot(node).is_some())?;

@@ -11,6 +11,7 @@ mod repeatable;
 mod rotary;
 mod rotary_table;
 mod serial_zero;
+mod survey;
 mod volumetric;
 mod volumetric_cold;
 mod volumetric_day;

@@ -5,7 +5,7 @@
 //! both over a range and prints them.
 
 use compensator::error_table::{ErrorTable, Node};
-use tests::{Bench, Edit, random};
+use tests::{Bench, Edit, random, seeds};
 use truestage::run::CalibrateOptions;
 use truestage::{Failure, Store};
 use units::Metres;
@@ -269,9 +269,7 @@ fn a_position_that_is_wrong_in_every_run_is_refused_and_named() {
 #[test]
 #[ignore = "many stages: for whoever wants the rates, over SEEDS=FIRST..LAST"]
 fn the_rates_over_many_seeds() {
-    let seeds = std::env::var("SEEDS").unwrap_or_else(|_| "1..300".into());
-    let (first, last) = seeds.split_once("..").expect("SEEDS=FIRST..LAST");
-    let (first, last): (u64, u64) = (first.parse().unwrap(), last.parse().unwrap());
-    Count::over(first..=last, false).tell("shipped stage");
-    Count::over(first..=last, true).tell("drawn stages");
+    let seeds = seeds("1..300");
+    Count::over(seeds.clone(), false).tell("shipped stage");
+    Count::over(seeds, true).tell("drawn stages");
 }

@@ -5,6 +5,16 @@ use crate::can::CanFrame;
 use core::fmt;
 
 /// A 16-bit emergency error code.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::emcy::EmergencyCode;
+///
+/// assert_eq!(EmergencyCode(0x8611).to_string(), "0x8611 (following error)");
+/// assert_eq!(EmergencyCode(0x2311).name(), "current", "the class of a code without a name");
+/// assert!(EmergencyCode(0x0000).is_cleared());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct EmergencyCode(pub u16);
 
@@ -88,6 +98,19 @@ impl fmt::Display for EmergencyCode {
 }
 
 /// One emergency message.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanFrame;
+/// use wire::canopen::emcy::{Emergency, EmergencyCode};
+///
+/// let frame = CanFrame::standard(0x083, &[0x11, 0x86, 0x20, 0x02, 0, 0, 0, 0]);
+/// let (node, emergency) = Emergency::parse(&frame)?;
+/// assert_eq!((node.raw(), emergency.code), (3, EmergencyCode::FOLLOWING_ERROR));
+/// assert_eq!(emergency.emit(node), frame);
+/// # Ok::<(), wire::canopen::WireError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Emergency {
     /// What happened.

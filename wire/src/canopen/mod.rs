@@ -41,6 +41,16 @@ pub enum WireError {
 }
 
 /// A CANopen node identifier, 1 to 127 (CiA 301, 7.3.5).
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::{Function, NodeId};
+///
+/// let node = NodeId::new(5).expect("1 to 127");
+/// assert_eq!(node.cob_id(Function::SdoRequest), 0x605);
+/// assert_eq!(NodeId::new(0), None, "all nodes are no node");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(u8);
 
@@ -72,6 +82,15 @@ impl fmt::Display for NodeId {
 }
 
 /// The base identifiers of the predefined connection set (CiA 301, 7.3.5).
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::{Function, NodeId};
+///
+/// assert_eq!(Function::of(0x585), NodeId::new(5).map(|node| (Function::SdoResponse, node)));
+/// assert_eq!(Function::of(0x080), None, "a SYNC, of no node");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u16)]
 #[expect(missing_docs, reason = "the names are the standard's")]
@@ -118,6 +137,22 @@ impl Function {
 }
 
 /// The address of one value in an object dictionary.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::Object;
+/// use wire::canopen::sdo::{Expedited, SdoRequest, SdoResponse};
+///
+/// let mode = Object::new(0x6060, 0);
+/// assert_eq!(mode.to_string(), "0x6060:00");
+/// let data = Expedited::new(&[1]).expect("1 to 4 bytes");
+/// let write = SdoRequest::DownloadExpedited { object: mode, data };
+/// assert_eq!(write.emit(), [0x2F, 0x60, 0x60, 0, 1, 0, 0, 0]);
+/// let answer = SdoResponse::parse(&[0x60, 0x60, 0x60, 0, 0, 0, 0, 0])?;
+/// assert_eq!(answer, SdoResponse::DownloadInitiate { object: mode });
+/// # Ok::<(), wire::canopen::WireError>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Object {
     /// 16-bit index.

@@ -8,6 +8,18 @@ use core::fmt;
 pub const NMT_COB_ID: u16 = 0x000;
 
 /// What a master can ask of a node.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanFrame;
+/// use wire::canopen::{NodeId, nmt::NmtCommand};
+///
+/// assert_eq!(NmtCommand::Start.emit(NodeId::new(3)).to_string(), "000#0103");
+/// let heard = NmtCommand::parse(&CanFrame::standard(0, &[0x80, 0]))?;
+/// assert_eq!(heard, (NmtCommand::EnterPreOperational, None), "for all nodes");
+/// # Ok::<(), wire::canopen::WireError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum NmtCommand {
@@ -68,6 +80,16 @@ impl NmtCommand {
 }
 
 /// A node's state as its heartbeat reports it.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::nmt::NmtState;
+///
+/// assert_eq!(NmtState::from_raw(0x05), NmtState::Operational);
+/// assert_eq!(NmtState::from_raw(0x85), NmtState::Operational, "with a toggle bit");
+/// assert_eq!(NmtState::PreOperational.raw(), 0x7F);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NmtState {
     /// Just booted.
@@ -119,6 +141,17 @@ impl fmt::Display for NmtState {
 }
 
 /// The heartbeat (or, with [`NmtState::BootUp`], the boot-up message) of a node.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::{NodeId, nmt};
+///
+/// let node = NodeId::new(2).expect("1 to 127");
+/// let beat = nmt::emit_heartbeat(node, nmt::NmtState::Operational);
+/// assert_eq!(beat.to_string(), "702#05");
+/// assert_eq!(nmt::parse_heartbeat(&beat), Ok((node, nmt::NmtState::Operational)));
+/// ```
 pub fn emit_heartbeat(node: NodeId, state: NmtState) -> CanFrame {
     CanFrame::standard(node.cob_id(Function::ErrorControl), &[state.raw()])
 }
@@ -127,6 +160,18 @@ pub fn emit_heartbeat(node: NodeId, state: NmtState) -> CanFrame {
 ///
 /// # Errors
 /// When the identifier or the length is not error control's.
+///
+/// # Example
+///
+/// ```
+/// use wire::can::CanFrame;
+/// use wire::canopen::nmt::{NmtState, parse_heartbeat};
+///
+/// let (node, state) = parse_heartbeat(&CanFrame::standard(0x703, &[0x00]))?;
+/// assert_eq!((node.raw(), state), (3, NmtState::BootUp));
+/// assert!(parse_heartbeat(&CanFrame::standard(0x080, &[0x05])).is_err(), "a SYNC");
+/// # Ok::<(), wire::canopen::WireError>(())
+/// ```
 #[inline]
 pub fn parse_heartbeat(frame: &CanFrame) -> Result<(NodeId, NmtState), WireError> {
     const MESSAGE: &str = "heartbeat";
@@ -149,6 +194,15 @@ pub fn parse_heartbeat(frame: &CanFrame) -> Result<(NodeId, NmtState), WireError
 }
 
 /// The value of 0x1016 sub 1..n: which producer to watch, and for how long (CiA 301, 7.5.2.19).
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::{NodeId, nmt::consumer_heartbeat_entry};
+///
+/// let master = NodeId::new(0x7F).expect("1 to 127");
+/// assert_eq!(consumer_heartbeat_entry(master, 500), 0x007F_01F4);
+/// ```
 pub const fn consumer_heartbeat_entry(producer: NodeId, time_ms: u16) -> u32 {
     (producer.raw() as u32) << 16 | time_ms as u32
 }

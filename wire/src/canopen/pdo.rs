@@ -3,6 +3,16 @@
 use super::Object;
 
 /// One entry of a mapping parameter: which object, how many bits.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::pdo::MappedObject;
+///
+/// let actual_position = MappedObject::new(0x6064, 0, 32);
+/// assert_eq!(actual_position.raw(), 0x6064_0020);
+/// assert_eq!(MappedObject::from_raw(0x6041_0010).object.to_string(), "0x6041:00");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MappedObject {
     /// The object.
@@ -35,6 +45,16 @@ impl MappedObject {
 }
 
 /// The COB-ID entry of a communication parameter (sub 1).
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::pdo::PdoCobId;
+///
+/// let switched_off = PdoCobId::valid(0x181).disabled();
+/// assert_eq!(switched_off.0, 0xC000_0181);
+/// assert_eq!((switched_off.is_valid(), switched_off.cob_id()), (false, 0x181));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PdoCobId(pub u32);
 
@@ -64,6 +84,16 @@ impl PdoCobId {
 }
 
 /// When a PDO is sent or taken over (sub 2).
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::pdo::Transmission;
+///
+/// assert_eq!(Transmission::from_raw(1), Transmission::Synchronous(1));
+/// assert_eq!(Transmission::Event.raw(), 255);
+/// assert_eq!(Transmission::from_raw(252), Transmission::Unknown(252));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transmission {
     /// At the next SYNC after a change.
@@ -100,6 +130,18 @@ impl Transmission {
 
 /// The little-endian unsigned value of `bits` bits that starts `bit_offset` bits into `payload`;
 /// `None` when the payload is too short or more than 64 bits are asked for.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::pdo::{extract, sign_extend};
+///
+/// // A statusword and a position.
+/// let payload = [0x37, 0x16, 0xFE, 0xFF, 0xFF, 0xFF];
+/// assert_eq!(extract(&payload, 0, 16), Some(0x1637));
+/// assert_eq!(extract(&payload, 16, 32).map(|raw| sign_extend(raw, 32)), Some(-2));
+/// assert_eq!(extract(&payload, 32, 32), None, "beyond its end");
+/// ```
 #[inline]
 pub fn extract(payload: &[u8], bit_offset: usize, bits: u8) -> Option<u64> {
     let end = bit_offset + usize::from(bits);
@@ -114,6 +156,19 @@ pub fn extract(payload: &[u8], bit_offset: usize, bits: u8) -> Option<u64> {
 
 /// Writes the low `bits` of `value` at `bit_offset`; `None` (and nothing written) when it
 /// does not fit.
+///
+/// # Example
+///
+/// ```
+/// use wire::canopen::pdo::insert;
+///
+/// let mut payload = [0; 8];
+/// let (controlword, target) = (0x0F, -2_i64);
+/// assert_eq!(insert(&mut payload, 0, 16, controlword), Some(()));
+/// assert_eq!(insert(&mut payload, 16, 32, target.cast_unsigned()), Some(()));
+/// assert_eq!(payload, [0x0F, 0, 0xFE, 0xFF, 0xFF, 0xFF, 0, 0]);
+/// assert_eq!(insert(&mut payload, 48, 32, 0), None, "80 bits");
+/// ```
 #[inline]
 pub fn insert(payload: &mut [u8; 8], bit_offset: usize, bits: u8, value: u64) -> Option<()> {
     if bit_offset + usize::from(bits) > 64 || bits == 0 {

@@ -481,6 +481,10 @@ impl SdoResponse {
 }
 
 /// The checksum of a block transfer: CRC-16/XMODEM over the data (CiA 301, 7.2.4.3.16).
+///
+/// ```
+/// assert_eq!(wire::canopen::sdo::block_crc(b"123456789"), 0x31C3, "XMODEM's check value");
+/// ```
 pub fn block_crc(data: &[u8]) -> u16 {
     data.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ u16::from(*byte) << 8, |crc, _| {

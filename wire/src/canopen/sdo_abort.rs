@@ -5,6 +5,17 @@ use core::fmt;
 macro_rules! abort_codes {
     ($($name:ident = $raw:literal, $text:literal;)*) => {
         /// Why a transfer was aborted (CiA 301, table 22).
+        ///
+        /// # Example
+        ///
+        /// ```
+        /// use wire::canopen::sdo::AbortCode;
+        ///
+        /// let code = AbortCode::from_raw(0x0602_0000);
+        /// assert_eq!(code, AbortCode::NoSuchObject);
+        /// assert_eq!(AbortCode::TimedOut.raw(), 0x0504_0000);
+        /// assert_eq!(AbortCode::from_raw(7), AbortCode::Unknown(7), "kept as it came");
+        /// ```
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[expect(missing_docs, reason = "each is described by its Display text")]
         pub enum AbortCode {

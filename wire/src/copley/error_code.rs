@@ -3,6 +3,15 @@
 use core::fmt;
 
 /// What is wrong with a command (p. 66).
+///
+/// # Example
+///
+/// ```
+/// use wire::copley::ErrorCode;
+///
+/// assert_eq!(ErrorCode::from_raw(18).to_string(), "error 18 (the axis moves already)");
+/// assert_eq!(ErrorCode::from_raw(77), ErrorCode::Unknown(77));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ErrorCode {
     /// 1.

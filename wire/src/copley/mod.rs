@@ -40,6 +40,17 @@ pub const BAUD_AT_RESET: u32 = 9_600;
 
 /// Which amplifier a line is for: that at the cable, or a node behind it; and which of its
 /// axes, where it has several.
+///
+/// # Example
+///
+/// ```
+/// use wire::copley::Address;
+///
+/// let behind = Address::node(3).and_then(|node| node.axis('b'));
+/// assert_eq!(behind.map(|it| it.to_string()), Some("3.b".into()));
+/// assert_eq!(Address::GATEWAY.node_number(), 0);
+/// assert_eq!(Address::node(128), None);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
     node: u8,
@@ -133,6 +144,20 @@ pub enum Command {
 }
 
 /// A command for one amplifier.
+///
+/// # Example
+///
+/// ```
+/// use wire::copley::{Address, Bank, Command, ErrorCode, Parameter, Request};
+///
+/// let (bank, parameter) = (Bank::Ram, Parameter::POSITION_COMMAND);
+/// let command = Command::Set { bank, parameter, value: 40_000 };
+/// let request = Request { address: Address::GATEWAY, command };
+/// assert_eq!(request.emit(), b"s r0xca 40000\r");
+/// assert_eq!(Request::parse(b"s r0xca 40000"), Ok(request));
+/// let refused = Request::parse(b"s r0xca").map_err(|it| it.code);
+/// assert_eq!(refused, Err(ErrorCode::TooLittleData));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
     /// Who.
@@ -289,6 +314,17 @@ fn parse_number(word: &str) -> Option<i64> {
 }
 
 /// What an amplifier answers.
+///
+/// # Example
+///
+/// ```
+/// use wire::copley::{ErrorCode, NotAReply, Reply};
+///
+/// assert_eq!(Reply::parse(b"ok"), Ok(Reply::Ok));
+/// assert_eq!(Reply::parse(b"v 0x1f").map(|it| it.number()), Ok(Some(31)));
+/// assert_eq!(Reply::parse(b"e 33"), Ok(Reply::Error(ErrorCode::Syntax)));
+/// assert_eq!(Reply::parse(b"okk"), Err(NotAReply));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// `ok`: the command was taken. Not that it has been done.

@@ -12,6 +12,17 @@ pub enum Bank {
 }
 
 /// A parameter's number.
+///
+/// # Example
+///
+/// ```
+/// use wire::copley::{Bank, Command, Parameter, Request};
+///
+/// assert_eq!(Parameter::EVENT_STATUS.to_string(), "0xa0");
+/// let command = Request::parse(b"g f0x17").map(|it| it.command);
+/// let (bank, parameter) = (Bank::Flash, Parameter::POSITION);
+/// assert_eq!(command, Ok(Command::Get { bank, parameter }));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Parameter(pub u16);
 

@@ -5,6 +5,15 @@ use core::fmt;
 
 bitflags! {
     /// [`Parameter::EVENT_STATUS`] (p. 46).
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use wire::copley::EventStatus;
+    ///
+    /// let status = EventStatus::from_bits_retain(0x0800_0200);
+    /// assert_eq!(status, EventStatus::IN_MOTION | EventStatus::POSITIVE_LIMIT_SWITCH);
+    /// ```
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct EventStatus: u32 {
         /// Bit 0.
@@ -95,6 +104,16 @@ bitflags! {
 
 bitflags! {
     /// [`Parameter::FAULTS`] (p. 48).
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use wire::copley::Faults;
+    ///
+    /// let faults = Faults::from_bits_retain(0x0004_0200);
+    /// assert_eq!(faults.to_string(), "following error, safe torque off");
+    /// assert_eq!(Faults::empty().to_string(), "no fault");
+    /// ```
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct Faults: u32 {
         /// Bit 0; cannot be cleared.

@@ -1,6 +1,6 @@
 //! Why samples give no origin.
 
-use units::{Metres, Volts};
+use units::{Approach, Metres, Volts};
 
 use super::Sensor;
 use crate::least_squares::LeastSquaresError;
@@ -22,6 +22,14 @@ pub enum RefineError {
     NotFinite {
         /// Which sample.
         index: usize,
+    },
+    /// Too few passes in one direction.
+    #[error("hall refinement: {seen} passes with approach `{}`, at least 2 are needed", approach.symbol())]
+    TooFewPasses {
+        /// In which direction.
+        approach: Approach,
+        /// Passes there.
+        seen: usize,
     },
     /// Too few samples altogether, or in one window.
     #[error("hall refinement: {seen} samples around {} mm, at least {needed} are needed; \

@@ -107,6 +107,18 @@ pub struct Flank {
     pub slope_sensor: Volts,
 }
 
+/// What passes tell beyond the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passes {
+    /// The origin seen forward less that seen in reverse: lost motion, and what the voltages lag at the
+    /// speed of the passes.
+    pub lost_motion: Metres,
+    /// Standard deviation of the origin of a single pass.
+    pub scatter: Metres,
+    /// Of that deviation.
+    pub degrees_of_freedom: usize,
+}
+
 /// An origin and everything it rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZeroEstimate {
@@ -143,6 +155,8 @@ pub struct ZeroEstimate {
     /// By how many sample periods the voltages lag the position; `None` when all samples were
     /// taken in one direction.
     pub lag_samples: Option<f64>,
+    /// What passes in both directions told; `None` for samples of one sweep.
+    pub passes: Option<Passes>,
 }
 
 /// Finds the origin in `points`, given in the order taken.
@@ -150,6 +164,28 @@ pub struct ZeroEstimate {
 /// # Errors
 /// When a flank, the peak or the centre is not covered, a curve is not smooth within its noise,
 /// or too many samples are wild; with place and values.
+///
+/// # Example
+///
+/// ```
+/// use compensator::hall_zero::{HallPoint, RefineOptions, refine};
+/// use units::{Metres, Volts};
+///
+/// // Noiseless curves about an origin at 0.3 mm, there and back.
+/// let there = (-400..=400).chain((-400..=400).rev());
+/// let points: Vec<HallPoint> = there
+///     .map(|step| {
+///         let mm = 0.0025 * f64::from(step);
+///         let (slope, peak) = (2.0 * mm).sin_cos();
+///         let position = Metres::from_mm(mm + 0.3);
+///         HallPoint { position, peak: Volts(2.0 + 0.9 * peak), slope: Volts(2.5 + 0.7 * slope) }
+///     })
+///     .collect();
+/// let options = RefineOptions { excess_max: f64::INFINITY, ..RefineOptions::default() };
+/// let zero = refine(&points, &options)?;
+/// assert!((zero.origin.mm() - 0.3).abs() < 1e-6, "{} mm", zero.origin.mm());
+/// # Ok::<(), compensator::hall_zero::RefineError>(())
+/// ```
 pub fn refine(points: &[HallPoint], options: &RefineOptions) -> Result<ZeroEstimate, RefineError> {
     let data = Data::new(points)?;
     let coarse = Coarse::find(points, options)?;
@@ -215,6 +251,7 @@ pub fn refine(points: &[HallPoint], options: &RefineOptions) -> Result<ZeroEstim
         points: used,
         outlier_share: share,
         lag_samples: lag(&fits),
+        passes: None,
     })
 }
 

@@ -34,8 +34,10 @@ impl<'a> Data<'a> {
                 (points[b].position - points[a].position).value() / steps
             })
             .collect();
-        let noise_peak = neighbour_noise(points, |p| p.peak.value());
-        let noise_slope = neighbour_noise(points, |p| p.slope.value());
+        let noise =
+            |voltage| neighbour_noise(points, voltage).max(converter_noise(points, voltage));
+        let noise_peak = noise(|p| p.peak.value());
+        let noise_slope = noise(|p| p.slope.value());
         Ok(Self {
             points,
             travel,
@@ -155,7 +157,7 @@ fn at(place: f64) -> impl Fn(LeastSquaresError) -> RefineError {
 fn needed_degree(window: &Rows, options: &RefineOptions) -> Result<usize, LeastSquaresError> {
     let squares = |degree| {
         let fit = fit_rows(&window.rows, degree, window.with_lag)?;
-        let sum = fit.residuals.iter().map(|r| r * r).sum::<f64>();
+        let sum = fit.squares();
         Ok((sum, fit.degrees_of_freedom))
     };
     let (best, freedom) = squares(options.degree_max)?;
@@ -192,6 +194,22 @@ fn neighbour_noise(points: &[HallPoint], voltage: fn(&HallPoint) -> f64) -> f64 
         })
         .collect();
     robust_sigma(&residuals).unwrap_or(0.0)
+}
+
+/// What the steps of a converter add to the noise: where it is quieter than its step, neighbours are equal
+/// and say nothing. The step is the smallest difference of two samples.
+fn converter_noise(points: &[HallPoint], voltage: fn(&HallPoint) -> f64) -> f64 {
+    let differences = points
+        .windows(2)
+        .map(|w| (voltage(&w[1]) - voltage(&w[0])).abs());
+    let step = differences
+        .filter(|it| *it > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    if step.is_finite() {
+        step / 12_f64.sqrt()
+    } else {
+        0.0
+    }
 }
 
 /// The samples of one window.

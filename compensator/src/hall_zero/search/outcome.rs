@@ -6,7 +6,8 @@ use units::{Metres, MetresPerSecond, Volts};
 
 use super::{Held, Sample};
 use crate::hall_zero::{
-    HallPoint, RefineError, RefineOptions, SearchFailure, Settings, ZeroEstimate, refine,
+    HallPoint, Pass, RefineError, RefineOptions, SearchFailure, Settings, ZeroEstimate, refine,
+    refine_passes,
 };
 
 /// A zero found by the patent's steps.
@@ -35,7 +36,32 @@ impl Outcome {
     /// As [`refine`]; and when it lies further from P0 than the bands δ2 and δ3 explain.
     pub fn refine(&self, settings: &Settings) -> Result<ZeroEstimate, RefineError> {
         let points: Vec<HallPoint> = self.samples.iter().map(Sample::point).collect();
-        let mut estimate = refine(&points, &RefineOptions::for_search(settings))?;
+        self.agreed(
+            refine(&points, &RefineOptions::for_search(settings))?,
+            settings,
+        )
+    }
+
+    /// The regression over passes that were made after the search; see [`refine_passes`].
+    ///
+    /// # Errors
+    /// As [`refine_passes`]; and when it lies further from P0 than the bands δ2 and δ3 and the lost motion
+    /// explain.
+    pub fn refine_by_passes(
+        &self,
+        passes: &[Pass],
+        settings: &Settings,
+    ) -> Result<ZeroEstimate, RefineError> {
+        let options = RefineOptions::for_search(settings);
+        self.agreed(refine_passes(passes, &options)?, settings)
+    }
+
+    /// `estimate`, if it is where the search stands.
+    fn agreed(
+        &self,
+        mut estimate: ZeroEstimate,
+        settings: &Settings,
+    ) -> Result<ZeroEstimate, RefineError> {
         let p0 = self.p0.position;
         estimate.p0_patent = Some(p0);
         // δ3 and δ2 are voltages; the slopes turn them into the patent's own tolerance.
@@ -46,7 +72,11 @@ impl Outcome {
             .min(estimate.right.slope_v_per_m.abs());
         let own = settings.delta3.value() / estimate.centre_slope_v_per_m.abs()
             + settings.delta2.value() / flank;
-        let limit = Metres(2.0 * own);
+        // The search has come to P0, G1 and G2 from one side each.
+        let lost_motion = estimate
+            .passes
+            .map_or(Metres::ZERO, |it| it.lost_motion.abs());
+        let limit = Metres(2.0 * own) + lost_motion;
         if (estimate.origin - p0).abs() > limit {
             return Err(RefineError::Disagrees {
                 origin: estimate.origin,
@@ -59,6 +89,26 @@ impl Outcome {
 }
 
 /// What the search wants of the axis until the next sample.
+///
+/// # Example
+///
+/// A search goes to the nominal zero first, and gives up when nothing moves.
+///
+/// ```
+/// use compensator::hall_zero::{Progress, Reason, Sample, Search, Settings};
+/// use units::{Metres, Time, Volts};
+///
+/// let mut search = Search::new(Settings::default(), Metres::from_mm(1.0), Time::ZERO)?;
+/// let mut look = |seconds: f64| {
+///     let (at, position) = (Time::from_seconds(seconds), Metres::ZERO);
+///     let (peak, slope) = (Volts(2.0), Volts(2.5));
+///     search.handle_sample(&Sample { at, position, peak, slope, standing: true })
+/// };
+/// assert!(matches!(look(0.0), Progress::Move { to, .. } if to == Metres::from_mm(1.0)));
+/// let Progress::Failed(failure) = look(3.0) else { unreachable!("2 s are the limit") };
+/// assert!(matches!(failure.reason, Reason::NotMoving));
+/// # Ok::<(), compensator::hall_zero::SettingsError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
     /// Move towards `to`; a new wish comes long before it is reached, or there.

@@ -9,6 +9,18 @@ use crate::volumetric::{Axis, Point, Volume};
 
 /// The four body diagonals, each of `count` points at even distances, starting at x low: with
 /// (y, z) low and low, high and low, low and high, high and high. Fewer than 2 points count as 2.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::{Point, Volume, identify::body_diagonals};
+///
+/// let volume = Volume::new(Point::ZERO, Point::from_mm(600.0, 500.0, 400.0))?;
+/// let [first, .., last] = body_diagonals(&volume, 3);
+/// assert_eq!(first[1], Point::from_mm(300.0, 250.0, 200.0), "all meet in the middle");
+/// assert_eq!(last[0], Point::from_mm(0.0, 500.0, 400.0));
+/// # Ok::<(), compensator::volumetric::VolumeError>(())
+/// ```
 pub fn body_diagonals(volume: &Volume, count: usize) -> [Vec<Point>; 4] {
     core::array::from_fn(|at| {
         let from_high = [false, at % 2 == 1, at / 2 == 1];
@@ -60,6 +72,18 @@ pub fn direction(points: &[Point]) -> Option<[f64; 3]> {
 ///
 /// The rising diagonal (both from low to high) shortens by c·ab/L, the falling one lengthens by
 /// as much, with sides a and b and length L.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::identify::squareness_of_face_diagonals;
+/// use units::Metres;
+///
+/// // Sides of 300 mm and 400 mm leaning by 10 µrad: 10e-6 · 0.3 · 0.4/0.5 m = 2.4 µm each.
+/// let (rising, falling) = (Metres::from_um(-2.4), Metres::from_um(2.4));
+/// let angle = squareness_of_face_diagonals(rising, falling, Metres(0.3), Metres(0.4));
+/// assert!((angle.value() - 10e-6).abs() < 1e-15);
+/// ```
 pub fn squareness_of_face_diagonals(
     rising: Metres,
     falling: Metres,

@@ -118,6 +118,46 @@ pub struct Alignment {
 }
 
 /// What is to be found, and in how many settings of the instrument.
+///
+/// # Example
+///
+/// The positioning error of x, read with an interferometer at three places.
+///
+/// ```
+/// use compensator::volumetric::function::Shape;
+/// use compensator::volumetric::identify::{FunctionPlan, Observation, Plan, Reading, RunSetup};
+/// use compensator::volumetric::model::ErrorName;
+/// use compensator::volumetric::{Axis, Point};
+/// use units::Metres;
+///
+/// let places = [0.0, 100.0, 200.0];
+/// let name = ErrorName::Along(Axis::X, Axis::X);
+/// let plan = Plan {
+///     chain: "FXYZ".parse()?,
+///     functions: vec![FunctionPlan { name, nodes: places.map(Metres::from_mm).to_vec() }],
+///     shape: Shape::Linear,
+///     squarenesses: vec![],
+///     runs: vec![RunSetup { offset: true, alignment: None }],
+///     zero: Point::ZERO,
+///     thermal: Default::default(),
+/// };
+/// let read = |(mm, um): (f64, f64)| Observation {
+///     at: Point::from_mm(mm, 0.0, 0.0),
+///     tool: Point::ZERO,
+///     run: 0,
+///     reading: Reading::Length {
+///         along: [1.0, 0.0, 0.0],
+///         deviation: Metres::from_um(um),
+///         u: Metres::from_um(0.1),
+///     },
+/// };
+/// let readings = places.into_iter().zip([7.0, 8.0, 10.0]).map(read);
+/// let found = plan.identify(&readings.collect::<Vec<_>>())?;
+/// let [positioning, ..] = &found.axis_errors(Shape::Linear)?[0].along;
+/// let at_end = positioning.as_ref().map(|it| it.at(Metres(0.2)).um());
+/// assert!(at_end.is_some_and(|it| (it - 3.0).abs() < 1e-6), "the zero of the run is 7 µm");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Which axis stands on which.

@@ -33,6 +33,20 @@ pub struct Straightness {
 ///
 /// # Errors
 /// When there are fewer than two, lengths differ, or a value is not finite.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::identify::{ReferenceLine, straightness};
+/// use units::Metres;
+///
+/// let positions = [0.0, 0.1, 0.2].map(Metres);
+/// let deviations = [0.0, 4.0, 2.0].map(Metres::from_um);
+/// let seen = straightness(&positions, &deviations, ReferenceLine::EndPoints)?;
+/// assert!((seen.slope.value() - 10e-6).abs() < 1e-15, "the line taken out");
+/// assert!((seen.error.um() - 3.0).abs() < 1e-9);
+/// # Ok::<(), compensator::least_squares::LeastSquaresError>(())
+/// ```
 pub fn straightness(
     positions: &[Metres],
     deviations: &[Metres],

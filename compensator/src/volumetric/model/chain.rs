@@ -14,6 +14,20 @@ use crate::volumetric::{Axis, Point};
 /// standing on the foundation. `FXYZ` is a gantry that does everything, `XFYZ` a bed that moves
 /// under a column. The notation is that of H. Schwenke et al., "Geometric error measurement and
 /// compensation of machines: an update", CIRP Annals 57 (2008).
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::Axis;
+/// use compensator::volumetric::model::Chain;
+///
+/// let table_below: Chain = "XFYZ".parse()?;
+/// assert!(table_below.carries_workpiece(Axis::X));
+/// assert_eq!(table_below.sense(Axis::X), -1.0, "the tool goes the other way");
+/// assert!(table_below.is_on_lever(Axis::Y, Axis::Z), "z hangs on y");
+/// assert!("XYZ".parse::<Chain>().is_err(), "no foundation");
+/// # Ok::<(), compensator::volumetric::model::ChainError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chain {
     /// From the workpiece to the tool.

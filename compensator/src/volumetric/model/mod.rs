@@ -112,6 +112,39 @@ struct Stage {
 }
 
 /// A machine's errors made ready to be applied: no allocation and a constant time per call.
+///
+/// # Example
+///
+/// x turns the rest by 10 µrad about z: y and tool, 0.3 m and 0.2 m to the side, make −5 µm along x of it.
+///
+/// ```
+/// use compensator::error_table::Limits;
+/// use compensator::volumetric::function::Function;
+/// use compensator::volumetric::model::{Machine, Squareness, Thermal, VolumetricModel};
+/// use compensator::volumetric::{Point, Volume, online::MovingState};
+/// use units::{Metres, MetresPerSecond, Radians};
+///
+/// let mut machine = Machine {
+///     chain: "FXYZ".parse()?,
+///     volume: Volume::new(Point::ZERO, Point::from_mm(600.0, 500.0, 400.0))?,
+///     axes: Default::default(),
+///     squareness: Squareness::default(),
+///     thermal: Thermal::default(),
+///     tool_max: Metres(0.3),
+///     displacement_max: Metres::ZERO,
+///     roll_max: Radians::ZERO,
+/// };
+/// let tilt = Function::constant(Metres(-1.0), Metres(1.0), Radians(10e-6))?;
+/// machine.axes[0].about[2] = Some(tilt);
+/// let (size, rate) = (Metres::from_um(500.0), MetresPerSecond(0.1));
+/// let model = VolumetricModel::new(machine, Limits { size, slope: 0.1, rate })?;
+/// let tool = Point::from_mm(0.0, 200.0, 0.0);
+/// let now = model.conditions(tool, &[], &MovingState::default())?;
+/// let target = Point::from_mm(400.0, 300.0, 100.0);
+/// assert!((model.deviation(target, &now)?.x.um() + 5.0).abs() < 1e-3);
+/// assert!(((model.command(target, &now)? - target).x.um() - 5.0).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct VolumetricModel {
     machine: Machine,

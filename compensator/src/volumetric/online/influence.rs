@@ -53,6 +53,24 @@ impl Influence {
 }
 
 /// F for every displacement: of the axis that moves, along each of its sideways directions.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::Point;
+/// use compensator::volumetric::online::{Influences, MovingState};
+/// use units::{Metres, Radians};
+///
+/// let um = Metres::from_um;
+/// let state = MovingState {
+///     sideways: [[um(16.0), um(32.0)], [um(1.0), um(2.0)], [um(4.0), um(8.0)]],
+///     roll: [Radians::ZERO; 3],
+/// };
+/// // Without functions all factors are 1: D_x(y) + D_x(z), D_y(x) + D_y(z), D_z(x) + D_z(y).
+/// let errors = Influences::default().errors(Point::ZERO, &state);
+/// let seen = [errors.x, errors.y, errors.z].map(|it| it.um().round());
+/// assert_eq!(seen, [5.0, 24.0, 34.0]);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Influences {
     /// By axis x, y, z; then along the two other directions in the order x, y, z. F_xy, by

@@ -20,6 +20,21 @@ use units::portable::{atan, tan};
 use units::{Metres, Radians};
 
 /// The geometry of the two detectors.
+///
+/// # Example
+///
+/// ```
+/// use compensator::volumetric::online::RollOptics;
+/// use units::{Metres, Radians};
+///
+/// let (mm, roll_max) = (Metres::from_mm, Radians(0.05));
+/// let optics = RollOptics::new(mm(10.0), mm(100.0), Radians::from_degrees(45.0), roll_max)?;
+/// let roll = optics.solve(mm(-0.5), mm(-0.3))?;
+/// assert!((roll.angle.value().tan() - 0.01).abs() < 1e-15);
+/// assert!((roll.first.mm() - 0.6 / 0.99).abs() < 1e-12);
+/// assert!(optics.solve(mm(50.0), mm(50.0)).is_err(), "no roll up to 0.05 rad");
+/// # Ok::<(), compensator::volumetric::online::RollError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollOptics {
     height: f64,

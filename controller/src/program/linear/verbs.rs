@@ -75,9 +75,15 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
         Ok((zeroed, to_json::counters(&machine.counters())))
     })?;
     let estimate = &zeroed.estimate;
+    let lost_motion = estimate.passes.map_or(String::new(), |it| {
+        format!(
+            "\nlost motion {:.3} µm between forward and reverse",
+            it.lost_motion.um()
+        )
+    });
     let text = format!(
         "axis {axis}: zero found, standard uncertainty {:.1} nm ({} samples); the coarse \
-         reference was off by {:.3} µm\nrecorded in {}",
+         reference was off by {:.3} µm{lost_motion}\nrecorded in {}",
         estimate.standard_uncertainty.nm(),
         estimate.points,
         estimate.origin.um(),

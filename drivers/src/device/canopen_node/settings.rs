@@ -42,6 +42,30 @@ impl Default for NodeTimeouts {
 }
 
 /// What is set about a node, whatever its profile.
+///
+/// # Example
+///
+/// A device at which nobody answers.
+///
+/// ```
+/// use drivers::device::canopen_node::NodeSettings;
+/// use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
+/// use drivers::device::Device;
+/// use std::time::Duration;
+/// use units::{Time, Volts};
+/// use wire::canopen::NodeId;
+///
+/// let (node, master) = (NodeId::new(5).expect("1 to 127"), NodeId::new(127).expect("likewise"));
+/// let common = NodeSettings::new(node, master, Duration::from_millis(2));
+/// let channel = ChannelSettings { input: 1, full_scale: Volts(10.0) };
+/// let settings = Cia401Settings::new(common, &[channel]).expect("1 to 4 channels");
+/// let mut module = Cia401Analog::new(settings);
+/// module.start(Time::ZERO);
+/// module.handle_timeout(Time::from_seconds(10.0));
+/// let Some(Err(error)) = module.poll_outcome() else { unreachable!("10 s are over") };
+/// let text = "node 5: waited 10s for boot-up or an answer to SDO, last saw nothing";
+/// assert_eq!(error.to_string(), text);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeSettings {
     /// The node.

@@ -70,6 +70,43 @@ impl Cia401Settings {
 }
 
 /// One CiA 401 module with analog inputs.
+///
+/// # Example
+///
+/// A node that answers every question with the number of a drive is no analog module.
+///
+/// ```
+/// use drivers::device::canopen_node::NodeSettings;
+/// use drivers::device::cia401::{ChannelSettings, Cia401Analog, Cia401Settings};
+/// use drivers::device::{Device, DeviceError};
+/// use std::time::Duration;
+/// use units::{Time, Volts};
+/// use wire::can::CanFrame;
+/// use wire::canopen::NodeId;
+/// use wire::{Input, Payload};
+///
+/// let (node, master) = (NodeId::new(5).expect("1 to 127"), NodeId::new(127).expect("likewise"));
+/// let common = NodeSettings::new(node, master, Duration::from_millis(2));
+/// let channel = ChannelSettings { input: 1, full_scale: Volts(10.0) };
+/// let settings = Cia401Settings::new(common, &[channel]).expect("1 to 4 channels");
+/// let mut module = Cia401Analog::new(settings);
+/// module.start(Time::ZERO);
+/// while let Some(Payload::Frame(asked)) = module.poll_transmit() {
+///     if let (Some(0x605), &[0x40, low, high, sub, ..]) = (asked.standard_id(), asked.data()) {
+///         let answer = [0x43, low, high, sub, 0x92, 0x01, 0x02, 0x00];
+///         let input = Input::Payload(Payload::Frame(CanFrame::standard(0x585, &answer)));
+///         module.handle(Time::from_seconds(0.001), &input);
+///     }
+/// }
+/// let outcome = module.poll_outcome();
+/// let wrong = Some(Err(DeviceError::WrongIdentity {
+///     node,
+///     what: "device profile",
+///     expected: 401,
+///     seen: 402,
+/// }));
+/// assert_eq!(outcome, wrong);
+/// ```
 #[derive(Debug)]
 pub struct Cia401Analog {
     settings: Cia401Settings,

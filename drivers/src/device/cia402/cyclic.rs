@@ -68,6 +68,17 @@ impl ModeChange {
 ///
 /// The coarsest power that is exact: drives that know one power only know milliseconds.
 /// `None` when no power takes it: 255 units at most.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::cia402::interpolation_period;
+/// use std::time::Duration;
+///
+/// assert_eq!(interpolation_period(Duration::from_millis(2)), Some((2, -3)));
+/// assert_eq!(interpolation_period(Duration::from_micros(250)), Some((25, -5)));
+/// assert_eq!(interpolation_period(Duration::from_nanos(1_500)), None);
+/// ```
 pub fn interpolation_period(period: Duration) -> Option<(u8, i8)> {
     let nanos = period.as_nanos();
     [
@@ -82,6 +93,16 @@ pub fn interpolation_period(period: Duration) -> Option<(u8, i8)> {
 }
 
 /// The shortest period from `at_least` on that [`interpolation_period`] takes, if there is one.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::cia402::period_from;
+/// use std::time::Duration;
+///
+/// assert_eq!(period_from(Duration::from_nanos(1_500)), Some(Duration::from_micros(2)));
+/// assert_eq!(period_from(Duration::from_secs(1)), None, "255 ms at most");
+/// ```
 pub fn period_from(at_least: Duration) -> Option<Duration> {
     [1_000_u64, 10_000, 100_000, 1_000_000]
         .into_iter()

@@ -94,6 +94,31 @@ impl Activity {
 }
 
 /// One CiA 402 drive, one axis: linear ([`Metres`]) or rotary.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::canopen_node::NodeSettings;
+/// use drivers::device::cia402::{Cia402Drive, Cia402Settings};
+/// use drivers::device::{Axis, AxisCommand, Device};
+/// use std::time::Duration;
+/// use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale, Time};
+/// use wire::{Payload, canopen::NodeId};
+///
+/// let (node, master) = (NodeId::new(5).expect("1 to 127"), NodeId::new(127).expect("likewise"));
+/// let common = NodeSettings::new(node, master, Duration::from_millis(2));
+/// let scale = Scale::new(Metres(10e-9)).expect("a count is some length");
+/// let (speed, acceleration) = (MetresPerSecond(0.1), MetresPerSecondSquared(1.0));
+/// let mut drive = Cia402Drive::new(Cia402Settings::new(common, scale, speed, acceleration));
+/// drive.start(Time::ZERO);
+/// let Some(Payload::Frame(asked)) = drive.poll_transmit() else { unreachable!("it asks") };
+/// assert_eq!(asked.to_string(), "605#4000100000000000", "who is it?");
+/// assert_eq!(drive.reading(), None);
+/// // A command before the start is done.
+/// let target = Metres::from_mm(1.0);
+/// drive.command(Time::ZERO, AxisCommand::MoveTo { target, speed, acceleration });
+/// assert!(matches!(drive.poll_outcome(), Some(Err(_))));
+/// ```
 #[derive(Debug)]
 pub struct Cia402Drive<Q: Coordinate = Metres> {
     settings: Cia402Settings<Q>,

@@ -190,6 +190,25 @@ impl Cia402Settings<Radians> {
     /// heartbeat is a quick stop.
     ///
     /// `None` when a turn has no counts, or more than the drive's 32 bits.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use drivers::device::canopen_node::NodeSettings;
+    /// use drivers::device::cia402::{Cia402Settings, PositionRange, Turn};
+    /// use std::time::Duration;
+    /// use units::{RadiansPerSecond, RadiansPerSecondSquared};
+    /// use wire::canopen::NodeId;
+    ///
+    /// let (node, master) = (NodeId::new(5).expect("1 to 127"), NodeId::new(127).expect("likewise"));
+    /// let common = NodeSettings::new(node, master, Duration::from_millis(2));
+    /// let turn = Turn { counts: 1_296_000, range: PositionRange::CountsOn };
+    /// let (speed, acceleration) = (RadiansPerSecond(0.5), RadiansPerSecondSquared(1.0));
+    /// let settings = Cia402Settings::rotary(common, turn, speed, acceleration).expect("32 bits");
+    /// assert!((settings.scale.resolution().arcsec() - 1.0).abs() < 1e-9);
+    /// let no_counts = Turn { counts: 0, ..turn };
+    /// assert!(Cia402Settings::rotary(common, no_counts, speed, acceleration).is_none());
+    /// ```
     pub fn rotary(
         common: NodeSettings,
         turn: Turn,

@@ -101,6 +101,23 @@ impl InputSettings {
 }
 
 /// Everything the driver must know about one module.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::canopen_node::NodeSettings;
+/// use drivers::device::cia404::{Cia404Settings, InputSettings};
+/// use std::time::Duration;
+/// use wire::canopen::NodeId;
+///
+/// let (node, master) = (NodeId::new(5).expect("1 to 127"), NodeId::new(127).expect("likewise"));
+/// let common = NodeSettings::new(node, master, Duration::from_millis(2));
+/// let inputs: Vec<_> = (1..=5).map(InputSettings::pt100).collect();
+/// let settings = Cia404Settings::new(common, &inputs, 50).expect("up to eight inputs");
+/// assert_eq!(settings.pdo_bytes(), [8, 2], "four inputs in a PDO");
+/// let twice = [InputSettings::pt100(1), InputSettings::voltage(1)];
+/// assert!(Cia404Settings::new(common, &twice, 50).is_none());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cia404Settings {
     /// Node, master, identity, heartbeats, SYNC period, start time-outs.

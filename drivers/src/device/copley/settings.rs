@@ -6,6 +6,27 @@ use units::{Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 use wire::copley::Address;
 
 /// Everything the driver must know about one amplifier.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::{Device, LineUse, copley::{CopleyAxis, CopleySettings}};
+/// use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale, Time};
+/// use wire::{LineControl, Payload, copley::Address};
+///
+/// let scale = Scale::new(Metres(10e-9)).expect("a count is some length");
+/// let (speed, acceleration) = (MetresPerSecond(0.1), MetresPerSecondSquared(5.0));
+/// let settings = CopleySettings::new(Address::GATEWAY, scale, speed, acceleration);
+/// let mut axis = CopleyAxis::new(settings);
+/// axis.start(Time::ZERO);
+/// assert!(matches!(axis.line_use(), LineUse::Wants { .. }), "it may share its line");
+/// assert_eq!(axis.poll_transmit(), None, "not before it was told that time has passed");
+/// axis.handle_timeout(Time::ZERO);
+/// let rate = Payload::Control(LineControl::Baud(115_200));
+/// assert_eq!(axis.poll_transmit(), Some(rate));
+/// axis.handle_timeout(axis.poll_timeout());
+/// assert_eq!(axis.poll_transmit(), Some(Payload::Bytes(b"g r0x90\r".to_vec())));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct CopleySettings<Q: Coordinate = Metres> {
     /// Whom the lines are for.

@@ -4,6 +4,16 @@ use units::Volts;
 use wire::dcon::{CHANNEL_CHARACTERS, DconError, parse_volts};
 
 /// The input range of a module (ADAM-4000 manual, input range codes).
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::dcon::InputRange;
+/// use units::Volts;
+///
+/// assert_eq!(InputRange::ending_at(Volts(5.0)).map(InputRange::code), Some(0x09));
+/// assert_eq!(InputRange::ending_at(Volts(7.5)), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputRange {
     /// ±10 V, shown as `±dd.ddd`.

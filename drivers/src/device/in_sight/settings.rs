@@ -26,6 +26,24 @@ impl CameraFrame {
 }
 
 /// How an image controller is used.
+///
+/// # Example
+///
+/// ```
+/// use drivers::device::{Device, in_sight::{InSight, InSightSettings}};
+/// use units::Time;
+/// use wire::in_sight::Cell;
+/// use wire::{Input, Payload};
+///
+/// let cell = Cell::parse("C7").expect("a letter and up to three digits");
+/// let mut camera = InSight::new(InSightSettings::new("uvw.job", cell));
+/// camera.start(Time::ZERO);
+/// camera.poll_transmit();
+/// assert_eq!(camera.poll_transmit(), Some(Payload::Bytes(b"GF\r".to_vec())), "which job?");
+/// let other = Input::Payload(Payload::Bytes(b"1\rother.job\r".to_vec()));
+/// camera.handle(Time::from_seconds(0.01), &other);
+/// assert!(matches!(camera.poll_outcome(), Some(Err(_))));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct InSightSettings {
     /// The job that must be active: `GF` answers with its name.

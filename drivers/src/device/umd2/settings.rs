@@ -7,6 +7,30 @@ use wire::umd2::{DEFAULT_SAMPLE_RATE_HZ, VACUUM_WAVELENGTH_M};
 use crate::device::Direction;
 
 /// How an interferometer is used.
+///
+/// # Example
+///
+/// The first good sample is the datum; ten counts are ten half wavelengths from there, and half as much with a
+/// beam that goes there twice.
+///
+/// ```
+/// use drivers::device::{Device, DisplacementInstrument, umd2::{Umd2, Umd2Settings}};
+/// use units::{Metres, Time};
+/// use wire::{Input, Payload};
+///
+/// let settings = Umd2Settings { optics_factor: 2, start_samples: 1, ..Umd2Settings::default() };
+/// let mut laser = Umd2::new(settings);
+/// laser.start(Time::ZERO);
+/// for (at, line) in [(0.1, "58 2458 0 0\n"), (0.102, "2458 2458 1000 0 0 7 0 0\n")] {
+///     let input = Input::Payload(Payload::Bytes(line.into()));
+///     laser.handle(Time::from_seconds(at), &input);
+/// }
+/// assert_eq!(laser.poll_outcome(), Some(Ok(())));
+/// let line = b"2458 2458 1010 0 0 8 0 0\n".to_vec();
+/// laser.handle(Time::from_seconds(0.104), &Input::Payload(Payload::Bytes(line)));
+/// let seen = laser.latest().map(|it| it.vacuum.nm());
+/// assert!(seen.is_some_and(|nm| (nm - 5.0 * 316.495_686).abs() < 1e-3));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Umd2Settings {
     /// The laser's wavelength in vacuum.

@@ -30,6 +30,25 @@ impl Default for Timeouts {
 }
 
 /// How a value is carried.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::sdo_client::{Method, SdoClient, Timeouts};
+/// use units::Time;
+/// use wire::can::CanFrame;
+/// use wire::canopen::{NodeId, Object};
+///
+/// let node = NodeId::new(2).expect("1 to 127");
+/// let mut client = SdoClient::new(node, Timeouts::default());
+/// client.read(Time::ZERO, Object::new(0x1000, 0), Method::Auto)?;
+/// let asked = client.poll_transmit().map(|it| it.to_string());
+/// assert_eq!(asked, Some("602#4000100000000000".into()));
+/// let answer = CanFrame::standard(0x582, &[0x43, 0x00, 0x10, 0, 0x92, 0x01, 0x02, 0x00]);
+/// client.handle_frame(Time::from_seconds(0.001), &answer);
+/// assert_eq!(client.poll_outcome(), Some(Ok(vec![0x92, 0x01, 0x02, 0x00])));
+/// # Ok::<(), drivers::protocol::sdo_client::Busy>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
     /// Expedited up to 4 bytes, segmented above.
@@ -39,6 +58,26 @@ pub enum Method {
 }
 
 /// How often a failed transfer is begun anew.
+///
+/// # Example
+///
+/// ```
+/// use drivers::protocol::sdo_client::{Method, Retry, SdoClient, Timeouts};
+/// use units::Time;
+/// use wire::canopen::{NodeId, Object};
+///
+/// let node = NodeId::new(2).expect("1 to 127");
+/// let mut client = SdoClient::new(node, Timeouts::default()).with_retry(Retry::Never);
+/// client.read(Time::ZERO, Object::new(0x1008, 0), Method::Auto)?;
+/// client.poll_transmit();
+/// client.handle_timeout(client.poll_timeout());
+/// let Some(Err(failure)) = client.poll_outcome() else { unreachable!("nobody answered") };
+/// let text = "0x1008:00: no answer to a read within 500ms (1 attempts)";
+/// assert_eq!(failure.to_string(), text);
+/// let abort = client.poll_transmit().map(|it| it.to_string());
+/// assert_eq!(abort, Some("602#8008100000000405".into()));
+/// # Ok::<(), drivers::protocol::sdo_client::Busy>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Retry {
     /// Not at all.

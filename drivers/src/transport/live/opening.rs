@@ -95,6 +95,26 @@ impl Plan {
 
 impl Live {
     /// Begins the list of ports to open.
+    ///
+    /// # Example
+    ///
+    /// ```no_run
+    /// use drivers::transport::Transport;
+    /// use drivers::transport::clock::Clock;
+    /// use drivers::transport::live::{Live, SerialSettings};
+    /// use units::Time;
+    /// use wire::{Payload, Port};
+    ///
+    /// let mut ports = Live::builder(Clock::real())
+    ///     .socketcan(Port(0), "can0")
+    ///     .serial(Port(1), "/dev/ttyUSB0", SerialSettings::new(9_600))
+    ///     .build()?;
+    /// ports.send(Port(1), &Payload::Bytes(b"#01\r".to_vec()))?;
+    /// while let Some(arrival) = ports.receive(Time::from_seconds(1.0)) {
+    ///     assert!(arrival.port <= Port(1));
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub const fn builder(clock: Clock) -> LiveBuilder {
         LiveBuilder {
             clock,

@@ -6,6 +6,18 @@ use super::super::serial::SerialSettings;
 use wire::slcan::{BitrateCode, Command};
 
 /// How an SLCAN adapter is set up.
+///
+/// # Example
+///
+/// ```
+/// use drivers::transport::live::{SerialSettings, SlcanSettings};
+///
+/// let settings = SlcanSettings {
+///     serial: SerialSettings::new(1_000_000),
+///     ..SlcanSettings::new(500_000)
+/// };
+/// assert_eq!((settings.bitrate, settings.serial.baud), (500_000, 1_000_000), "CAN, and the cable");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlcanSettings {
     /// The CAN bus's bit/s.

@@ -74,6 +74,44 @@ pub enum ServerEvent {
 }
 
 /// The communication half of an emulated CANopen node.
+///
+/// # Example
+///
+/// A node with one parameter of its own, which takes 1 and 6 only.
+///
+/// ```
+/// use mock_bus::node::canopen_server::dictionary::{Bounds, Entry, Kind};
+/// use mock_bus::node::canopen_server::{CanopenServer, Description, Dictionary, Identity, Manners};
+/// use std::time::Duration;
+/// use units::Time;
+/// use wire::can::CanFrame;
+/// use wire::canopen::NodeId;
+///
+/// let node = NodeId::new(1).expect("1 to 127");
+/// let mut own = Dictionary::default();
+/// let mode = Entry::read_write(Kind::I8, 1).bounded(Bounds::OneOf(&[1, 6]));
+/// own.insert(0x6060, 0, mode);
+/// let device = Description {
+///     device_type: 0x0002_0192,
+///     device_name: "a drive".into(),
+///     hardware_version: "1".into(),
+///     software_version: "1".into(),
+///     identity: Identity::default(),
+///     heartbeat_ms: 0,
+///     rpdos: vec![],
+///     tpdos: vec![],
+/// };
+/// let mut server = CanopenServer::new(node, Duration::ZERO, &device, own, Manners::default());
+/// server.advance(Time::ZERO);
+/// assert_eq!(server.poll_transmit(), Some(CanFrame::standard(0x701, &[0])), "it has booted");
+/// let mut write = |value: u8| {
+///     let request = CanFrame::standard(0x601, &[0x2F, 0x60, 0x60, 0, value, 0, 0, 0]);
+///     server.handle(Time::ZERO, &request);
+///     server.poll_transmit().map(|it| it.to_string())
+/// };
+/// assert_eq!(write(6), Some("581#6060600000000000".into()));
+/// assert_eq!(write(2), Some("581#8060600030000906".into()), "0x06090030: invalid value");
+/// ```
 #[derive(Debug)]
 pub struct CanopenServer {
     node: NodeId,

@@ -61,6 +61,27 @@ const HOMING: i64 = 6;
 const CYCLIC_POSITION: i64 = 8;
 
 /// An emulated drive on the bus.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::cia402_drive::{Cia402DriveConfig, Cia402DriveNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::{Payload, can::CanFrame};
+///
+/// let (mut drive, mut plant) = (Cia402DriveNode::new(Default::default()), Plant::default());
+/// let now = Time::from_seconds(1.0);
+/// drive.advance(now, &mut plant);
+/// let boot_up = Payload::Frame(CanFrame::standard(0x701, &[0]));
+/// assert_eq!(drive.poll_transmit(), Some(boot_up));
+/// let read_device_type = CanFrame::standard(0x601, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+/// drive.handle(now, &Payload::Frame(read_device_type), &mut plant);
+/// drive.advance(Time::from_seconds(1.1), &mut plant);
+/// let answer = CanFrame::standard(0x581, &[0x43, 0x00, 0x10, 0, 0x92, 0x01, 0x02, 0x00]);
+/// assert_eq!(drive.poll_transmit(), Some(Payload::Frame(answer)));
+/// ```
 #[derive(Debug)]
 pub struct Cia402DriveNode {
     drive: Drive,

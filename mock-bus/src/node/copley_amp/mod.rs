@@ -44,6 +44,26 @@ const DEAF: Duration = Duration::from_millis(100);
 const RATE_TOLERANCE: f64 = 0.03;
 
 /// Amplifiers, the first of which is at the cable.
+///
+/// # Example
+///
+/// ```
+/// use mock_bus::node::Node;
+/// use mock_bus::node::copley_amp::{CopleyAmpsConfig, CopleyAmpsNode};
+/// use mock_bus::plant::Plant;
+/// use units::Time;
+/// use wire::Payload;
+///
+/// let (config, mut plant) = (CopleyAmpsConfig::default(), Plant::default());
+/// let mut amps = CopleyAmpsNode::new(&config, 1, "amps");
+/// amps.power_on(Time::ZERO, &mut plant);
+/// amps.advance(Time::from_seconds(2.0), &mut plant);
+/// let asked = Payload::Bytes(b"g r0x90\r".to_vec());
+/// amps.handle(Time::from_seconds(2.0), &asked, &mut plant);
+/// amps.advance(Time::from_seconds(2.1), &mut plant);
+/// // 9600 bit/s, which its clock cannot make exactly.
+/// assert_eq!(amps.poll_transmit(), Some(Payload::Bytes(b"v 9603\r".to_vec())));
+/// ```
 pub struct CopleyAmpsNode {
     config: CopleyAmpsConfig,
     amps: Vec<Amp>,

@@ -1,0 +1,111 @@
+use super::*;
+use crate::hall_zero::rig::{Magnets, Noise};
+
+/// A stage as its passes see it.
+#[derive(Clone, Copy)]
+struct Stage {
+    noise_mv: f64,
+    repeatability_nm: f64,
+    lost_motion_um: f64,
+}
+
+/// Passes of a stage whose origin is at 0: each shifted by what it repeats to, and by half the lost motion.
+fn passes(stage: &Stage, count: usize, noise: &mut Noise) -> Vec<Pass> {
+    let magnets = Magnets::drifted(noise, 0.0);
+    (0..count)
+        .map(|number| {
+            let approach = [Approach::Forward, Approach::Reverse][number % 2];
+            let sign = if number % 2 == 0 { 1.0 } else { -1.0 };
+            let lost_mm = sign * stage.lost_motion_um * 0.5e-3;
+            let shift_mm = stage.repeatability_nm * 1e-6 * noise.normal() - lost_mm;
+            let point = |step: i32| {
+                let mm = sign * f64::from(step) * 5e-3;
+                let [v1, v2] = magnets.volts(mm + shift_mm);
+                HallPoint {
+                    position: Metres((mm * 1e5).round() * 1e-8),
+                    peak: Volts(v1 + stage.noise_mv * 1e-3 * noise.normal()),
+                    slope: Volts(v2 + stage.noise_mv * 1e-3 * noise.normal()),
+                }
+            };
+            let points = (-200..=200).map(point).collect();
+            Pass { approach, points }
+        })
+        .collect()
+}
+
+const STAGE: Stage = Stage {
+    noise_mv: 0.2,
+    repeatability_nm: 25.0,
+    lost_motion_um: 1.0,
+};
+
+#[test]
+fn lost_motion_is_told_and_has_no_part_in_the_origin() {
+    for lost_motion_um in [0.0, 4.0, 20.0] {
+        let stage = Stage {
+            lost_motion_um,
+            ..STAGE
+        };
+        let passes = passes(&stage, 6, &mut Noise(3));
+        let zero = refine_passes(&passes, &RefineOptions::default()).unwrap();
+        let told = zero.passes.unwrap();
+        let off = told.lost_motion - Metres::from_um(lost_motion_um);
+        assert!(off.abs() < Metres::from_um(0.15), "{told:?}");
+        assert!(zero.origin.abs() < Metres::from_um(0.15), "{zero:?}");
+        assert_eq!(told.degrees_of_freedom, 4);
+    }
+}
+
+/// Sound stages of all sorts: none is refused, and the origin lies within twice the stated uncertainty as
+/// often as that promises.
+#[test]
+fn sound_stages_are_not_blamed_and_their_uncertainty_is_whole() {
+    let mut noise = Noise(17);
+    for (noise_mv, repeatability_nm, lost_motion_um) in [
+        (0.2, 25.0, 1.0),
+        (0.02, 25.0, 1.0),
+        (0.01, 10.0, 0.0),
+        (0.02, 1000.0, 4.0),
+        (0.5, 300.0, 20.0),
+        (0.2, 0.0, 0.0),
+    ] {
+        let stage = Stage {
+            noise_mv,
+            repeatability_nm,
+            lost_motion_um,
+        };
+        let (count, mut covered) = (200, 0);
+        for _ in 0..count {
+            let passes = passes(&stage, 6, &mut noise);
+            let zero = refine_passes(&passes, &RefineOptions::default());
+            let zero = zero.unwrap_or_else(|error| panic!("{noise_mv} mV: {error}"));
+            let ratio = zero.origin / zero.standard_uncertainty;
+            covered += usize::from(ratio.abs() <= 2.0);
+        }
+        let share = covered as f64 / f64::from(count);
+        println!("{noise_mv} mV, {repeatability_nm} nm: within 2u {share}");
+        assert!((0.91..=0.99).contains(&share), "{share}");
+    }
+}
+
+#[test]
+fn one_direction_alone_says_nothing_of_lost_motion() {
+    let mut all = passes(&STAGE, 6, &mut Noise(5));
+    all.retain(|it| it.approach == Approach::Forward);
+    let error = refine_passes(&all, &RefineOptions::default()).unwrap_err();
+    let expected = RefineError::TooFewPasses {
+        approach: Approach::Reverse,
+        seen: 0,
+    };
+    assert_eq!(error, expected);
+}
+
+#[test]
+fn interference_within_a_pass_is_refused() {
+    let mut all = passes(&STAGE, 6, &mut Noise(6));
+    for (at, point) in all[3].points.iter_mut().enumerate() {
+        point.slope = point.slope + Volts(3e-3 * (at as f64 * 0.9).sin());
+    }
+    let error = refine_passes(&all, &RefineOptions::default()).unwrap_err();
+    assert!(matches!(error, RefineError::LackOfFit { .. }), "{error}");
+}
