@@ -148,6 +148,16 @@ impl Figures {
     pub fn conforms(&self) -> bool {
         self.conformity.conforms()
     }
+
+    /// The largest mean deviation's magnitude: what "as found ±x µm" means.
+    pub fn largest_deviation(&self) -> Metres {
+        self.targets
+            .iter()
+            .flat_map(|target| [target.mean_forward, target.mean_reverse])
+            .fold(Metres::ZERO, |largest, deviation| {
+                largest.max(deviation.abs())
+            })
+    }
 }
 
 /// Evaluates a series measured from both sides, every target at least twice from each.

@@ -5,8 +5,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows what it measured")]
 use truestage::emulated::Emulated;
 use truestage::linear::VerifyOptions;
-use truestage::run::CalibrateOptions;
-use truestage::{Machine, config, store_in};
+use truestage::{CalibrateOptions, Machine, config, store_in};
 
 const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
 const STAGE: &str = include_str!("../../configs/emulated/linear.toml");

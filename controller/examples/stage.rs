@@ -2,8 +2,7 @@
 //!
 //! `cargo run --example stage -- machine.toml x 12.5`
 #![expect(clippy::print_stdout, reason = "an example shows where the stage is")]
-use truestage::store::Lease;
-use truestage::{Machine, config, ports, store_of};
+use truestage::{Lease, Machine, config, ports, store_of};
 use units::Metres;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

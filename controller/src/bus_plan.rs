@@ -21,7 +21,7 @@ const LATCH_PDO_BYTES: u8 = 8;
 ///
 /// # Panics
 /// When there is no such bus.
-pub fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError> {
+pub(crate) fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoadError> {
     let bus = &config.can[name];
     let ms = |ms: u16| Duration::from_millis(ms.into());
     let mut plan = BusPlan::new(bus.bitrate_bit_per_s, bus.sync_period())

@@ -32,6 +32,21 @@ impl Edit for str {
     }
 }
 
+/// The text of a machine file with the shipped heartbeats made rare: hours without SYNC cost little in
+/// virtual time then.
+///
+/// # Panics
+/// When one of them is not in the text.
+pub fn with_rare_heartbeats(text: &str) -> String {
+    text.edit("master_heartbeat_ms = 50", "master_heartbeat_ms = 2000")
+        .edit("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
+        .edit(
+            "heartbeat_consumer_ms = 150",
+            "heartbeat_consumer_ms = 7000",
+        )
+        .edit("watch_master_ms = 500", "watch_master_ms = 7000")
+}
+
 #[cfg(test)]
 mod tests {
     use super::Edit;

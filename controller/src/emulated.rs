@@ -23,29 +23,16 @@ use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::assemble;
 use crate::config::MachineConfig;
-use crate::edit::Edit;
 use crate::failure::Failure;
 use crate::ports::{self, Endpoint, Overrides};
 use crate::volumetric::{LineOperator, LineOptics, LineTask};
 use compensator::volumetric::{Axis, Point};
 
 pub use error::EmulatedError;
-pub use mock_bus::plant::{DriftLimits, HallDrift};
+pub use mock_bus::plant::HallDrift;
 
-/// The text of a machine file with the shipped heartbeats made rare: hours without SYNC cost little in
-/// virtual time then.
-///
-/// # Panics
-/// When one of them is not in the text.
-pub fn with_rare_heartbeats(text: &str) -> String {
-    text.edit("master_heartbeat_ms = 50", "master_heartbeat_ms = 2000")
-        .edit("heartbeat_producer_ms = 50", "heartbeat_producer_ms = 2000")
-        .edit(
-            "heartbeat_consumer_ms = 150",
-            "heartbeat_consumer_ms = 7000",
-        )
-        .edit("watch_master_ms = 500", "watch_master_ms = 7000")
-}
+#[cfg(feature = "program")]
+pub(crate) use mock_bus::plant::DriftLimits;
 
 /// A simulated machine in virtual time, shared by a transport and whoever injects faults,
 /// cycles its power or judges by its truth.

@@ -31,36 +31,78 @@
 //! comes with it, is the module `emulated` alone: machines without hardware, for tests.
 //! With `default-features = false` the library links neither.
 //!
+//! # Names
+//!
+//! Here is what a program has to write. Quantities are those of `units`; what a machine of any kind is and
+//! fails with, and records of any kind, are in `machine`; mathematics are in `compensator`. What is read only
+//! (sections of a configuration, entries of a journal) has fields and needs no name.
+//!
 //! This is not a safety controller: wire STO.
 
-pub mod assemble;
-pub mod bus_plan;
+mod assemble;
+mod bus_plan;
 pub mod config;
 mod connected;
 mod correction;
 mod edit;
 #[cfg(feature = "emulator")]
 pub mod emulated;
-pub mod failure;
+mod failure;
 mod handle;
 mod hardware;
-pub mod json;
 pub mod linear;
-pub mod page;
 pub mod platform;
 pub mod ports;
+#[cfg(feature = "program")]
+mod program;
 pub mod rotary;
-pub mod run;
-pub mod store;
+mod run;
+mod store;
 mod stores;
-pub mod text;
 pub mod volumetric;
 
+// A machine, and why it stopped or refused.
 pub use connected::Machine;
-pub use edit::Edit;
 pub use failure::Failure;
-pub use machine::{
-    Desk, Engine, EngineFailure, Found, Observer, Patience, Silent, Stage, StopRequest, engine,
-};
-pub use store::Store;
-pub use stores::{CONTENTS, store_in, store_of, store_of_journal};
+pub use run::CalibrateOptions;
+
+// What is kept, and who has the machine meanwhile.
+pub use machine::records::{Lease, Store};
+pub use stores::{store_in, store_of};
+
+// Who is told how far a procedure is, and who asks it to stop.
+pub use machine::{Observer, Stage, StopRequest};
+
+// The command, whose `main` is this alone.
+#[cfg(feature = "program")]
+pub use program::main;
+
+/// Several axes as one motion, a set-point at every SYNC. What a correction of one's own is given and
+/// has to say is in [`machine::engine`].
+pub mod engine {
+    pub use machine::engine::{
+        Cause, Correction, Desk, Engine, Live, NoCorrection, State, read_path,
+    };
+}
+
+/// What the tests of this project need beyond that. No promise is made about it.
+#[doc(hidden)]
+pub mod for_tests {
+    pub use crate::edit::{Edit, with_rare_heartbeats};
+    pub use crate::hardware::analog::ModuleConfig;
+    pub use crate::hardware::camera::CameraDevice;
+    pub use crate::hardware::drive::DriveConfig;
+    pub use crate::hardware::instrument::InstrumentDevice;
+    pub use crate::linear::entries::PointEntry;
+    pub use crate::linear::settings::{compensation, harmless};
+    pub use crate::rotary::settings::rotary_settings;
+    pub use crate::volumetric::calibrate::VolumetricEvaluated;
+    pub use crate::volumetric::entries::OpticsName;
+    pub use crate::volumetric::first_part::FirstPartCorrection;
+    pub use crate::volumetric::line::{Line, LineReading, LineReadout};
+    pub use crate::volumetric::record::BendRecord;
+    pub use crate::volumetric::settings::{beam_detector, beam_drift, roll_optics};
+}
+
+#[cfg(test)]
+use edit::Edit;

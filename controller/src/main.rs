@@ -1,9 +1,7 @@
 //! The command `truestage`.
 
-mod program;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    program::main()
+    truestage::main()
 }

@@ -20,7 +20,7 @@ pub struct CalibrateOptions {
 }
 
 /// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.
-pub fn utc_now() -> String {
+pub(crate) fn utc_now() -> String {
     let now = jiff::Timestamp::now();
     now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }

@@ -11,7 +11,7 @@ use crate::rotary::RotaryContent;
 use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent};
 
 /// What calibrations of each kind of machine say.
-pub const CONTENTS: &[ContentKind] = &[
+pub(crate) const CONTENTS: &[ContentKind] = &[
     ContentKind::of::<LinearContent>(),
     ContentKind::of::<RotaryContent>(),
     ContentKind::of::<ScrewContent>(),
@@ -28,9 +28,4 @@ pub fn store_of(machine: &MachineSection) -> Store {
 /// The store of `machine` below `data_dir`.
 pub fn store_in(data_dir: &Path, machine: &str) -> Store {
     Store::new(data_dir, machine, CONTENTS)
-}
-
-/// The store that the journal at `path` lies in, by its place; `None` when it lies elsewhere.
-pub fn store_of_journal(path: &Path) -> Option<Store> {
-    Store::of_journal(path, CONTENTS)
 }

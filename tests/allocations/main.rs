@@ -12,7 +12,8 @@ use tests::stream::{Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::config::MachineConfig;
 use truestage::engine::{Cause, Correction, Engine, NoCorrection};
-use truestage::volumetric::{FirstPartCorrection, VolumetricCorrection, VolumetricFailure};
+use truestage::for_tests::FirstPartCorrection;
+use truestage::volumetric::{VolumetricCorrection, VolumetricFailure};
 
 #[global_allocator]
 static COUNTED: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
@@ -35,7 +36,7 @@ enum Part {
 }
 
 fn of_a_volume(config: &MachineConfig, part: Part) -> Box<dyn Correction> {
-    let known = nothing_known(config.volumetric.as_ref().expect("it has one"));
+    let known = nothing_known(config);
     let bad = |it: VolumetricFailure| -> ! { panic!("{it}") };
     match part {
         Part::Any => {

@@ -20,13 +20,14 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use drivers::transport::real_time::RealTime;
+use machine::engine::{Histogram, Timing};
 use serde_json::{Value, json};
 use tests::apart::{Apart, used_by_the_loop};
 use tests::stream::{self, Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::Failure;
 use truestage::config::MachineConfig;
-use truestage::engine::{Cause, Correction, Engine, Histogram, NoCorrection, Timing};
+use truestage::engine::{Cause, Correction, Engine, NoCorrection};
 use truestage::volumetric::VolumetricCorrection;
 use units::Metres;
 
@@ -216,10 +217,10 @@ fn zero(stand: &mut Stand) -> Result<(), Failure> {
 
 /// None for screws; for three axes what their detectors and thermometers make of nothing known.
 fn correction_of(config: &MachineConfig) -> Box<dyn Correction> {
-    let Some(known) = &config.volumetric else {
+    if config.volumetric.is_none() {
         return Box::new(NoCorrection);
-    };
-    Box::new(VolumetricCorrection::new(config, nothing_known(known)).unwrap())
+    }
+    Box::new(VolumetricCorrection::new(config, nothing_known(config)).unwrap())
 }
 
 /// From rest to rest; screws beyond those of the engine stand still.

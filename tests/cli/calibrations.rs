@@ -3,7 +3,7 @@
 use std::fs;
 
 use tests::LINEAR;
-use truestage::store::Lease;
+use truestage::Lease;
 
 use crate::programs::{check_error, text, truestage};
 

@@ -8,11 +8,11 @@ use drivers::transport::Transport;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
 use drivers::transport::lockstep::Participant;
+use machine::records::{ReadJournal, read_journal};
 use nix::sys::signal::Signal;
 use tests::Rig;
+use truestage::for_tests::PointEntry;
 use truestage::linear::LinearLog;
-use truestage::linear::PointEntry;
-use truestage::store::{ReadJournal, read_journal};
 use wire::{Input, Payload, Port};
 
 use crate::programs::{Bench, Process, live_rigs};

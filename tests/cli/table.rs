@@ -1,12 +1,12 @@
 //! The cycle of a rotary table in processes of their own: somebody turns the plate meanwhile.
 
+use core::fmt::Debug;
 use std::fs;
 
+use machine::records::{ReadJournal, read_journal};
 use nix::sys::signal::Signal;
 use tests::{Edit, ROTARY, Rig};
 use truestage::rotary::PlateLog;
-use truestage::rotary::SweepEntry;
-use truestage::store::{ReadJournal, read_journal};
 
 use crate::programs::{Bench, live_rigs, number, text};
 
@@ -33,7 +33,7 @@ fn journal(bench: &Bench) -> Option<ReadJournal<PlateLog>> {
     read_journal::<PlateLog>(&paths.next()?).ok()
 }
 
-fn of_the_first(journal: &ReadJournal<PlateLog>) -> Vec<SweepEntry> {
+fn of_the_first(journal: &ReadJournal<PlateLog>) -> Vec<impl PartialEq + Debug + use<>> {
     let sweeps = journal.log.sweeps.iter();
     sweeps.filter(|it| it.offset == 0.0).cloned().collect()
 }

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use machine::records::read_journal;
 use tests::volume::{Volume, good, quick};
 use tests::{Edit, VOLUMETRIC};
-use truestage::store::read_journal;
+use truestage::for_tests::OpticsName;
 use truestage::volumetric::GeometryContent;
-use truestage::volumetric::OpticsName;
 use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{VerifyBy, WarmUp};
 

@@ -8,13 +8,13 @@ use std::process::Command;
 use std::sync::MutexGuard;
 
 use compensator::volumetric::{Axis, Point};
+use machine::records::read_journal;
 use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use tests::volume::point_mm;
 use tests::{Edit, INTERFACE, Rig, VOLUMETRIC, vcan_is_native};
 use truestage::emulated::EmulatedOnPtys;
-use truestage::store::read_journal;
 use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{LineOptics, LineTask};
 

@@ -8,7 +8,7 @@ use drivers::device::{Alarm, AnalogInput, AnalogReading, Device};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::{Desk, Emulator, Rig, Setup, rigs};
-use truestage::config::ModuleConfig;
+use truestage::for_tests::ModuleConfig;
 use units::Volts;
 
 /// How long a module may be silent.

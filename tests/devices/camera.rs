@@ -9,7 +9,7 @@ use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::in_sight_controller::InSightControllerNode;
 use mock_bus::plant::Pose;
 use tests::{Desk, Emulator, Rig, Setup, on_every_rig, rigs};
-use truestage::config::CameraDevice;
+use truestage::for_tests::CameraDevice;
 
 type Eye = Desk<InSight>;
 

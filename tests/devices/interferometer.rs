@@ -8,7 +8,7 @@ use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::plant::{LineOptics, LineSetUp};
 use mock_bus::simulation::Simulation;
 use tests::{Desk, Emulator, Setup, rigs};
-use truestage::config::InstrumentDevice;
+use truestage::for_tests::InstrumentDevice;
 use units::{Metres, Pascals};
 
 type Laser = Desk<Umd2>;

@@ -7,9 +7,9 @@ use drivers::device::{Alarm, DeviceError, DisplacementInstrument};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Desk, EMULATED, Edit, Emulator, MACHINE, Rig, Setup, rigs};
 use truestage::Failure;
-use truestage::config::InstrumentDevice;
+use truestage::for_tests::InstrumentDevice;
 use truestage::linear::VerifyOptions;
-use truestage::run::CalibrateOptions;
+use truestage::CalibrateOptions;
 use units::Metres;
 
 /// The section of the instrument in a machine's file.

@@ -24,7 +24,7 @@ fn table(rig: Rig, setup: &Setup) -> Table {
     let emulator = Emulator::new(rig, setup);
     let loaded = &emulator.loaded;
     let (rotary, bus) = (&loaded.config.rotary["c"], &loaded.config.can["can0"]);
-    let settings = truestage::rotary::settings::rotary_settings(rotary, bus, loaded.patience);
+    let settings = truestage::for_tests::rotary_settings(rotary, bus, loaded.patience);
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
 

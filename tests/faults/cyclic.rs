@@ -2,9 +2,9 @@
 //! 10, 12 to 15, 22 to 24, 32, 50; those of the host are in `cyclic_host.rs`).
 
 use drivers::device::Alarm;
+use machine::engine::EngineFailure;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
-use truestage::engine::EngineFailure;
 use wire::LinkState;
 use wire::can::CanId;
 use wire::canopen::emcy::EmergencyCode;

@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use drivers::transport::in_process::InProcess;
 use drivers::transport::{SendError, Transport};
+use machine::engine::EngineFailure;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, machine_config};
 use truestage::StopRequest;
 use truestage::emulated::Emulated;
-use truestage::engine::{Cause, Engine, EngineFailure, NoCorrection, State};
+use truestage::engine::{Cause, Engine, NoCorrection, State};
 use truestage::{Failure, Machine};
 use units::{Metres, Time};
 use wire::{Arrival, Payload, Port};

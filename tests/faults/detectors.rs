@@ -7,17 +7,15 @@ use std::sync::{Arc, Mutex};
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::online::{BeamReference, Sample};
+use compensator::volumetric::online::{BeamDetector, BeamReference, Sample};
+use machine::engine::{Channel, Corrected, Observed, Source, ThermometerSample, Validity};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::volume::{Volume, good};
 use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::Failure;
-use truestage::engine::{
-    Cause, Channel, Corrected, Correction, Engine, Live, Observed, Source, ThermometerSample,
-    Validity,
-};
-use truestage::volumetric::BeamDetectorConfig;
+use truestage::engine::{Cause, Correction, Engine, Live};
+use truestage::for_tests::{beam_detector, beam_drift, roll_optics};
 use truestage::volumetric::{VolumetricCorrection, VolumetricState};
 use truestage::{Observer, Stage};
 use units::{Celsius, Metres, Quantity, Radians};
@@ -108,9 +106,7 @@ fn constant<Q: Quantity>(value: Q) -> Function<Q> {
 }
 
 /// What a detector whose channels begin at `first` sees.
-fn place(config: &BeamDetectorConfig, first: usize, seen: &Seen) -> [Metres; 2] {
-    let mut detector =
-        truestage::volumetric::settings::beam_detector(config).expect("it was checked");
+fn place(mut detector: BeamDetector, first: usize, seen: &Seen) -> [Metres; 2] {
     let channel = |k: usize| seen.0[first + k].expect("all have sent");
     let sample = Sample {
         channels: core::array::from_fn(|k| channel(k).volts),
@@ -123,18 +119,20 @@ fn place(config: &BeamDetectorConfig, first: usize, seen: &Seen) -> [Metres; 2] 
 /// A machine without errors whose x slide has risen since it was calibrated.
 fn risen(bench: &Bench, seen: &Seen) -> VolumetricState {
     let config = bench.loaded.config.volumetric.as_ref().expect("it has one");
+    let detector = |config| beam_detector(config).expect("it was checked");
     let beams = Axis::ALL.map(|axis| {
         let at = axis.index();
         let beam = config.beam.each()[at].expect("it has one");
-        let [first, second] = place(&beam.slider, 8 * at, seen);
+        let [first, second] = place(detector(&beam.slider), 8 * at, seen);
         let up = if axis == Axis::X { RISEN } else { Metres::ZERO };
-        let end = place(beam.end.as_ref().expect("it has one"), 8 * at + 4, seen);
-        let drift = truestage::volumetric::settings::beam_drift(beam).expect("it was checked");
+        let end = detector(beam.end.as_ref().expect("it has one"));
+        let end = place(end, 8 * at + 4, seen);
+        let drift = beam_drift(beam).expect("it was checked");
         let slider = [constant(first), constant(second - up)];
         Some(BeamReference::new(slider, end, drift).expect("sound"))
     });
     let roll = config.roll.as_ref().expect("it has one");
-    let optics = truestage::volumetric::settings::roll_optics(roll).expect("it was checked");
+    let optics = roll_optics(roll).expect("it was checked");
     let reading = |k: usize| {
         let volts = seen.0[24 + k].expect("all have sent").volts;
         Metres::from_mm(volts.value() * roll.mm_per_v[k])

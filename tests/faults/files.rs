@@ -3,11 +3,12 @@
 
 use std::fs;
 
+use machine::records::{CalibrationRecord, StoreError};
 use tests::{Bench, Edit};
+use truestage::CalibrateOptions;
+use truestage::Lease;
 use truestage::linear::{LinearContent, LinearLog};
 use truestage::rotary::RotaryContent;
-use truestage::run::CalibrateOptions;
-use truestage::store::{CalibrationRecord, Lease, StoreError};
 use truestage::{Failure, Machine, Store};
 
 use crate::scene::shortened;
@@ -306,7 +307,7 @@ fn a_killed_run_goes_on_where_it_stopped() {
         "{failure:?}"
     );
     let journal = store.newest_run("calibrate", "x").unwrap().unwrap();
-    let before = truestage::store::read_journal::<LinearLog>(&journal).unwrap();
+    let before = machine::records::read_journal::<LinearLog>(&journal).unwrap();
     assert_eq!((before.log.points.len(), before.complete), (30, false));
     // Another process would have a flag of its own.
     bench

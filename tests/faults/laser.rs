@@ -6,10 +6,10 @@ use std::time::Duration;
 use compensator::error_table::FitError;
 use compensator::length_correction::EnvironmentError;
 use drivers::device::Alarm;
+use machine::records::read_journal;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
 use truestage::linear::LinearLog;
-use truestage::store::read_journal;
 
 use crate::scene::{Phase, Played, STOPPING, Scene, Wanted, check, check_harmless};
 

@@ -1,11 +1,11 @@
 //! What the program itself must refuse: targets beyond the limits, calibrations that are too
 //! large or too steep, and those that make the axis worse (classes 48, 49).
 
+use machine::records::CalibrationRecord;
 use tests::Bench;
+use truestage::CalibrateOptions;
 use truestage::linear::LinearContent;
 use truestage::linear::VerifyOptions;
-use truestage::run::CalibrateOptions;
-use truestage::store::CalibrationRecord;
 use truestage::{Failure, Machine, Store};
 use units::Metres;
 

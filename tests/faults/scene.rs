@@ -5,16 +5,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
+use machine::records::read_journal;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::simulation::Simulation;
 use tests::{Bench, Edit};
+use truestage::CalibrateOptions;
 use truestage::emulated::Emulated;
 use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::linear::LinearLog;
 use truestage::linear::{Calibrated, VerifyOptions};
-use truestage::run::CalibrateOptions;
-use truestage::store::read_journal;
 use truestage::{Failure, Machine, Store};
 use truestage::{Observer, Stage};
 use units::{Metres, Time};

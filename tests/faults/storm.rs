@@ -10,13 +10,13 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use drivers::device::Alarm;
+use machine::records::{StoreError, read_journal};
 use mock_bus::fault::{FaultConfig, FaultId};
 use mock_bus::random::Stream;
 use tests::Bench;
+use truestage::CalibrateOptions;
 use truestage::linear::LinearLog;
 use truestage::linear::VerifyOptions;
-use truestage::run::CalibrateOptions;
-use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Time};
 use wire::cia402::PowerState;

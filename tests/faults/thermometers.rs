@@ -6,12 +6,13 @@
 use core::time::Duration;
 
 use compensator::volumetric::{Axis, Point};
+use machine::engine::Source;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::Edit;
-use tests::volume::{Off, Volume, good, point_mm, size};
+use tests::volume::{Off, REFERENCES, Volume, good, point_mm, size};
 use truestage::Failure;
-use truestage::engine::{Cause, Live, Source};
-use truestage::volumetric::{REFERENCES, VolumetricFailure, VolumetricState};
+use truestage::engine::{Cause, Live};
+use truestage::volumetric::{VolumetricFailure, VolumetricState};
 use units::{Metres, Quantity, Time};
 
 /// When the machine becomes warm, and when it is.

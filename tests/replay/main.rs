@@ -8,9 +8,9 @@ use drivers::transport::record::Recorder;
 use drivers::transport::replay::{Replay, ReplayReport};
 use drivers::transport::{SendError, Transport};
 use tests::{Bench, Edit, machine_config};
-use truestage::linear::PointEntry;
+use truestage::for_tests::PointEntry;
 use truestage::linear::{Verified, VerifyOptions, Zeroed};
-use truestage::{Failure, Machine, Store, assemble};
+use truestage::{Failure, Machine, Store, ports};
 use units::Time;
 use wire::{Arrival, Payload, Port};
 
@@ -99,7 +99,7 @@ fn recorded(seed: u64) -> (Found, String) {
         |text| text,
         |inner| {
             let config = machine_config("/".as_ref(), short).config;
-            let ports = assemble::ports(&config);
+            let ports = ports::numbers(&config);
             let names: Vec<_> = ports.iter().map(|(name, port)| (*port, &**name)).collect();
             Box::new(Recorder::new(inner, writer, &names).expect("memory takes every byte"))
         },
@@ -146,7 +146,7 @@ impl Transport for Watched {
 fn replayed(recording: &str) -> (Found, ReplayReport) {
     let folder = tempfile::tempdir().unwrap();
     let loaded = machine_config(folder.path(), short);
-    let ports = assemble::ports(&loaded.config);
+    let ports = ports::numbers(&loaded.config);
     let names: Vec<_> = ports.iter().map(|(name, port)| (*port, &**name)).collect();
     let replay = Replay::parse(recording, &names).unwrap_or_else(|error| panic!("{error}"));
     let replay = Rc::new(RefCell::new(replay));

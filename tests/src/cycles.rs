@@ -2,10 +2,10 @@
 
 use core::time::Duration;
 
+use truestage::CalibrateOptions;
 use truestage::linear::VerifyOptions;
 use truestage::platform::Pose;
 use truestage::rotary::Way;
-use truestage::run::CalibrateOptions;
 use truestage::volumetric::WarmUp;
 use truestage::{Failure, Machine, Store};
 use units::{Metres, Radians};

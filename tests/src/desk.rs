@@ -8,8 +8,9 @@ use drivers::device::{
 };
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
-use truestage::assemble;
-use truestage::config::{DriveConfig, Loaded};
+use truestage::config::Loaded;
+use truestage::for_tests::DriveConfig;
+use truestage::ports;
 use units::{Coordinate, Time};
 use wire::canopen::NodeId;
 use wire::{Payload, Port};
@@ -36,7 +37,7 @@ impl<D: Device> Desk<D> {
     /// When the configuration has no such bus or line.
     pub fn new(emulator: Emulator, name: &str, device: D) -> Self {
         let config = &emulator.loaded.config;
-        let port = assemble::ports(config)[name];
+        let port = ports::numbers(config)[name];
         let mut transport = emulator.transport();
         let heartbeat = config.can.get(name).map(|bus| {
             let sync = bus.sync_period();

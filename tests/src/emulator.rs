@@ -13,7 +13,7 @@ use crate::rig::{
     LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC, shipped_config,
 };
 use crate::stream::Watch;
-use truestage::Edit;
+use truestage::for_tests::Edit;
 
 /// The interface that `RIG=vcan` runs on; made by whoever starts the tests.
 pub const INTERFACE: &str = "vcan0";

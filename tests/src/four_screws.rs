@@ -1,6 +1,6 @@
 //! The alignment platform with a fourth screw: a second one along y, opposite the first.
 
-use truestage::Edit;
+use truestage::for_tests::Edit;
 
 const AXIS: &str = "[axis.r]
 device = \"cia402\"

@@ -36,4 +36,4 @@ pub use rig::{
 };
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};
-pub use truestage::Edit;
+pub use truestage::for_tests::Edit;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use drivers::transport::Transport;
-use truestage::Edit;
 use truestage::config::{self, Loaded};
 use truestage::emulated::{Emulated, HallDrift};
+use truestage::for_tests::Edit;
 use truestage::{Machine, Store};
 use units::Metres;
 

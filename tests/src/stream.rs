@@ -6,11 +6,12 @@ use std::vec::IntoIter;
 
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::BeamReference;
+use machine::engine::{AXES_MAX, PushError};
 use mock_bus::runner::Running;
 use mock_bus::simulation::Simulation;
+use truestage::config::MachineConfig;
 use truestage::emulated::Emulated;
-use truestage::engine::{AXES_MAX, Cause, Desk, Engine, Live, PushError, State};
-use truestage::volumetric::VolumetricConfig;
+use truestage::engine::{Cause, Desk, Engine, Live, State};
 use truestage::volumetric::VolumetricState;
 use truestage::{Failure, Machine};
 use units::{Celsius, Metres, MetresPerSecond, Radians};
@@ -73,11 +74,12 @@ fn smooth(share: f64) -> f64 {
 ///
 /// # Panics
 /// When the configuration has become another one.
-pub fn nothing_known(config: &VolumetricConfig) -> VolumetricState {
+pub fn nothing_known(config: &MachineConfig) -> VolumetricState {
+    let config = config.volumetric.as_ref().expect("it has one");
     let ends = [Metres(-0.01), Metres(0.51)];
     let zero = || Function::new(&ends, &[Metres::ZERO; 2], Shape::Linear).expect("it is good");
     let beams = config.beam.each().map(|beam| {
-        let drift = truestage::volumetric::settings::beam_drift(beam?).expect("it was checked");
+        let drift = truestage::for_tests::beam_drift(beam?).expect("it was checked");
         BeamReference::new([zero(), zero()], [Metres::ZERO; 2], drift).ok()
     });
     let roll = Function::new(&ends, &[Radians(0.0); 2], Shape::Linear);

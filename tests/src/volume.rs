@@ -8,22 +8,25 @@ use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
 use compensator::volumetric::online::StateMap;
 use compensator::volumetric::{Axis, Point};
+use machine::engine::Observed;
+use machine::records::{CalibrationRecord, RecordHead};
 use mock_bus::plant::VolumetricTruth;
-use truestage::emulated::with_rare_heartbeats;
-use truestage::engine::{Live, Observed};
-use truestage::store::{CalibrationRecord, RecordHead};
-use truestage::volumetric::{
-    BendRecord, GeometryContent, MemoryName, StateMemoryContent, WorkVolume,
-};
-use truestage::volumetric::{
-    GEOMETRY, Mover, REFERENCES, VolumetricCorrection, VolumetricState, memory_pointer,
-};
+use truestage::engine::Live;
+use truestage::volumetric::{GeometryContent, MemoryName, StateMemoryContent, WorkVolume};
+use truestage::volumetric::{Mover, VolumetricCorrection, VolumetricState};
 use units::{Celsius, Metres, Radians, Time};
 
 use crate::{Bench, VOLUMETRIC, random};
-use truestage::Edit;
+use truestage::for_tests::{BendRecord, Edit, with_rare_heartbeats};
 
 pub use frame::Frame;
+
+/// What the errors of three axes are called where an axis is named.
+pub const GEOMETRY: &str = "volume";
+/// Likewise what their detectors read.
+pub const REFERENCES: &str = "volume-references";
+/// Likewise the displacements that the machine was built with.
+const FIRST_MEMORY: &str = "volume-first-memory";
 
 /// How far the axes go.
 pub const TRAVEL_MM: [f64; 3] = [500.0, 400.0, 300.0];
@@ -348,13 +351,12 @@ impl Volume {
         let references = store.active(REFERENCES).expect("it can be read");
         let references = references.current.expect("they were taken");
         let content = StateMemoryContent::new(MemoryName::First, &references, &map);
-        let pointer = memory_pointer(MemoryName::First);
         let head = RecordHead {
-            axis: pointer.into(),
+            axis: FIRST_MEMORY.into(),
             ..self.bench.machine.this_machine("x")
         };
         let id = store.save(&CalibrationRecord { head, content });
-        let activated = store.activate(pointer, &id.expect("there is room"));
+        let activated = store.activate(FIRST_MEMORY, &id.expect("there is room"));
         activated.expect("it was just stored");
     }
 

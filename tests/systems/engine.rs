@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use drivers::transport::real_time::RealTime;
+use machine::engine::Timing;
 use mock_bus::simulation::Simulation;
 use tests::stream::{
     self, Bounds, RADIUS, Writer, check_lives, circle, diagonal, is_lateness, is_overrun,
@@ -17,7 +18,7 @@ use tests::stream::{
 };
 use tests::{Rig, Setup, Stand, not_run, rigs, true_pose};
 use truestage::Failure;
-use truestage::engine::{Cause, Engine, NoCorrection, Timing};
+use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::volumetric::VolumetricCorrection;
 use units::{Metres, MetresPerSecond};
 
@@ -297,8 +298,7 @@ fn three_axes_are_corrected_by_what_they_see_while_they_follow_on_every_bus() {
     let setups = [setup.clone(), with_period(&setup, "5.0"), rarely];
     with_zeroed("three axes corrected as they go", &setups, |stand| {
         let config = stand.emulator.loaded.config.clone();
-        let known = config.volumetric.as_ref().expect("it has one");
-        let correction = VolumetricCorrection::new(&config, nothing_known(known))?;
+        let correction = VolumetricCorrection::new(&config, nothing_known(&config))?;
         let (mut engine, desk) = Engine::new(&stand.machine, &AXES, Box::new(correction))?;
         if stand.rig() != Rig::InProcess {
             engine.in_real_time();

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
+use mock_bus::plant::DriftLimits;
 use tests::{Setup, Stand, on_every_rig};
+use truestage::CalibrateOptions;
 use truestage::Failure;
-use truestage::emulated::{DriftLimits, HallDrift};
+use truestage::emulated::HallDrift;
 use truestage::linear::{Verified, VerifyOptions};
-use truestage::run::CalibrateOptions;
-use truestage::text::largest_deviation;
 use units::{Metres, Volts};
 
 const SEED: u64 = 1;
@@ -41,7 +41,7 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
     let store = stand.store.clone();
     stand.machine.linear("x")?.zero(&store)?;
     let found = verify(stand, None)?;
-    let largest = largest_deviation(&found.figures);
+    let largest = found.figures.largest_deviation();
     assert!(largest >= Metres::from_um(8.0), "only {} µm", largest.um());
     let options = CalibrateOptions::default();
     let calibrated = stand.machine.linear("x")?.calibrate(&store, &options)?;

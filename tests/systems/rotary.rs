@@ -1,10 +1,10 @@
 //! The rotary table's whole cycle, the same on every bus.
 
 use tests::{Emulator, Hand, Setup, Stand, on_every_rig};
+use truestage::CalibrateOptions;
 use truestage::Failure;
 use truestage::emulated::HallDrift;
 use truestage::rotary::Way;
-use truestage::run::CalibrateOptions;
 use units::Radians;
 
 const AXIS: &str = "c";

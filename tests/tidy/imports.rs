@@ -113,7 +113,7 @@ impl Imports {
 }
 
 /// Where `mod child;` in `parent` looks for its file.
-fn file_of(parent: &Path, is_root: bool, child: &str) -> PathBuf {
+pub(crate) fn file_of(parent: &Path, is_root: bool, child: &str) -> PathBuf {
     let folder = parent.parent().expect("a file is in a folder");
     let is_folder = is_root || parent.ends_with("mod.rs");
     let folder = match parent.file_stem() {
@@ -252,7 +252,7 @@ impl<'ast> Visit<'ast> for Reader {
 }
 
 /// `#[cfg(test)]`, alone or among others.
-fn is_test(attributes: &[syn::Attribute]) -> bool {
+pub(crate) fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|it| {
         it.path().is_ident("cfg")
             && it

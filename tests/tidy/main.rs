@@ -6,6 +6,7 @@ mod hardware;
 mod imports;
 mod kinds;
 mod licences;
+mod public_names;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -214,7 +215,7 @@ fn whoever_reads_the_truth_is_caught_whatever_the_way_to_it() {
         assert_eq!(emulator_offences(verify, code).len(), 1, "{code}");
     }
     let demo = "controller/src/program/platform/demo.rs";
-    let allowed = "use truestage::emulated::HallDrift;";
+    let allowed = "use crate::emulated::HallDrift;";
     assert_eq!(emulator_offences(demo, allowed), [""; 0]);
     let peeks = "    let truly = emulated.simulation().truth().position();";
     assert_eq!(emulator_offences(demo, peeks).len(), 1);
@@ -274,7 +275,7 @@ const SYSTEMS_MATHEMATICS: &[&str] = &[
 ];
 
 /// What is only looked at: it reaches no set-point, no record and no log.
-const PICTURES: &[&str] = &["controller/src/page/", "/report.rs", "/report/"];
+const PICTURES: &[&str] = &["controller/src/program/page/", "/report.rs", "/report/"];
 
 #[test]
 fn a_seed_is_the_same_log_whatever_the_processor_calls_a_sine() {

@@ -8,7 +8,7 @@ use units::Short;
 use super::schema::{self, DEVICE, type_of, without_null};
 
 /// Every section with its keys, as Markdown.
-pub fn markdown() -> String {
+pub(crate) fn markdown() -> String {
     let schema = schema::schema();
     let reference = Reference { schema: &schema };
     let mut text = reference.keys(&schema);

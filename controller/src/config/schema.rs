@@ -28,7 +28,8 @@ pub(super) fn inline() -> &'static Value {
 }
 
 /// The schema as editors take it, each part once.
-pub fn schema() -> Value {
+#[cfg(test)]
+pub(crate) fn schema() -> Value {
     settings_of(false)
 }
 

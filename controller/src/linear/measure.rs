@@ -22,7 +22,7 @@ use machine::Stage;
 
 /// How a series is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasureOptions {
+pub(crate) struct MeasureOptions {
     /// For progress.
     pub stage: Stage,
     /// Whether the active calibration corrects the moves.
@@ -61,7 +61,7 @@ impl Measured {
 ///
 /// # Errors
 /// When they make none: a point is not finite, or measured twice.
-pub fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
+pub(crate) fn series_of(points: &[PointEntry]) -> Result<LinearSeries, Failure> {
     let measurements = points
         .iter()
         .map(|point| Measurement {

@@ -25,7 +25,6 @@ pub struct LinearContent {
 /// One calibrated position, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry quantity and unit")]
 pub struct NodeRecord {
     pub position_m: f64,
     pub forward_m: Option<f64>,

@@ -6,7 +6,7 @@ use units::Metres;
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RunPlan {
+pub(crate) struct RunPlan {
     /// The instrument's name.
     pub instrument: String,
     /// Where, increasing.

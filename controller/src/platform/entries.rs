@@ -7,7 +7,6 @@ use units::{Metres, Radians};
 /// A pose, metres and radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry quantity and unit")]
 pub struct PoseRecord {
     pub x_m: f64,
     pub y_m: f64,

@@ -6,39 +6,36 @@
 //! at their zero, reached forward.
 
 mod agreement;
-mod calibrate;
+pub(crate) mod calibrate;
 pub(crate) mod check;
 pub(crate) mod config;
 mod entries;
 mod failure;
 mod handle;
 mod header;
-pub mod json;
 mod log;
 mod look;
 mod moves;
-mod record;
-pub mod report;
+pub(crate) mod record;
 mod sound;
-mod state;
+pub(crate) mod state;
 mod take_up;
-mod verify;
-mod zero;
+pub(crate) mod verify;
+pub(crate) mod zero;
 
-pub use calibrate::{PlatformCalibrated, ScrewCalibrated};
+// What users write; `tests/tidy/public_names.txt` lists it.
 pub use compensator::platform::Pose;
-pub use config::{
-    ActuatorConfig, AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig,
-    PlatformVerifyConfig, PlatformZeroConfig, ScrewCompensationConfig,
-};
-pub use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
-pub use failure::{Contradiction, PlatformFailure};
+pub use failure::PlatformFailure;
 pub use handle::AlignmentPlatform;
-pub use log::{PlatformEntry, PlatformLog};
+pub use log::PlatformLog;
 pub use moves::PoseMoved;
-pub use record::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
-pub use take_up::TakenUp;
-pub use verify::{Aligned, PlatformVerified, PoseChecked};
-pub use zero::PlatformZeroed;
+pub use record::ScrewContent;
 
-pub(crate) use state::{PlatformState, difference, kinematics, largest_error};
+// What the rest of this package uses.
+pub(crate) use config::{
+    AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
+};
+pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+pub(crate) use log::PlatformEntry;
+pub(crate) use record::ScrewMethodName;
+pub(crate) use state::{PlatformState, kinematics};

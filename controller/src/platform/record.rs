@@ -60,7 +60,6 @@ pub struct ScrewContent {
 /// A stroke that was measured, metres; `approach` is `+` or `-`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry quantity and unit")]
 pub struct StrokeRecord {
     pub approach: char,
     pub stroke_m: f64,
@@ -70,7 +69,6 @@ pub struct StrokeRecord {
 /// A periodic term, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "the names carry quantity and unit")]
 pub struct HarmonicRecord {
     pub number: u32,
     pub sine_m: f64,

@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
+use machine::records::{Glance, Lease, RecordHead, Store, short};
 use serde_json::{Value, json};
-use truestage::config::Loaded;
-use truestage::store::{Glance, Lease, RecordHead, Store, short};
-use truestage::volumetric::MemoryName;
-use truestage::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
-use truestage::{Failure, config, store_of};
 
+use crate::config::Loaded;
 use crate::program::kind::Kind;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
+use crate::volumetric::MemoryName;
+use crate::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
+use crate::{Failure, config, store_of};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CalCommand {
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_calibration_that_is_stored_is_shown() {
-        for kind in truestage::CONTENTS {
+        for kind in crate::stores::CONTENTS {
             assert_eq!(of_kind(kind.name()).kind, kind.name());
         }
     }

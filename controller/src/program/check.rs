@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use serde_json::json;
-use truestage::{config, text};
 
+use crate::config;
 use crate::program::output::{Ended, Output};
+use crate::program::text;
 
 pub(crate) fn run(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;

@@ -8,15 +8,16 @@ use compensator::error_table::{self, FitOptions, Fitted};
 use compensator::hall_zero::HallSeries;
 use compensator::hall_zero::fit_hall;
 use compensator::iso230;
+use machine::records::{CalibrationRecord, short};
 use serde_json::json;
-use truestage::config::MachineConfig;
-use truestage::linear::LinearContent;
-use truestage::store::{CalibrationRecord, short};
-use truestage::{Failure, config, json as to_json, store_of, text};
 use units::Metres;
 
+use crate::config::MachineConfig;
+use crate::linear::LinearContent;
 use crate::program::data_file::{head_of, read};
 use crate::program::output::{Ended, Output};
+use crate::program::{json as to_json, text};
+use crate::{Failure, config, store_of};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum FitCommand {
@@ -118,7 +119,7 @@ fn store_fit(
     let name = linear_axis(config_path, &loaded.config, axis)?;
     let head = head_of(&loaded, &name, data)?;
     if axes[&name].compensation.is_some() {
-        truestage::linear::settings::compensation(&loaded.config, &name, fitted.table.clone())?;
+        crate::linear::settings::compensation(&loaded.config, &name, fitted.table.clone())?;
     }
     let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
     let record = CalibrationRecord { head, content };

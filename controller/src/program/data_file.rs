@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use drivers::device::Identity;
-use truestage::run::utc_now;
-use truestage::store::{
+use machine::records::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead, SCHEMA_VERSION,
 };
-use truestage::volumetric::VolumetricFailure;
-use truestage::{Failure, config};
+
+use crate::run::utc_now;
+use crate::volumetric::VolumetricFailure;
+use crate::{Failure, config};
 
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|source| Failure::File {

@@ -1,9 +1,8 @@
 //! What a verb acts upon: a platform, a work volume, linear or rotary axes, as the configuration says.
 
-use truestage::Failure;
-use truestage::config::{self, MachineConfig};
-
 use super::verbs::Verbs;
+use crate::Failure;
+use crate::config::{self, MachineConfig};
 use crate::program::MachineArgs;
 use crate::program::output::Ended;
 
@@ -79,7 +78,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use truestage::Edit;
+    use crate::Edit;
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use truestage::store::{CalibrationRecord, Content, Store};
-use truestage::{Failure, store_of_journal};
+use machine::records::{CalibrationRecord, Content, Store};
+
+use crate::Failure;
+use crate::stores::CONTENTS;
 
 /// The calibrations of a kind that were made from the journal at `path`.
 pub(crate) fn made_from<C: Content>(
@@ -19,5 +21,5 @@ pub(crate) fn made_from<C: Content>(
 /// lies elsewhere.
 pub(crate) fn source(path: &Path) -> Option<(Store, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
-    Some((store_of_journal(path)?, name))
+    Some((Store::of_journal(path, CONTENTS)?, name))
 }

@@ -5,6 +5,7 @@ mod check;
 mod data;
 mod data_file;
 mod demo;
+mod json;
 mod kind;
 mod linear;
 mod made_from;
@@ -13,6 +14,7 @@ mod output;
 mod page;
 mod platform;
 mod progress;
+mod report;
 mod reset;
 mod resume;
 mod rotary;
@@ -22,6 +24,7 @@ mod show;
 #[cfg(test)]
 mod stored_tests;
 mod targets;
+mod text;
 mod verbs;
 mod volumetric;
 
@@ -31,12 +34,12 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use wire::lockstep::path_of;
 
+use crate::Failure;
+use crate::ports::Pace;
 use kind::{Kind, by_kind};
 use output::Output;
-use truestage::Failure;
-use truestage::ports::Pace;
 
-/// What a shell script learns of an end: [`truestage::Failure::exit_code`].
+/// What a shell script learns of an end: [`crate::Failure::exit_code`].
 const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
                           4 device or bus, 5 out of tolerance,\n130 stopped by Ctrl-C, 143 by \
                           SIGTERM, 129 by SIGHUP";
@@ -101,7 +104,7 @@ enum Command {
         data: PathBuf,
     },
     /// A self-contained HTML page of a run.
-    Report(page::ReportArgs),
+    Report(report::ReportArgs),
 }
 
 /// How a machine is reached.
@@ -225,7 +228,7 @@ enum MemoryChoice {
     Second,
 }
 
-impl From<MemoryChoice> for truestage::volumetric::MemoryName {
+impl From<MemoryChoice> for crate::volumetric::MemoryName {
     fn from(choice: MemoryChoice) -> Self {
         match choice {
             MemoryChoice::First => Self::First,
@@ -304,10 +307,10 @@ impl MoveArgs {
 
     /// # Errors
     /// When it says which way round what does not turn.
-    fn without_way(&self) -> Result<(), truestage::Failure> {
+    fn without_way(&self) -> Result<(), crate::Failure> {
         match self.way {
             None => Ok(()),
-            Some(_) => Err(truestage::Failure::Usage {
+            Some(_) => Err(crate::Failure::Usage {
                 what: "--way is for rotary axes".into(),
                 help: "leave it out".into(),
             }),
@@ -316,7 +319,7 @@ impl MoveArgs {
 }
 
 /// Runs the command line of this process.
-pub(crate) fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let output = Output::new(cli.json);
     let result = match cli.command {
@@ -353,7 +356,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => rotary::fit::plan(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
-        Command::Report(args) => page::run(&args, output),
+        Command::Report(args) => report::run(&args, output),
     };
     match result {
         Ok(None) => ExitCode::SUCCESS,

@@ -11,11 +11,11 @@ use drivers::transport::live::OpenError;
 use drivers::transport::lockstep::lend_hand;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, tcflush};
-use truestage::Failure;
-use truestage::rotary::{Operator, PlateMove, PlateTask};
-use truestage::volumetric::{LineOperator, LineOptics, LineTask};
 
+use crate::Failure;
 use crate::program::output::Output;
+use crate::rotary::{Operator, PlateMove, PlateTask};
+use crate::volumetric::{LineOperator, LineOptics, LineTask};
 
 /// Asks on stderr and waits for Enter on stdin; the machine lives on meanwhile.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde_json::{Value, json};
 
-use truestage::Failure;
+use crate::Failure;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
 /// it), or with no result.

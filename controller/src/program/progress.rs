@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use truestage::{Observer, Stage};
+
+use crate::{Observer, Stage};
 
 /// One bar for the procedure that runs.
 pub(crate) struct Bars {

@@ -1,11 +1,11 @@
 //! `truestage reset`: a fault of a drive is acknowledged.
 
 use serde_json::json;
-use truestage::json as to_json;
-use truestage::ports::Use;
 use wire::cia402::PowerState;
 
+use crate::ports::Use;
 use crate::program::AxisArgs;
+use crate::program::json as to_json;
 use crate::program::output::{Ended, Output};
 use crate::program::session::{Session, choose_axis};
 

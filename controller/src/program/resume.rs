@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use truestage::Failure;
-use truestage::store::{AnyLog, Store, read_journal};
+use machine::records::{AnyLog, Store, read_journal};
 
+use crate::Failure;
 use crate::program::NEWEST_RUN;
 
 /// The journal named, or, for a bare `--resume`, the newest incomplete one of this axis.
@@ -78,7 +78,7 @@ mod tests {
 
     fn store() -> (tempfile::TempDir, Store) {
         let folder = tempfile::tempdir().unwrap();
-        let store = truestage::store_in(folder.path(), "m");
+        let store = crate::store_in(folder.path(), "m");
         fs::create_dir_all(store.runs()).unwrap();
         fs::write(store.runs().join("20200101-calibrate-x-00.jsonl"), "").unwrap();
         (folder, store)

@@ -1,10 +1,10 @@
 //! `truestage scan`.
 
+use machine::Found;
 use serde_json::json;
-use truestage::Failure;
-use truestage::Found;
-use truestage::ports::Use;
 
+use crate::Failure;
+use crate::ports::Use;
 use crate::program::MachineArgs;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;

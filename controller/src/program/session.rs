@@ -6,14 +6,14 @@ use std::path::Path;
 
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
-use truestage::config::{self, Loaded};
-use truestage::ports::{self, Overrides, Use};
-use truestage::store::Lease;
-use truestage::{Failure, Machine, StopRequest, Store, assemble, store_of};
+use machine::records::Lease;
 
+use crate::config::{self, Loaded};
+use crate::ports::{self, Overrides, Use};
 use crate::program::output::Output;
 use crate::program::progress::Bars;
 use crate::program::{AxisArgs, MachineArgs};
+use crate::{Failure, Machine, StopRequest, Store, assemble, store_of};
 
 /// A machine that is connected and leased to this process.
 pub(crate) struct Session {

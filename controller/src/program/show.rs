@@ -1,8 +1,9 @@
 //! Stored calibrations on the screen: what each kind of content shows of one, and of two.
 
+use machine::records::{Content, Store};
 use serde_json::Value;
-use truestage::Failure;
-use truestage::store::{Content, Store};
+
+use crate::Failure;
 
 /// Lines for people, and values for programs.
 pub(crate) type Changes = (Vec<String>, Vec<Value>);

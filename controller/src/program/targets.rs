@@ -1,7 +1,8 @@
 //! Targets as a person types them: the unit is never guessed.
 
-use truestage::Failure;
 use units::{Metres, Radians};
+
+use crate::Failure;
 
 /// `x=12.5mm`: the unit is never guessed.
 pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {

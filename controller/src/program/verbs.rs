@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use truestage::Failure;
-
 use super::output::{Ended, Output};
 use super::show::Shown;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use crate::Failure;
 
 /// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {

@@ -13,10 +13,8 @@ use compensator::rotary::{Placement, RotarySeries};
 use core::f64::consts::TAU;
 use units::Radians;
 
-use crate::rotary::PlateLog;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::placement::{Placed, PlateRun};
-use crate::store::ReadJournal;
 
 /// A calibration that scatters more than so many times what is stated is refused.
 const NOISE_FACTOR_MAX: f64 = 2.0;
@@ -64,7 +62,7 @@ pub(super) fn evaluate(
 }
 
 /// The solution, and the readings at their nominal positions that it was made from.
-fn fit(
+pub(crate) fn fit(
     axis: &str,
     lines: u32,
     options: &SolveOptions,
@@ -87,50 +85,6 @@ fn fit(
         moved = nominal;
     }
     Ok((solution, moved))
-}
-
-/// What the placements of a journal say, as far as they were read.
-#[derive(Clone, Debug)]
-pub struct Evaluated {
-    /// Table and plate.
-    pub solution: Solution,
-    /// For each placement, where each reading was made on the table, and what is left of it.
-    pub residuals: Vec<Vec<(Radians, Radians)>>,
-}
-
-/// The evaluation of the placements that `journal` has whole; `None` when they are too few, or do
-/// not part table and plate.
-pub fn evaluated(journal: &ReadJournal<PlateLog>) -> Option<Evaluated> {
-    let plan = journal.log.plan.as_ref()?;
-    let placements = journal.log.placements.iter();
-    let placed: Vec<Placed> = placements
-        .map(|it| Placed::of(it, &journal.log.sweeps, plan.passes))
-        .collect();
-    let options = SolveOptions {
-        amplification_max: f64::INFINITY,
-        ..SolveOptions::default()
-    };
-    let (solution, read) = fit(&journal.header.axis, plan.lines, &options, &placed).ok()?;
-    let placements = read.placements().iter();
-    Some(Evaluated {
-        residuals: placements.map(|it| residuals(it, &solution)).collect(),
-        solution: at_table_positions(solution, common_phase(&placed)),
-    })
-}
-
-fn residuals(placement: &Placement, solution: &Solution) -> Vec<(Radians, Radians)> {
-    let lines = placement.readings.len();
-    let spacing = TAU / lines as f64;
-    let expected = solution.expected(placement.offset);
-    let apart: Vec<(Radians, Radians)> = (0..lines)
-        .filter_map(|line| {
-            let place = Radians(((line + placement.offset) % lines) as f64 * spacing);
-            Some((place, placement.readings[line]? - expected[line]?))
-        })
-        .collect();
-    let mean = apart.iter().map(|it| it.1).sum::<Radians>() / apart.len().max(1) as f64;
-    let left = apart.into_iter();
-    left.map(|(place, apart)| (place, apart - mean)).collect()
 }
 
 /// Where the plate lay from the table positions, of all placements: the nodes at which the table's

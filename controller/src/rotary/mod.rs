@@ -15,41 +15,40 @@ mod calibrate;
 pub(crate) mod check;
 mod config;
 mod entries;
-mod estimate;
+pub(crate) mod estimate;
 mod failure;
 mod in_use;
-pub mod json;
 mod line_speed;
 mod log;
-mod moves;
+pub(crate) mod moves;
 mod operator;
-mod placement;
-mod record;
-pub mod report;
-pub mod settings;
+pub(crate) mod placement;
+pub(crate) mod record;
+pub(crate) mod settings;
 mod sound;
 mod sweep;
 mod table;
 mod turn;
-mod verify;
+pub(crate) mod verify;
 
+// What users write; `tests/tidy/public_names.txt` lists it.
 pub use calibrate::RotaryCalibrated;
-pub use config::{
-    DirectionName, EdgeName, LineDetectorConfig, OptimiseName, PeriodicInterpolationName,
-    PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
-    RotaryVerifyConfig, RotaryZeroConfig,
-};
-pub use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
-pub use estimate::{Evaluated, evaluated};
 pub use failure::RotaryFailure;
-pub use log::{PlateEntry, PlateLog};
-pub use moves::RotaryMoved;
+pub use log::PlateLog;
 pub use operator::{Operator, PlateMove, PlateTask};
-pub use record::{ReadingName, RotaryContent};
+pub use record::RotaryContent;
 pub use sweep::{Sweep, SweepOptions};
 pub use table::RotaryTable;
 pub use turn::Way;
-pub use verify::{RotaryFigures, RotaryVerified};
+pub use verify::RotaryVerified;
 
+// What the rest of this package uses.
+pub(crate) use config::{
+    DirectionName, EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
+    RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
+    RotaryVerifyConfig,
+};
+pub(crate) use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub(crate) use in_use::TableInUse;
+pub(crate) use log::PlateEntry;
 pub(crate) use table::RotaryMemory;

@@ -78,7 +78,7 @@ impl PlateRun {
 
 /// What was read in one placement. Lists count table positions.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Placed {
+pub(crate) struct Placed {
     pub(super) offset: f64,
     /// Mean of both directions, in which what the detector is late by cancels; of one, less what it
     /// is late by on the others; `None` where a line was not read.
@@ -92,7 +92,7 @@ pub(super) struct Placed {
 
 impl Placed {
     /// What `sweeps` of one placement, `passes` in each direction, say.
-    pub(super) fn of(placement: &PlacementEntry, sweeps: &[SweepEntry], passes: u32) -> Self {
+    pub(crate) fn of(placement: &PlacementEntry, sweeps: &[SweepEntry], passes: u32) -> Self {
         let own = |approach: char, passes: core::ops::RangeInclusive<u32>| {
             let own = sweeps.iter().filter(|it| it.offset == placement.offset);
             let own = own.filter(|it| it.approach == approach && passes.contains(&it.pass));

@@ -9,7 +9,6 @@ use crate::store::{StoreError, short};
 /// One reading of the run: a line of the plate in one placement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "both are counted in lines of the plate")]
 pub struct ReadingName {
     pub offset: u32,
     pub line: u32,

@@ -118,7 +118,7 @@ pub(crate) fn index_limit(rotary: &RotaryConfig) -> Option<Duration> {
 ///
 /// # Errors
 /// When it breaks a limit of size or slope.
-pub fn periodic_compensation(
+pub(crate) fn periodic_compensation(
     config: &RotaryCompensationConfig,
     axis: &str,
     table: PeriodicTable,

@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use machine::records::{AnyLog, ConfigHash};
+
 use super::*;
 use crate::Edit;
 use crate::config::{Loaded, parse};

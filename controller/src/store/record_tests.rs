@@ -1,7 +1,12 @@
+use machine::records::ConfigHash;
+
 use super::*;
-use crate::linear::{LinearContent, NodeRecord};
-use crate::platform::{HarmonicRecord, ScrewContent, ScrewMethodName, StrokeRecord};
-use crate::rotary::{ReadingName, RotaryContent};
+use crate::linear::LinearContent;
+use crate::linear::record::NodeRecord;
+use crate::platform::record::{HarmonicRecord, StrokeRecord};
+use crate::platform::{ScrewContent, ScrewMethodName};
+use crate::rotary::RotaryContent;
+use crate::rotary::record::ReadingName;
 use crate::store_in;
 
 /// Written by the first program, before there were other kinds, and named by its hash then.

@@ -1,6 +1,8 @@
 //! A run that the journals of all kinds are tried with.
 
-use super::{ConfigHash, IdentityRecord, InstrumentRecord, JournalHeader, SCHEMA_VERSION};
+use machine::records::ConfigHash;
+
+use super::{IdentityRecord, InstrumentRecord, JournalHeader, SCHEMA_VERSION};
 
 pub(crate) fn hash() -> ConfigHash {
     ConfigHash::recorded("h")

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 mod detectors;
 
-pub use detectors::{
+pub(crate) use detectors::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, LayoutName,
     RollConfig, TemperatureConfig,
 };
@@ -75,7 +75,6 @@ pub struct VolumetricConfig {
 /// One of the three directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-#[expect(missing_docs, reason = "the names say it")]
 pub enum VolumeAxisName {
     X,
     Y,

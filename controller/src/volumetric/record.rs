@@ -17,9 +17,10 @@ use units::{Celsius, Metres, Quantity, Radians};
 
 use crate::store::{IdentityRecord, StoreError, short};
 
-pub use agreement::AgreementRecord;
+pub(crate) use agreement::AgreementRecord;
 pub(crate) use warmth::AXES;
-pub use warmth::{BendRecord, ExpansionRecord, UnknownRecord};
+pub use warmth::BendRecord;
+pub(crate) use warmth::{ExpansionRecord, UnknownRecord};
 
 /// How a function runs between its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

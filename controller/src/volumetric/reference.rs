@@ -125,7 +125,7 @@ struct Stops {
 ///
 /// # Errors
 /// When they were never measured.
-pub fn measured_geometry(store: &Store) -> Result<String, Failure> {
+pub(crate) fn measured_geometry(store: &Store) -> Result<String, Failure> {
     let geometry = store.active(GEOMETRY)?.current;
     Ok(geometry.ok_or(VolumetricFailure::NoGeometry)?)
 }

@@ -35,7 +35,7 @@ pub enum BeamDetectorError {
 }
 
 /// The direction that a name stands for.
-pub const fn volume_axis(name: VolumeAxisName) -> Axis {
+pub(crate) const fn volume_axis(name: VolumeAxisName) -> Axis {
     match name {
         VolumeAxisName::X => Axis::X,
         VolumeAxisName::Y => Axis::Y,
@@ -44,7 +44,7 @@ pub const fn volume_axis(name: VolumeAxisName) -> Axis {
 }
 
 /// How an error function is drawn between its nodes.
-pub const fn function_shape(name: ShapeName) -> Shape {
+pub(crate) const fn function_shape(name: ShapeName) -> Shape {
     match name {
         ShapeName::Linear => Shape::Linear,
         ShapeName::MonotoneCubic => Shape::MonotoneCubic,
@@ -70,7 +70,7 @@ fn millis(ms: f64) -> Duration {
 ///
 /// # Errors
 /// When the text is no chain.
-pub fn volumetric_chain(config: &VolumetricConfig) -> Result<Chain, ChainError> {
+pub(crate) fn volumetric_chain(config: &VolumetricConfig) -> Result<Chain, ChainError> {
     config.chain.parse()
 }
 
@@ -78,7 +78,7 @@ pub fn volumetric_chain(config: &VolumetricConfig) -> Result<Chain, ChainError> 
 ///
 /// # Errors
 /// When it has no extent.
-pub fn work_volume(config: &VolumetricConfig) -> Result<Volume, VolumeError> {
+pub(crate) fn work_volume(config: &VolumetricConfig) -> Result<Volume, VolumeError> {
     Volume::new(point_of_mm(config.low_mm), point_of_mm(config.high_mm))
 }
 
@@ -160,7 +160,7 @@ pub fn roll_optics(config: &RollConfig) -> Result<RollOptics, RollError> {
 }
 
 /// What a temperature can be.
-pub fn temperature_settings(config: &TemperatureConfig) -> TemperatureSettings {
+pub(crate) fn temperature_settings(config: &TemperatureConfig) -> TemperatureSettings {
     TemperatureSettings {
         low: Celsius(config.low_c),
         high: Celsius(config.high_c),
@@ -173,7 +173,7 @@ pub fn temperature_settings(config: &TemperatureConfig) -> TemperatureSettings {
 
 /// What temperatures do to the machine, each by how far it is from what it was when the machine
 /// was calibrated: `references`, in the order of the configuration.
-pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
+pub(crate) fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
     let channels = config.temperature.iter().zip(references);
     let channels = channels.map(|(it, reference)| ThermalChannel {
         reference: *reference,
@@ -194,7 +194,7 @@ pub fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Thermal {
 
 /// The guides that bend, as identification looks for their bows: from tilts alone, since films and
 /// supports shift a slide sideways too.
-pub fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
+pub(crate) fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
     let place = |axis: Axis| {
         let beam = config.beam.each()[axis.index()];
         beam.map(|it| point_of_mm(it.slider.place_mm))
@@ -216,7 +216,7 @@ pub fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
 ///
 /// # Errors
 /// When positions and factors form no function.
-pub fn influences(config: &[InfluenceConfig]) -> Result<Influences, FunctionError> {
+pub(crate) fn influences(config: &[InfluenceConfig]) -> Result<Influences, FunctionError> {
     let mut influences = Influences::default();
     for it in config {
         let nodes: Vec<_> = it
@@ -237,7 +237,7 @@ pub fn influences(config: &[InfluenceConfig]) -> Result<Influences, FunctionErro
 }
 
 /// How values of detectors come and go.
-pub fn feed_settings(config: &FeedConfig) -> FeedSettings {
+pub(crate) fn feed_settings(config: &FeedConfig) -> FeedSettings {
     FeedSettings {
         patience: millis(config.patience_ms),
         reaction: match config.reaction {
@@ -252,7 +252,7 @@ pub fn feed_settings(config: &FeedConfig) -> FeedSettings {
 }
 
 /// What the model's deviations may be at most.
-pub fn model_limits(config: &VolumetricCompensationConfig) -> Limits {
+pub(crate) fn model_limits(config: &VolumetricCompensationConfig) -> Limits {
     Limits {
         size: Metres::from_um(config.size_limit_um),
         slope: config.slope_limit,

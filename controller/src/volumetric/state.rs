@@ -17,12 +17,12 @@ use crate::volumetric::{BeamReferencesContent, GeometryContent, MemoryName, Stat
 use crate::volumetric::{VolumetricFailure, VolumetricState};
 
 /// What the errors of three axes are called where an axis is named.
-pub const GEOMETRY: &str = "volume";
+pub(crate) const GEOMETRY: &str = "volume";
 /// Likewise what their detectors read.
-pub const REFERENCES: &str = "volume-references";
+pub(crate) const REFERENCES: &str = "volume-references";
 
 /// Likewise the displacements that are kept.
-pub const fn memory_pointer(memory: MemoryName) -> &'static str {
+pub(crate) const fn memory_pointer(memory: MemoryName) -> &'static str {
     match memory {
         MemoryName::First => "volume-first-memory",
         MemoryName::Second => "volume-second-memory",

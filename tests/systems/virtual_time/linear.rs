@@ -3,9 +3,9 @@
 use compensator::iso230::Figures;
 use tests::Bench;
 use tests::Edit;
+use truestage::CalibrateOptions;
+use truestage::Failure;
 use truestage::linear::{Corrected, VerifyOptions};
-use truestage::run::CalibrateOptions;
-use truestage::{Failure, text};
 use units::{Metres, Time};
 
 fn options(calibration: Option<String>) -> VerifyOptions {
@@ -42,7 +42,7 @@ fn twenty_stages_are_brought_within_two_micrometres_between_the_calibrated_posit
     let mut least = Metres(f64::INFINITY);
     for seed in 1..=20 {
         let (found, left) = cycle(seed);
-        let largest = text::largest_deviation(&found);
+        let largest = found.largest_deviation();
         assert!(
             largest >= Metres::from_um(8.0),
             "seed {seed}: as found {} µm",

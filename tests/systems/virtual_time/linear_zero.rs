@@ -3,8 +3,9 @@
 //! Judged by the plant's truth: where, on the scale, the drive's coordinate zero has come to
 //! lie. The stage's own repeatability at a stop has no part in it.
 
+use mock_bus::plant::DriftLimits;
 use tests::Bench;
-use truestage::emulated::{DriftLimits, HallDrift};
+use truestage::emulated::HallDrift;
 use units::{Metres, Volts};
 
 const CYCLES: u64 = 50;

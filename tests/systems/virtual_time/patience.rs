@@ -5,8 +5,8 @@ use core::time::Duration;
 
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{EMULATED, machine_config};
+use truestage::CalibrateOptions;
 use truestage::emulated::Emulated;
-use truestage::run::CalibrateOptions;
 use truestage::{Machine, ports};
 
 /// A calibration that meets `fault` fails after so long, on the wall: the machine stopped, as far as

@@ -5,17 +5,17 @@ use core::time::Duration;
 use std::cell::Cell;
 use std::rc::Rc;
 
+use machine::records::{StoreError, read_journal};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
+use truestage::CalibrateOptions;
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::rotary::PlateLog;
 use truestage::rotary::Way;
 use truestage::rotary::{
     Operator, PlateMove, PlateTask, RotaryCalibrated, RotaryFailure, RotaryVerified,
 };
-use truestage::run::CalibrateOptions;
-use truestage::store::{StoreError, read_journal};
 use truestage::{Failure, Machine};
 use truestage::{Observer, Stage};
 use units::Radians;

@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 
 use tests::{Bench, Edit, seeds};
+use truestage::CalibrateOptions;
 use truestage::Failure;
-use truestage::run::CalibrateOptions;
 
 /// `text` with each `KEY=VALUE` of `changes` written into the one line that sets that key.
 fn with(text: String, changes: &str) -> String {

@@ -1,9 +1,9 @@
 //! A calibration without warm lines, of a machine that goes on warming up while its lines are read.
 
 use tests::Edit;
-use tests::volume::{Frame, Volume, good, percentile_95, spread};
+use tests::volume::{Frame, GEOMETRY, Volume, good, percentile_95, spread};
 use truestage::volumetric::GeometryContent;
-use truestage::volumetric::{GEOMETRY, WarmUp};
+use truestage::volumetric::WarmUp;
 use units::Metres;
 
 /// Hardly any gradient and films, but scales that become a kelvin and more warmer meanwhile.

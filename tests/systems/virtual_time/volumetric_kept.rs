@@ -3,11 +3,10 @@
 use core::time::Duration;
 
 use compensator::volumetric::Axis;
-use compensator::volumetric::online::Memories;
+use compensator::volumetric::online::{Memories, StateMap};
 use tests::Edit;
 use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
-use truestage::volumetric::MemoryName;
-use truestage::volumetric::{Remembered, VolumetricState};
+use truestage::volumetric::{MemoryName, VolumetricState};
 use units::{Metres, Time};
 
 /// The tool of the shipped machine, and of its emulation.
@@ -152,8 +151,8 @@ fn refusal(volume: &mut Volume) -> String {
 }
 
 /// In the middle of x, across it.
-fn kept(memory: &Remembered) -> [Metres; 2] {
-    memory.map.at(Axis::X, Metres::from_mm(250.0))
+fn kept(map: &StateMap) -> [Metres; 2] {
+    map.at(Axis::X, Metres::from_mm(250.0))
 }
 
 /// Whoever does what he is told to is not told it again.
@@ -179,7 +178,7 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     assert!(refused.contains(told), "{refused}");
     let again = record(&mut volume, MemoryName::First);
     assert!(
-        kept(&again)
+        kept(&again.map)
             .iter()
             .all(|it| it.abs() < Metres::from_um(1.0))
     );
@@ -189,7 +188,11 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     idle_until(&mut volume, 2.0 * 3600.0);
     // All of it is in the second before there is a first.
     let all = record(&mut volume, MemoryName::Second);
-    assert!(kept(&all).iter().any(|it| it.abs() > Metres::from_um(3.0)));
+    assert!(
+        kept(&all.map)
+            .iter()
+            .any(|it| it.abs() > Metres::from_um(3.0))
+    );
     let first = record(&mut volume, MemoryName::First);
     assert_eq!(first.foreign.as_ref(), Some(&all.id));
     let refused = refusal(&mut volume);
@@ -201,7 +204,7 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     let stored = good(volume.work().state(&store));
     let (state, _) = stored.expect("it was stored");
     let both = state.memories.kept(Axis::X, Metres::from_mm(250.0));
-    for (both, all) in both.into_iter().zip(kept(&all)) {
+    for (both, all) in both.into_iter().zip(kept(&all.map)) {
         assert!((both - all).abs() < Metres::from_um(0.5), "{both:?}");
     }
     // Without its first the second would keep less than there was.

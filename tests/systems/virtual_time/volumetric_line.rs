@@ -11,9 +11,8 @@ use mock_bus::plant::LineTruth;
 use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::Failure;
 use truestage::emulated::Emulated;
-use truestage::volumetric::{
-    Line, LineOperator, LineOptics, LineReading, LineReadout, LineTask, VolumetricFailure,
-};
+use truestage::for_tests::{Line, LineReading, LineReadout};
+use truestage::volumetric::{LineOperator, LineOptics, LineTask, VolumetricFailure};
 use units::{Metres, Radians};
 use wire::cia402::PowerState;
 

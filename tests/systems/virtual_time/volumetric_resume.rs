@@ -5,14 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use compensator::volumetric::function::Shape;
+use machine::records::{ReadJournal, read_journal};
 use tests::volume::{Volume, good, quick};
 use truestage::Failure;
 use truestage::emulated::{Emulated, HallDrift};
-use truestage::store::{ReadJournal, read_journal};
+use truestage::for_tests::VolumetricEvaluated;
 use truestage::volumetric::VolumeLog;
-use truestage::volumetric::{
-    LineOperator, LineTask, VolumetricCalibrated, VolumetricEvaluated, WarmUp,
-};
+use truestage::volumetric::{LineOperator, LineTask, VolumetricCalibrated, WarmUp};
 
 /// Sets lines up, notes which, and goes home before the one that it is told.
 struct Hand {

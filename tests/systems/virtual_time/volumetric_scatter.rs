@@ -1,10 +1,10 @@
 //! A calibration of three axes whose interferometer loses count while a line is read.
 
+use machine::records::read_journal;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use tests::volume::{Volume, quick};
 use truestage::Failure;
 use truestage::emulated::Emulated;
-use truestage::store::read_journal;
 use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{LineOperator, LineTask, VolumetricFailure, WarmUp};
 

@@ -6,7 +6,7 @@
 
 use compensator::error_table::{ErrorTable, Node};
 use tests::{Bench, Edit, random, seeds};
-use truestage::run::CalibrateOptions;
+use truestage::CalibrateOptions;
 use truestage::{Failure, Store};
 use units::Metres;
 
@@ -174,9 +174,8 @@ impl Count {
 
     fn spoil(&mut self, bench: &Bench, table: &ErrorTable, seed: u64) {
         let config = &bench.loaded.config;
-        let refused = |wrong: ErrorTable| {
-            truestage::linear::settings::compensation(config, "x", wrong).is_err()
-        };
+        let refused =
+            |wrong: ErrorTable| truestage::for_tests::compensation(config, "x", wrong).is_err();
         let inner = table.nodes().len() - 4;
         let at = 2 + (random(&mut (seed ^ 0xBAD)) * inner as f64) as usize;
         for (half_wavelengths, found) in &mut self.found {
@@ -184,7 +183,7 @@ impl Count {
             *found += u32::from(refused(with_error(table, at, error)));
         }
         if let Ok(Some(noticed)) =
-            table.judge_neighbours(truestage::linear::settings::harmless(config, "x"))
+            table.judge_neighbours(truestage::for_tests::harmless(config, "x"))
         {
             self.noticed.push(noticed);
             self.certain.1 += 1;
@@ -251,8 +250,8 @@ fn a_position_that_is_wrong_in_every_run_is_refused_and_named() {
         let mut bench = Bench::new(seed);
         let table = calibrated(&mut bench).unwrap_or_else(|failure| panic!("{failure}"));
         let wrong = with_error(&table, 12, HALF_WAVELENGTH * 5.0);
-        let failure = truestage::linear::settings::compensation(&bench.loaded.config, "x", wrong)
-            .unwrap_err();
+        let failure =
+            truestage::for_tests::compensation(&bench.loaded.config, "x", wrong).unwrap_err();
         assert_eq!(failure.exit_code(), 3);
         let text = failure.to_string();
         for part in [

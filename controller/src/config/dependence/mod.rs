@@ -14,7 +14,7 @@ use machine::records::ConfigHash;
 use super::model::MachineConfig;
 
 /// The hash of what a calibration depends on in `config`.
-pub fn hash_of(config: &MachineConfig) -> ConfigHash {
+pub(crate) fn hash_of(config: &MachineConfig) -> ConfigHash {
     ConfigHash::of_texts(&version_2::text(config), &[version_1::text(config)])
 }
 

@@ -1,5 +1,6 @@
 use crate::Edit;
-use crate::config::{ConfigError, Diagnostic, parse};
+use crate::config::diagnostic::Diagnostic;
+use crate::config::{ConfigError, parse};
 
 const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
 const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");

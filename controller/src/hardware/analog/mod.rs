@@ -14,9 +14,9 @@ use serde::Deserialize;
 use super::bus::Wiring;
 use super::node::NodeConfig;
 use crate::config::judge::Judge;
-pub use cia401::Cia401Config;
-pub use cia404::Cia404Config;
-pub use dcon::DconConfig;
+pub(crate) use cia401::Cia401Config;
+pub(crate) use cia404::Cia404Config;
+pub(crate) use dcon::DconConfig;
 
 /// An analog module, by what `device` calls it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

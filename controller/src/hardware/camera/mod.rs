@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::bus::Wiring;
 use crate::config::judge::Judge;
-pub use in_sight::InSightConfig;
+pub(crate) use in_sight::InSightConfig;
 
 /// An image controller, by what `device` calls it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

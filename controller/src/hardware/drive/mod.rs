@@ -15,8 +15,8 @@ use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquare
 use super::bus::Wiring;
 use super::node::NodeConfig;
 use crate::config::judge::Judge;
-pub use cia402::Cia402AxisConfig;
-pub use copley::{AmplifierConfig, CopleyAxisConfig};
+pub(crate) use cia402::Cia402AxisConfig;
+pub(crate) use copley::CopleyAxisConfig;
 
 /// The servo drive of an axis, by what `device` calls it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

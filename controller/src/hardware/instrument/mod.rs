@@ -14,8 +14,8 @@ use units::{Metres, Radians};
 
 use super::bus::{SerialLine, Wiring};
 use crate::config::judge::Judge;
-pub use nd287::Nd287Config;
-pub use umd2::Umd2Config;
+pub(crate) use nd287::Nd287Config;
+pub(crate) use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
 const ANGLE_U: Radians = Radians(0.2e-3);

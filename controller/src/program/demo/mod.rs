@@ -9,16 +9,16 @@ pub(crate) mod stand;
 use std::io::IsTerminal;
 use std::time::Instant;
 
-use truestage::config::{self, Loaded};
-use truestage::emulated::EmulatedOnPtys;
-use truestage::store::Lease;
-use truestage::{Failure, Machine, ports, store_of};
+use machine::records::Lease;
 
 pub(crate) use self::stand::DemoArgs;
 use self::stand::{Stand, Which};
+use crate::config::{self, Loaded};
+use crate::emulated::EmulatedOnPtys;
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
+use crate::{Failure, Machine, ports, store_of};
 
 pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     if args.machine == Which::Volumetric {

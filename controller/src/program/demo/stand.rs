@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
+use machine::records::JournalHeader;
 use serde_json::Value;
-use truestage::emulated::{EmulatedOnPtys, HallDrift};
-use truestage::store::JournalHeader;
-use truestage::{Failure, Machine, Store};
 use units::Time;
+
+use crate::emulated::{EmulatedOnPtys, HallDrift};
+use crate::{Failure, Machine, Store};
 
 /// How long the mains stays off, and what the drives take to boot, in machine time.
 const POWER_OFF: Duration = Duration::from_millis(800);

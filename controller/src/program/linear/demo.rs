@@ -4,19 +4,20 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use compensator::iso230::Figures;
+use machine::records::read_journal;
 use serde_json::{Value, json};
-use truestage::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
-use truestage::linear::ZeroEntry;
-use truestage::linear::report::{self, Page, Section};
-use truestage::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
-use truestage::page::facts_of;
-use truestage::run::CalibrateOptions;
-use truestage::store::read_journal;
-use truestage::{Failure, Machine, Store, json as to_json, text};
 use units::{Metres, Time, Volts};
 
+use crate::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
+use crate::linear::ZeroEntry;
+use crate::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
 use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::linear::report::{self, Page, Section};
 use crate::program::output::Output;
+use crate::program::page::facts_of;
+use crate::program::{json as to_json, text};
+use crate::run::CalibrateOptions;
+use crate::{Failure, Machine, Store};
 
 const AXIS: &str = "x";
 /// What aged, warmed and disturbed Hall sensors may do between two power-ups.
@@ -147,7 +148,7 @@ fn columns(story: &Story) -> [(&'static str, &Figures); 3] {
 }
 
 fn summary(story: &Story, report: &std::path::Path, wall: Duration, lived: Time) -> String {
-    let largest = |figures| text::largest_deviation(figures).um();
+    let largest = |figures: &Figures| figures.largest_deviation().um();
     let mut lines = vec![
         String::new(),
         text::figures_table(&columns(story)),
@@ -202,7 +203,7 @@ fn to_value(story: &Story, report: &std::path::Path, wall: Duration) -> Value {
         "as_found": to_json::figures(&story.found.figures),
         "as_left": to_json::figures(&story.left.figures),
         "as_left_after_power_cycles": to_json::figures(&story.after.figures),
-        "as_found_largest_deviation_um": to_json::um(text::largest_deviation(&story.found.figures)),
+        "as_found_largest_deviation_um": to_json::um(story.found.figures.largest_deviation()),
         "zero": to_json::zero(&story.first_zero.estimate),
         "power_cycles": rezeros,
         "calibration": {"id": story.calibrated.id, "path": story.calibrated.path},

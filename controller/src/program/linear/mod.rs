@@ -3,14 +3,15 @@
 pub(crate) mod demo;
 mod moved;
 mod page;
+mod report;
 mod shown;
 pub(crate) mod verbs;
 
-use truestage::linear::{LinearContent, LinearLog};
-use truestage::store::Log;
+use machine::records::Log;
 
 use super::show::Shown;
 use super::verbs::Verbs;
+use crate::linear::{LinearContent, LinearLog};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {

@@ -1,9 +1,11 @@
 //! What `move` says of a linear axis: the encoder's place, and plainly what was not corrected.
 
+use machine::records::short;
 use serde_json::{Value, json};
-use truestage::linear::{Corrected, Moved};
-use truestage::store::short;
 use units::{Metres, Short};
+
+use crate::linear::Corrected;
+use crate::linear::moved::Moved;
 
 /// For people: where the encoder stands, then what to know about the correction.
 pub(crate) fn text(axis: &str, moved: &Moved, calibration: Option<&str>) -> String {

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use compensator::iso230::{self, Figures};
-use truestage::Failure;
-use truestage::linear::report::{self, Page, Section};
-use truestage::linear::{LinearLog, PointEntry, series_of};
-use truestage::page::facts_of;
-use truestage::store::read_journal;
+use machine::records::read_journal;
+
+use crate::Failure;
+use crate::linear::measure::series_of;
+use crate::linear::{LinearLog, PointEntry};
+use crate::program::linear::report::{self, Page, Section};
+use crate::program::page::facts_of;
 
 /// The page of the journal at `path`.
 pub(crate) fn html(path: &Path) -> Result<String, Failure> {

@@ -1,9 +1,10 @@
 //! The stored deviations of a linear axis on the screen.
 
 use serde_json::json;
-use truestage::linear::{LinearContent, NodeRecord};
 use units::Metres;
 
+use crate::linear::LinearContent;
+use crate::linear::record::NodeRecord;
 use crate::program::show::{Changes, Show};
 
 impl Show for LinearContent {

@@ -2,20 +2,21 @@
 
 use std::path::PathBuf;
 
+use machine::records::Store;
 use serde_json::{Value, json};
-use truestage::linear::VerifyOptions;
-use truestage::ports::Use;
-use truestage::run::CalibrateOptions;
-use truestage::store::Store;
-use truestage::{Failure, Machine, json as to_json, text};
 use units::{Metres, Short};
 
+use crate::linear::VerifyOptions;
+use crate::ports::Use;
 use crate::program::linear::moved;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_target;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use crate::program::{json as to_json, text};
+use crate::run::CalibrateOptions;
+use crate::{Failure, Machine};
 
 /// What is settled before anything moves.
 struct Prepared {

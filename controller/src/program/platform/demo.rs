@@ -2,21 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
+use machine::records::read_journal;
 use serde_json::json;
-use truestage::emulated::HallDrift;
-use truestage::platform::report as page;
-use truestage::platform::report::PlatformPage;
-use truestage::platform::{Aligned, PlatformCalibrated, PlatformVerified, PlatformZeroed, Pose};
-use truestage::store::read_journal;
-use truestage::{Failure, Store, json as to_json};
 use units::{Metres, Radians};
 
+use crate::emulated::HallDrift;
+use crate::platform::Pose;
+use crate::platform::calibrate::PlatformCalibrated;
+use crate::platform::verify::{Aligned, PlatformVerified};
+use crate::platform::zero::PlatformZeroed;
 use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::json as to_json;
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
+use crate::program::platform::report as page;
+use crate::program::platform::report::PlatformPage;
 use crate::program::platform::verbs::{
     calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
 };
+use crate::{Failure, Store};
 
 /// Everything the demonstration found.
 struct Story {

@@ -7,18 +7,19 @@ use compensator::screw::{
     self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
 use compensator::screw::{AxisStrokes, StrokeSeries};
+use machine::records::{CalibrationRecord, short};
 use serde_json::{Value, json};
-use truestage::platform::PlatformConfig;
-use truestage::platform::json as to_json;
-use truestage::platform::{ScrewContent, ScrewMethodName};
-use truestage::store::{CalibrationRecord, short};
-use truestage::text::ScrewTerm;
-use truestage::{Failure, config, store_of, text};
 use units::{Metres, Short};
 
+use crate::platform::PlatformConfig;
+use crate::platform::{ScrewContent, ScrewMethodName};
 use crate::program::data_file::{head_of, read};
 use crate::program::output::{Ended, Output};
+use crate::program::platform::json as to_json;
 use crate::program::show::{Changes, Show};
+use crate::program::text;
+use crate::program::text::ScrewTerm;
+use crate::{Failure, config, store_of};
 
 /// What `truestage fit screw` is told.
 #[derive(Debug, Args)]

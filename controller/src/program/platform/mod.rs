@@ -2,18 +2,20 @@
 
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod json;
+mod report;
 pub(crate) mod verbs;
 
 use std::path::Path;
 
-use truestage::Failure;
-use truestage::platform::report::PlatformPage;
-use truestage::platform::{PlatformLog, ScrewContent};
-use truestage::store::{Log, read_journal};
+use machine::records::{Log, read_journal};
+use report::PlatformPage;
 
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
+use crate::Failure;
+use crate::platform::{PlatformLog, ScrewContent};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
@@ -30,5 +32,5 @@ pub(crate) const VERBS: Verbs = Verbs {
 fn html(path: &Path) -> Result<String, Failure> {
     let journal = read_journal::<PlatformLog>(path)?;
     let page = PlatformPage::of(&journal, made_from::<ScrewContent>(path)?);
-    Ok(truestage::platform::report::render(&page))
+    Ok(report::render(&page))
 }

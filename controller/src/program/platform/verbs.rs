@@ -1,17 +1,18 @@
 //! The verbs of the cycle on an alignment platform (system S1).
 
 use serde_json::{Value, json};
-use truestage::platform::{
-    Aligned, PlatformCalibrated, PlatformFailure, PlatformVerified, Pose, PoseMoved,
-};
-use truestage::ports::Use;
-use truestage::{Failure, Machine, Store, json as to_json};
 
+use crate::platform::calibrate::PlatformCalibrated;
+use crate::platform::verify::{Aligned, PlatformVerified};
+use crate::platform::{PlatformFailure, Pose, PoseMoved};
+use crate::ports::Use;
+use crate::program::json as to_json;
 use crate::program::output::{Ended, Output};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::session::Session;
 use crate::program::targets::{angle, length};
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
+use crate::{Failure, Machine, Store};
 
 /// Starts the platform, zeroes it, runs `procedure`, switches off; what `possible` refuses, before
 /// anything is sent.
@@ -266,7 +267,7 @@ pub(crate) fn calibrated_value(calibrated: &PlatformCalibrated) -> Value {
                 "lost_motion_um": to_json::um(screw.model.lost_motion),
                 "lost_motion_um_u": screw.model.u_lost_motion().map(to_json::um),
                 "scatter_um": screw.model.scatter.map(to_json::um),
-                "outliers": truestage::platform::json::outliers(&screw.outliers, &[]),
+                "outliers": crate::program::platform::json::outliers(&screw.outliers, &[]),
                 "harmonics": screw.model.harmonics.iter().map(|it| it.number).collect::<Vec<_>>(),
             })
         })

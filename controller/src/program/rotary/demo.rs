@@ -3,23 +3,24 @@
 use std::path::PathBuf;
 
 use compensator::rotary::Design;
+use machine::records::read_journal;
 use serde_json::json;
-use truestage::emulated::{EmulatedOnPtys, HallDrift};
-use truestage::rotary::Way;
-use truestage::rotary::report as page;
-use truestage::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryMoved, RotaryVerified};
-use truestage::run::CalibrateOptions;
-use truestage::store::read_journal;
-use truestage::{Failure, Store};
 use units::Radians;
 
+use crate::emulated::{EmulatedOnPtys, HallDrift};
 use crate::program::demo::stand::{Shown, Stand, power_cycle, took, write_page};
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
+use crate::program::rotary::report as page;
 use crate::program::rotary::verbs::{
     calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
     verified_value,
 };
+use crate::rotary::Way;
+use crate::rotary::moves::RotaryMoved;
+use crate::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryVerified};
+use crate::run::CalibrateOptions;
+use crate::{Failure, Store};
 
 const AXIS: &str = "c";
 /// Two turns on and a little.
@@ -146,7 +147,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
     write_page(store, &left.header, &html)
 }
 
-fn planned(machine: &mut truestage::Machine, output: Output) -> Result<Design, Failure> {
+fn planned(machine: &mut crate::Machine, output: Output) -> Result<Design, Failure> {
     let config = machine.rotary(AXIS)?.config().calibrate.as_ref();
     let config = config.ok_or_else(|| Failure::NotConfigured {
         axis: AXIS.to_owned(),

@@ -9,16 +9,16 @@ use compensator::rotary::{
     self, Criterion, Design, PlanError, Reading, Solution, SolveOptions,
     rms_amplification_of_a_pair, rms_amplification_of_all,
 };
+use machine::records::{CalibrationRecord, short};
 use serde_json::json;
-use truestage::rotary::RotaryContent;
-use truestage::rotary::json as to_json;
-use truestage::store::{CalibrationRecord, short};
-use truestage::{Failure, config, store_of};
 use units::Radians;
 
 use crate::program::data_file::{read, rotary_head_of};
 use crate::program::output::{Ended, Output};
+use crate::program::rotary::json as to_json;
 use crate::program::show::{Changes, Show};
+use crate::rotary::RotaryContent;
+use crate::{Failure, config, store_of};
 
 /// Harmonics that a plan prints; `--json` has them all.
 const SHOWN: usize = 8;
@@ -263,11 +263,7 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
     }
     let content = RotaryContent::new(solution);
     if let Some(limits) = &axes[&axis].compensation {
-        truestage::rotary::settings::periodic_compensation(
-            limits,
-            &axis,
-            content.table("just made")?,
-        )?;
+        crate::rotary::settings::periodic_compensation(limits, &axis, content.table("just made")?)?;
     }
     let record = CalibrationRecord { head, content };
     Ok(store_of(&loaded.config.machine).save(&record)?)

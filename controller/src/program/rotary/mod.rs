@@ -2,17 +2,20 @@
 
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod json;
+mod report;
+mod residuals;
 pub(crate) mod verbs;
 
 use std::path::Path;
 
-use truestage::Failure;
-use truestage::rotary::{PlateLog, RotaryContent};
-use truestage::store::{Log, read_journal};
+use machine::records::{Log, read_journal};
 
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
+use crate::Failure;
+use crate::rotary::{PlateLog, RotaryContent};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
@@ -29,5 +32,5 @@ pub(crate) const VERBS: Verbs = Verbs {
 fn html(path: &Path) -> Result<String, Failure> {
     let journal = read_journal::<PlateLog>(path)?;
     let made = made_from::<RotaryContent>(path)?;
-    Ok(truestage::rotary::report::render(&journal, &made))
+    Ok(report::render(&journal, &made))
 }

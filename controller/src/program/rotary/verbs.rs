@@ -1,23 +1,24 @@
 //! The verbs of the cycle on rotary axes (system S2).
 
+use machine::records::short;
 use serde_json::{Value, json};
-use truestage::ports::Use;
-use truestage::rotary::Way;
-use truestage::rotary::json::{arcsec, solution};
-use truestage::rotary::{
-    RotaryCalibrated, RotaryFailure, RotaryFigures, RotaryMoved, RotaryVerified,
-};
-use truestage::run::CalibrateOptions;
-use truestage::store::short;
-use truestage::{Failure, Machine, Store, json as to_json};
 use units::Radians;
 
+use crate::ports::Use;
+use crate::program::json as to_json;
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
+use crate::program::rotary::json::{arcsec, solution};
 use crate::program::session::{Session, choose_axis};
 use crate::program::targets::angle;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs, WayName};
+use crate::rotary::Way;
+use crate::rotary::moves::RotaryMoved;
+use crate::rotary::verify::RotaryFigures;
+use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
+use crate::run::CalibrateOptions;
+use crate::{Failure, Machine, Store};
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let run = |_: &mut Machine, _: &str, _: &Store| Ok(());

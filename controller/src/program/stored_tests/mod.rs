@@ -2,7 +2,7 @@
 //! they are shown or refused.
 //!
 //! `controller/golden` has those of demonstrations of each kind of machine; the many lines of three axes are thinned
-//! so that each case is evaluated in milliseconds. A case is a seed: `MUTATIONS=20000 cargo test -p truestage --bin truestage mutated --
+//! so that each case is evaluated in milliseconds. A case is a seed: `MUTATIONS=20000 cargo test -p truestage --lib mutated --
 //! --include-ignored` tries so many of each kind, and what fails names its seed.
 
 mod mutation;
@@ -13,13 +13,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use mutation::{Chance, edit, edit_lines};
 use nix::time::{ClockId, clock_gettime};
 use serde_json::Value;
-use truestage::{Failure, Store};
 
 use crate::program::output::Output;
-use crate::program::{cal, page};
-use mutation::{Chance, edit, edit_lines};
+use crate::program::{cal, report};
+use crate::{Failure, Store};
 
 /// So many of each kind in every run.
 const QUICK: usize = 400;
@@ -88,7 +88,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let store = truestage::store_in(folder.path(), "m");
+        let store = crate::store_in(folder.path(), "m");
         for part in ["calibrations", "runs"] {
             fs::create_dir_all(store.root().join(part)).expect("there is room");
         }
@@ -233,7 +233,7 @@ fn show_calibration(desk: &Desk, base: &str, id: &str, run: &Path) -> Result<Str
     let text = cal::shown(store, id)?.0;
     let diff = cal::compared(store, base, id, Output::new(true));
     let diff = diff.map_or_else(|it| it.to_string(), |it| it.0);
-    Ok([list, text, diff, page::html(run)?].concat())
+    Ok([list, text, diff, report::html(run)?].concat())
 }
 
 fn edit_calibrations(machine: &Machine, count: usize) -> Tally {
@@ -269,7 +269,7 @@ fn edit_journals(machine: &Machine, count: usize) -> Tally {
     for (at, (name, text)) in machine.journals.iter().enumerate() {
         let lines = thinned(lines_of(text));
         let run = desk.put_journal(name, &lines);
-        let whole = look(|| page::html(&run));
+        let whole = look(|| report::html(&run));
         assert_eq!(whole.fate, Fate::Shown, "{name} as it was written");
         // Calibrations are what most work goes into.
         let share = if at == 0 { 3 } else { 1 };
@@ -278,7 +278,7 @@ fn edit_journals(machine: &Machine, count: usize) -> Tally {
             let mut edited = lines.clone();
             (0..=chance.below(3)).for_each(|_| edit_lines(&mut edited, &mut chance));
             let run = desk.put_journal(name, &edited);
-            tally.add(seed, name, judged(look(|| page::html(&run)), &whole));
+            tally.add(seed, name, judged(look(|| report::html(&run)), &whole));
         }
         fs::remove_file(run).expect("it is there");
     }
@@ -367,7 +367,7 @@ fn what_is_refused_is_named_with_file_place_expectation_and_what_stands_there() 
     let (name, journal) = ROTARY.journals[0];
     let mut lines = lines_of(journal);
     lines[1]["lines"] = 4_000_000.into();
-    let refused = page::html(&desk.put_journal(name, &lines)).expect_err("no such plate");
+    let refused = report::html(&desk.put_journal(name, &lines)).expect_err("no such plate");
     let text = refused.to_string();
     for part in [name, "line 2", "lines", "2 to 1000000", "seen: 4000000"] {
         assert!(text.contains(part), "{part}: {text}");

@@ -5,17 +5,18 @@ use core::time::Duration;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use machine::records::{Lease, ReadJournal, read_journal};
 use serde_json::json;
-use truestage::emulated::{Emulated, with_rare_heartbeats};
-use truestage::store::{Lease, ReadJournal, read_journal};
-use truestage::volumetric::report::{HourOfDay, render_day};
-use truestage::volumetric::{VerifyBy, VolumeLog, VolumetricCalibrated, WarmUp};
-use truestage::{Failure, Machine, Store, config, store_of};
 use units::{Metres, Time};
 
+use crate::edit::with_rare_heartbeats;
+use crate::emulated::Emulated;
 use crate::program::demo::stand::{DemoArgs, write_page};
 use crate::program::output::{Ended, Output};
+use crate::program::volumetric::report::{HourOfDay, render_day};
 use crate::program::volumetric::verbs::{calibrated_text, calibrated_value};
+use crate::volumetric::{VerifyBy, VolumeLog, VolumetricCalibrated, WarmUp};
+use crate::{Failure, Machine, Store, config, store_of};
 
 /// How long the machine warms up between cold and warm lines.
 const WARM_UP: Duration = Duration::from_secs(2 * 3600);

@@ -6,26 +6,26 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use compensator::volumetric::identify::{IdentifyError, Observation, Optics};
 use compensator::volumetric::{VolumeLine, VolumeSeries};
+use machine::records::{CalibrationRecord, ReadJournal, RecordHead, read_journal, short};
 use serde_json::json;
-use truestage::config;
-use truestage::config::Loaded;
-use truestage::store::{CalibrationRecord, ReadJournal, RecordHead, read_journal, short};
-use truestage::volumetric::VolumetricConfig;
-use truestage::volumetric::settings::function_shape;
-use truestage::volumetric::{
-    BeamReferencesContent, LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeLog,
-    VolumeReferencesEntry,
-};
-use truestage::volumetric::{
-    GEOMETRY, REFERENCES, VolumetricEvaluated, VolumetricFailure, volume_plan,
-};
-use truestage::{Failure, store_of};
 use units::Radians;
 
+use crate::config;
+use crate::config::Loaded;
 use crate::program::data_file::{read, volume_head_of};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::shown;
 use crate::program::volumetric::verbs::{add_unknown, found_value, unknown_text, warmth_text};
+use crate::volumetric::VolumetricConfig;
+use crate::volumetric::calibrate::VolumetricEvaluated;
+use crate::volumetric::calibrate::volume_plan;
+use crate::volumetric::settings::function_shape;
+use crate::volumetric::{
+    BeamReferencesContent, LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeLog,
+    VolumeReferencesEntry,
+};
+use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
+use crate::{Failure, store_of};
 
 /// What `truestage fit volumetric` is told.
 #[derive(Debug, Args)]
@@ -299,8 +299,8 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
+    use crate::Store;
     use crate::program::stored_tests::lines_of;
-    use truestage::Store;
 
     const JOURNAL: &str = include_str!("../../../golden/volumetric_calibrate.jsonl");
     const MACHINE: &str = include_str!("../../../../configs/machines/volumetric.toml");
@@ -399,17 +399,17 @@ mod tests {
         let desk = Desk::new();
         let path = desk.journal("run.jsonl", |_, _| ());
         desk.save(path.clone()).expect("it is sound");
-        let made = truestage::volumetric::report::Made::of(&desk.store, "run.jsonl").unwrap();
+        let made = crate::program::volumetric::report::Made::of(&desk.store, "run.jsonl").unwrap();
         let stored = made.geometries.first().expect("it was stored");
         let agreement = stored.agreement.expect("with its figures");
-        let html = truestage::volumetric::report::render(&read_journal(&path).unwrap(), &made);
+        let html = crate::program::volumetric::report::render(&read_journal(&path).unwrap(), &made);
         for text in [agreement.readings_text(), agreement.tool_text()] {
             assert_eq!(html.matches(&text).count(), 1, "{text}");
             assert!(shown(stored).contains(&text), "{text}");
         }
         assert_eq!(html.matches("standard uncertainty 0").count(), 1);
         // Without what was made, it is evaluated alike.
-        let html = truestage::volumetric::report::render(
+        let html = crate::program::volumetric::report::render(
             &read_journal(&path).unwrap(),
             &Default::default(),
         );

@@ -3,21 +3,20 @@
 pub(crate) mod demo;
 pub(crate) mod fit;
 pub(crate) mod part;
+mod report;
 pub(crate) mod shown;
 pub(crate) mod verbs;
 
 use std::path::Path;
 
-use truestage::Failure;
-use truestage::store::{Log, read_journal};
-use truestage::volumetric::report::Made;
-use truestage::volumetric::{
-    BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog,
-};
+use machine::records::{Log, read_journal};
+use report::Made;
 
 use super::made_from::source;
 use super::show::Shown;
 use super::verbs::Verbs;
+use crate::Failure;
+use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
@@ -37,10 +36,7 @@ pub(crate) const VERBS: Verbs = Verbs {
 /// The page of the journal at `path`, with what was made from it.
 fn html(path: &Path) -> Result<String, Failure> {
     let journal = read_journal::<VolumeLog>(path)?;
-    Ok(truestage::volumetric::report::render(
-        &journal,
-        &made_from(path)?,
-    ))
+    Ok(report::render(&journal, &made_from(path)?))
 }
 
 /// What was made from the journal at `path`.

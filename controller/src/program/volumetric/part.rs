@@ -4,20 +4,21 @@
 use std::path::Path;
 
 use compensator::volumetric::{Axis, Point};
+use machine::engine::{CsvPath, Departure, Lack, Live, Validity, read_path};
+use machine::records::short;
 use serde_json::{Value, json};
-use truestage::engine::{CsvPath, Departure, Lack, Live, Validity, read_path};
-use truestage::ports::Use;
-use truestage::store::short;
-use truestage::volumetric::MemoryName;
-use truestage::volumetric::{FirstPart, GEOMETRY, Mover, PathRefusal, Remembered};
-use truestage::{Failure, Machine, Store};
 use units::Metres;
 
+use crate::ports::Use;
 use crate::program::data_file::read;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
 use crate::program::{MachineArgs, MemoryArgs};
+use crate::volumetric::MemoryName;
+use crate::volumetric::first_part::FirstPart;
+use crate::volumetric::{GEOMETRY, Mover, PathRefusal, Remembered};
+use crate::{Failure, Machine, Store};
 
 /// How a path was followed.
 struct Followed {
@@ -300,8 +301,8 @@ pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
 mod tests {
     use core::time::Duration;
 
+    use crate::config;
     use drivers::transport::{SendError, Transport};
-    use truestage::config;
     use units::Time;
     use wire::{Arrival, Payload, Port};
 

@@ -1,12 +1,11 @@
 //! The stored errors of three axes on the screen.
 
 use serde_json::json;
-use truestage::store::Content;
-use truestage::volumetric::{
-    BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent,
-};
 
 use crate::program::show::{Changes, Show};
+use crate::volumetric::{
+    BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent,
+};
 
 impl Show for GeometryContent {
     fn lines(&self) -> String {

@@ -5,25 +5,27 @@ use std::path::PathBuf;
 
 use compensator::volumetric::identify::{Identified, scatter_limit};
 use compensator::volumetric::{Axis, Point};
+use machine::engine::Live;
+use machine::records::short;
 use serde_json::{Value, json};
-use truestage::config::MachineConfig;
-use truestage::engine::Live;
-use truestage::ports::Use;
-use truestage::store::short;
-use truestage::volumetric::UnknownRecord;
-use truestage::volumetric::{
-    GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, VolumetricReferenced,
-    VolumetricVerified, WarmUp, measured_geometry,
-};
-use truestage::{Failure, Machine, Store, config, json as to_json};
 use units::Metres;
 
+use crate::config::MachineConfig;
+use crate::ports::Use;
+use crate::program::json as to_json;
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
+use crate::volumetric::UnknownRecord;
+use crate::volumetric::reference::{VolumetricReferenced, measured_geometry};
+use crate::volumetric::verify::VolumetricVerified;
+use crate::volumetric::{
+    GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, WarmUp,
+};
+use crate::{Failure, Machine, Store, config};
 
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);

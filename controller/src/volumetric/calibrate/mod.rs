@@ -34,8 +34,8 @@ use compensator::volumetric::online::BeamReference;
 use units::{Metres, Radians};
 
 pub use evaluate::VolumetricEvaluated;
-pub use plan::volume_plan;
-pub use scatter::{Off, Scatter, WorstReading};
+pub(crate) use plan::volume_plan;
+pub(crate) use scatter::Scatter;
 
 use crate::failure::Failure;
 use crate::run::{note_failure, utc_now};

@@ -22,7 +22,7 @@ use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 ///
 /// # Errors
 /// When it is not configured, or chain or volume are none.
-pub fn volume_plan(
+pub(crate) fn volume_plan(
     config: &VolumetricConfig,
     is_warm: bool,
     drives: Vec<IdentityRecord>,

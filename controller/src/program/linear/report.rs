@@ -8,37 +8,37 @@ use compensator::iso230::Figures;
 use units::Metres;
 
 use crate::linear::{LinearContent, PointEntry, ZeroEntry};
-use crate::page::{document, escape, facts};
-use crate::text;
+use crate::program::page::{document, escape, facts};
+use crate::program::text;
 
 /// One measured series on the page.
 #[derive(Clone, Debug)]
-pub struct Section<'a> {
+pub(crate) struct Section<'a> {
     /// Its heading: `as found`, `as left` …
-    pub title: String,
+    pub(crate) title: String,
     /// Its figures.
-    pub figures: &'a Figures,
+    pub(crate) figures: &'a Figures,
     /// Its points.
-    pub points: &'a [PointEntry],
+    pub(crate) points: &'a [PointEntry],
 }
 
 /// What a page shows.
 #[derive(Clone, Debug, Default)]
-pub struct Page<'a> {
+pub(crate) struct Page<'a> {
     /// Heading.
-    pub title: String,
+    pub(crate) title: String,
     /// Name and value, for the head of the page.
-    pub facts: Vec<(String, String)>,
+    pub(crate) facts: Vec<(String, String)>,
     /// Measured series.
-    pub sections: Vec<Section<'a>>,
+    pub(crate) sections: Vec<Section<'a>>,
     /// The calibration in use.
-    pub calibration: Option<&'a LinearContent>,
+    pub(crate) calibration: Option<&'a LinearContent>,
     /// Zeros found, in order.
-    pub zeros: Vec<ZeroEntry>,
+    pub(crate) zeros: Vec<ZeroEntry>,
 }
 
 /// The page as HTML.
-pub fn render(page: &Page<'_>) -> String {
+pub(crate) fn render(page: &Page<'_>) -> String {
     let mut html = facts(&page.facts);
     if !page.sections.is_empty() {
         html += "<h2>ISO 230-2 figures</h2>";

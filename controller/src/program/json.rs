@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use units::Metres;
 
 /// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
-pub fn um(length: Metres) -> f64 {
+pub(crate) fn um(length: Metres) -> f64 {
     let rounded = (length.um() * 1e4).round() / 1e4;
     // -0.0 would print as "-0.0".
     rounded + 0.0
@@ -22,7 +22,7 @@ fn directional(figure: &Directional) -> Value {
 }
 
 /// ISO 230-2 figures in micrometres.
-pub fn figures(figures: &Figures) -> Value {
+pub(crate) fn figures(figures: &Figures) -> Value {
     let targets: Vec<_> = figures
         .targets
         .iter()
@@ -59,7 +59,7 @@ pub fn figures(figures: &Figures) -> Value {
 }
 
 /// What devices counted, as `{device: {what: count}}`; what never happened is left out.
-pub fn counters(counters: &[(String, &'static str, u64)]) -> Value {
+pub(crate) fn counters(counters: &[(String, &'static str, u64)]) -> Value {
     let mut devices = serde_json::Map::new();
     for (device, what, count) in counters.iter().filter(|(_, _, count)| *count > 0) {
         let device = devices.entry(device.clone()).or_insert_with(|| json!({}));
@@ -69,7 +69,7 @@ pub fn counters(counters: &[(String, &'static str, u64)]) -> Value {
 }
 
 /// An error table: deviations (actual − target) in micrometres.
-pub fn table(table: &ErrorTable) -> Value {
+pub(crate) fn table(table: &ErrorTable) -> Value {
     let length = |value: Option<Metres>| value.map(um);
     let nodes: Vec<_> = table
         .nodes()
@@ -95,7 +95,7 @@ pub fn table(table: &ErrorTable) -> Value {
 }
 
 /// How a table was fitted.
-pub fn fitted(fitted: &Fitted) -> Value {
+pub(crate) fn fitted(fitted: &Fitted) -> Value {
     let outliers: Vec<_> = fitted
         .robust
         .outliers
@@ -118,7 +118,7 @@ pub fn fitted(fitted: &Fitted) -> Value {
 }
 
 /// A zero from the Hall sensors.
-pub fn zero(estimate: &ZeroEstimate) -> Value {
+pub(crate) fn zero(estimate: &ZeroEstimate) -> Value {
     json!({
         "origin_um": um(estimate.origin),
         "origin_um_u": um(estimate.standard_uncertainty),

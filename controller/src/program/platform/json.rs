@@ -23,7 +23,7 @@ fn rounded(value: f64) -> f64 {
 
 /// The patent's means, of the deviations as they stand in the file. What was not repeated has no
 /// uncertainty (null).
-pub fn patent(estimate: &PatentEstimate) -> Value {
+pub(crate) fn patent(estimate: &PatentEstimate) -> Value {
     let u = estimate.uncertainty;
     json!({
         "rows": estimate.rows,
@@ -45,7 +45,7 @@ pub fn patent(estimate: &PatentEstimate) -> Value {
 }
 
 /// Rows that were left out of a fit; `lines` are those of all rows in their file, if any.
-pub fn outliers(outliers: &[StrokeOutlier], lines: &[usize]) -> Value {
+pub(crate) fn outliers(outliers: &[StrokeOutlier], lines: &[usize]) -> Value {
     let named = outliers.iter().map(|it| {
         json!({
             "line": lines.get(it.index),
@@ -59,7 +59,7 @@ pub fn outliers(outliers: &[StrokeOutlier], lines: &[usize]) -> Value {
 }
 
 /// A least-squares model of rows in `lines` of a file, of the deviations as they stand there.
-pub fn fitted(fitted: &Fitted, rows: usize, lines: &[usize]) -> Value {
+pub(crate) fn fitted(fitted: &Fitted, rows: usize, lines: &[usize]) -> Value {
     let model = &fitted.model;
     let tests = fitted.tests.iter().map(|test| {
         json!({

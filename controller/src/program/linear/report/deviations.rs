@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use units::Metres;
 
 use super::Section;
-use crate::page::svg::{Axes, FORWARD, HEIGHT, REVERSE, RIGHT, WIDTH, grid, padded};
+use crate::program::page::svg::{Axes, FORWARD, HEIGHT, REVERSE, RIGHT, WIDTH, grid, padded};
 
 /// Deviation over position: each point, and mean ± 2 s at each target, both approaches.
 pub(super) fn deviations(section: &Section<'_>) -> String {

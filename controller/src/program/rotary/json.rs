@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 use units::Radians;
 
 /// Arcseconds, rounded to a thousandth of a microarcsecond: beyond it is noise of the arithmetic.
-pub fn arcsec(angle: Radians) -> f64 {
+pub(crate) fn arcsec(angle: Radians) -> f64 {
     let rounded = (angle.arcsec() * 1e9).round() / 1e9;
     // -0.0 would print as "-0.0".
     rounded + 0.0
 }
 
 /// The word for a criterion.
-pub const fn criterion(criterion: Criterion) -> &'static str {
+pub(crate) const fn criterion(criterion: Criterion) -> &'static str {
     match criterion {
         Criterion::Worst => "worst",
         Criterion::Rms => "rms",
@@ -22,7 +22,7 @@ pub const fn criterion(criterion: Criterion) -> &'static str {
 }
 
 /// What offsets make of noise, compared with the patent's pair and with theory.
-pub fn design(design: &Design, pair: &Design) -> Value {
+pub(crate) fn design(design: &Design, pair: &Design) -> Value {
     let lines = design.lines();
     let mut value = amplification(design);
     value["lines"] = json!(lines);
@@ -50,7 +50,7 @@ fn amplification(design: &Design) -> Value {
 }
 
 /// What readings say about table and plate. A table error is reading − true angle.
-pub fn solution(solution: &Solution) -> Value {
+pub(crate) fn solution(solution: &Solution) -> Value {
     let list = |values: Option<Vec<Radians>>| {
         values.map(|values| values.into_iter().map(arcsec).collect::<Vec<_>>())
     };

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use machine::records::{AnyLog, read_journal};
 use serde_json::json;
-use truestage::Failure;
-use truestage::store::{AnyLog, read_journal};
 
+use crate::Failure;
 use crate::program::kind::Kind;
 use crate::program::output::{Ended, Output};
 

@@ -3,21 +3,21 @@
 
 use core::fmt::Write as _;
 
+use machine::records::{CalibrationRecord, ReadJournal};
 use units::Radians;
 
-use crate::page::band::{Sure, band, enlargement, said};
-use crate::page::chart::{BLUE, Mark, ORANGE, Series, chart};
-use crate::page::{document, escape, facts, facts_of};
+use crate::program::page::band::{Sure, band, enlargement, said};
+use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
+use crate::program::page::{document, escape, facts, facts_of};
+use crate::program::rotary::residuals::residuals_of;
 use crate::rotary::PlateLog;
-use crate::rotary::{Evaluated, evaluated};
 use crate::rotary::{JudgedEntry, RotaryContent};
-use crate::store::{CalibrationRecord, ReadJournal};
 
 /// So many readings that were left out are named.
 const NAMED: usize = 20;
 
 /// The page of `journal`, with the calibrations that were made from it.
-pub fn render(
+pub(crate) fn render(
     journal: &ReadJournal<PlateLog>,
     calibrations: &[(String, CalibrationRecord<RotaryContent>)],
 ) -> String {
@@ -25,7 +25,7 @@ pub fn render(
 }
 
 /// The same, with verifications that were made later, each under its name.
-pub fn render_with(
+pub(crate) fn render_with(
     journal: &ReadJournal<PlateLog>,
     calibrations: &[(String, CalibrationRecord<RotaryContent>)],
     later: &[(&str, &ReadJournal<PlateLog>)],
@@ -37,7 +37,7 @@ pub fn render_with(
         html += &calibration(&record.content);
     }
     if header.verb == "calibrate" {
-        html += &match evaluated(journal) {
+        html += &match residuals_of(journal) {
             Some(it) => residuals(&it),
             None => "<p class=\"note\">The placements read so far do not part table and \
                      plate.</p>"
@@ -223,9 +223,10 @@ fn named(what: &str, readings: &[(u32, u32)]) -> String {
     format!("<p>{}: {}.</p>", escape(what), names.join(", "))
 }
 
-fn residuals(evaluated: &Evaluated) -> String {
-    let each = evaluated.residuals.iter().flatten();
-    let points = each.map(|(at, residual)| (at.degrees(), residual.arcsec()));
+fn residuals(each: &[(Radians, Radians)]) -> String {
+    let points = each
+        .iter()
+        .map(|(at, residual)| (at.degrees(), residual.arcsec()));
     let dots = [series("one reading", BLUE, Mark::Dots, points.collect())];
     format!(
         "<h2>Residuals</h2><p>What is left of each reading, all placements together.</p>\

@@ -4,41 +4,41 @@ use core::fmt::Write as _;
 
 use compensator::platform::Pose;
 use compensator::screw::ScrewModel;
+use machine::records::ClosureEntry;
+use machine::records::{CalibrationRecord, ReadJournal, short};
 use units::{Approach, Metres, Radians};
 
-use crate::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
-use crate::page::{IN_USE, document, escape, facts};
 use crate::platform::PlatformLog;
+use crate::platform::state::{difference, largest_error};
 use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
-use crate::platform::{difference, largest_error};
-use crate::store::ClosureEntry;
-use crate::store::{CalibrationRecord, ReadJournal, short};
-use crate::text;
+use crate::program::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
+use crate::program::page::{IN_USE, document, escape, facts};
+use crate::program::text;
 
 /// How finely a model's curve is drawn.
 const CURVE_POINTS: u32 = 240;
 
 /// A calibration of a screw, under its name.
-pub type Named = (String, CalibrationRecord<ScrewContent>);
+pub(crate) type Named = (String, CalibrationRecord<ScrewContent>);
 
 /// What a page of a platform shows; what is empty is left out.
 #[derive(Clone, Debug, Default)]
-pub struct PlatformPage<'a> {
+pub(crate) struct PlatformPage<'a> {
     /// Heading.
-    pub title: String,
+    pub(crate) title: String,
     /// Name and value, for the head of the page.
-    pub facts: Vec<(String, String)>,
+    pub(crate) facts: Vec<(String, String)>,
     /// Verifications: a heading (`as found`, `as left` …) and the run.
-    pub visits: Vec<(String, &'a ReadJournal<PlatformLog>)>,
+    pub(crate) visits: Vec<(String, &'a ReadJournal<PlatformLog>)>,
     /// The run that calibrated, with the calibrations made from it by their names.
-    pub calibrated: Option<(&'a ReadJournal<PlatformLog>, Vec<Named>)>,
+    pub(crate) calibrated: Option<(&'a ReadJournal<PlatformLog>, Vec<Named>)>,
     /// Runs that found the zero.
-    pub zeros: Vec<&'a ReadJournal<PlatformLog>>,
+    pub(crate) zeros: Vec<&'a ReadJournal<PlatformLog>>,
 }
 
 impl<'a> PlatformPage<'a> {
     /// The page of one run; `calibrations` are those made from it.
-    pub fn of(journal: &'a ReadJournal<PlatformLog>, calibrations: Vec<Named>) -> Self {
+    pub(crate) fn of(journal: &'a ReadJournal<PlatformLog>, calibrations: Vec<Named>) -> Self {
         let header = &journal.header;
         let mut page = Self {
             title: format!("{} of platform {}", header.verb, header.machine),
@@ -61,9 +61,11 @@ impl<'a> PlatformPage<'a> {
 }
 
 /// The head of a page of one run, with the calibrations' names as short as elsewhere.
-pub fn facts_of(journal: &ReadJournal<PlatformLog>) -> Vec<(String, String)> {
-    let mut facts =
-        crate::page::facts_of(journal, journal.log.strokes.len() + journal.log.poses.len());
+pub(crate) fn facts_of(journal: &ReadJournal<PlatformLog>) -> Vec<(String, String)> {
+    let mut facts = crate::program::page::facts_of(
+        journal,
+        journal.log.strokes.len() + journal.log.poses.len(),
+    );
     let named = facts.iter_mut().filter(|(name, _)| name == IN_USE);
     for (_, value) in named {
         let each = value.split(' ').map(|it| match it.split_once('=') {
@@ -82,7 +84,7 @@ pub fn facts_of(journal: &ReadJournal<PlatformLog>) -> Vec<(String, String)> {
 }
 
 /// The page as HTML.
-pub fn render(page: &PlatformPage<'_>) -> String {
+pub(crate) fn render(page: &PlatformPage<'_>) -> String {
     let mut html = facts(&page.facts);
     let visits: Vec<Visit<'_>> = page.visits.iter().map(Visit::of).collect();
     if !visits.is_empty() {

@@ -1,7 +1,7 @@
 //! What a person reads on a terminal.
 
 use compensator::error_table::FALSE_ALARMS;
-use compensator::iso230::{Conformity, Directional, Figures};
+use compensator::iso230::{Conformity, Figures};
 use compensator::screw::ScrewModel;
 use units::Metres;
 
@@ -37,7 +37,7 @@ pub(crate) const ROWS: &[Row] = &[
 ];
 
 /// ISO 230-2 figures side by side, micrometres.
-pub fn figures_table(columns: &[(&str, &Figures)]) -> String {
+pub(crate) fn figures_table(columns: &[(&str, &Figures)]) -> String {
     let mut text = format!("{:<30} {:>3}", "ISO 230-2 (µm)", "");
     for (title, _) in columns {
         text += &format!(" {title:>22}");
@@ -76,19 +76,8 @@ fn lack(conformity: &Conformity) -> Option<String> {
     (!lacks.is_empty()).then(|| format!("NOT AS ISO 230-2 ASKS: {}", lacks.join("; ")))
 }
 
-/// The largest mean deviation's magnitude: what "as found ±x µm" means.
-pub fn largest_deviation(figures: &Figures) -> Metres {
-    figures
-        .targets
-        .iter()
-        .flat_map(|target| [target.mean_forward, target.mean_reverse])
-        .fold(Metres::ZERO, |largest, deviation| {
-            largest.max(deviation.abs())
-        })
-}
-
 /// Which positions of its tables each linear axis believes, and why.
-pub fn table_notes(config: &MachineConfig) -> Vec<String> {
+pub(crate) fn table_notes(config: &MachineConfig) -> Vec<String> {
     let axes = config.axis.iter();
     let own = axes.filter_map(|(name, it)| Some((name, it.compensation.as_ref()?)));
     own.map(|(name, limits)| {
@@ -110,7 +99,7 @@ pub fn table_notes(config: &MachineConfig) -> Vec<String> {
 }
 
 /// How wrong a position of a table could be without being noticed.
-pub fn noticed(smallest: Option<Metres>) -> String {
+pub(crate) fn noticed(smallest: Option<Metres>) -> String {
     smallest.map_or_else(
         || "too few positions to notice a wrong one by its neighbours".into(),
         |error| {
@@ -122,31 +111,21 @@ pub fn noticed(smallest: Option<Metres>) -> String {
     )
 }
 
-/// One line: `A = 1.234 µm (↑ 1.0, ↓ 1.1)`.
-pub fn accuracy_line(accuracy: &Directional) -> String {
-    format!(
-        "A = {:.3} µm (forward {:.3}, reverse {:.3})",
-        accuracy.bidirectional.um(),
-        accuracy.forward.um(),
-        accuracy.reverse.um()
-    )
-}
-
 /// One term of a screw's model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ScrewTerm {
+pub(crate) struct ScrewTerm {
     /// What it is.
-    pub name: String,
+    pub(crate) name: String,
     /// How large, in its unit.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Its standard uncertainty, where anything was repeated.
-    pub standard_uncertainty: Option<f64>,
+    pub(crate) standard_uncertainty: Option<f64>,
     /// The unit of both.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
 }
 
 /// The terms of a screw's model, in the units people read.
-pub fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
+pub(crate) fn screw_terms(model: &ScrewModel) -> Vec<ScrewTerm> {
     let term = |name: &str, value, standard_uncertainty, unit| ScrewTerm {
         name: name.to_owned(),
         value,

@@ -3,9 +3,9 @@
 
 use compensator::volumetric::function::Shape;
 
-use crate::page::chart::{BLUE, Mark, Series, chart};
-use crate::page::escape;
-use crate::volumetric::VolumetricEvaluated;
+use crate::program::page::chart::{BLUE, Mark, Series, chart};
+use crate::program::page::escape;
+use crate::volumetric::calibrate::VolumetricEvaluated;
 use crate::volumetric::{AgreementRecord, GeometryContent, VolumeLog};
 
 /// The figures as they are stored.

@@ -6,12 +6,12 @@ mod agreement;
 use core::fmt::Write as _;
 
 use compensator::volumetric::Axis;
+use machine::records::{ReadJournal, Store, StoreError};
 use units::{Metres, Radians};
 
-use crate::page::band::{Sure, band, enlargement, said};
-use crate::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
-use crate::page::{document, escape, facts};
-use crate::store::{ReadJournal, Store, StoreError};
+use crate::program::page::band::{Sure, band, enlargement, said};
+use crate::program::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
+use crate::program::page::{document, escape, facts};
 use crate::volumetric::{
     FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeLog,
 };
@@ -30,20 +30,20 @@ const SQUARENESSES: [&str; 3] = ["y to x", "z to x", "z to y"];
 
 /// What a line showed at one hour of a day, in each state.
 #[derive(Clone, Debug)]
-pub struct HourOfDay<'a> {
+pub(crate) struct HourOfDay<'a> {
     /// Which hour.
-    pub hour: f64,
+    pub(crate) hour: f64,
     /// As found, by tables alone, corrected by what the machine sees.
-    pub runs: [&'a ReadJournal<VolumeLog>; 3],
+    pub(crate) runs: [&'a ReadJournal<VolumeLog>; 3],
 }
 
 /// What was made from a run.
 #[derive(Clone, Debug, Default)]
-pub struct Made {
+pub(crate) struct Made {
     /// The name and the kind of each record.
-    pub named: Vec<(String, &'static str)>,
+    pub(crate) named: Vec<(String, &'static str)>,
     /// The errors among them.
-    pub geometries: Vec<GeometryContent>,
+    pub(crate) geometries: Vec<GeometryContent>,
 }
 
 impl Made {
@@ -51,7 +51,7 @@ impl Made {
     ///
     /// # Errors
     /// When the folder cannot be read.
-    pub fn of(store: &Store, source: &str) -> Result<Self, StoreError> {
+    pub(crate) fn of(store: &Store, source: &str) -> Result<Self, StoreError> {
         let geometries = store.made_from::<GeometryContent>(source)?;
         let named = store.glances_from(source)?;
         Ok(Self {
@@ -62,7 +62,7 @@ impl Made {
 }
 
 /// The page of `journal`, with the calibrations that were made from it.
-pub fn render(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
+pub(crate) fn render(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
     let header = &journal.header;
     let title = format!("{} of three axes, {}", header.verb, header.machine);
     let mut html = facts(&facts_of_run(journal, made));
@@ -76,7 +76,7 @@ pub fn render(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
 }
 
 /// The page of a demonstration: a day, and the calibration that it began with.
-pub fn render_day(
+pub(crate) fn render_day(
     day: &[HourOfDay<'_>],
     calibrated: &ReadJournal<VolumeLog>,
     made: &Made,
@@ -92,7 +92,7 @@ const NOTE: &str = "deviation = actual − target, at the tool; tilts are right-
                     and a direction: e_yx is the displacement of x along y, e_ax its tilt about x.";
 
 fn facts_of_run(journal: &ReadJournal<VolumeLog>, made: &Made) -> Vec<(String, String)> {
-    let mut facts = crate::page::facts_of(journal, 0);
+    let mut facts = crate::program::page::facts_of(journal, 0);
     // Readings of lines are no points, and three axes no axis.
     facts.retain(|(name, _)| name != "points" && name != "axis" && name != "drive");
     // Who the instrument is shows when it is switched on, after the journal was begun.
@@ -267,8 +267,11 @@ fn temperatures(readings: &[LineReadingEntry]) -> String {
     if series.is_empty() {
         return String::new();
     }
-    let chart =
-        crate::page::chart::chart_about("Temperatures", (label, "thermometer (°C)"), &series);
+    let chart = crate::program::page::chart::chart_about(
+        "Temperatures",
+        (label, "thermometer (°C)"),
+        &series,
+    );
     format!("<h2>Temperatures</h2><figure>{chart}</figure>")
 }
 

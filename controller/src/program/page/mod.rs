@@ -6,7 +6,7 @@ pub(crate) mod svg;
 
 use core::fmt::Write as _;
 
-use crate::store::{IdentityRecord, ReadJournal};
+use machine::records::{IdentityRecord, ReadJournal};
 
 pub(crate) const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;\
@@ -31,7 +31,7 @@ pub(crate) fn document(title: &str, body: &str, note: &str) -> String {
 }
 
 /// The head of a page for one run in which so many `points` were measured.
-pub fn facts_of<L>(journal: &ReadJournal<L>, points: usize) -> Vec<(String, String)> {
+pub(crate) fn facts_of<L>(journal: &ReadJournal<L>, points: usize) -> Vec<(String, String)> {
     let header = &journal.header;
     let mut facts = vec![
         (
