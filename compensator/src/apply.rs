@@ -23,7 +23,7 @@ pub enum Alarm {
         limit: Metres,
     },
     /// Changed faster than the rate limit without notice; follows at the limit.
-    #[error("correction lags {:.3} um behind: it changes faster than {:.3} um/s",
+    #[error("the correction lags behind by {:.3} um: it changes faster than {:.3} um/s",
         lag.um(), limit.value() * 1e6)]
     Rate {
         /// How far it is behind.
@@ -32,7 +32,7 @@ pub enum Alarm {
         limit: MetresPerSecond,
     },
     /// NaN or infinite; the last correction is held.
-    #[error("correction wanted is not a number; the last one is held")]
+    #[error("the requested correction is not a number; the last one is held")]
     NotFinite,
 }
 

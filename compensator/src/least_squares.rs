@@ -45,7 +45,7 @@ pub enum LeastSquaresError {
         observation: usize,
     },
     /// A column is a combination of the others.
-    #[error("least squares: coefficient {column} cannot be told from the others")]
+    #[error("least squares: coefficient {column} cannot be distinguished from the others")]
     Dependent {
         /// Index of the column.
         column: usize,

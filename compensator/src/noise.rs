@@ -1,4 +1,4 @@
-//! Repeatable noise for the tests of this package.
+//! Reproducible noise for the tests of this package.
 
 use units::portable::ln;
 

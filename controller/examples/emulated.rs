@@ -36,7 +36,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let accuracy = verified.figures.accuracy.bidirectional;
     let (seen_um, limit_um) = (accuracy.um(), verified.tolerance.um());
     println!("A = {seen_um:.3} um as left, the tolerance is {limit_um:.3} um");
-    println!("the stage lived {:.0} s", machine.now().seconds());
+    println!(
+        "{:.0} s passed on the emulated stage",
+        machine.now().seconds()
+    );
     assert!(verified.is_within_tolerance());
     Ok(())
 }

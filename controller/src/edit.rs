@@ -1,7 +1,7 @@
-//! Edits of a machine file's text whose maker relies on them.
+//! Edits of the text of a machine's file that must not miss their place.
 
-/// A text of which a passage is exchanged. An edit that matches nothing would leave the text as
-/// it is, and whoever relies on the edit with a machine that they did not mean.
+/// A text in which a passage is replaced. An edit that matches nothing would leave the text as it
+/// is, and the caller would then use a machine that was not meant.
 pub trait Edit {
     /// The text with every `from` become `to`.
     ///

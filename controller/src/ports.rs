@@ -81,7 +81,7 @@ fn parse_word(word: &str, config: &MachineConfig) -> Result<(String, Endpoint), 
         .collect();
     let what = if is_can { "CAN bus" } else { "serial line" };
     Err(usage(format!(
-        "`{name}` is no {what} of the configuration; it has {}",
+        "`{name}` is not a {what} of the configuration, which has {}",
         names.join(", ")
     )))
 }
@@ -223,7 +223,8 @@ fn refuse_real(endpoints: &BTreeMap<String, Endpoint>) -> Result<(), Failure> {
         None => Ok(()),
         Some((name, _)) => Err(Failure::Usage {
             what: format!(
-                "a clock that is not the wall's with `{name}`, which is no emulated port"
+                "the clock of an emulated machine was asked for, but `{name}` is not an emulated \
+                 port"
             ),
             help: "leave --clock and --clock-speed out on a real machine".into(),
         }),

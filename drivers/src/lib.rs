@@ -1,4 +1,5 @@
-//! Drivers of precision stages: protocols, devices, transports. Bytes are the package `wire`'s.
+//! Drivers of precision stages: protocols, devices, transports. Bytes are encoded and decoded by
+//! the package `wire`.
 //!
 //! - [`protocol`]: sans-io machines (SDO client, NMT, heartbeat, CiA 402 power machine).
 //! - [`device`]: what one device's objects or lines mean, behind domain traits.

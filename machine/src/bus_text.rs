@@ -24,11 +24,13 @@ pub fn identifier_text(id: CanId) -> String {
 /// What became of a bus or line.
 pub fn link_text(state: LinkState) -> &'static str {
     match state {
-        LinkState::Up => "came back; the machine must be started anew",
+        LinkState::Up => "came back; start the machine again",
         LinkState::Down => {
-            "down: the interface was set down (ENETDOWN), or the adapter does not answer any more; \
-             set it up and start again"
+            "down: the interface was set down (ENETDOWN), or the adapter no longer answers; set it \
+             up and start again"
         }
-        LinkState::Gone => "the interface or adapter vanished (ENODEV); plug it in and start again",
+        LinkState::Gone => {
+            "the interface or adapter has disappeared (ENODEV); plug it in and start again"
+        }
     }
 }

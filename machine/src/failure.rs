@@ -63,8 +63,8 @@ pub enum Failure {
     },
     /// Another master is on the bus.
     #[error(
-        "{port}: {heard} was heard that this controller did not send: another master is on the \
-         bus; disconnect it, then start again"
+        "{port}: received {heard} that this controller did not send: another master is on the bus; \
+         disconnect it, then start again"
     )]
     SecondMaster {
         /// The port's name in the configuration.
@@ -72,7 +72,7 @@ pub enum Failure {
         /// What only a master sends.
         heard: &'static str,
     },
-    /// Somebody takes the bus for himself, and what should have come did not.
+    /// One sender occupies the bus, and an expected message did not come.
     #[error(
         "{port}: {} takes {percent:.0} % of the bus and leaves no room; find the device or program \
          that sends it ({missing})", identifier_text(*id)
@@ -89,9 +89,10 @@ pub enum Failure {
     },
     /// Something went wrong shortly after the program was kept from its buses.
     #[error(
-        "{failure}. This program was kept from its buses for {:.3} s, until {:.3} s before, which may be \
-         the whole cause: the computer is too busy for real time. Give it SCHED_FIFO (`ulimit -r`) or \
-         less to do; an emulated machine can wait for it (--clock lockstep:PATH)",
+        "{failure}. This program was kept from its buses for {:.3} s, until {:.3} s before, and \
+         that alone may be the cause: the computer is too busy for real time. Allow the program \
+         SCHED_FIFO (`ulimit -r`) or give the computer less to do; an emulated machine can wait \
+         for the program (--clock lockstep:PATH)",
         pause.as_secs_f64(), ago.as_secs_f64()
     )]
     HeldUp {
@@ -119,7 +120,7 @@ pub enum Failure {
         source: DeviceError,
     },
     /// A command did not end in time.
-    #[error("{device}: {step} not done within {}", units::ShortSpan(*waited))]
+    #[error("{device}: {step} did not end within {}", units::ShortSpan(*waited))]
     Overdue {
         /// The device's name in the configuration.
         device: String,
@@ -149,7 +150,7 @@ pub enum Failure {
         /// Which axis.
         axis: String,
     },
-    /// The machine was stopped, or was never started: nobody would heed its alarms.
+    /// The machine was stopped, or was never started: its alarms would not be handled.
     #[error("{device}: not moved, the machine was stopped; start it again (`Machine::start`)")]
     NotStarted {
         /// The drive.

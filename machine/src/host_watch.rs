@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn a_failure_shortly_after_a_pause_names_the_computer_and_keeps_what_failed() {
         let said = after(310, 500, overdue());
-        for part in ["0.310 s", "enable not done", "--clock lockstep"] {
+        for part in ["0.310 s", "enable did not end", "--clock lockstep"] {
             assert!(said.contains(part), "{said}");
         }
         let failure = Failure::HeldUp {

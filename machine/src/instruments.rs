@@ -1,4 +1,4 @@
-//! Displacement instruments and analog modules: used for a while, read, left alone again.
+//! Displacement instruments and analog modules: put into use, read, released again.
 
 use core::time::Duration;
 
@@ -19,12 +19,12 @@ impl Machine {
         self.use_device(self.instrument_device(at), instrument)
     }
 
-    /// Nobody needs an instrument or a camera now: an operator may reach into its beam.
+    /// No instrument or camera is in use from now on: an operator may reach into its beam.
     pub fn leave_instrument(&mut self) {
         self.instrument_in_use = None;
     }
 
-    /// Instruments may be taken away: whoever comes back must say again who it is.
+    /// Instruments may be taken away: one that comes back is identified again.
     pub fn forget_instruments(&mut self) {
         self.leave_instrument();
         self.started_instruments.clear();

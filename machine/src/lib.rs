@@ -4,9 +4,9 @@
 //! A [`Machine`] is assembled of [`Parts`] over a [`Transport`](drivers::transport::Transport) and
 //! driven by plain sequential procedures that call [`Machine::tick`]; every wait of every procedure
 //! is that one function, so supervision, heartbeats and the stop request hold at every moment, on
-//! real buses and in virtual time alike (docs/decisions/0001). What a kind of machine knows, a
-//! calibration or the place of a plate, is no business of this crate: each kind is a handle of its
-//! own over the machine (docs/decisions/0020).
+//! real buses and in virtual time alike (docs/decisions/0001). What only one kind of machine knows,
+//! such as a calibration or the place of a plate, does not belong in this crate: each kind is a
+//! handle of its own over the machine (docs/decisions/0020).
 
 mod bus_text;
 mod bus_watch;

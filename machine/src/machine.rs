@@ -146,7 +146,7 @@ impl Machine {
         self.observer = observer;
     }
 
-    /// Whoever is told about progress.
+    /// The observer that is told about progress.
     pub fn observer(&mut self) -> &mut dyn Observer {
         &mut *self.observer
     }

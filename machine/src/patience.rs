@@ -1,5 +1,5 @@
-//! How much longer than configured things are waited for on a machine that lives faster than the
-//! wall's clock. See docs/decisions/0004-patience.md.
+//! How much longer than configured the program waits on a machine whose time runs faster than real
+//! time. See docs/decisions/0004-patience.md.
 
 use core::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Scan: who is on the buses, asked without changing anything.
+//! Scan: which devices are on the buses, found out without changing anything.
 //!
 //! Every node number of every CAN bus is asked for its device type (0x1000) and identity
 //! (0x1018) by expedited SDO upload; nothing is written and no node changes its state. Devices on
@@ -85,7 +85,7 @@ impl Machine {
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
         let awaited: Vec<_> = expected.keys().copied().collect();
         self.observer
-            .waiting(&format!("{name}: nodes 1 to 127 are asked who they are"));
+            .waiting(&format!("{name}: asking nodes 1 to 127 for their identity"));
         self.ask_once(port, &all, DEVICE_TYPE, &mut answers)?;
         let silent = silent(&awaited, DEVICE_TYPE, &answers);
         if !silent.is_empty() {
@@ -213,7 +213,10 @@ impl Machine {
         }
         let names: Vec<_> = asked.iter().map(|it| self.device_name(it.at)).collect();
         if !names.is_empty() {
-            let text = format!("serial lines: {} are asked who they are", names.join(", "));
+            let text = format!(
+                "serial lines: asking {} for their identity",
+                names.join(", ")
+            );
             self.observer.waiting(&text);
         }
         asked
@@ -356,6 +359,8 @@ fn missing(port: &str, node: NodeId, device: &str) -> Found {
         node: Some(node.raw()),
         name: Some(device.to_owned()),
         identity: None,
-        mismatches: vec!["does not answer: power, cable, bit rate or node number?".to_owned()],
+        mismatches: vec![
+            "does not answer; check its power, cable, bit rate and node number".to_owned(),
+        ],
     }
 }

@@ -1,4 +1,4 @@
-//! Somebody asks the machine to stop: a person, a signal, another program.
+//! A request to stop the machine: by a person, a signal or another program.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -94,7 +94,7 @@ impl Machine {
         })
     }
 
-    /// The failure that has just happened, or what it came of: somebody who fills a bus, or this
+    /// The failure that has just happened, or its cause: a sender that fills a bus, or this
     /// computer, which was held up.
     pub fn explain<F: Layered>(&self, failure: F) -> F {
         let now = self.now();
@@ -134,8 +134,8 @@ impl Machine {
         if let Err(failure) = outcome {
             let axis = self.device_name(at);
             self.observer.warning(&format!(
-                "axis {axis} did not confirm that it stopped ({failure}); its drive watches our \
-                 heartbeat and stops by itself: make sure before you reach in"
+                "axis {axis} did not confirm that it stopped ({failure}); its drive monitors our \
+                 heartbeat and stops by itself: make sure that it stands still before you reach in"
             ));
         }
     }

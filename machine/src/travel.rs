@@ -95,7 +95,7 @@ impl Machine {
         Ok(self.approach[self.axis_index(axis)?])
     }
 
-    /// From which side `axis` came to where it is, nobody knows any more.
+    /// Forgets from which side `axis` came to its position.
     ///
     /// # Errors
     /// When there is no such axis.

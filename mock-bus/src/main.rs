@@ -41,10 +41,10 @@ struct Arguments {
     /// Make a symbolic link to a port's terminal.
     #[arg(long, value_name = "PORT=PATH", value_parser = port_and_path)]
     link: Vec<(String, PathBuf)>,
-    /// Chooses noise and errors.
+    /// Seed of the machine's noise and errors.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Simulated seconds for each second.
+    /// Simulated seconds per real second.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
     /// `lockstep:PATH`: time passes only when neither the machine nor the programs that talk to
@@ -52,10 +52,11 @@ struct Arguments {
     /// socket at PATH: `truestage … --clock lockstep:PATH`.
     #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "speed")]
     clock: Option<PathBuf>,
-    /// With --clock: a program that is killed does not end the machine; the next one goes on.
+    /// With --clock: a program that is killed does not end the machine; the next one continues.
     #[arg(long, requires = "clock")]
     outlive: bool,
-    /// A socket for `mock-bus ctl` where time is the wall's; a lockstep clock's own serves too.
+    /// A socket for `mock-bus ctl` in real time; with --clock, the clock's own socket serves
+    /// instead.
     #[arg(long, value_name = "PATH", conflicts_with = "clock")]
     control: Option<PathBuf>,
     /// Add a fault, as TOML: `from_s = 2.0, fault = { kind = "beam_blocked" }`.
@@ -65,9 +66,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Lends a hand at a running machine: `mock-bus ctl SOCKET turn-plate 73`.
+    /// Acts on a running machine, as its operator would: `mock-bus ctl SOCKET turn-plate 73`.
     Ctl {
-        /// Where it listens: the PATH of its `--clock lockstep:PATH` or `--control PATH`.
+        /// Where the machine listens: the PATH of its `--clock lockstep:PATH` or `--control PATH`.
         socket: PathBuf,
         /// `turn-plate LINES`, `fix-plate OFFSET`, `place-plate OFFSET`, `set-up-line TOML`, `take-line-away`, `fault TOML`, `end-fault
         /// NUMBER`, `power off`, `power on`, or `truth`.
@@ -158,9 +159,9 @@ fn wait_for_the_end(signals: &SigSet, machine: &Running) -> Result<(), Errno> {
 fn tell_pauses(pauses: Pauses, told: u64) -> u64 {
     if let Some((at, pause)) = pauses.last.filter(|_| pauses.count > told) {
         eprintln!(
-            "mock-bus: this computer held the emulated machine up for {:.3} s, until {:.3} s of its \
-             time ({} pauses so far): what its controller misses then is no fault of the machine; \
-             with --clock lockstep:PATH it does not matter",
+            "mock-bus: this computer paused the emulated machine for {:.3} s, until {:.3} s of its \
+             time ({} pauses so far): what the controller misses meanwhile is not a fault of the \
+             machine; with --clock lockstep:PATH such pauses do no harm",
             pause.as_secs_f64(),
             at.seconds(),
             pauses.count

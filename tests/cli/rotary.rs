@@ -209,7 +209,7 @@ fn what_cannot_be_used_is_told_with_file_line_and_cause_and_nothing_is_stored() 
     check_refused(
         &with("1,5,1.0"),
         &[],
-        &["data.csv:110:1", "offset 1 comes again"],
+        &["data.csv:110:1", "offset 1 appears again"],
     );
     check_refused(
         &with("36,5,1.0"),
@@ -229,7 +229,7 @@ fn what_cannot_be_used_is_told_with_file_line_and_cause_and_nothing_is_stored() 
     check_refused(
         &csv(&rows[..LINES]),
         &[],
-        &["data.csv:37:1", "one placement cannot part"],
+        &["data.csv:37:1", "one placement cannot separate"],
     );
     check_refused(
         &csv(&rows[..90]),
@@ -257,7 +257,7 @@ fn placements_and_options_of_no_use_are_told_and_nothing_is_stored() {
         &["--amplification-limit", "1"],
         &["is amplified", "the limit is 1.0"],
     );
-    check_refused(&good, &[], &["no axis is a rotary one"]);
+    check_refused(&good, &[], &["this machine has no rotary axis"]);
     let urad = folder();
     fs::write(
         urad.path().join("u.csv"),

@@ -192,7 +192,7 @@ fn refuses_files(runs: &Runs, csv: &str) {
     let others = csv.lines().filter(|it| !diagonals.contains(&cells(it)[0]));
     let no_diagonals: String = others.map(|line| format!("{line}\n")).collect();
     let error = refused(&no_diagonals, &[]).with_code(3);
-    check_error(&error, &["do not tell", "squareness of y to x"]);
+    check_error(&error, &["do not determine", "squareness of y to x"]);
     let error = refused(&csv.edit_first("linear_um", "linear_mm"), &[]).with_code(2);
     check_error(&error, &["wrong.csv:2:3", "linear_um"]);
     let error = refused(

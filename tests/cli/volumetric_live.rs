@@ -324,7 +324,7 @@ fn follows(live: &Live) {
         "it did not ask for real time: {next}"
     );
     for (rows, why, code) in [
-        ("0.0,0,0,0\n0.040,zero,0,0\n", "`zero` is no number", 2),
+        ("0.0,0,0,0\n0.040,zero,0,0\n", "`zero` is not a number", 2),
         ("0.0,0,0,0\n9.0,900,0,0\n", "axis x: a stop from here", 3),
         ("0.0,0,0,0\n40.0,61,0,0\n", "outside the calibrated", 3),
     ] {

@@ -593,7 +593,7 @@ fn a_start_that_finds_no_amplifier_says_what_it_looks_for_meanwhile() {
     assert!(told.len() >= 4, "{told:?}");
     for it in told.iter() {
         assert!(
-            it.contains("u: looking for the amplifier at the cable"),
+            it.contains("u: looking for the amplifier with address 0"),
             "{it}"
         );
     }

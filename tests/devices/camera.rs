@@ -221,7 +221,7 @@ fn a_silent_line_is_a_time_out_and_forgotten_when_it_speaks_again() {
 fn a_light_barrier_that_triggers_too_is_named() {
     check(|eye| {
         with_node(eye, |node| node.quirks_mut().triggered_twice = true);
-        refused(eye, "nobody else triggers");
+        refused(eye, "no other program triggers");
         with_node(eye, |node| node.quirks_mut().triggered_twice = false);
         look(eye, 1).expect("the light barrier is off");
     });

@@ -157,5 +157,5 @@ fn an_axis_that_never_rests_is_named_and_nothing_is_begun() {
     };
     assert_eq!(axis, "x");
     assert!(waited >= Duration::from_secs(5), "{waited:?}");
-    assert!(failure.to_string().contains("still moves"), "{failure}");
+    assert!(failure.to_string().contains("still moving"), "{failure}");
 }

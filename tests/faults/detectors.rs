@@ -308,10 +308,7 @@ fn a_channel_that_is_stuck_is_noticed_and_named() {
         panic!("{}", day.cause)
     };
     assert_eq!(lack.source, Source::Slide(Axis::X), "{lack}");
-    assert!(
-        lack.to_string().contains("input 2 of it is stuck"),
-        "{lack}"
-    );
+    assert!(lack.to_string().contains("its input 2 is stuck"), "{lack}");
     // 100 samples, each tenth SYNC; 200 ms of patience and some periods.
     let stopped = day.lives.len();
     let soon = FAULT_AT + 1090..=FAULT_AT + 1170;

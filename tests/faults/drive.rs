@@ -103,7 +103,7 @@ fn a_drive_that_resets_while_it_moves_is_not_zeroed_any_more() {
         .emulated("boot_delay_ms = 100", "boot_delay_ms = 2");
     let wanted = Wanted {
         cause: alarm!(Alarm::UnexpectedBootUp { .. }),
-        words: &["x:", "booted by itself"],
+        words: &["x:", "restarted unexpectedly"],
         within: PERIOD * 4,
         rest: PERIOD * 4 + STOPPING * 2,
     };

@@ -251,7 +251,7 @@ fn a_file_of_a_newer_program_or_of_another_kind_is_refused_clearly() {
         "{failure:?}"
     );
     assert!(
-        failure.to_string().contains("use the newer program"),
+        failure.to_string().contains("use a newer version"),
         "{failure}"
     );
     let mut shelf = Shelf::new();

@@ -62,7 +62,7 @@ fn a_statusword_that_sticks_in_a_move_ends_it_in_bounded_time() {
                 })
             )
         },
-        words: &["x:", "target reached"],
+        words: &["x:", "target to be reached"],
         within: Duration::from_secs(5),
         rest: Duration::from_secs(5),
     };
@@ -108,7 +108,7 @@ fn a_target_that_is_never_reached_ends_the_move_in_bounded_time() {
                 })
             )
         },
-        words: &["x:", "target reached", "60.0"],
+        words: &["x:", "target to be reached", "60.0"],
         within: Duration::from_secs(10),
         rest: Duration::from_secs(10),
     };

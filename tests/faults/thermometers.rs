@@ -286,7 +286,7 @@ fn an_input_that_is_stuck_stops_the_machine_where_that_is_wanted() {
         let stuck = Fault::InputStuck { channel };
         let stood = stand(&mut volume, stuck, noticed + SECOND / 3);
         let lack = check_stopped(&stood, noticed, source);
-        assert!(lack.contains("input 1 of it is stuck"), "{lack}");
+        assert!(lack.contains("its input 1 is stuck"), "{lack}");
     }
 }
 

@@ -164,7 +164,7 @@ pub enum Status {
     HeldOffline,
     /// -6: the user has no full access.
     NoAccess,
-    /// A code that the reference does not name.
+    /// A code that the reference does not list.
     Unknown(i32),
 }
 
@@ -223,7 +223,7 @@ impl fmt::Display for Status {
             Self::OutOfMemory => "out of memory",
             Self::HeldOffline => "set offline by hand or by an input",
             Self::NoAccess => "no full access",
-            Self::Unknown(_) => "a code that its reference does not name",
+            Self::Unknown(_) => "a code that the In-Sight reference does not list",
         };
         write!(f, "status {} ({meaning})", self.code())
     }
@@ -259,21 +259,23 @@ pub struct Inspection {
     pub y: f64,
     /// In the job's unit of angle; 0 where nothing was found.
     pub angle: f64,
-    /// How like the taught marks the worst one looks, 0 to 100.
+    /// The similarity of the worst mark to the taught one, 0 to 100.
     pub score: f64,
 }
 
-/// Why a line is no inspection.
+/// Why a line is not an inspection result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InspectionError {
     /// Not seven fields.
-    #[error("{seen} fields, an inspection has 7: count,found,judgement,x,y,angle,score")]
+    #[error(
+        "inspection result has {seen} fields, expected 7: count,found,judgement,x,y,angle,score"
+    )]
     Fields {
         /// How many there are.
         seen: usize,
     },
     /// A field is not a number of its kind.
-    #[error("the {field} of the inspection is no number that it can be")]
+    #[error("inspection result: {field} is not a number in its range")]
     Field {
         /// Which.
         field: &'static str,

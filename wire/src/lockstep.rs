@@ -31,7 +31,7 @@ use super::{LineControl, Port};
 
 /// The version of these lines.
 pub const VERSION: u32 = 1;
-/// A line is never longer; a peer that sends more speaks something else.
+/// A line is never longer; a peer that sends more does not use this protocol.
 pub const LINE_MAX: usize = 1 << 20;
 
 /// Where the side channel of a clock is that a command line names as `lockstep:PATH`.
@@ -165,7 +165,7 @@ pub enum Reply {
 
 /// A line that means nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{line}` is no message of a lockstep clock (version {VERSION})")]
+#[error("`{line}` is not a message of the lockstep clock (version {VERSION})")]
 pub struct Unintelligible {
     /// The line, shortened.
     pub line: String,

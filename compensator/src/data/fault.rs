@@ -1,4 +1,4 @@
-//! What can be wrong with a data file, told to whoever has to mend it.
+//! What can be wrong with a data file, in words for the person who has to correct it.
 
 use core::error::Error;
 

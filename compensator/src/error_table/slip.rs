@@ -87,8 +87,8 @@ pub fn find_slip(readings: &[Change], count: Metres) -> Option<Slip> {
     let steps = READINGS..=size - READINGS;
     let step = strongest(steps.map(|at| Stepped::new(&drift, &changes, at)))?;
     // NaN, too, is no slip.
-    let is_chance = !(step.chance() * (size as f64) < SLIP_FALSE_ALARMS);
-    if is_chance || !beats_its_rivals(&step, &drift, &changes) {
+    let is_real = step.chance() * (size as f64) < SLIP_FALSE_ALARMS;
+    if !is_real || !beats_its_rivals(&step, &drift, &changes) {
         return None;
     }
     let step = Stepped::new(&drift.with_lost_motion(readings), &changes, step.at);

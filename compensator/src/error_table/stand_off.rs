@@ -58,8 +58,8 @@ struct Order {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "error table: at {:.3} mm (approach `{}`) the deviation of {:.3} um stands {:.3} um off the \
-     curve through its neighbours from {:.3} to {:.3} mm; by the other positions up to {:.3} um \
-     would be believed",
+     curve through its neighbours from {:.3} to {:.3} mm; judged by the other positions, at most \
+     {:.3} um is plausible",
     position.mm(), approach.symbol(), deviation.um(), seen.abs().um(), from.mm(), to.mm(),
     limit.um()
 )]

@@ -145,7 +145,7 @@ fn the_refusal_says_where_how_much_and_what_would_be_believed() {
     for part in [
         "at 36.000 mm (approach `+`)",
         "through its neighbours from",
-        "would be believed",
+        "is plausible",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

@@ -104,7 +104,7 @@ fn one_direction_alone_says_nothing_of_lost_motion() {
 fn interference_within_a_pass_is_refused() {
     let mut all = passes(&STAGE, 6, &mut Noise(6));
     for (at, point) in all[3].points.iter_mut().enumerate() {
-        point.slope = point.slope + Volts(3e-3 * (at as f64 * 0.9).sin());
+        point.slope += Volts(3e-3 * (at as f64 * 0.9).sin());
     }
     let error = refine_passes(&all, &RefineOptions::default()).unwrap_err();
     assert!(matches!(error, RefineError::LackOfFit { .. }), "{error}");

@@ -76,7 +76,7 @@ pub enum EnvironmentError {
     /// A sensor outside what a machine hall can have.
     #[error(
         "environment: {channel} is {seen} {unit}, outside {low} to {high}; sensor broken, \
-             disconnected or in another unit?",
+         disconnected or in another unit?",
         seen = units::Short(*seen), low = units::Short(*low), high = units::Short(*high)
     )]
     OutOfRange {
@@ -117,7 +117,8 @@ pub enum EnvironmentError {
     #[error(transparent)]
     Air(#[from] air::OutOfRange),
     /// A setting that is not finite or of impossible size.
-    #[error("length correction: {setting} is {seen}", seen = units::Short(*seen))]
+    #[error("length correction: {setting} is {seen}, which is not possible",
+        seen = units::Short(*seen))]
     Setting {
         /// Which setting.
         setting: &'static str,

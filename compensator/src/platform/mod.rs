@@ -102,8 +102,8 @@ pub enum PlatformError {
     },
     /// A travel that does not contain stroke zero.
     #[error(
-        "platform: actuator `{name}` travels from {} to {} mm; strokes count from pose zero, \
-         which must be within",
+        "platform: actuator `{name}` travels from {} to {} mm; strokes count from pose zero, which \
+         must lie within this travel",
         units::Short(min.mm()), units::Short(max.mm())
     )]
     Travel {

@@ -16,13 +16,16 @@ pub enum DesignError {
         seen: usize,
     },
     /// Fewer than two placements.
-    #[error("{seen} placement(s) of the plate; at least 2 are needed to part table and plate")]
+    #[error(
+        "{seen} placement(s) of the plate; at least 2 are needed to separate the errors of table \
+         and plate"
+    )]
     Placements {
         /// How many.
         seen: usize,
     },
     /// An offset that repeats or is a whole turn or more.
-    #[error("plate offset {offset} repeats or is not one of 0 to {}", lines - 1)]
+    #[error("plate offset {offset} is repeated or is not one of 0 to {}", lines - 1)]
     Offset {
         /// The offset.
         offset: usize,
@@ -33,7 +36,8 @@ pub enum DesignError {
     #[error(
         "plate offsets {offsets:?} differ by multiples of {step} only, which divides the {lines} \
          lines: harmonic {harmonic} and its multiples look the same in every placement and cannot \
-         be told from the plate; choose another offset (`truestage plan rotary`)"
+         be distinguished from errors of the plate; choose another offset (`truestage plan \
+         rotary`)"
     )]
     Unobservable {
         /// The offsets.

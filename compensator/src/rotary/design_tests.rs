@@ -100,6 +100,6 @@ fn offsets_that_amplify_beyond_the_limit_are_refused() {
 fn what_are_no_offsets_is_refused() {
     check_refused(1, &[0, 1], "a plate with 1 line(s)");
     check_refused(8, &[3], "1 placement(s)");
-    check_refused(8, &[0, 8], "offset 8 repeats or is not one of 0 to 7");
-    check_refused(8, &[0, 3, 3], "offset 3 repeats");
+    check_refused(8, &[0, 8], "offset 8 is repeated or is not one of 0 to 7");
+    check_refused(8, &[0, 3, 3], "offset 3 is repeated");
 }

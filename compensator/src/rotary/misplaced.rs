@@ -1,4 +1,4 @@
-//! Whether the plate was turned as it is said: a slip that no reading shows by itself.
+//! Whether the plate was turned as was entered: a mistake that no single reading shows.
 //!
 //! The other placements alone give table and plate. With them the readings of a placement fit one
 //! turn of the plate, which is found by correlation; when that is another one than was entered,
@@ -9,8 +9,9 @@
 //! - the lines are wrong and their positions right, as when lines are told apart by where the table
 //!   finds them: reading − G\[p\] is A\[p − s\] for another s.
 //!
-//! Of three placements each is judged by two; two cannot judge each other. Harmonics that the others
-//! cannot part are left with the plate, which spoils the prediction by no more than the table's share.
+//! Of three placements each is judged by two; two cannot judge each other. Harmonics that the
+//! others cannot separate are attributed to the plate, which spoils the prediction by no more than
+//! the table's share.
 
 use realfft::RealFftPlanner;
 use units::Radians;
@@ -31,9 +32,9 @@ const RESIDUAL_MIN: f64 = 1e-12;
 /// A placement that fits another turn of the plate than was entered.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the placement at plate offset {offset} fits offset {likely} far better: its readings differ by \
-     {:.3} arcsec (rms) from what the other placements predict there, by {:.3} as entered; was the \
-     plate turned by {likely} lines?",
+    "the placement at plate offset {offset} fits offset {likely} far better: its readings differ \
+     by {:.3} arcsec (rms) from what the other placements predict there, but by {:.3} as entered; \
+     was the plate turned by {likely} lines?",
     residual_likely.arcsec(), residual.arcsec()
 )]
 pub struct Misplaced {

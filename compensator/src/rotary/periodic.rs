@@ -128,7 +128,7 @@ pub enum PeriodicError {
 
 /// A command or target that is no angle.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("rotary compensation: an angle of {seen} rad is none", seen = units::Short(*seen))]
+#[error("rotary compensation: {seen} rad is not a usable angle", seen = units::Short(*seen))]
 pub struct NotAnAngle {
     /// What was asked for: a NaN or an infinity.
     pub seen: f64,

@@ -37,7 +37,7 @@ pub enum Criterion {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// More placements than lines, or fewer than two.
-    #[error("{placements} placements of a plate with {lines} lines; 2 to {lines} are possible")]
+    #[error("{placements} placement(s) of a plate with {lines} lines; 2 to {lines} are possible")]
     Placements {
         /// How many were wanted.
         placements: usize,
@@ -45,7 +45,7 @@ pub enum PlanError {
         lines: usize,
     },
     /// A plate that is none, or larger than is planned for.
-    #[error("a plate with {seen} lines; offsets are planned for 2 to {max}")]
+    #[error("a plate with {seen} lines; offsets can be planned for 2 to {max} lines")]
     Lines {
         /// Its lines.
         seen: usize,

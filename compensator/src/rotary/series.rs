@@ -44,7 +44,10 @@ pub enum RotarySeriesError {
         seen: usize,
     },
     /// Fewer than two placements.
-    #[error("{seen} placement(s) of the plate; at least 2 are needed to part table and plate")]
+    #[error(
+        "{seen} placement(s) of the plate; at least 2 are needed to separate the errors of table \
+         and plate"
+    )]
     Placements {
         /// How many.
         seen: usize,
@@ -110,8 +113,8 @@ pub enum RotaryFault {
     },
     /// The same line twice in one placement.
     #[error(
-        "line {line} of the placement at offset {offset} stands in line {first} of the file \
-         already; each line is read once, and no offset is used twice"
+        "line {line} of the placement at offset {offset} is already in row {first} of the file; \
+         each line is read once, and no offset is used twice"
     )]
     DuplicateLine {
         /// The placement.
@@ -123,8 +126,8 @@ pub enum RotaryFault {
     },
     /// Rows of one offset with others between them.
     #[error(
-        "offset {offset} comes again after another one (it began in line {first} of the file): no \
-         offset is used twice, and the rows of one placement stand together"
+        "offset {offset} appears again after another one (it began in row {first} of the file): \
+         use each offset once, and keep the rows of one placement together"
     )]
     RepeatedOffset {
         /// The offset.
@@ -134,8 +137,8 @@ pub enum RotaryFault {
     },
     /// Fewer than two placements.
     #[error(
-        "all rows have offset {offset}: one placement cannot part table and plate; turn the plate \
-         by some lines and read it again"
+        "all rows have offset {offset}: one placement cannot separate the errors of table and \
+         plate; turn the plate by some lines and read it again"
     )]
     OnePlacement {
         /// The only offset.
@@ -144,8 +147,8 @@ pub enum RotaryFault {
     /// All offsets differ by multiples of a number that divides the number of lines.
     #[error(
         "offset {offset} and those before it differ by multiples of {step} only, which divides the \
-         {lines} lines: harmonic {harmonic} and its multiples look the same in every placement \
-         and cannot be told from the plate; add a placement at another offset"
+         {lines} lines: harmonic {harmonic} and its multiples look the same in every placement and \
+         cannot be distinguished from errors of the plate; add a placement at another offset"
     )]
     CommonStep {
         /// The last offset.
@@ -172,8 +175,8 @@ pub enum RotaryFault {
     },
     /// The number of lines cannot be told from the file.
     #[error(
-        "line {line} is read in {seen} of {placements} placements, so that the number of lines \
-         cannot be told from the file (lines count from 0): say how many lines the plate has"
+        "line {line} is read in {seen} of {placements} placements, so the number of lines is not \
+         clear from the file (lines count from 0): state how many lines the plate has"
     )]
     UnknownLines {
         /// The first or the last line.

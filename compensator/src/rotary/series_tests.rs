@@ -89,13 +89,13 @@ fn a_line_or_offset_that_repeats_is_named_with_its_first_place() {
         3,
         "0,1,9",
         3,
-        "line 1 of the placement at offset 0 stands in line 3 of the file",
+        "line 1 of the placement at offset 0 is already in row 3 of the file",
     );
     check_row(
         7,
         "0,2,9",
         1,
-        "offset 0 comes again after another one (it began in line 2",
+        "offset 0 appears again after another one (it began in row 2",
     );
     let again = format!("{HEADER}{0}\n{0}\n", good(4)[..4].join("\n"));
     check_text(&again, None, 6, 3, "no offset is used twice");
@@ -109,7 +109,7 @@ fn wrong_counts_are_refused() {
         None,
         5,
         1,
-        "one placement cannot part table and plate",
+        "one placement cannot separate the errors of table and plate",
     );
     let short = format!("{HEADER}{}\n", good(4)[..5].join("\n"));
     check_text(&short, None, 5, 3, "line 3 is read in 1 of 2 placements");

@@ -85,8 +85,8 @@ pub enum SolveError {
     },
     /// A table error is known too badly.
     #[error(
-        "the table error at position {position} has {seen:.1} times the uncertainty of a reading, \
-         the limit is {limit:.1}; too many readings are missing there"
+        "the table error at position {position} has {seen:.1} times the standard uncertainty of a \
+         reading, the limit is {limit:.1}; too many readings are missing there"
     )]
     Amplified {
         /// Where, in lines.
@@ -99,8 +99,8 @@ pub enum SolveError {
     /// So many readings disagree that it is not clear which are wrong.
     #[error(
         "{seen} of {readings} readings disagree with the others, first line {} at plate offset {}; \
-         at most {limit} are believed to be outliers: was the plate clamped firmly, and each \
-         offset entered as it was?",
+         at most {limit} may be outliers: was the plate clamped firmly, and was each offset \
+         entered correctly?",
         first.line, first.offset
     )]
     TooManyOutliers {

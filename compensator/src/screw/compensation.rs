@@ -38,7 +38,8 @@ pub enum Rule {
 /// A target for which there is no compensation.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "screw compensation: {} mm is outside {} to {} mm, what was measured and may be extrapolated",
+    "screw compensation: {} mm is outside {} to {} mm, the measured range with its permitted \
+     extrapolation",
     units::Short(seen.mm()), units::Short(first.mm()), units::Short(last.mm())
 )]
 pub struct OutOfRange {
@@ -124,7 +125,7 @@ impl ScrewCompensation {
     /// where harmonics do not peak together.
     ///
     /// # Errors
-    /// When a limit is none, or the model is not sound or exceeds a limit, with value and limit.
+    /// When a limit is invalid, or the model is not sound or exceeds a limit, with value and limit.
     pub fn new(model: ScrewModel, limits: Limits, rule: Rule) -> Result<Self, ScrewError> {
         check_limits(&limits)?;
         check_model(&model)?;

@@ -281,10 +281,16 @@ fn what_cannot_be_undone_within_the_limits_is_refused_when_loaded() {
         "Are the approaches swapped",
     );
     check_refused(|m, _| m.lead = None, "harmonics need a positive lead");
-    check_refused(|m, _| m.harmonics[1].number = 1, "twice or has number 0");
-    check_refused(|m, _| m.harmonics[1].number = 0, "twice or has number 0");
+    check_refused(
+        |m, _| m.harmonics[1].number = 1,
+        "twice or has the number 0",
+    );
+    check_refused(
+        |m, _| m.harmonics[1].number = 0,
+        "twice or has the number 0",
+    );
     check_refused(|m, _| m.slope = f64::NAN, "not finite");
-    check_refused(|m, _| m.last = m.first, "no range");
+    check_refused(|m, _| m.last = m.first, "do not form a range");
     check_refused(|m, _| m.covariance = Some(vec![0.0; 9]), "covariance");
     check_refused(|_, l| l.slope = 1.0, "limit Slope is 1");
     check_refused(|_, l| l.size = Metres(f64::NAN), "limit Size is NaN");

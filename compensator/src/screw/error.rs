@@ -34,7 +34,7 @@ pub enum FitError {
     },
     /// Each side at strokes of its own, so that a lost motion looks like a slope.
     #[error(
-        "screw: forward and reverse have no strokes in common enough to tell lost motion from \
+        "screw: forward and reverse have too few strokes in common to distinguish lost motion from \
          slope; measure the same strokes from both sides"
     )]
     LostMotionLikeSlope,
@@ -42,8 +42,8 @@ pub enum FitError {
     /// else.
     #[error(
         "screw: the strokes stand at {places} place(s) of the {} mm lead, so its periodic error is \
-         not observable (it cannot be told from offset and slope); measure at five or more places \
-         spread over more than one turn, or leave the lead out", units::Short(lead.mm())
+         not observable (it cannot be distinguished from offset and slope); measure at five or \
+         more places spread over more than one turn, or leave the lead out", units::Short(lead.mm())
     )]
     Periodic {
         /// The lead.
@@ -53,8 +53,8 @@ pub enum FitError {
     },
     /// No row to spare.
     #[error(
-        "screw: {rows} rows for a model of {parameters} parameters leave nothing to judge the noise \
-         by; repeat the strokes or measure more"
+        "screw: {rows} rows for a model of {parameters} parameters leave nothing from which to \
+         judge the noise; repeat the strokes or measure more"
     )]
     TooFewRows {
         /// Rows given.

@@ -48,7 +48,7 @@ pub struct Fitted {
 /// Fits the model to the strokes of one axis.
 ///
 /// # Errors
-/// When an option is none, or something is not observable in these strokes, by name.
+/// When an option is invalid, or a term is not observable in these strokes; the error names it.
 ///
 /// # Example
 ///

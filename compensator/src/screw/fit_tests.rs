@@ -201,7 +201,7 @@ fn what_is_not_observable_is_named() {
     apart.extend([row(Approach::Reverse, 1500.0, 3.0); 5]);
     check_says(
         fit(&apart, &FitOptions::default()),
-        "tell lost motion from slope",
+        "distinguish lost motion from slope",
     );
     // The patent's own strokes: 0.5, 1 and 1.5 mm at a lead of 2 mm.
     let both = |strokes: &[f64]| Screw::PLAIN.measured(strokes, 6, 0.1, &mut Noise(1));

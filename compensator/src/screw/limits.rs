@@ -148,14 +148,14 @@ pub(super) fn check_model(model: &ScrewModel) -> Result<(), ScrewError> {
         .is_some_and(|it| it.is_finite() && it > Metres::ZERO);
     let checks = [
         (finite, "a value is not finite"),
-        (model.first < model.last, "its strokes are no range"),
+        (model.first < model.last, "its strokes do not form a range"),
         (
             lead_known || model.harmonics.is_empty(),
             "harmonics need a positive lead",
         ),
         (
             waves().all(|it| it.number > 0 && !twice(it)),
-            "a harmonic is there twice or has number 0",
+            "a harmonic appears twice or has the number 0",
         ),
         (
             model.covariance.as_ref().is_none_or(covers),

@@ -25,8 +25,8 @@ pub enum ScrewFault {
     },
     /// A stroke a thousand times shorter than the others.
     #[error(
-        "axis {axis}: a stroke of {} um stands beside strokes from {} to {} um; \
-         are micrometres and millimetres mixed?",
+        "axis {axis}: a stroke of {} um does not fit the others, from {} to {} um; are micrometres \
+         and millimetres mixed?",
         units::Short(*stroke_um), units::Short(*least_um), units::Short(*most_um)
     )]
     MixedUnits {
@@ -108,7 +108,8 @@ pub enum StrokeError {
     },
     /// A stroke a thousand times shorter than the others.
     #[error(
-        "axis {axis}: a stroke of {} um beside strokes from {} to {} um", units::Short(stroke.um()),
+        "axis {axis}: a stroke of {} um does not fit the others, from {} to {} um",
+        units::Short(stroke.um()),
         units::Short(others.0.um()), units::Short(others.1.um())
     )]
     MixedUnits {
@@ -430,7 +431,7 @@ mod tests {
             rows,
             4,
             5,
-            "1.5 um stands beside strokes from 500 to 1000 um",
+            "1.5 um does not fit the others, from 500 to 1000 um",
         );
         let rows = "u,+,1,0.3\nu,+,500,0.3\nu,+,1500,0.3\n";
         check_rows(rows, 2, 5, "are micrometres and millimetres mixed?");

@@ -50,7 +50,7 @@ pub enum NoCorrection {
     /// The deviation exceeds its limit, or is not a number.
     #[error(
         "the deviation along {axis} is {:.3} um, the limit {:.3} um; a wrong temperature, a \
-         detector out of adjustment, or the tables of another machine?", seen.um(), limit.um()
+         misaligned detector, or the tables of another machine?", seen.um(), limit.um()
     )]
     TooLarge {
         /// Along which direction.

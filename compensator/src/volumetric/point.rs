@@ -118,7 +118,7 @@ impl core::ops::Neg for Point {
 
 /// Why two corners do not make a volume.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("work volume, axis {axis}: from {} mm to {} mm is no range", units::Short(low.mm()),
+#[error("work volume, axis {axis}: {} mm to {} mm is not a range", units::Short(low.mm()),
     units::Short(high.mm()))]
 pub struct VolumeError {
     /// Which axis.

@@ -96,14 +96,14 @@ pub enum VolumeFault {
         /// The cell.
         seen: String,
     },
-    /// A standard uncertainty that is none.
+    /// A standard uncertainty that is not above zero.
     #[error("`u` is {seen}; a standard uncertainty is above zero", seen = units::Short(*seen))]
     Uncertainty {
         /// The cell.
         seen: f64,
     },
     /// A line that comes in parts.
-    #[error("line {number} comes again; keep its rows together, one set-up is one line")]
+    #[error("line {number} appears again; keep its rows together: one set-up is one line")]
     Again {
         /// Its number.
         number: u32,
@@ -115,13 +115,15 @@ pub enum VolumeFault {
         number: u32,
     },
     /// A line that goes nowhere.
-    #[error("line {number} has no two different places; a line is read at two at least")]
+    #[error(
+        "line {number} was read at one place only; a line needs readings at two places or more"
+    )]
     Nowhere {
         /// Its number.
         number: u32,
     },
     /// Straightness optics that look along the line.
-    #[error("line {number} goes along {axis}, across which its straightness is to be read")]
+    #[error("line {number} runs along {axis}, so no straightness along {axis} can be read on it")]
     Along {
         /// Its number.
         number: u32,
@@ -308,12 +310,12 @@ mod tests {
         check_fault("1,linear_mm,0,0,0,0,0,0,0,0.1\n", (2, 3), "`linear_mm`");
         check_fault("1,linear_um,0,0,0,0,0,0,0,0\n", (2, 27), "above zero");
         check_fault("1,linear_um,0,0,nan,0,0,0,0,1\n", (2, 17), "finite");
-        check_fault(&format!("{row}{row}"), (2, 1), "no two different");
+        check_fault(&format!("{row}{row}"), (2, 1), "one place only");
         let other = "2,linear_um,0,0,0,0,0,0,0,0.1\n2,linear_um,9,0,0,0,0,0,0,0.1\n";
-        check_fault(&format!("{row}{end}{other}{row}"), (6, 1), "comes again");
+        check_fault(&format!("{row}{end}{other}{row}"), (6, 1), "appears again");
         let tool = "1,linear_um,9,0,0,0,0,5,0,0.1\n";
         check_fault(&format!("{row}{tool}"), (3, 1), "another tool");
         let along = "3,straightness_x_um,0,0,0,0,0,0,0,1\n3,straightness_x_um,9,0,0,0,0,0,0,1\n";
-        check_fault(along, (2, 1), "goes along x");
+        check_fault(along, (2, 1), "runs along x");
     }
 }

@@ -466,7 +466,7 @@ mod tests {
         let all_along_x = refused("direction = [0.0, 1.0]", "direction = [1.0, 0.0]");
         assert!(all_along_x.contains("actuator"), "{all_along_x}");
         let too_far = refused("x_max_mm = 1.5", "x_max_mm = 4.5");
-        assert!(too_far.contains("the screws do not"), "{too_far}");
+        assert!(too_far.contains("the screws cannot reach"), "{too_far}");
         let blind = refused("camera = \"eye\"", "camera = \"ear\"");
         assert!(blind.contains("there is no camera `ear`"), "{blind}");
         let turning = refused("overrun_mm = 0.1", "overrun_mm = 0.001");

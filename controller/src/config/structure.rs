@@ -66,7 +66,7 @@ fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
         ("number" | "integer", Value::Integer(it)) => number(path, *it as f64, schema, findings),
         ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
         (expected, _) => {
-            let cause = format!("{} is expected here, this is {seen}", in_words(expected));
+            let cause = format!("expected {} here, this is {seen}", in_words(expected));
             say(findings, path, cause, correction(expected, value));
         }
     }

@@ -1,4 +1,4 @@
-//! What a shell script learns of a failure.
+//! The exit code that tells a shell script of a failure.
 
 use super::Failure;
 use crate::store::StoreError;

@@ -69,13 +69,14 @@ fn check_jump_limit(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &Compensat
         judge.say(
             "jump_limit_um",
             format!(
-                "{} um accept nothing more: `slope_limit` refuses changes above {} um over the \
-                 {} mm from one position to the next",
+                "{} um has no effect: `slope_limit` refuses changes above {} um over the {} mm \
+                 from one position to the next",
                 Short(jump_limit_um),
                 Short(steepest_um),
                 Short(run.step_mm)
             ),
-            "leave it out: the table's own positions then say what is believed of one of them",
+            "leave it out: the limit for each position then follows from the other positions of \
+             the table",
         );
     }
 }
@@ -106,7 +107,7 @@ fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig)
                 "the limit switch at {} mm is not beyond the soft limit of {} mm",
                 zero.negative_limit_mm, axis.motion.soft_min_mm
             ),
-            "give the switch's place seen from the zero, below soft_min_mm: usually negative",
+            "give the switch's position relative to the zero, below soft_min_mm: usually negative",
         );
     }
     if !(axis.motion.soft_min_mm..=axis.motion.soft_max_mm).contains(&0.0) {
@@ -116,7 +117,7 @@ fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig)
                 "the zero lies outside the soft limits {} to {} mm: the axis cannot go there",
                 axis.motion.soft_min_mm, axis.motion.soft_max_mm
             ),
-            "soft limits are seen from the zero",
+            "soft limits are relative to the zero",
         );
     }
 }
@@ -163,7 +164,7 @@ fn check_rails(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig)
                 judge.say(
                     key,
                     format!("a converter of ±{reach} V never reads {rail} V"),
-                    "give the voltage from which on sensor or converter are saturated",
+                    "give the voltage from which on the sensor or the converter is saturated",
                 );
             }
         }

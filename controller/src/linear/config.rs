@@ -74,7 +74,8 @@ pub struct CalibrateConfig {
     /// Last position.
     #[schemars(extend("x-range" = "with `overrun_mm` within the soft limits"))]
     pub end_mm: f64,
-    /// Distance of positions; the end is always measured.
+    /// Distance of positions; the last one is stretched or split so that the end is measured and no step is
+    /// shorter than half of it.
     #[schemars(range(min = 0.001), extend("x-range" = "at most the range"))]
     pub step_mm: f64,
     /// Bidirectional runs.

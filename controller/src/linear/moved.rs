@@ -13,8 +13,8 @@ pub enum Corrected {
     No,
     /// The calibration, between its first and last position.
     Within,
-    /// Beyond the calibrated range, from `first` to `last`: the deviation of its end, which nobody
-    /// measured there.
+    /// Beyond the calibrated range, from `first` to `last`: the deviation at its end is used, which
+    /// was not measured there.
     Held {
         /// First calibrated position.
         first: Metres,

@@ -1,4 +1,4 @@
-//! Tables of linear axes: what of a table is believed, and how it is applied.
+//! Tables of linear axes: which positions of a table are accepted, and how it is applied.
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use units::{Metres, MetresPerSecond};

@@ -43,7 +43,7 @@ fn check_inconsistency(judge: &mut Judge<'_>, platform: &PlatformConfig) {
         (None, 4..) => judge.say(
             "",
             format!("four screws can contradict each other, and `{key}` is missing"),
-            "say by how much they may: what the platform bears without being strained",
+            "give the contradiction that the platform bears without strain",
         ),
         (Some(_), ..4) => judge.say(
             key,
@@ -62,8 +62,8 @@ fn check_lone_homing(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     match (platform.zero.lone_homing, platform.actuator.len()) {
         (false, 4..) => judge.say(
             "",
-            "each of the four screws homes while the others stand, and nothing says that \
-             the platform bears it",
+            "each of the four screws homes while the others stand still, and nothing says that the \
+             platform bears it",
             format!(
                 "give `{key} = true` if couplings or guides yield over the whole way to the \
                  index; otherwise build the platform with three screws"
@@ -95,7 +95,7 @@ fn check_references(
                 judge.say(
                     "index_mm",
                     "the index lies beyond the upper soft limit",
-                    "give the first index pulse off the negative limit switch",
+                    "give the position of the first index pulse off the negative limit switch",
                 );
             }
             judge.within(
@@ -163,8 +163,8 @@ fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &P
         judge.say(
             "",
             format!(
-                "the work range reaches x = {} mm, y = {} mm, theta = {}°, which the screws do not: \
-                 {cause}",
+                "the work range extends to x = {} mm, y = {} mm, theta = {}°, which the screws \
+                 cannot reach: {cause}",
                 Short(pose.x.mm()),
                 Short(pose.y.mm()),
                 Short(pose.angle.value().to_degrees()),
@@ -194,6 +194,6 @@ fn unreachable_corner(held: &Platform, platform: &PlatformConfig) -> Option<(Pos
             let pose = Pose::default();
             angles
                 .is_none()
-                .then(|| (pose, "nothing is in reach".into()))
+                .then(|| (pose, "no pose can be reached".into()))
         })
 }

@@ -10,7 +10,7 @@ use units::Metres;
 #[derive(Debug, thiserror::Error)]
 pub enum PlatformFailure {
     /// The machine has no platform.
-    #[error("this machine is no platform: its configuration has no [platform]")]
+    #[error("this machine is not a platform: its configuration has no [platform]")]
     None,
     /// A section of the configuration is missing.
     #[error("[platform.{section}] is missing in the configuration")]
@@ -54,8 +54,8 @@ pub enum PlatformFailure {
     Forward(#[from] ForwardError),
     /// Screws that stand, or would stand, where no pose has them together.
     #[error(
-        "platform: the screws contradict each other by {:.3} µm, the limit is {:.3} µm; from the pose \
-         they agree on best, {screws}{consequence}",
+        "platform: the screws contradict each other by {:.3} µm, the limit is {:.3} µm; from the \
+         pose that fits them best, {screws}{consequence}",
         seen.um(), limit.um()
     )]
     Contradiction {

@@ -29,7 +29,7 @@ pub struct PoseMoved {
     pub skew: Option<Duration>,
     /// The largest standard uncertainty of the screws' places, where calibrated.
     pub standard_uncertainty: Option<Metres>,
-    /// The screws whose play was taken up before, because nobody knew how they stood.
+    /// The screws whose play was taken up before, because their engagement was unknown.
     pub taken_up: Vec<TakenUp>,
 }
 

@@ -1,4 +1,4 @@
-//! The play of screws of which nobody knows how they stand: taken up before it can do harm.
+//! The play of screws whose engagement is unknown: it is taken up before it can do harm.
 
 use compensator::screw::{Engagement, ScrewCompensation, ScrewMemory};
 use units::{Approach, Metres};

@@ -238,7 +238,7 @@ impl AlignmentPlatform<'_> {
             return Ok(poses);
         }
         Err(Failure::Usage {
-            what: "most of the work range is out of the screws' reach".into(),
+            what: "the screws cannot reach most of the work range".into(),
             help: "lower x_max_mm, y_max_mm or theta_max_deg of [platform]".into(),
         })
     }

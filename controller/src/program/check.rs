@@ -1,4 +1,4 @@
-//! `truestage check`: whether a configuration is sound, and what is known of it.
+//! `truestage check`: whether a configuration is valid, and a summary of it.
 
 use std::path::Path;
 

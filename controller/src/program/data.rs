@@ -28,7 +28,7 @@ pub(crate) enum FitCommand {
         /// Store it as a calibration of this machine (activate it with `cal activate`).
         #[arg(long, value_name = "CONFIG")]
         save: Option<PathBuf>,
-        /// The axis it belongs to; the only one when there is one.
+        /// The axis it belongs to; may be left out when there is only one.
         #[arg(long)]
         axis: Option<String>,
     },
@@ -89,7 +89,7 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
     let judged = fitted.table.judge_neighbours(Metres::ZERO);
     text += &match judged {
         Ok(noticed) => format!("\n{}", text::noticed(noticed)),
-        Err(stand_off) => format!("\nNOT TO BE BELIEVED AS IT IS: {stand_off}"),
+        Err(stand_off) => format!("\nNOT PLAUSIBLE AS IT IS: {stand_off}"),
     };
     value["wrong_position_noticed_um"] = json!(judged.ok().flatten().map(to_json::um));
     value["stands_off"] = json!(judged.err().map(|it| it.to_string()));

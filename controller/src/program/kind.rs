@@ -53,7 +53,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
     if turning > 0 {
         return Err(Failure::Usage {
             what: format!("{} are axes of different kinds", named.join(", ")),
-            help: "name linear and rotary axes in commands of their own".into(),
+            help: "use one command for the linear axes and another for the rotary axes".into(),
         });
     }
     if config.volumetric.is_some() {

@@ -59,13 +59,13 @@ struct Cli {
 enum Command {
     /// The whole cycle on an emulated machine: start here.
     Demo(demo::DemoArgs),
-    /// Judge a configuration; touches no bus.
+    /// Check a configuration; no bus is touched.
     Check {
         /// The machine's configuration.
         #[arg(default_value = "machine.toml")]
         config: PathBuf,
     },
-    /// Who is on the buses, and what does not match the configuration; nothing is changed.
+    /// List the devices on the buses and what does not match the configuration; nothing changes.
     Scan(MachineArgs),
     /// Acknowledge the fault of a drive, once; nothing moves.
     Reset(AxisArgs),
@@ -121,14 +121,14 @@ struct MachineArgs {
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     clock_speed: f64,
     /// `lockstep:PATH`: the clock of an emulated machine that waits for its controller (`mock-bus
-    /// --clock lockstep:PATH`). Its own hand then turns plates and sets lines up.
+    /// --clock lockstep:PATH`). That machine then turns plates and sets up lines itself.
     #[arg(long, value_name = "CLOCK", value_parser = path_of, conflicts_with = "clock_speed")]
     clock: Option<PathBuf>,
-    /// Who acts where a person is asked to: the hand of the emulated machine at this socket
-    /// (`mock-bus --control PATH`; that of --clock if not given), or `ask`, whoever sits here.
+    /// Who does what a person is asked to do: the emulated machine at this socket (`mock-bus
+    /// --control PATH`; that of --clock if not given), or, with `ask`, the person at this terminal.
     #[arg(long, value_name = "PATH")]
     hand: Option<PathBuf>,
-    /// Write everything on the buses to this file, in candump's log format; it must not exist yet.
+    /// Write all traffic on the buses to this file, in candump's log format; it must not exist yet.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
 }
@@ -153,7 +153,7 @@ impl MachineArgs {
 struct AxisArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// Which axis; the only one when there is one.
+    /// Which axis; may be left out when there is only one.
     #[arg(long)]
     axis: Option<String>,
 }
@@ -174,14 +174,14 @@ struct CalibrateArgs {
     /// Continue the newest interrupted run of this axis, or the journal given.
     #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
     resume: Option<PathBuf>,
-    /// Save although the place measured first and last differs by more than the limit.
+    /// Save even if the first and the last measurement of one place differ by more than the limit.
     #[arg(long)]
     accept_drift: bool,
     /// Do not wait for the person who turns the plate of a rotary table, or sets up the lines of
     /// an interferometer.
     #[arg(long)]
     yes: bool,
-    /// Three axes: let them run to and fro for this long, then measure again what heat has changed.
+    /// Three axes: let them move to and fro for this long, then measure again what heat changed.
     #[arg(long, value_name = "MINUTES")]
     warm_up_min: Option<f64>,
 }
@@ -217,7 +217,8 @@ enum MemoryCommand {
 struct MemoryArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// What the machine was built with, or what all parts are to be made with beyond that.
+    /// The state in which the machine was built (first), or the state beyond it in which all parts
+    /// are to be made (second).
     #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
     memory: MemoryChoice,
 }
@@ -244,8 +245,8 @@ struct RunArgs {
     machine: MachineArgs,
     /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
     path: Option<PathBuf>,
-    /// The first of several parts: what the detectors see meanwhile is not corrected but recorded
-    /// as the second memory, and all later parts are made with it, like this one.
+    /// The first of several parts: what the detectors see during this part is not corrected but
+    /// recorded as the second memory, so that all later parts are made like this one.
     #[arg(long)]
     first_part: bool,
 }

@@ -50,10 +50,11 @@ impl Terminal {
                 return Err(Failure::Usage {
                     what:
                         "somebody must turn the plate or set lines up, and there is no terminal to \
-                           ask at; nothing was moved"
+                         ask at; nothing was moved"
                             .into(),
-                    help: "run it in a terminal, or with --yes where that is done without being \
-                           waited for"
+                    help:
+                        "run it in a terminal, or with --yes if that is done without waiting for \
+                         it"
                         .into(),
                 });
             }
@@ -72,8 +73,8 @@ impl Terminal {
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
         self.output.note(
-            "  what it moves is switched off, which is no safe stop: make the machine safe first; \
-             Enter when it is done, Ctrl-C to stop (what was read is kept)",
+            "  the drives of this run are switched off, which is not a safe stop: make the machine \
+             safe first; press Enter when it is done, Ctrl-C to stop (what was read is kept)",
         );
         Ok(())
     }
@@ -130,7 +131,7 @@ impl LineOperator for Terminal {
 
     fn pack_up(&mut self) -> Result<(), Failure> {
         self.output
-            .note("> the interferometer is not needed any more and may be packed up");
+            .note("> the interferometer is no longer needed and may be packed up");
         match &self.answers {
             Answers::Hand(socket) => self.lend_hand(socket, "take-line-away"),
             Answers::Keyboard(_) | Answers::Nobody => Ok(()),
@@ -156,7 +157,7 @@ fn line_words(task: &LineTask) -> String {
 
 fn gone(why: &io::Error) -> Failure {
     Failure::Usage {
-        what: format!("the terminal is gone ({why}); the placements that were read are kept"),
+        what: format!("the terminal was closed ({why}); the placements that were read are kept"),
         help: "continue with --resume".into(),
     }
 }

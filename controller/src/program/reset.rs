@@ -25,7 +25,7 @@ pub(crate) fn run(args: &AxisArgs, output: Output) -> Ended {
     })?;
     let word = |state: Option<PowerState>| state.map_or("unknown".into(), |it| it.to_string());
     let text = format!(
-        "axis {axis}: was in {}, is in {}; zero it before it moves",
+        "axis {axis}: was in {}, is now in {}; zero it before it moves",
         word(before),
         word(after)
     );

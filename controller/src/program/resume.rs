@@ -17,7 +17,7 @@ pub(crate) fn journal_to_resume(
     let Some(path) = resume else { return Ok(None) };
     if path.extension().is_some_and(|it| it == "toml") {
         return Err(Failure::Usage {
-            what: format!("--resume {}: that is no journal", path.display()),
+            what: format!("--resume {}: this is not a journal", path.display()),
             help: format!(
                 "write the configuration first: truestage {verb} {} --resume",
                 path.display()

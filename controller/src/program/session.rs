@@ -82,8 +82,8 @@ fn refuse_existing(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage {
-        what: format!("--record {}: there is such a file already", path.display()),
-        help: "it was not touched; give another name, or move it away".into(),
+        what: format!("--record {}: this file already exists", path.display()),
+        help: "it was not changed; give another name, or move it away".into(),
     })
 }
 

@@ -7,7 +7,7 @@ use crate::Failure;
 /// `x=12.5mm`: the unit is never guessed.
 pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {
     let usage = || Failure::Usage {
-        what: format!("`{text}` is no target"),
+        what: format!("`{text}` is not a target"),
         help: "write AXIS=LENGTH with a unit: x=12.5mm, x=-300um, x=0.1m".into(),
     };
     let (axis, value) = text.split_once('=').ok_or_else(usage)?;

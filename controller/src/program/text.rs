@@ -64,8 +64,9 @@ fn lack(conformity: &Conformity) -> Option<String> {
         targets,
         targets_wanted,
     } = conformity;
-    let few_runs = format!("{runs} runs from each side, it asks for {runs_wanted}");
-    let few_targets = format!("{targets} targets, it asks for {targets_wanted} over this range");
+    let few_runs = format!("{runs} runs from each side, the standard requires {runs_wanted}");
+    let few_targets =
+        format!("{targets} targets, the standard requires {targets_wanted} over this range");
     let lacks: Vec<String> = [
         (runs < runs_wanted, few_runs),
         (targets < targets_wanted, few_targets),
@@ -73,10 +74,10 @@ fn lack(conformity: &Conformity) -> Option<String> {
     .into_iter()
     .filter_map(|(is_so, text)| is_so.then_some(text))
     .collect();
-    (!lacks.is_empty()).then(|| format!("NOT AS ISO 230-2 ASKS: {}", lacks.join("; ")))
+    (!lacks.is_empty()).then(|| format!("DOES NOT CONFORM TO ISO 230-2: {}", lacks.join("; ")))
 }
 
-/// Which positions of its tables each linear axis believes, and why.
+/// Which positions of its tables each linear axis accepts, and why.
 pub(crate) fn table_notes(config: &MachineConfig) -> Vec<String> {
     let axes = config.axis.iter();
     let own = axes.filter_map(|(name, it)| Some((name, it.compensation.as_ref()?)));
@@ -85,13 +86,14 @@ pub(crate) fn table_notes(config: &MachineConfig) -> Vec<String> {
         let by = match limits.jump_limit_um {
             None => "half of what its instrument counts; `jump_limit_um` is not needed",
             Some(_) => {
-                "its `jump_limit_um`: wise only where finer positions showed that the stage is like that, \
-                 for a wrong position within it is corrected like a right one"
+                "its `jump_limit_um`: wise only where finer positions showed that the stage is \
+                 like that, because a wrong position within this limit is corrected like a right \
+                 one"
             }
         };
         format!(
-            "axis {name}: a position of a table is refused when it stands off its neighbours by more \
-             than one good table in {:.0} shows and by more than {harmless:.3} µm ({by})",
+            "axis {name}: a position of a table is refused when it stands off its neighbours by \
+             more than occurs in one of {:.0} good tables and by more than {harmless:.3} µm ({by})",
             1.0 / FALSE_ALARMS
         )
     })
@@ -167,9 +169,9 @@ mod tests {
     fn what_a_measurement_lacks_of_the_standard_is_said_below_its_figures() {
         let (poor, good) = (figures(3, 4), figures(5, 5));
         let text = figures_table(&[("as found", &poor), ("as left", &good)]);
-        let told = "\nas found: NOT AS ISO 230-2 ASKS: 3 runs from each side, it asks for 5; \
-                    4 targets, it asks for 5 over this range";
+        let told = "\nas found: DOES NOT CONFORM TO ISO 230-2: 3 runs from each side, the standard \
+                    requires 5; 4 targets, the standard requires 5 over this range";
         assert!(text.ends_with(told), "{text}");
-        assert!(!figures_table(&[("as left", &good)]).contains("NOT AS"));
+        assert!(!figures_table(&[("as left", &good)]).contains("DOES NOT CONFORM"));
     }
 }

@@ -50,7 +50,8 @@ fn check_cycle(
             ("compensation", rotary.compensation.is_some()),
         ] {
             if !is_there {
-                let help = format!("add [rotary.{name}.{section}], or leave the calibration out");
+                let help =
+                    format!("add [rotary.{name}.{section}], or remove [rotary.{name}.calibrate]");
                 judge.say("", format!("needs the section `{section}`"), help);
             }
         }

@@ -224,7 +224,7 @@ impl RotaryCalibrateConfig {
     /// The placements: those given, or those planned.
     ///
     /// # Errors
-    /// When there are none that part table and plate within the limit.
+    /// When none separate the errors of table and plate within the limit.
     pub fn design(&self) -> Result<Design, PlanError> {
         if let Some(planned) = self.planned.get() {
             return Ok(planned.clone());

@@ -9,7 +9,8 @@ use units::Radians;
 pub enum RotaryFailure {
     /// Most of the plate cannot be seen.
     #[error(
-        "axis {axis}: only {seen} of {lines} lines were read in one pass, {wanted} are needed; {}",
+        "axis {axis}: only {seen} of {lines} lines were read in one pass, at least {wanted} are \
+         needed; {}",
         if *overwritten > 0 {
             format!("{overwritten} were overwritten before they were read: turn slower \
                      (speed_deg_per_s), or give the computer less to do")
@@ -31,9 +32,10 @@ pub enum RotaryFailure {
     },
     /// The plate or the detector moved while a placement was read.
     #[error(
-        "axis {axis}: the lines of the placement at offset {offset} moved by {:.3} arcsec while they \
-         were read, the limit is {:.3} arcsec; fix plate and detector, let the temperature settle; \
-         what was read of this placement is void, those before are kept: continue with --resume",
+        "axis {axis}: the lines of the placement at offset {offset} moved by {:.3} arcsec while \
+         they were read, the limit is {:.3} arcsec; fix plate and detector, let the temperature \
+         settle; the readings of this placement are discarded, earlier placements are kept: \
+         continue with --resume",
         seen.arcsec(), limit.arcsec(), offset = units::Short(*offset))]
     Slipped {
         /// Which axis.
@@ -45,7 +47,7 @@ pub enum RotaryFailure {
         /// How much is allowed.
         limit: Radians,
     },
-    /// The plate was turned otherwise than was asked for.
+    /// The plate was turned differently from what was asked for.
     #[error(
         "axis {axis}: {source} Nothing was stored; continue with --resume, which asks for that \
          placement again and keeps the others"
@@ -58,9 +60,9 @@ pub enum RotaryFailure {
     },
     /// The plate of a verification lies elsewhere.
     #[error(
-        "axis {axis}: the plate does not lie at offset {expected} but at {seen} (the readings differ \
-         by {:.3} arcsec rms from what the calibration says of the plate there, by {:.3} where it was \
-         to lie); turn it by {} lines and verify again",
+        "axis {axis}: the plate does not lie at offset {expected} but at {seen} (the readings \
+         differ by {:.3} arcsec rms from what the calibration predicts for the plate there, but by \
+         {:.3} at the offset asked for); turn it by {} lines and verify again",
         residual.arcsec(), residual_expected.arcsec(), expected - seen,
         expected = units::Short(*expected), seen = units::Short(*seen))]
     LiesElsewhere {
@@ -90,9 +92,10 @@ pub enum RotaryFailure {
     },
     /// The readings are worse than they can be.
     #[error(
-        "axis {axis}: readings scatter by {:.4} arcsec {about}, {:.4} were expected \
+        "axis {axis}: readings scatter by {:.4} arcsec {about}, {:.4} arcsec was expected \
          (reading_noise_arcsec); nothing was stored: look for vibration, a loose plate, a detector \
-         out of focus, a plate turned otherwise than was asked for, or state what it really does",
+         out of focus or a plate turned differently from what was asked for, or set \
+         reading_noise_arcsec to the real noise",
         seen.arcsec(), expected.arcsec()
     )]
     Noise {
@@ -105,7 +108,7 @@ pub enum RotaryFailure {
         /// As stated in the configuration.
         expected: Radians,
     },
-    /// Placements that are no series.
+    /// Placements that do not form a series.
     #[error("axis {axis}: {source}")]
     Series {
         /// Which axis.
@@ -121,7 +124,7 @@ pub enum RotaryFailure {
         /// Why.
         source: SolveError,
     },
-    /// A target that is no angle.
+    /// A target that is not an angle.
     #[error("axis {axis}: {source}; nothing was moved")]
     NotAnAngle {
         /// Which axis.
@@ -131,8 +134,8 @@ pub enum RotaryFailure {
     },
     /// With its calibration the table is worse than without; it is not used any more.
     #[error(
-        "axis {axis}: CALIBRATION {calibration} MAKES THE TABLE WORSE: deviation {:.3} arcsec rms with \
-         it, {:.3} without; it was taken out of use: was the encoder touched since?",
+        "axis {axis}: CALIBRATION {calibration} MAKES THE TABLE WORSE: deviation {:.3} arcsec rms \
+         with it, {:.3} without; it was taken out of use: was the encoder moved since it was made?",
         after.arcsec(), before.arcsec()
     )]
     MadeWorse {

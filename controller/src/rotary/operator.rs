@@ -64,8 +64,8 @@ impl PlateTask {
     }
 }
 
-/// Who turns the plate. The machine lives on while it waits: it asks once, and then again and
-/// again whether it has been done. The axis is switched off meanwhile; that is no safe stop.
+/// Who turns the plate. The machine keeps running while it waits: it asks once, and then repeatedly
+/// whether it has been done. The axis is switched off meanwhile, which is not a safe stop.
 pub trait Operator {
     /// Asks for a placement.
     ///

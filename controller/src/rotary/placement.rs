@@ -401,7 +401,7 @@ impl RotaryTable<'_> {
         if let Some(stray) = strays.first() {
             let (count, degrees) = (strays.len(), stray.to_degrees());
             say(format!(
-                "{count} edge(s) where no line is, one at {degrees:.4}°"
+                "{count} edge(s) where there is no line, one at {degrees:.4}°"
             ));
         }
     }

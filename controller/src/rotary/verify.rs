@@ -4,11 +4,11 @@
 //! agree with what the calibration says of both. At an offset of whole lines the places are those
 //! of the calibration; half a line beyond, they lie between them and the interpolation is on trial.
 //!
-//! What this sees: an error of the table of harmonic k, with the weight |w_s − w̄| (s the offset, w̄
-//! the mean over the placements of the calibration), which is never below 1 − |w̄|. What it cannot
-//! see: where the zero is, and what table and detector do alike for every placement, such as a
-//! detector that moves with the table. It judges readings of a table that turns; that a move comes
-//! to rest where its reading says is the drive's affair.
+//! What this sees: an error of the table of harmonic k, with the weight |w_s − w̄| (s the offset,
+//! w̄ the mean over the placements of the calibration), which is never below 1 − |w̄|. What it
+//! cannot see: where the zero is, and what table and detector do alike for every placement, such as
+//! a detector that moves with the table. It judges readings of a table that turns; whether a move
+//! comes to rest at the position that its reading shows depends on the drive.
 
 use std::path::PathBuf;
 

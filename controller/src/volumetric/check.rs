@@ -32,7 +32,7 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
     if config.platform.is_some() {
         judge.say(
             "",
-            "the axes cannot move a platform too",
+            "the axes cannot move a platform as well",
             "keep either [platform] or [volumetric]",
         );
     }
@@ -41,7 +41,7 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
         judge.say(
             "axes",
             "an axis is named twice",
-            "give those that move along x, y and z",
+            "give the three axes that move along x, y and z",
         );
     }
     for name in &volumetric.axes {
@@ -121,7 +121,7 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
         judge.say(
             "zero.order",
             "an axis is named twice",
-            "give all three, that which clears the workpiece first",
+            "give all three, beginning with the axis that clears the workpiece",
         );
     }
     for (name, index_mm) in volumetric.axes.iter().zip(zero.index_mm) {
@@ -139,7 +139,7 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             judge.say(
                 "zero.index_mm",
                 format!("the index of axis {name} lies outside its soft limits"),
-                "give the first index pulse off the negative limit switch",
+                "give the position of the first index pulse off the negative limit switch",
             );
         }
     }
@@ -180,7 +180,7 @@ fn check_compensation(
             if !enough {
                 judge.say(
                     key,
-                    format!("axis {name} takes corrections up to {seen} only ({of_axis})"),
+                    format!("axis {name} takes corrections only up to {seen} ({of_axis})"),
                     format!("raise axis.{name}.cyclic.{of_axis} to at least {wanted}"),
                 );
             }
@@ -197,7 +197,7 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
             judge.say(
                 "",
                 "there are detectors, but no section `feed`",
-                "add [volumetric.feed]: what is to be done when one of them is in trouble",
+                "add [volumetric.feed]: it says what is done when one of them fails",
             );
         }
         return;
@@ -207,7 +207,7 @@ fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
         (ReactionName::FadeOut, None) => judge.say(
             "feed.reaction",
             "fade_out needs `fade_out_s`",
-            "say over which time",
+            "give the time over which the value fades out",
         ),
         (ReactionName::Hold | ReactionName::Stop, Some(_)) => judge.say(
             "feed.fade_out_s",
@@ -235,7 +235,8 @@ fn check_calibrate(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &V
         if volumetric.reference.is_none() {
             judge.say(
                 "calibrate",
-                "the detectors' references are taken with the errors, but nothing says how",
+                "the references of the detectors are taken together with the errors, but nothing \
+                 says how",
                 "add [volumetric.reference]",
             );
         }
@@ -300,7 +301,7 @@ fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
         if it.axis == it.direction {
             judge.say(
                 "influence",
-                "a detector sees its axis from the side only",
+                "a detector sees displacements only across its axis",
                 "give a `direction` other than `axis`",
             );
         }
@@ -326,8 +327,10 @@ fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
         if seen > limit {
             judge.say(
                 "",
-                format!("all modules have {seen} {what}, the correction sees {limit}"),
-                "list the channels that are used only",
+                format!(
+                    "all modules together have {seen} {what}, the correction reads at most {limit}"
+                ),
+                "list only the channels that are used",
             );
         }
     }
@@ -361,7 +364,7 @@ mod tests {
         check(cyclic, "", ".axes", "does not follow cyclic");
         check("\"FXYZ\"", "\"FXYX\"", ".chain", "`FXYX`");
         let high = "high_mm = [500.0,";
-        check(high, "high_mm = [-1.0,", ".high_mm", "no range");
+        check(high, "high_mm = [-1.0,", ".high_mm", "not a range");
         check(
             high,
             "high_mm = [502.9,",
@@ -431,7 +434,7 @@ mod tests {
         );
         check("end_mm = 600.0\n", "", ".beam.x.drift", "`end_mm`");
         let (from, to) = ("drift = \"pivoting\"", "drift = \"translating\"");
-        check(from, to, ".beam.x.source_mm", "no such key");
+        check(from, to, ".beam.x.source_mm", "does not take this key");
         let key = format!("{slider}.saturation_v");
         check(
             "saturation_v = 3.2",

@@ -25,10 +25,10 @@ pub enum VolumetricFailure {
         /// Which section.
         section: &'static str,
     },
-    /// A beam is watched, but nobody knows what its detectors read when the axis is right.
+    /// A beam is watched, but the references of its detectors are missing.
     #[error(
-        "axis {axis}: its detectors have no references; take them (`truestage reference`) while the \
-         machine is as warm as it was when its errors were measured"
+        "axis {axis}: its detectors have no references; take them (`truestage reference`) while \
+         the machine has the temperature at which its errors were measured"
     )]
     NoReference {
         /// Whose beam.
@@ -36,8 +36,8 @@ pub enum VolumetricFailure {
     },
     /// The roll is watched, but has no reference.
     #[error(
-        "the roll detectors have no reference; take it (`truestage reference`) while the machine is \
-         as warm as it was when its errors were measured"
+        "the roll detectors have no reference; take it (`truestage reference`) while the machine \
+         has the temperature at which its errors were measured"
     )]
     NoRollReference,
     /// Thermometers without the temperatures at the calibration.
@@ -55,9 +55,9 @@ pub enum VolumetricFailure {
     NoGeometry,
     /// References that were taken with other errors in use.
     #[error(
-        "the references {references} of the detectors count from the calibration {measured_with}, but \
-         {geometry} is in use; activate what belongs together (`truestage cal activate`), or take \
-         the references again (`truestage reference`)"
+        "the references {references} of the detectors count from the calibration {measured_with}, \
+         but {geometry} is in use; activate records that belong together (`truestage cal \
+         activate`), or take the references again (`truestage reference`)"
     )]
     OtherGeometry {
         /// The references.
@@ -69,9 +69,9 @@ pub enum VolumetricFailure {
     },
     /// A memory that counts from other references.
     #[error(
-        "the {which} state memory {memory} counts from the references {measured_with}, in use: \
-         {references}; record it again (`truestage memory record --memory {which}`), or clear it \
-         (`truestage memory clear --memory {which}`)"
+        "the {which} state memory {memory} counts from the references {measured_with}, but \
+         {references} are in use; record it again (`truestage memory record --memory {which}`), or \
+         clear it (`truestage memory clear --memory {which}`)"
     )]
     OtherReferences {
         /// First or second.
@@ -85,10 +85,10 @@ pub enum VolumetricFailure {
     },
     /// A second memory that counts beyond another first one.
     #[error(
-        "the second state memory {memory} counts beyond the first memory {measured_with}, in use: \
-         {first}; make the first part again (`truestage run PATH --first-part`), record it again \
-         (`truestage memory record --memory second`), or clear it (`truestage memory clear --memory \
-         second`)"
+        "the second state memory {memory} counts from the first memory {measured_with}, but \
+         {first} is in use; make the first part again (`truestage run PATH --first-part`), record \
+         it again (`truestage memory record --memory second`), or clear it (`truestage memory \
+         clear --memory second`)"
     )]
     OtherFirstMemory {
         /// The second memory.
@@ -101,10 +101,10 @@ pub enum VolumetricFailure {
     /// What was recorded while a first part was made is no state to keep.
     #[error("{0}; nothing was stored")]
     Memory(#[from] MemoryError),
-    /// A detector that says nothing where its reference is to be taken.
+    /// A detector that gives no reliable value where its reference is to be taken.
     #[error(
-        "axis {axis} at {:.3} mm: the detector {what} says nothing to be relied upon: {source}; \
-         nothing was stored", at.mm()
+        "axis {axis} at {:.3} mm: the detector {what} gives no reliable value: {source}; nothing \
+         was stored", at.mm()
     )]
     Blind {
         /// Along which axis.
@@ -116,10 +116,10 @@ pub enum VolumetricFailure {
         /// What is wrong.
         source: Trouble,
     },
-    /// A thermometer that shows nothing to be relied upon.
+    /// A thermometer that gives no reliable value.
     #[error(
-        "thermometer {index} ([[volumetric.temperature]], counted from 0) says nothing to be relied \
-        upon: {source}; nothing was stored: look after it and its wires, and begin again"
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) gives no reliable value: \
+         {source}; nothing was stored: check it and its wires, and begin again"
     )]
     NoTemperature {
         /// Which, from 0.
@@ -129,10 +129,11 @@ pub enum VolumetricFailure {
     },
     /// A machine that is not as warm as when its errors were measured.
     #[error(
-        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {:.2} °C, but {:.2} °C \
-        when the errors {geometry} were measured, more than {limit_k:.2} K apart: references taken now \
-        would count what warmth does as nothing. Let the machine come to that temperature (by rest, or by \
-        moving), or calibrate again; what was in use stays in use", now.value(), then.value()
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {:.2} °C, but \
+         {:.2} °C when the errors {geometry} were measured, more than {limit_k:.2} K apart: \
+         references taken now would count the thermal errors as zero. Let the machine come to that \
+         temperature (by resting, or by moving), or calibrate again; what was in use stays in use",
+        now.value(), then.value()
     )]
     OtherWarmth {
         /// Which, from 0.
@@ -148,10 +149,11 @@ pub enum VolumetricFailure {
     },
     /// Likewise of the difference across a guide.
     #[error(
-        "the guide of {axis}: thermometer {over} shows {now_k:+.2} K more than {under} (counted from 0), but \
-        {then_k:+.2} K when the errors {geometry} were measured, more than {limit_k:.2} K apart: references \
-        taken now would count its bending as nothing. Let the machine come to that state (by rest, or by \
-        moving), or calibrate again; what was in use stays in use"
+        "the guide of {axis}: thermometer {over} shows {now_k:+.2} K more than {under} (counted \
+         from 0), but {then_k:+.2} K when the errors {geometry} were measured, more than \
+         {limit_k:.2} K apart: references taken now would count its bending as zero. Let the \
+         machine come to that state (by resting, or by moving), or calibrate again; what was in \
+         use stays in use"
     )]
     OtherGradient {
         /// Whose guide.
@@ -182,15 +184,16 @@ pub enum VolumetricFailure {
     },
     /// A journal that does not say how its readings are evaluated.
     #[error(
-        "this journal does not say how errors of three axes are found from it; give one of \
-         `calibrate` of such a machine"
+        "this journal does not say how the errors of three axes are found from it; give the \
+         journal of a `calibrate` run of such a machine"
     )]
     NoPlan,
-    /// A calibration is to be continued, but its references hold no more.
+    /// A calibration is to be continued, but its references no longer hold.
     #[error(
-        "axis {axis}: along its way the detectors of the {what} see changes that differ by {:.2} um, more \
-         than {:.2} um (resume_limit_um), since the references of this run were taken; the machine \
-         has changed, or a detector was moved: start a new calibration without --resume", seen.um(),
+        "axis {axis}: along its travel the detectors of the {what} see changes that differ by \
+         {:.2} um, more than {:.2} um (resume_limit_um), since the references of this run were \
+         taken; the machine has changed, or a detector was moved: start a new calibration without \
+         --resume", seen.um(),
          limit.um()
     )]
     Moved {
@@ -205,10 +208,10 @@ pub enum VolumetricFailure {
     },
     /// A calibration is to be continued on a machine that is colder or warmer.
     #[error(
-        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {seen:.2} °C, it showed \
-         {before:.2} °C when this run was interrupted; without lines that are read warm it may be \
-         {limit:.2} K more or less: let the machine become as warm as it was, or start a new \
-         calibration with --warm-up-min"
+        "thermometer {index} ([[volumetric.temperature]], counted from 0) shows {seen:.2} °C, but \
+         showed {before:.2} °C when this run was interrupted; without lines read after warming up, \
+         at most {limit:.2} K of difference is permitted: let the machine come to that \
+         temperature, or start a new calibration with --warm-up-min"
     )]
     WarmthSince {
         /// Which, from 0.
@@ -220,7 +223,7 @@ pub enum VolumetricFailure {
         /// By how much they may differ, kelvin.
         limit: f64,
     },
-    /// Readings that do not tell the errors.
+    /// Readings that do not determine the errors.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     /// Readings that are worse than they can be.
@@ -246,7 +249,7 @@ pub enum VolumetricFailure {
         /// Why.
         source: PushError,
     },
-    /// A detector that cannot be.
+    /// A detector with impossible settings.
     #[error("axis {axis}: {source}")]
     Detector {
         /// Whose.
@@ -254,16 +257,16 @@ pub enum VolumetricFailure {
         /// Why.
         source: BeamDetectorError,
     },
-    /// The kinematic chain is none.
+    /// The kinematic chain is invalid.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The work volume is none.
+    /// The work volume is invalid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// An influence is no function.
+    /// An influence is not a function.
     #[error("influence: {0}")]
     Influence(#[from] FunctionError),
-    /// The roll optics are none.
+    /// The roll optics are invalid.
     #[error(transparent)]
     Roll(#[from] RollError),
     /// The errors cannot be compensated.
@@ -296,16 +299,16 @@ pub enum VolumetricFailure {
     /// A line without a direction, or with optics that look along it.
     #[error(
         "this line has no direction, or its optics do not look across it; nothing was moved: give \
-         it a length, and a direction across that is square to it"
+         it a length, and optics whose direction is square to the line"
     )]
     NotALine,
     /// A line is to be measured with something that is not there.
     #[error("there is no instrument `{instrument}`; add [instrument.{instrument}]")]
     NoInstrument {
-        /// How it is called.
+        /// Its name.
         instrument: String,
     },
-    /// A line is to be measured with optics that nobody has described.
+    /// A line is to be measured with optics that the configuration does not describe.
     #[error(
         "instrument {instrument}: `{key}` is missing in [instrument.{instrument}.optics]; nothing \
          was moved"
@@ -331,10 +334,11 @@ pub enum VolumetricFailure {
         /// Why it ended.
         cause: Cause,
     },
-    /// A reading that is no error of the machine.
+    /// A reading too large to be an error of the machine.
     #[error(
-        "the line reads {:.1} um off, more than {:.1} um that a machine like this can be: check \
-         the optics, `reverse`, and that the tool stays on the line", seen.um(), limit.um()
+        "the line reads a deviation of {:.1} um, more than the {:.1} um that is possible on this \
+         machine: check the optics, `reverse`, and that the tool stays on the line",
+        seen.um(), limit.um()
     )]
     ImpossibleReading {
         /// What was read.
@@ -342,10 +346,10 @@ pub enum VolumetricFailure {
         /// What is possible.
         limit: Metres,
     },
-    /// A tilt that is no error of the machine.
+    /// A tilt too large to be an error of the machine.
     #[error(
-        "the line reads a tilt of {:.1} arcsec, more than {:.1} arcsec that a machine like this \
-         can have: check the optics", seen.arcsec(), limit.arcsec()
+        "the line reads a tilt of {:.1} arcsec, more than the {:.1} arcsec that is possible on \
+         this machine: check the optics", seen.arcsec(), limit.arcsec()
     )]
     ImpossibleTilt {
         /// What was read.

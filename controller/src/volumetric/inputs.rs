@@ -1,4 +1,4 @@
-//! Where in the engine's channels each detector stands, and whether it is to be believed.
+//! Which of the engine's channels belong to each detector, and whether its value is accepted.
 
 use core::time::Duration;
 

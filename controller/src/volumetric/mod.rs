@@ -12,8 +12,8 @@
 //! | `state` | what is stored, put together: errors, references, memories |
 //! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
 //! | `line` | lines of the tool's way that a laser interferometer measures: set up, travelled, read |
-//! | `inputs` | where in the engine's channels each detector stands, and whether it is to be believed |
-//! | `thermometers` | likewise of the thermometers, which share their trouble where they belong together |
+//! | `inputs` | which of the engine's channels belong to each detector, and whether its value is accepted |
+//! | `thermometers` | the same for the thermometers; those that belong together fail together |
 
 pub(crate) mod calibrate;
 pub(crate) mod check;

@@ -421,7 +421,7 @@ impl StateMemoryContent {
 
 /// The error for a record with a part that three axes do not have, or that it has twice.
 fn no_error(id: &str, name: &str) -> StoreError {
-    let source = format!("`{name}` is no error of three axes, or is there twice");
+    let source = format!("`{name}` is not an error of three axes, or appears twice");
     StoreError::model(&short(id), source)
 }
 
@@ -489,7 +489,7 @@ mod tests {
         for (names, wrong) in [(["e_yx", "e_wx"], "e_wx"), (["e_ax", "e_ax"], "e_ax")] {
             let refused = with(&names).errors("id").unwrap_err().to_string();
             assert!(
-                refused.contains(&format!("`{wrong}` is no error")),
+                refused.contains(&format!("`{wrong}` is not an error")),
                 "{refused}"
             );
         }

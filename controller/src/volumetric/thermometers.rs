@@ -1,6 +1,6 @@
 //! Thermometers on their way into the correction. Those that make one effect between them share
 //! their trouble: when one of them says nothing, all of them hold, fade or stop, and they come back
-//! together. One of a pair that fades alone would leave a gradient that is none.
+//! together. If one of a pair faded alone, it would leave a gradient that does not exist.
 
 use compensator::volumetric::model::{Thermal, ThermalChannel};
 use compensator::volumetric::online::{Feed, FeedStatus, TemperatureChannel, Trouble};

@@ -11,7 +11,7 @@ use wire::copley::Faults;
 
 use super::DeviceName;
 
-/// Something that must stop the machine, or at least be told.
+/// Something that must stop the machine, or at least be reported.
 ///
 /// # Example
 ///
@@ -22,7 +22,7 @@ use super::DeviceName;
 ///
 /// let node = NodeId::new(5).expect("1 to 127");
 /// let alarm = Alarm::HeartbeatLost { node, waited: Duration::from_millis(150) };
-/// let text = "node 5: no heartbeat for 150ms; power, cable or drive lost";
+/// let text = "node 5: no heartbeat for 150ms; check its power and cable";
 /// assert_eq!(alarm.to_string(), text);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -32,10 +32,10 @@ use super::DeviceName;
 )]
 pub enum Alarm {
     /// No heartbeat for the consumer time.
-    #[error("{node}: no heartbeat for {}; power, cable or drive lost", units::ShortSpan(*waited))]
+    #[error("{node}: no heartbeat for {}; check its power and cable", units::ShortSpan(*waited))]
     HeartbeatLost { node: NodeId, waited: Duration },
-    /// The node booted by itself: it was reset or lost power, its reference is gone.
-    #[error("{node}: booted by itself; it lost power or was reset, zero again")]
+    /// The node restarted unexpectedly: it was reset or lost power, and its zero is lost.
+    #[error("{node}: restarted unexpectedly; it lost power or was reset: zero again")]
     UnexpectedBootUp { node: NodeId },
     /// A second device with this node identifier is on the bus.
     #[error(
@@ -44,7 +44,7 @@ pub enum Alarm {
     )]
     DuplicateNode { node: NodeId },
     /// The node left operational.
-    #[error("{node}: left operational, is {state}")]
+    #[error("{node}: left the state operational, is now {state}")]
     UnexpectedNmtState { node: NodeId, state: NmtState },
     /// An emergency message that reports an error.
     #[error("{node}: emergency {}, error register {:#04X}", emergency.code, emergency.register)]
@@ -53,7 +53,7 @@ pub enum Alarm {
     #[error("{node}: process data missing for {missed} SYNC periods")]
     PdoLost { node: NodeId, missed: u32 },
     /// A PDO was shorter than its mapping.
-    #[error("{node}: process data of {seen} bytes, mapped {expected}")]
+    #[error("{node}: received process data of {seen} bytes, {expected} bytes are mapped")]
     PdoTooShort {
         node: NodeId,
         expected: usize,
@@ -67,24 +67,24 @@ pub enum Alarm {
         seen: PowerState,
     },
     /// The drive says its following error left the window.
-    #[error("{node}: following error outside its window; blocked or overloaded?")]
+    #[error("{node}: following error outside its window; is the axis blocked or overloaded?")]
     FollowingError { node: NodeId },
     /// In cyclic synchronous position: the drive is enabled and follows its set-points no more.
     #[error(
-        "{node}: the drive does not follow its set-points any more (0x6041 bit 12); was it halted, \
-         or given another command?"
+        "{node}: the drive no longer follows its set-points (0x6041 bit 12); was it halted, or \
+         given another command?"
     )]
     NotFollowing { node: NodeId },
     /// In cyclic synchronous position: the drive limits what it was sent.
     #[error(
-        "{node}: the drive limits its set-points (0x6041 bit 11); limit switch, or soft limit, speed \
-         or torque limit of its own?"
+        "{node}: the drive limits its set-points (0x6041 bit 11); is it on a limit switch, or at \
+         its own soft limit, speed limit or torque limit?"
     )]
     InternalLimit { node: NodeId },
-    /// The axis goes the other way than its drive wants it to.
+    /// The axis moves against the direction that its drive demands.
     #[error(
-        "{node}: the axis runs in the wrong direction: wanted {wanted:+.3}, went {moved:+.3}; motor \
-         phases, encoder or polarity exchanged?"
+        "{node}: the axis moves in the wrong direction: expected {wanted:+.3}, moved {moved:+.3}; \
+         are the motor phases swapped, or is the encoder or the polarity reversed?"
     )]
     WrongDirection {
         node: NodeId,
@@ -92,14 +92,14 @@ pub enum Alarm {
         moved: LengthOrAngle,
     },
     /// An implausible jump of a position.
-    #[error("{node}: position jumped by {jump:.3}, possible are {limit:.3}")]
+    #[error("{node}: position jumped by {jump:.3}, at most {limit:.3} is possible")]
     PositionJump {
         node: NodeId,
         jump: LengthOrAngle,
         limit: LengthOrAngle,
     },
-    /// The drive latches no more, though it was not told so.
-    #[error("{node}: the touch probe was switched off; does somebody else write 0x60B8?")]
+    /// The drive no longer latches, although this controller did not switch that off.
+    #[error("{node}: the touch probe was switched off; does another program write 0x60B8?")]
     LatchDisarmed { node: NodeId },
     /// The interferometer's measurement beam is blocked.
     #[error("interferometer: beam lost; clear and align it, set a new datum")]
@@ -119,16 +119,17 @@ pub enum Alarm {
     /// Samples are missing from the interferometer's stream.
     #[error("interferometer: {lost} samples missing")]
     SamplesLost { lost: u64 },
-    /// The interferometer began to count anew: it was reset or lost power.
+    /// The interferometer's count started again: it was reset or lost power.
     #[error("interferometer: was reset; set a new datum")]
     CountRestarted,
     /// The stream ended.
-    #[error("interferometer: no sample for {}; cable or power?", units::ShortSpan(*waited))]
+    #[error("interferometer: no sample for {}; check its cable and power",
+        units::ShortSpan(*waited))]
     StreamSilent { waited: Duration },
     /// Lines that are not understood came in a row: wrong baud rate?
-    #[error("{lines} lines in a row not understood; wrong baud rate?")]
+    #[error("{lines} lines in a row could not be read; is the baud rate wrong?")]
     Garbage { lines: u64 },
-    /// Something that only one family of devices can say.
+    /// An alarm that only one family of devices has.
     #[error("{}: {}; {}", .0.device, .0.what, .0.remedy)]
     Own(&'static OwnAlarm),
     /// An analog channel's sample is too old.
@@ -141,17 +142,17 @@ pub enum Alarm {
         trouble: AmplifierTrouble,
     },
     /// An amplifier has restarted.
-    #[error("{device}: has restarted; it lost power or was reset, zero again")]
+    #[error("{device}: restarted unexpectedly; it lost power or was reset: zero again")]
     AmplifierRestarted { device: DeviceName },
     /// An amplifier does not answer.
-    #[error("{device}: no answer for {}; power or cable lost? the axis may still move",
+    #[error("{device}: no answer for {}; check its power and cable: the axis may still be moving",
         units::ShortSpan(*waited))]
     AmplifierSilent {
         device: DeviceName,
         waited: Duration,
     },
     /// An implausible jump of a position that was asked for.
-    #[error("{device}: position jumped by {jump:.3}, possible are {limit:.3}")]
+    #[error("{device}: position jumped by {jump:.3}, at most {limit:.3} is possible")]
     AmplifierJumped {
         device: DeviceName,
         jump: LengthOrAngle,
@@ -211,15 +212,17 @@ pub enum AmplifierTrouble {
 impl fmt::Display for AmplifierTrouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::ShortCircuit => "short circuit; motor or its cable",
+            Self::ShortCircuit => "short circuit in the motor or its cable",
             Self::AmplifierHot => "amplifier too hot",
             Self::MotorHot => "motor too hot",
             Self::OverVoltage => "supply voltage too high",
             Self::UnderVoltage => "supply voltage too low",
-            Self::EncoderError => "encoder error; encoder or its cable",
+            Self::EncoderError => "error of the encoder or its cable",
             Self::PhasingError => "motor phasing error",
             Self::CommandFault => "command signal missing",
-            Self::TrackingError => "following error outside its limit; blocked or overloaded?",
+            Self::TrackingError => {
+                "following error outside its limit; is the axis blocked or overloaded?"
+            }
             Self::PositiveLimitSwitch => "on its positive limit switch",
             Self::NegativeLimitSwitch => "on its negative limit switch",
             Self::PositiveSoftLimit => "beyond its positive software limit",

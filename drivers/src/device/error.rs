@@ -1,4 +1,4 @@
-//! Why a device failed at what it was told: where, what was awaited, what was seen.
+//! Why a device could not carry out a command: where, what was awaited, what was seen.
 
 use core::fmt;
 use core::time::Duration;
@@ -51,7 +51,7 @@ pub enum DeviceError {
         step: &'static str,
     },
     /// A transfer went wrong in another way and was aborted by us.
-    #[error("{node}, {object}: transfer broken off with {code} while {step}")]
+    #[error("{node}, {object}: transfer aborted by this controller with {code} while {step}")]
     SdoProtocol {
         node: NodeId,
         object: Object,
@@ -60,8 +60,8 @@ pub enum DeviceError {
     },
     /// The device is not the one the configuration names.
     #[error(
-        "{node}: {what} is {seen:#010X}, the configuration says {expected:#010X}; \
-             fit the right device or correct the configuration"
+        "{node}: {what} is {seen:#010X}, the configuration says {expected:#010X}; fit the right \
+         device or correct the configuration"
     )]
     WrongIdentity {
         node: NodeId,
@@ -104,7 +104,7 @@ pub enum DeviceError {
         step: &'static str,
         state: PowerState,
     },
-    /// The command needs something that is not so.
+    /// A condition that the command needs is not met.
     #[error("{device}: {step} needs {needs}")]
     NotPossible {
         device: DeviceName,
@@ -124,7 +124,7 @@ pub enum DeviceError {
         limit: f64,
         unit: &'static str,
     },
-    /// A device answered a command with something else than success.
+    /// A device refused a command.
     #[error("{device}: {step} refused with {status}")]
     Refused {
         device: DeviceName,
@@ -133,9 +133,9 @@ pub enum DeviceError {
     },
     /// Too few good pictures.
     #[error(
-        "{device}: {good} good pictures of {wanted}; of {} bad ones {without_target} showed no \
-         target and {judged_bad} were judged bad (best score {:.0} %); is the target in the \
-         field, clean, lit and at rest?",
+        "{device}: {good} of {wanted} pictures were good; of the {} bad ones {without_target} \
+         showed no target and {judged_bad} were judged bad (best score {:.0} %); is the target in \
+         the field, clean, lit and at rest?",
         without_target + judged_bad, best_score * 100.0
     )]
     NoGoodPicture {
@@ -155,8 +155,8 @@ pub enum DeviceError {
     },
     /// An amplifier on a serial line did not answer.
     #[error(
-        "{device}: no answer ({attempts} attempts) while {step}; its power, address, cable or \
-         the line's baud rate?"
+        "{device}: no answer ({attempts} attempts) while {step}; check its power, its address, the \
+         cable and the line's baud rate"
     )]
     Unanswered {
         device: DeviceName,
@@ -171,7 +171,7 @@ pub enum DeviceError {
         code: ErrorCode,
         step: &'static str,
     },
-    /// A parameter read back differs from what was written, or is no number.
+    /// A parameter read back differs from what was written, or is not a number.
     #[error("{device}, parameter {parameter}: read back {seen}, wrote {expected} ({step})")]
     ParameterReadBack {
         device: DeviceName,
@@ -204,14 +204,14 @@ pub enum DeviceError {
         limit: f64,
         unit: &'static str,
     },
-    /// Latched faults are in the way.
+    /// Latched faults prevent the command.
     #[error("{device}: {step} is not possible with latched faults: {faults}")]
     Faulted {
         device: DeviceName,
         step: &'static str,
         faults: Faults,
     },
-    /// The amplifier broke a move off.
+    /// The amplifier aborted a move.
     #[error("{device}: {step} was aborted by the amplifier, last saw {seen}")]
     Aborted {
         device: DeviceName,

@@ -1,4 +1,4 @@
-//! What a device is called where a driver alone speaks of it.
+//! The name of a device in messages that come from its driver alone.
 
 use core::fmt;
 

@@ -150,7 +150,7 @@ impl Nd287 {
     fn identified(&mut self, now: Time, name: String) {
         if !name.starts_with(FAMILY) {
             self.exchange.rest(now, self.settings.period);
-            return self.refuse(SET_OTHERWISE, "a display that calls itself ND-28…");
+            return self.refuse(SET_OTHERWISE, "a display that identifies itself as ND-28…");
         }
         self.is_known = true;
         self.identity = Some(Identity {

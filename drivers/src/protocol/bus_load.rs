@@ -1,4 +1,4 @@
-//! Whether a configuration fits its bus, reckoned before the bus is opened.
+//! Whether a configuration fits its bus, computed before the bus is opened.
 //!
 //! Every frame is counted with the most stuff bits it can need and the interframe space
 //! (ISO 11898-1). Within one SYNC period the SYNC, all synchronous PDOs, and the shares of

@@ -1,11 +1,11 @@
 //! Taking part in the clock of an emulated machine, through its side channel.
 //!
-//! Source: conservative co-simulation (K. M. Chandy, J. Misra, "Distributed Simulation",
-//! 1979): nobody's time passes before it is certain that nothing earlier can reach him. The
-//! lines are those of [`wire::lockstep`].
+//! Source: conservative co-simulation (K. M. Chandy, J. Misra, "Distributed Simulation", 1979): the
+//! time of a participant advances only when it is certain that nothing earlier can still reach it.
+//! The lines are those of [`wire::lockstep`].
 //!
-//! When the emulator ends, nobody tells the time any more: the clock then goes on by the
-//! wall's, so that every deadline still comes, and the ports show what became of them.
+//! When the emulator has ended, nothing supplies the time any more: the clock then continues in
+//! real time, so that every deadline still comes, and the ports show what became of them.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::fd::{AsFd, BorrowedFd};
@@ -57,8 +57,8 @@ pub enum LockstepError {
     Lost(#[from] std::io::Error),
 }
 
-/// A hand at the emulated machine whose socket is at `path`: does what `words` say, in those of
-/// `mock-bus ctl`, and says what came of it.
+/// Acts on the emulated machine whose socket is at `path`: does what `words` say, in those of
+/// `mock-bus ctl`, and returns the answer.
 ///
 /// # Errors
 /// When nobody listens there, or the machine does not know how.

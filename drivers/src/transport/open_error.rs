@@ -48,8 +48,8 @@ pub enum OpenError {
     },
     /// The CAN adapter has no code for the bit rate.
     #[error(
-        "{path}: SLCAN knows no bit rate of {bitrate} bit/s; it has 10, 20, 50, 100, 125, \
-         250, 500, 800 and 1000 kbit/s"
+        "{path}: SLCAN has no code for {bitrate} bit/s; it supports 10, 20, 50, 100, 125, 250, \
+         500, 800 and 1000 kbit/s"
     )]
     Bitrate {
         /// The device's path.
@@ -66,7 +66,7 @@ pub enum OpenError {
         failure: SlcanFailure,
     },
     /// More ports than one thread waits for.
-    #[error("more than {limit} CAN buses and serial lines: give some to another process")]
+    #[error("more than {limit} CAN buses and serial lines: move some to another process")]
     TooManyPorts {
         /// How many there may be.
         limit: usize,

@@ -46,10 +46,10 @@ pub enum ReplayCause {
 impl fmt::Display for ReplayCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Syntax => "is no line of candump -L and no known comment",
+            Self::Syntax => "is neither a line of candump -L nor a known comment",
             Self::OutOfOrder => "is earlier than the one before",
-            Self::TooManyPorts => "names one port too many (256 at most)",
-            Self::Version => "is of a format newer than this program",
+            Self::TooManyPorts => "names more than 256 ports",
+            Self::Version => "is in a format newer than this program",
         })
     }
 }

@@ -116,7 +116,7 @@ pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OwnedFd, Ser
     let descriptor = os::take_descriptor(port);
     fcntl(&descriptor, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|errno| SerialError {
         source: errno.into(),
-        help: "this is no terminal device",
+        help: "this is not a serial line (terminal device)",
     })?;
     Ok(descriptor)
 }
@@ -132,7 +132,7 @@ fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
         Ok(_) if std::fs::File::open(path).is_err_and(|e| is_denied(&e)) => {
             "no permission; add the user to the group of the device (often `dialout`)"
         }
-        Ok(_) => "another program has it open, or it is no serial device",
+        Ok(_) => "another program has it open, or it is not a serial device",
     };
     SerialError { source, help }
 }

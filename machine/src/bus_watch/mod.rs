@@ -1,10 +1,10 @@
-//! What passes on the CAN buses that nobody of the configuration should say: a second master,
-//! another SDO client, and somebody who takes the bus for himself.
+//! Traffic on the CAN buses that no device of the configuration should send: that of a second
+//! master, of another SDO client, and of a sender that occupies the bus.
 //!
 //! A transport does not hear its own frames. A SYNC, an NMT command, a drive's set-point or a write
 //! to a device that is heard was sent by another master; two masters on one machine are never safe.
-//! Who only reads from a device is told: its answers look like ours. Who occupies the bus is looked
-//! up only when something failed to come: a full bus alone hurts nobody.
+//! A client that only reads from a device is reported: its answers look like ours. The sender that
+//! occupies the bus is looked up only when something failed to come: a full bus alone does no harm.
 
 mod load;
 
@@ -136,9 +136,9 @@ impl Bus {
                 Err(self.second_master("an SDO request that writes to one of the devices"))
             }
             Ok(_) if !core::mem::replace(&mut server.is_told, true) => Ok(Some(format!(
-                "{}: an SDO request to {} was heard that this controller did not send: another \
-                 program asks this device, and either may take the answer for its own; let it wait \
-                 until this machine is at rest",
+                "{}: received an SDO request to {} that this controller did not send: another \
+                 program reads from this device, and each may take the other's answer for its own; \
+                 let it wait until this machine is at rest",
                 self.name, server.node
             ))),
             // Noise, or told already.

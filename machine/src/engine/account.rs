@@ -1,4 +1,5 @@
-//! What the loop is asked and what it says: orders, states, causes, one period for whoever watches.
+//! What goes into the loop and what it reports: commands, states, causes, and one period for an
+//! observer.
 
 use compensator::apply::Alarm;
 use units::{Metres, Time};
@@ -55,7 +56,7 @@ pub(super) struct Heard<'a> {
     pub(super) temperatures: &'a [Option<ThermometerSample>],
 }
 
-/// One period of the loop, for whoever watches.
+/// One period of the loop, for an observer.
 #[derive(Clone, Copy, Debug)]
 pub struct Live {
     /// When it was decided.

@@ -19,7 +19,7 @@ pub enum Cause {
     )]
     RanDry,
     /// Whoever writes the path is gone.
-    #[error("whoever writes the path is gone; all axes were stopped together")]
+    #[error("the program that writes the path has ended; all axes were stopped together")]
     HostGone,
     /// A point was outside the limits, although it had been checked.
     #[error("a point for axis number {axis} is outside the limits; all axes were stopped")]
@@ -27,14 +27,16 @@ pub enum Cause {
         /// Which axis, in the order of the engine's axes.
         axis: usize,
     },
-    /// There is no way to a target, although it is within the limits.
+    /// No trajectory leads to a target, although the target is within the limits.
     #[error(
         "no motion within the limits of speed, acceleration and jerk leads to the target; all axes \
          were stopped together"
     )]
     NoWay,
-    /// The points that came belong to a path that an earlier stop had put an end to.
-    #[error("the path had been given up before, nothing of it was driven; begin another one")]
+    /// The points belong to a path that an earlier stop had already ended.
+    #[error(
+        "an earlier stop had already ended this path; nothing of it was driven; begin another one"
+    )]
     GivenUp,
     /// The computer was late by more than a period; what was queued is not replayed.
     #[error(

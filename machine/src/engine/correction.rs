@@ -202,7 +202,7 @@ impl Applied {
     pub(super) fn advance(&mut self, observed: &Observed<'_>) -> (PerAxis<Metres>, Option<Cause>) {
         let mut wanted = self.correction.correct(observed);
         if wanted.validity.is_followed() && !wanted.offset.iter().all(|it| it.is_finite()) {
-            wanted.validity = Validity::Stop("it is not a number");
+            wanted.validity = Validity::Stop("its value is not a number");
         }
         let mut stop = None;
         let mut follow = self.enabled;

@@ -35,10 +35,10 @@ pub enum CsvFault {
     #[error("the heading is `{seen}`, expected `{expected}` (the axes in any order)")]
     Heading { expected: String, seen: String },
     /// Too few or too many values.
-    #[error("{seen} values, the heading has {expected}")]
+    #[error("{seen} values, but the heading has {expected} columns")]
     Values { expected: usize, seen: usize },
     /// Not a number with a decimal point.
-    #[error("`{seen}` is no number; write a decimal point, no units")]
+    #[error("`{seen}` is not a number; write a decimal point, no units")]
     Number { seen: String },
     /// The first row is not at time 0.
     #[error("the path begins at {} s; it must begin at 0", units::Short(*seen))]
@@ -51,7 +51,7 @@ pub enum CsvFault {
     #[error("the file has {rows} rows; a path needs two or more")]
     Rows { rows: usize },
     /// Longer than anybody meant.
-    #[error("the path takes {} s; more than a day is not believed", units::Short(*seconds))]
+    #[error("the path takes {} s; at most one day is possible", units::Short(*seconds))]
     Length { seconds: f64 },
 }
 
@@ -416,14 +416,17 @@ mod tests {
              any order)",
         );
         let head = |rows: &str| format!("# path\n\ntime_s,x_mm,y_mm\n{rows}");
-        check(&head("0,0\n"), "line 4: 2 values, the heading has 3");
+        check(
+            &head("0,0\n"),
+            "line 4: 2 values, but the heading has 3 columns",
+        );
         check(
             &head("0,0,0\n1,0;5,0\n"),
-            "line 5, column x_mm: `0;5` is no number; write a decimal point, no units",
+            "line 5, column x_mm: `0;5` is not a number; write a decimal point, no units",
         );
         check(
             &head("0,0,NaN\n"),
-            "line 4, column y_mm: `NaN` is no number; write a decimal point, no units",
+            "line 4, column y_mm: `NaN` is not a number; write a decimal point, no units",
         );
         check(
             &head("1,0,0\n"),

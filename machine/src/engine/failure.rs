@@ -30,8 +30,9 @@ pub enum EngineFailure {
     },
     /// The machine's buses have different SYNC periods.
     #[error(
-        "[can.{bus}]: a SYNC period of {seen:?}, the axes that move together have {expected:?}, and \
-         their SYNC is sent on every CAN bus; give all of them the same sync_period_ms"
+        "[can.{bus}]: the SYNC period is {seen:?}, but that of the axes that move together is \
+         {expected:?}, and their SYNC is sent on every CAN bus; give all CAN buses the same \
+         sync_period_ms"
     )]
     Periods {
         /// The bus with another period.
@@ -43,8 +44,8 @@ pub enum EngineFailure {
     },
     /// An axis goes on moving although nothing drives it.
     #[error(
-        "axis {axis}: still moves after {waited:?}; the cyclic mode is entered and left at rest \
-         only; does its servo oscillate, or something push it?"
+        "axis {axis}: still moving after {waited:?}; the cyclic mode is entered and left only at \
+         rest; does its servo oscillate, or does something push the axis?"
     )]
     NotAtRest {
         /// Which axis.
@@ -69,7 +70,7 @@ pub enum EngineFailure {
         max: Metres,
     },
     /// A drive does not say what it holds.
-    #[error("axis {axis}: its drive is not in the cyclic mode any more")]
+    #[error("axis {axis}: its drive is no longer in the cyclic mode")]
     NotCyclic {
         /// Which axis.
         axis: String,
@@ -109,7 +110,7 @@ pub enum EngineFailure {
     /// An axis is not where it was sent.
     #[error(
         "axis {axis}: {:.3} um away from its set-points, the limit is {:.3} um; all drives were \
-         stopped at once; is it blocked, too fast, or running the wrong way?",
+         stopped at once; is it blocked, too fast, or moving in the wrong direction?",
         lag.um(), limit.um()
     )]
     Deviates {
@@ -120,10 +121,10 @@ pub enum EngineFailure {
         /// How far it may be.
         limit: Metres,
     },
-    /// SYNCs were missed by so much that the drives took their own measures.
+    /// So many SYNCs were missed that the drives reacted by themselves.
     #[error(
         "the loop was late by {periods} periods (the computer was held up), then: {then}; all \
-         drives were stopped at once; free the computer of other work, or allow SCHED_FIFO"
+         drives were stopped at once; give the computer less to do, or allow SCHED_FIFO"
     )]
     HeldUp {
         /// How many SYNCs were missed.
@@ -143,8 +144,8 @@ pub enum EngineFailure {
     /// No way to stop within the limits was found.
     #[error("no controlled stop was found; all drives were stopped at once")]
     NoStop,
-    /// Nobody takes orders any more.
-    #[error("the engine has ended, or too many orders wait")]
+    /// The engine takes no more commands.
+    #[error("the engine has ended, or too many commands are waiting")]
     NotTaken,
 }
 
@@ -154,8 +155,8 @@ fn late_answers(late: u64) -> String {
         return String::new();
     }
     format!(
-        "; {late} positions came after half of their SYNC period, too late for its decision: is the \
-         bus, an adapter or the computer too slow for this period?"
+        "; {late} positions arrived in the second half of their SYNC period, too late to be used \
+         in it: is the bus, an adapter or the computer too slow for this period?"
     )
 }
 

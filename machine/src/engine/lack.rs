@@ -35,7 +35,7 @@ impl fmt::Display for Source {
     }
 }
 
-/// A source that is not believed at the moment.
+/// A source whose value is not accepted at the moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lack {
     /// Which.

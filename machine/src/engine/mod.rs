@@ -279,7 +279,7 @@ impl Desk {
         }
     }
 
-    /// The newest period of the loop, `None` before the first, however long nobody looked.
+    /// The newest period of the loop, `None` before the first.
     pub fn live(&mut self) -> Option<Live> {
         let newest = (*self.newest.read())?;
         // Those before it count as looked at.
@@ -289,8 +289,8 @@ impl Desk {
         Some(newest)
     }
 
-    /// The next period that was not looked at yet, in order; some are left out when nobody
-    /// looked for more than 256.
+    /// The next period that has not been read yet, in order; some are left out when more than 256
+    /// were not read.
     pub fn next_live(&mut self) -> Option<Live> {
         self.live.pop().ok()
     }

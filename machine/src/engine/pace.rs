@@ -28,7 +28,7 @@ pub struct Timing {
     pub overruns: u64,
     /// SYNCs left out because of that.
     pub skipped: u64,
-    /// How often the grid of SYNCs was begun anew, because one left more than half a period late.
+    /// How often the grid of SYNCs was shifted, because one was sent more than half a period late.
     pub shifted: u64,
     /// What the system granted; empty when nothing was asked for.
     pub scheduling: String,

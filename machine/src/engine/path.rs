@@ -155,8 +155,8 @@ impl PathWriter {
         Ok(())
     }
 
-    /// Takes from `points` as many as there is room for, and finishes the path behind the last
-    /// one; whether that is done. Called again and again by whoever writes a path as it is driven.
+    /// Takes from `points` as many as there is room for, and finishes the path behind the last one;
+    /// whether that is done. A program that writes a path while it is driven calls this repeatedly.
     ///
     /// # Errors
     /// As [`PathWriter::push`]; the point that is refused is lost.

@@ -1,4 +1,4 @@
-//! Ways and stops by rsruckig, in units that suit it.
+//! Trajectories and stops by rsruckig, in units that suit it.
 //!
 //! rsruckig 3.0.1 compares with fixed numbers: positions and speeds to 1e-8, accelerations to
 //! 1e-10 and their limits to 1e-12. In millimetres and seconds it refused one way in two thousand,
@@ -238,7 +238,9 @@ impl Planner {
         self.input.synchronization = Synchronization::Phase;
         calculate(&mut self.ruckig, &self.input, leg)?;
         match (0..self.axes).find(|axis| !self.keeps_limits(*axis, leg)) {
-            Some(axis) => Err(format!("the way found leaves the limits of axis {axis}")),
+            Some(axis) => Err(format!(
+                "the trajectory that was found leaves the limits of axis {axis}"
+            )),
             None => Ok(()),
         }
     }

@@ -34,18 +34,21 @@ pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError>
         .prefix(".new-")
         .permissions(Permissions::from_mode(ORDINARY_MODE))
         .tempfile_in(folder)
-        .map_err(io_error("create a temporary file beside", path))?;
+        .map_err(io_error("create a temporary file beside it", path))?;
     if let Ok(replaced) = fs::metadata(path) {
         file.as_file()
             .set_permissions(replaced.permissions())
-            .map_err(io_error("set the mode of the file beside", path))?;
+            .map_err(io_error(
+                "set the mode of the temporary file beside it",
+                path,
+            ))?;
     }
     file.write_all(bytes).map_err(io_error("write", path))?;
     file.as_file()
         .sync_all()
-        .map_err(io_error("flush to disk", path))?;
+        .map_err(io_error("flush it to disk", path))?;
     file.persist(path)
-        .map_err(|error| io_error("rename into place", path)(error.error))?;
+        .map_err(|error| io_error("rename the temporary file to it", path)(error.error))?;
     sync_folder(folder)
 }
 
@@ -53,7 +56,7 @@ pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError>
 fn sync_folder(folder: &Path) -> Result<(), StoreError> {
     File::open(folder)
         .and_then(|handle| handle.sync_all())
-        .map_err(io_error("flush the folder", folder))
+        .map_err(io_error("flush the folder to disk", folder))
 }
 
 #[cfg(test)]

@@ -113,8 +113,7 @@ pub struct Glance {
 /// What a file says at a glance, and whether it can be so.
 type Parse = fn(&[u8]) -> Result<(Glance, Judged), serde_json::Error>;
 
-/// A kind of content that a store knows: one of a list, for whoever does not know of which kind a
-/// calibration is.
+/// A kind of content that a store knows: one of a list, for reading a calibration of unknown kind.
 #[derive(Clone, Copy, Debug)]
 pub struct ContentKind {
     pub(super) name: &'static str,

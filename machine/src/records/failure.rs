@@ -39,10 +39,10 @@ pub enum StoreError {
         /// The parser's words.
         cause: String,
     },
-    /// Whole, but it cannot be so.
+    /// Complete, but with an impossible content.
     #[error(
-        "{}: {place}: {expected} is expected there, seen: {seen}; the file was edited, or another \
-         program wrote it, and nothing of it is used: restore it, or measure again",
+        "{}: {place}: expected {expected}, seen: {seen}; the file was edited, or another program \
+         wrote it, and none of it is used: restore it, or measure again",
         at_line(path, *line)
     )]
     Unsound {
@@ -59,8 +59,8 @@ pub enum StoreError {
     },
     /// Written by a newer program.
     #[error(
-        "{}: written with schema version {seen}, this program knows {SCHEMA_VERSION}; \
-         use the newer program", path.display()
+        "{}: written with schema version {seen}, but this program knows version {SCHEMA_VERSION} \
+         only; use a newer version of the program", path.display()
     )]
     Newer {
         /// Which file.
@@ -70,8 +70,8 @@ pub enum StoreError {
     },
     /// The calibration belongs to another machine or another set-up of this one.
     #[error(
-        "calibration {id}: {what} is `{expected}` there, but `{seen}` here; it is refused on \
-         this machine, calibrate again"
+        "calibration {id}: {what} is `{expected}` there, but `{seen}` here; the calibration is \
+         refused on this machine: calibrate again"
     )]
     Foreign {
         /// The calibration.
@@ -99,7 +99,7 @@ pub enum StoreError {
         seen: String,
     },
     /// Another program uses the machine.
-    #[error("the machine is in use by {owner}; stop that first")]
+    #[error("the machine is in use by {owner}; stop that program first")]
     Leased {
         /// Who.
         owner: String,
@@ -111,7 +111,7 @@ pub enum StoreError {
         id: String,
     },
     /// More than one calibration starts like this.
-    #[error("`{id}` begins the name of {count} calibrations; give more digits")]
+    #[error("the names of {count} calibrations begin with `{id}`; give more digits")]
     Ambiguous {
         /// What was asked for.
         id: String,
@@ -149,7 +149,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// The journal cannot be continued.
-    #[error("{}: cannot be resumed: {what} was `{expected}`, is now `{seen}`", path.display())]
+    #[error("{}: cannot be resumed: {what} was `{expected}` and is now `{seen}`", path.display())]
     NotResumable {
         /// Which journal.
         path: PathBuf,

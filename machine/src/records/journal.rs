@@ -1,9 +1,9 @@
 //! Run journals: every measured point is written when it is measured.
 //!
-//! One line an entry: eight hexadecimal digits of CRC-32, a blank, JSON whose key `entry` says what it
-//! is. A killed run leaves whole lines and at most one torn one at the end, which is dropped when it is
-//! read. How a run begins, goes on and ends is said in every journal alike; what it measured, in the
-//! words of its kind ([`Log`]).
+//! One line an entry: eight hexadecimal digits of CRC-32, a blank, JSON whose key `entry` says what
+//! it is. A killed run leaves whole lines and at most one torn one at the end, which is dropped
+//! when it is read. Every journal records in the same way how a run begins, continues and ends;
+//! what it measured is recorded in the terms of its kind ([`Log`]).
 
 use core::marker::PhantomData;
 use std::fs::{self, File, OpenOptions};
@@ -115,7 +115,7 @@ pub trait Log: Default {
     fn keep_whole(&mut self, header: &JournalHeader);
 }
 
-/// The log of a journal of which nobody asks what was measured.
+/// The log of a journal whose measurements are not needed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AnyLog {
     /// What the first line after the header is called.
@@ -190,7 +190,7 @@ impl<L: Log> Journal<L> {
             }
         }
         let taken = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
-        Err(io_error("create a new journal in", folder)(taken))
+        Err(io_error("create a new journal in it", folder)(taken))
     }
 
     /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
@@ -215,7 +215,7 @@ impl<L: Log> Journal<L> {
             .open(path)
             .map_err(io_error("open", path))?;
         file.set_len(read.valid_bytes)
-            .map_err(io_error("cut the torn line of", path))?;
+            .map_err(io_error("cut off its incomplete last line", path))?;
         let mut journal = Self::over(path.to_owned(), file);
         journal.append(&Mark::Resumed {
             at: header.started.clone(),
@@ -266,7 +266,7 @@ impl<L: Log> Journal<L> {
         let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
         self.file
             .write_all(line.as_bytes())
-            .map_err(io_error("append to", &self.path))
+            .map_err(io_error("append to it", &self.path))
     }
 
     /// Forces everything to the disk; called where the axis stands and time does not matter.
@@ -276,7 +276,7 @@ impl<L: Log> Journal<L> {
     pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
         self.file
             .sync_data()
-            .map_err(io_error("flush to disk", &self.path))
+            .map_err(io_error("flush it to disk", &self.path))
     }
 }
 
@@ -368,7 +368,7 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
     let mut read = read.ok_or_else(|| StoreError::Format {
         path: path.to_owned(),
         line: 1,
-        cause: "no whole header line".into(),
+        cause: "the header line is missing or incomplete".into(),
     })?;
     read.valid_bytes = valid_bytes;
     read.torn = torn;
@@ -381,7 +381,7 @@ fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
         entry: String,
     }
     let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
-    let text = text.strip_suffix('\n').ok_or("the line does not end")?;
+    let text = text.strip_suffix('\n').ok_or("the line has no end")?;
     let (digits, json) = text.split_once(' ').ok_or("no checksum")?;
     let expected = u32::from_str_radix(digits, 16).map_err(|error| error.to_string())?;
     let seen = crc32fast::hash(json.as_bytes());

@@ -1,4 +1,4 @@
-//! One program a machine at a time.
+//! A machine is used by one program at a time.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Seek, Write};

@@ -1,9 +1,10 @@
-//! Whether what was loaded can be what it says it is: judged whole and once, where it enters, so that
-//! nothing behind has to expect a list of another length than its neighbour, a number that no machine
-//! makes, or a place that does not exist.
+//! Whether a loaded record is plausible: judged as a whole and once, when it is loaded, so that no
+//! later code has to expect a list whose length differs from its neighbour's, a number that no
+//! machine makes, or a place that does not exist.
 //!
-//! A checksum says that nothing changed by accident; whoever edits a file makes it anew. Limits are
-//! wide: they are what no stage, instrument or building reaches, not what a good machine keeps.
+//! A checksum shows that nothing changed by accident; whoever edits a file can compute it again.
+//! Limits are wide: they are what no stage, instrument or building reaches, not what a good machine
+//! keeps.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -51,13 +52,13 @@ pub const ANGLE_U_RAD: Limits = limits(0.0, 10.0, "rad");
 /// Turns are counted on.
 pub const TURNS_RAD: Limits = limits(-1e6, 1e6, "rad");
 /// One count of an encoder.
-pub const RESOLUTION: Limits = limits(f64::MIN_POSITIVE, 1.0, "m or rad a count");
+pub const RESOLUTION: Limits = limits(f64::MIN_POSITIVE, 1.0, "m or rad per count");
 /// What a place is off by, by way.
 pub const SLOPE: Limits = limits(-1.0, 1.0, "m/m");
 /// Thermal coefficients.
-pub const PER_KELVIN: Limits = limits(-1.0, 1.0, "a kelvin");
+pub const PER_KELVIN: Limits = limits(-1.0, 1.0, "per kelvin");
 /// How uncertain these are.
-pub const PER_KELVIN_U: Limits = limits(0.0, 1.0, "a kelvin");
+pub const PER_KELVIN_U: Limits = limits(0.0, 1.0, "per kelvin");
 /// From absolute zero to what melts any stage.
 pub const CELSIUS: Limits = limits(-273.15, 1500.0, "°C");
 /// How uncertain temperatures are.
@@ -223,7 +224,7 @@ pub fn approach(place: &str, seen: char) -> Judged {
 pub fn file_name(place: &str, seen: &str) -> Judged {
     let is_name = !seen.is_empty() && seen.len() <= 200 && seen != "." && seen != "..";
     let is_plain = seen.chars().all(|it| it != '/' && !it.is_control());
-    let expected = || "a name without `/`, of 200 letters at most".to_owned();
+    let expected = || "a name without `/`, of at most 200 bytes".to_owned();
     is(place, is_name && is_plain, expected, || {
         format!("`{}`", seen.escape_debug().take(80).collect::<String>())
     })
@@ -262,7 +263,7 @@ pub fn increasing(place: &str, seen: &[f64]) -> Judged {
 /// # Errors
 /// When it is not so.
 pub fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judged {
-    let expected = "what can be applied";
+    let expected = "a model that can be applied";
     built
         .map(|_| ())
         .map_err(|it| unsound(place, expected, it.to_string()))
@@ -273,6 +274,6 @@ pub fn model<T>(place: &str, built: Result<T, impl fmt::Display>) -> Judged {
 /// # Errors
 /// When it is not so.
 pub fn once(place: &str, is_new: bool) -> Judged {
-    let expected = || "one such line in a journal".to_owned();
+    let expected = || "only one such line in a journal".to_owned();
     is(place, is_new, expected, || "another one".to_owned())
 }

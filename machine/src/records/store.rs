@@ -140,7 +140,7 @@ impl Store {
         Ok(record)
     }
 
-    /// Likewise, for whoever does not know of which kind it is.
+    /// Likewise, when its kind is not known.
     ///
     /// # Errors
     /// As [`Store::load`]; when this store knows no such kind.

@@ -1,4 +1,4 @@
-//! Numbers that make no machine.
+//! Numbers that no machine can have.
 
 use super::error::positive;
 use super::{ConfigError, MachineConfig, PortConfig};

@@ -1,8 +1,8 @@
-//! Why a configuration is no machine.
+//! Why a configuration does not describe a machine.
 
 use std::path::PathBuf;
 
-/// Why a configuration is no machine.
+/// Why a configuration does not describe a machine.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file cannot be read.
@@ -45,7 +45,7 @@ pub enum ConfigError {
         port: String,
     },
     /// A number that cannot be.
-    #[error("{key} = {seen}, expected {expected}")]
+    #[error("{key} = {seen}; expected {expected}")]
     Value {
         /// Which key.
         key: &'static str,

@@ -1,5 +1,4 @@
-//! A CANopen module that samples analog inputs, whatever its profile: what they have in common
-//! is when.
+//! When a CANopen module samples its analog inputs, which is the same for every profile.
 //!
 //! Inputs are sampled when they are asked for: at the SYNC of a synchronous TPDO, by SDO, and, while
 //! the profile reports events, at the sampling period.

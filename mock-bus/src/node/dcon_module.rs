@@ -1,7 +1,7 @@
 //! An ADAM-4117 or I-7017 analog input module in the ASCII protocol.
 //!
-//! Source: Advantech ADAM-4000 series manual, chapter 4. It is polite to nobody: a syntax
-//! error, another module's address or a wrong checksum is answered by silence.
+//! Source: Advantech ADAM-4000 series manual, chapter 4. It answers nothing to a syntax error,
+//! another module's address or a wrong checksum.
 //!
 //! Absent: changing the configuration (`%AANNTTCCFF`), formats other than engineering units.
 

@@ -110,7 +110,7 @@ fn checked_cell<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Cell, D::E
     let text = String::deserialize(deserializer)?;
     Cell::parse(&text).ok_or_else(|| {
         D::Error::custom(format_args!(
-            "result_cell {text} is no cell, these are A0 to Z399"
+            "result_cell {text} is not a cell; cells are A0 to Z399"
         ))
     })
 }

@@ -8,8 +8,8 @@ use super::{Environment, Plant, PlatformTruth, TableTruth, VolumetricTruth};
 /// A look at the truth behind all sensors.
 ///
 /// # Panics
-/// What is asked of the linear stage panics on a machine that is none: a judge that takes the
-/// place of something that is not there for 0 would judge nothing.
+/// The questions about a linear stage panic on a machine that has none: a test that took a missing
+/// position for 0 would test nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth<'a> {
     plant: &'a Plant,

@@ -142,7 +142,7 @@ impl Endpoint {
         match &self.kind {
             Kind::Vcan(vcan) => vcan.interface().to_owned(),
             _ => self.path().map_or_else(
-                || "a terminal that was unplugged".to_owned(),
+                || "an unplugged terminal".to_owned(),
                 |path| path.display().to_string(),
             ),
         }

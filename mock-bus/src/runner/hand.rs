@@ -1,4 +1,4 @@
-//! Hands at the emulated machine: what can be done to it from outside, in words.
+//! What an operator's hands do at the emulated machine, as commands in words.
 //!
 //! `mock-bus ctl` and the side channel of a lockstep clock speak them. A hand only does what
 //! a person at a machine could do, or a fault that befalls it; looking at the truth is for
@@ -13,7 +13,7 @@ use crate::fault::{FaultConfig, FaultId};
 use crate::plant::{LineOptics, LineSetUp, Truth};
 use crate::simulation::Simulation;
 
-/// The words, for whoever used others.
+/// All commands, for the refusal of an unknown one.
 pub const WORDS: &str = "turn-plate LINES | fix-plate OFFSET | place-plate OFFSET | set-up-line TOML | take-line-away | fault TOML | \
                          end-fault NUMBER | power off | power on | truth";
 
@@ -120,12 +120,14 @@ impl Deed {
             ("fault", text) => fault(text).map(|it| Self::Fault(Box::new(it))),
             ("end-fault", number) => match number.parse() {
                 Ok(number) => Ok(Self::EndFault(FaultId(number))),
-                Err(_) => Err(format!("`{number}` is no number of a fault")),
+                Err(_) => Err(format!("`{number}` is not the number of a fault")),
             },
             ("power", "off") => Ok(Self::Power(false)),
             ("power", "on") => Ok(Self::Power(true)),
             ("truth", "") => Ok(Self::Truth),
-            _ => Err(format!("`{words}` is not understood; there are: {WORDS}")),
+            _ => Err(format!(
+                "`{words}` is not a known command; the commands are: {WORDS}"
+            )),
         }
     }
 }
@@ -164,7 +166,9 @@ impl Hands {
             Deed::FixPlate(offset) => {
                 has_plate(machine)?;
                 self.plate_at = offset;
-                Ok(format!("the plate is fixed; its place is called {offset}"))
+                Ok(format!(
+                    "the plate is fixed; its offset now counts as {offset}"
+                ))
             }
             Deed::SetUpLine(line) => {
                 if machine.truth().volumetric().is_none() {
@@ -184,11 +188,17 @@ impl Hands {
             Deed::EndFault(fault) => {
                 machine.end_fault(fault);
                 let times = machine.fault_deliveries(fault);
-                Ok(format!("fault {} struck {times} times", fault.0))
+                Ok(format!(
+                    "fault {} has ended; it took effect {times} times",
+                    fault.0
+                ))
             }
             Deed::Power(on) => {
                 machine.switch_mains(on);
-                Ok(format!("the mains is {}", if on { "on" } else { "off" }))
+                Ok(format!(
+                    "the mains power is {}",
+                    if on { "on" } else { "off" }
+                ))
             }
             Deed::Truth => Ok(truth(machine.now().seconds(), &machine.truth())),
         }
@@ -200,7 +210,7 @@ impl Hands {
         machine.turn_plate(lines);
         self.plate_at = to;
         Ok(format!(
-            "the plate was turned by {lines} lines; its place is called {to}"
+            "the plate was turned by {lines} lines; its offset is now {to}"
         ))
     }
 }
@@ -215,7 +225,7 @@ fn has_plate(machine: &Simulation) -> Result<(), String> {
 fn finite(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(number) if f64::is_finite(number) => Ok(number),
-        _ => Err(format!("`{text}` is no number")),
+        _ => Err(format!("`{text}` is not a number")),
     }
 }
 
@@ -297,11 +307,11 @@ mod tests {
     fn words_that_mean_nothing_are_refused_with_what_there_is() {
         for (words, says) in [
             ("", "turn-plate LINES"),
-            ("turn-plate", "no number"),
-            ("turn-plate inf", "no number"),
+            ("turn-plate", "not a number"),
+            ("turn-plate inf", "not a number"),
             ("power up", "power off"),
             ("fault fault = { kind = \"gremlin\" }", "gremlin"),
-            ("end-fault x", "no number"),
+            ("end-fault x", "not the number"),
             (
                 "set-up-line along = [0, 0, 0], optics = \"linear\"",
                 "direction",

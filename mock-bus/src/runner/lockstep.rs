@@ -7,9 +7,8 @@
 //! reaches one. Frames and bytes pass the kernel; nothing is guessed at, and how busy the
 //! computer is changes nothing. The lines are those of [`wire::lockstep`].
 //!
-//! Nobody there: time stands still until somebody comes. Somebody who ends without taking
-//! leave (unless that was asked for), hangs, or computes without end is named, and the
-//! machine ends.
+//! While there is no participant, time stands still. A participant that ends without signing off
+//! (unless that is permitted), hangs, or computes without end is named, and the machine ends.
 
 use core::time::Duration;
 use std::io::{self, Read};
@@ -180,7 +179,7 @@ impl Lockstep {
         for endpoint in &mut self.site.endpoints {
             if let Some(frame) = endpoint.strange_frame()? {
                 return Err(io::Error::other(format!(
-                    "{}: the frame {frame} comes from a program that does not keep the lockstep \
+                    "{}: the frame {frame} comes from a program that does not share the lockstep \
                      clock; give this machine an interface of its own, or leave --clock out",
                     endpoint.name()
                 )));
@@ -301,14 +300,14 @@ impl Lockstep {
             return Ok(());
         }
         let what = format!(
-            "{} ended without taking leave, at {:.6} s",
+            "{} ended without signing off, at {:.6} s",
             peer.who(),
             self.site.machine.now().seconds()
         );
         if !self.outlive {
             return Err(io::Error::other(what));
         }
-        eprintln!("mock-bus: {what}; time stands still until the next one comes");
+        eprintln!("mock-bus: {what}; time stands still until the next program joins");
         self.forget(who)
     }
 
@@ -358,7 +357,8 @@ impl Lockstep {
     fn welcome(&mut self, who: usize, version: u32, pid: u32, name: String) -> Reply {
         if version != VERSION {
             return Reply::Refused(format!(
-                "it speaks version {version} of the lockstep clock, this machine {VERSION}"
+                "the program uses version {version} of the lockstep clock, this machine version \
+                 {VERSION}"
             ));
         }
         self.site.visitors.peers[who].join(name, pid);

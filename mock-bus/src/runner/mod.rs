@@ -1,9 +1,9 @@
 //! The emulated machine on pseudo-terminals and SocketCAN interfaces.
 //!
-//! One thread waits for its clients and for the machine's next event. By the wall's clock it
-//! has absolute deadlines: a late wake-up is caught up, never added, and simulated time is
-//! wall time times `speed`. On a clock that it shares with its clients ([`Pace::Lockstep`])
-//! time passes only when nobody has anything left to do.
+//! One thread waits for its clients and for the machine's next event. In real time it has absolute
+//! deadlines: a late wake-up is caught up, never added, and simulated time is wall time times
+//! `speed`. On a clock that it shares with its clients ([`Pace::Lockstep`]) time passes only when
+//! nobody has anything left to do.
 
 mod endpoint;
 mod event_loop;
@@ -41,7 +41,7 @@ use visitors::{Door, Visitors};
 /// How an emulated machine's time passes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pace {
-    /// By the wall's clock: so many simulated seconds for each second.
+    /// In real time: so many simulated seconds per real second.
     Wall(f64),
     /// Only when neither the machine nor its clients have anything left to do; they agree over
     /// a Unix socket at this path.
@@ -51,7 +51,7 @@ pub enum Pace {
 /// How a machine is run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Chooses noise and errors.
+    /// Seed of the machine's noise and errors.
     pub seed: u64,
     /// How its time passes.
     pub pace: Pace,
@@ -123,7 +123,8 @@ pub enum RunError {
         seen: f64,
     },
     /// The socket beside the buses cannot be made.
-    #[error("socket {}: {source}; the folder must exist and nobody else listen there", path.display())]
+    #[error("socket {}: {source}; the folder must exist, and no other program may listen there",
+        path.display())]
     Door {
         /// Where.
         path: PathBuf,
@@ -145,8 +146,8 @@ enum Job {
     Stop,
 }
 
-/// How often the computer has kept a machine that lives by the wall's clock from its work: what
-/// its controller missed then is no fault of the machine.
+/// How often the computer has paused a machine that runs in real time: what its controller missed
+/// then is not a fault of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pauses {
     /// How many there were.

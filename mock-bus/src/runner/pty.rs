@@ -239,7 +239,7 @@ pub(super) fn await_readable(descriptor: BorrowedFd<'_>) -> io::Result<()> {
     let mut fds = [PollFd::new(descriptor, PollFlags::POLLIN)];
     match poll(&mut fds, PollTimeout::from(LIMIT_MS)) {
         Ok(0) => Err(io::Error::other(
-            "a participant says that it has sent more than has come",
+            "a participant reports more bytes sent than have arrived",
         )),
         Ok(_) | Err(Errno::EINTR) => Ok(()),
         Err(errno) => Err(errno.into()),

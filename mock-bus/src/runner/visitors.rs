@@ -109,8 +109,8 @@ impl Visitors {
                         done.map_or_else(Reply::Refused, Reply::Done)
                     }
                     Heard::Said(_) => Reply::Refused(
-                        "this machine lives by the wall's clock; start it with --clock \
-                         lockstep:PATH to share one"
+                        "this machine runs in real time; start it with --clock lockstep:PATH to \
+                         share a clock"
                             .to_owned(),
                     ),
                     Heard::Nonsense(what) => Reply::Refused(what),

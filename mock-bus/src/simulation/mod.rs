@@ -68,7 +68,7 @@ pub struct Delivery {
     pub event: Event,
 }
 
-/// Why the machine does not take what the controller sends.
+/// Why the machine does not accept what the controller sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeliverError {
     /// There is no such port.
@@ -78,7 +78,7 @@ pub enum DeliverError {
         port: Port,
     },
     /// A frame for a serial line, or bytes for a CAN bus.
-    #[error("port {} cannot carry this", port.0)]
+    #[error("port {} cannot carry this payload", port.0)]
     WrongKind {
         /// Which port.
         port: Port,

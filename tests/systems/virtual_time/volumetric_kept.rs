@@ -217,7 +217,7 @@ fn what_is_said_of_memories_that_do_not_belong_together_helps() {
     );
     assert_eq!(cleared, (Some(first.id), Some(beyond.id.clone())));
     let refused = refusal(&mut volume);
-    assert!(refused.contains("in use: none"), "{refused}");
+    assert!(refused.contains("but none is in use"), "{refused}");
     let told = "`truestage memory clear --memory second`";
     assert!(refused.contains(told), "{refused}");
     let machine = &mut volume.bench.machine;

@@ -23,7 +23,7 @@ pub enum WireError {
         seen: usize,
     },
     /// The identifier belongs to another message.
-    #[error("{message}: COB-ID {seen:#X} does not carry it")]
+    #[error("{message}: not carried by COB-ID {seen:#X}")]
     Identifier {
         /// The message that was expected.
         message: &'static str,

@@ -9,7 +9,7 @@ use core::fmt;
 /// ```
 /// use wire::copley::ErrorCode;
 ///
-/// assert_eq!(ErrorCode::from_raw(18).to_string(), "error 18 (the axis moves already)");
+/// assert_eq!(ErrorCode::from_raw(18).to_string(), "error 18 (the axis is already moving)");
 /// assert_eq!(ErrorCode::from_raw(77), ErrorCode::Unknown(77));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -138,24 +138,25 @@ impl fmt::Display for ErrorCode {
             Self::SurplusData => "too many values",
             Self::UnknownParameter => "no such parameter",
             Self::OutOfRange => "value out of range",
-            Self::ReadOnly => "parameter can only be read",
+            Self::ReadOnly => "parameter is read-only",
             Self::UnknownAxisState => "no such axis state",
             Self::NotInThisBank => "parameter is not in this memory bank",
-            Self::IllegalForwarding => "only the amplifier at the cable hands lines on",
-            Self::MovingAlready => "the axis moves already",
+            Self::IllegalForwarding => "only the amplifier with address 0 forwards commands",
+            Self::MovingAlready => "the axis is already moving",
             Self::SpeedLimit => "speed not possible for a move",
             Self::AccelerationLimit => "acceleration not possible for a move",
             Self::DecelerationLimit => "deceleration not possible for a move",
             Self::JerkLimit => "jerk not possible for a move",
             Self::TrajectoryMode => "not possible in this trajectory mode",
-            Self::ProgramRuns => "a program runs in the amplifier",
-            Self::ForwardingNode => "not a node number that lines can be handed on to",
+            Self::ProgramRuns => "a program is running in the amplifier",
+            Self::ForwardingNode => "not a node number that commands can be forwarded to",
             Self::CanFailed => {
-                "the amplifier at the cable cannot reach the node; its power, number, CAN cable?"
+                "the amplifier with address 0 cannot reach the node; check its power, its node \
+                 number and the CAN cable"
             }
             Self::Syntax => "not understood",
             Self::AxisLetter => "no such axis letter",
-            Self::EncoderCommand => "the encoder did not take the command",
+            Self::EncoderCommand => "the encoder did not accept the command",
             Self::Filter => "filter cannot be computed",
             Self::Unknown(raw) => return write!(f, "error {raw}"),
         };

@@ -166,7 +166,7 @@ pub struct Request {
     pub command: Command,
 }
 
-/// Why a line is no command: the number of the error that answers it.
+/// Why a line is not a command: the number of the error that answers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not a command: {code}")]
 pub struct Refused {
@@ -339,7 +339,7 @@ pub enum Reply {
 
 /// Why a line is no reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("amplifier: line is none of `ok`, `v ...`, `r ...`, `e ...`")]
+#[error("amplifier: line is not one of `ok`, `v ...`, `r ...`, `e ...`")]
 pub struct NotAReply;
 
 impl Reply {

@@ -171,7 +171,10 @@ impl fmt::Display for Faults {
             (Faults::LOGIC_FAILED, "logic device failed"),
             (Faults::COMMAND_LOST, "command signal lost"),
             (Faults::SAFETY_CIRCUIT, "safety circuit inconsistent"),
-            (Faults::CURRENT_UNCONTROLLED, "motor current not controlled"),
+            (
+                Faults::CURRENT_UNCONTROLLED,
+                "motor current cannot be controlled",
+            ),
             (Faults::MOTOR_UNCONNECTED, "motor not connected"),
             (Faults::SAFE_TORQUE_OFF, "safe torque off"),
         ];

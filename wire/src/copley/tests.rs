@@ -205,7 +205,7 @@ fn error_numbers_and_names_belong_together() {
     assert_eq!(ErrorCode::from_raw(2), ErrorCode::Unknown(2));
     assert_eq!(
         ErrorCode::from_raw(18).to_string(),
-        "error 18 (the axis moves already)"
+        "error 18 (the axis is already moving)"
     );
 }
 

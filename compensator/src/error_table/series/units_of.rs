@@ -59,18 +59,18 @@ pub(super) fn judge(series: &LinearSeries) -> Result<(), Unbelievable> {
 fn likely_cause(slope: f64) -> &'static str {
     let near = |value: f64| (slope / value - 1.0).abs() < 0.05;
     match slope {
-        _ if near(1e3) => "are they micrometres under `measured_mm`, or are the targets metres?",
-        _ if near(1e-3) => "are the targets micrometres under `target_mm`, or the others metres?",
-        _ if near(1e6) => "are they nanometres under `measured_mm`?",
-        _ if near(1e-6) => "are the targets nanometres under `target_mm`?",
+        _ if near(1e3) => "is `measured_mm` in micrometres, or `target_mm` in metres?",
+        _ if near(1e-3) => "is `target_mm` in micrometres, or `measured_mm` in metres?",
+        _ if near(1e6) => "is `measured_mm` in nanometres?",
+        _ if near(1e-6) => "is `target_mm` in nanometres?",
         _ if near(10.0) || near(0.1) => "is one of the columns in centimetres?",
         _ if near(25.4) || near(1.0 / 25.4) => "is one of the columns in inches?",
-        _ if near(-1.0) => "is the sign of the instrument turned?",
+        _ if near(-1.0) => "is the sign of the instrument reversed?",
         _ if near(2.0) || near(0.5) || near(4.0) || near(0.25) => {
             "is the optics' factor of the interferometer wrong?"
         }
         _ if slope.abs() < 0.05 => {
-            "are they deviations? `measured_mm` is the position that the instrument saw"
+            "does it hold deviations? `measured_mm` is the position that the instrument measured"
         }
         _ => "are the columns what their names say?",
     }
@@ -113,13 +113,13 @@ mod tests {
         let sum = |target, deviation| target + deviation;
         check_refused(
             &csv(1.0, |t, d| sum(t, d) * 1e3),
-            "micrometres under `measured_mm`",
+            "`measured_mm` in micrometres",
         );
-        check_refused(&csv(1e3, sum), "micrometres under `target_mm`");
+        check_refused(&csv(1e3, sum), "`target_mm` in micrometres");
         check_refused(&csv(1.0, |t, d| sum(t, d) / 25.4), "inches");
         check_refused(&csv(1.0, |t, d| -sum(t, d)), "sign of the instrument");
         check_refused(&csv(1.0, |t, d| 2.0 * sum(t, d)), "factor");
-        check_refused(&csv(1.0, |_, d| d), "are they deviations?");
+        check_refused(&csv(1.0, |_, d| d), "does it hold deviations?");
         check_refused(&csv(1.0, |t, d| 1.3 * t + d), "what their names say");
         check_refused(
             &csv(1.0, |t, d| t + d + 15.0 * (0.35 * t).sin()),

@@ -1,4 +1,4 @@
-//! What thermometers that were off make of the errors found.
+//! How errors of the thermometers change the errors found.
 
 use super::design::{Design, error_row};
 use super::effect::{seen, u_of};

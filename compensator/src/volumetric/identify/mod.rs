@@ -24,12 +24,13 @@
 //! What readings cannot tell is found by singular values of the scaled design, and said by the
 //! names of the errors concerned ([`Observability`]); it is never guessed.
 //!
-//! Runs at two or more warmths tell the thermal coefficients, with all errors at once: a guide
-//! that bends while the tool is on a lever looks like a scale that grows. Runs too much alike are
-//! refused, and thermometers' uncertainties are in those of the coefficients.
+//! Runs at two or more temperatures determine the thermal coefficients, together with all errors: a
+//! guide that bends while the tool is on a lever looks like a scale that grows. Runs at too similar
+//! temperatures are refused, and the uncertainties of the coefficients include those of the
+//! thermometers.
 //!
-//! Readings that scatter more than what was stated of them are told ([`Identified::scattered`]), with
-//! those that fit least.
+//! Readings that scatter more than their stated uncertainties are reported
+//! ([`Identified::scattered`]), with those that fit least.
 //!
 //! Absent: leaving out outliers, hysteresis, laser tracker lengths from unknown stations, the instrument's own
 //! temperature and air (correct the readings first: [`crate::length_correction`]), temperatures
@@ -251,8 +252,8 @@ impl fmt::Display for Unknown {
 pub enum IdentifyError {
     /// A function twice, with too few or unordered nodes.
     #[error(
-        "identification: {name} is planned twice, or its nodes do not increase, or there are \
-        fewer than {least}"
+        "identification: {name} is planned twice, or its nodes do not increase, or there are fewer \
+         than {least}"
     )]
     Nodes {
         /// Which function.
@@ -267,7 +268,7 @@ pub enum IdentifyError {
         name: SquarenessName,
     },
     /// The point where functions are zero is not within their nodes.
-    #[error("identification: {name} is to be zero at {} mm, which its nodes do not reach",
+    #[error("identification: {name} is to be zero at {} mm, which is outside its nodes",
         units::Short(zero.mm()))]
     Zero {
         /// Which function.
@@ -285,10 +286,10 @@ pub enum IdentifyError {
         /// How many are planned.
         runs: usize,
     },
-    /// A reading that is no number, has no uncertainty, or no direction.
+    /// A reading that is not a number, has no uncertainty, or no direction.
     #[error(
-        "identification, reading {index}: a value is not finite, the uncertainty not positive, \
-        or the direction's length not 1"
+        "identification, reading {index}: a value is not finite, the uncertainty not positive, or \
+         the direction's length not 1"
     )]
     NotUsable {
         /// Which reading.
@@ -313,10 +314,11 @@ pub enum IdentifyError {
         /// What is wrong.
         what: &'static str,
     },
-    /// Runs made at nearly the same warmth.
+    /// Runs made at nearly the same temperature.
     #[error(
-        "identification, {unknown}: the runs that tell it are {spread:.2} K apart, at least \
-        {least:.2} K are needed; let the machine warm up and measure again, or plan without it"
+        "identification, {unknown}: the runs that determine it differ by {spread:.2} K, but at \
+         least {least:.2} K is needed; let the machine warm up and measure again, or plan without \
+         it"
     )]
     TooAlike {
         /// What would be found from them.
@@ -326,10 +328,11 @@ pub enum IdentifyError {
         /// How far apart they should be.
         least: f64,
     },
-    /// Errors that these readings do not tell.
+    /// Errors that these readings do not determine.
     #[error(
-        "identification: these readings do not tell {unseen}; measure with another tool offset \
-        or along other lines, or plan without these errors"
+        "identification: these readings do not determine {unseen} (what `/` joins cannot be \
+         distinguished from each other); measure with another tool offset or along other lines, or \
+         plan without these errors"
     )]
     Unobservable {
         /// Which.

@@ -1,4 +1,4 @@
-//! What readings tell of what is planned.
+//! Which of the planned unknowns the readings determine.
 
 use core::fmt;
 
@@ -14,7 +14,7 @@ const SEEN_SHARE: f64 = 1e-7;
 /// An error is named when it has at least this part in an unseen combination.
 const NAMED_SHARE: f64 = 1e-3;
 
-/// Which combinations of errors readings do not tell.
+/// Which combinations of errors the readings do not determine.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observability {
     /// Each of them by what takes part in it, in the order of the plan.
@@ -51,7 +51,7 @@ impl fmt::Display for Observability {
             }
             for (at, name) in names.iter().enumerate() {
                 if at > 0 {
-                    f.write_str(" from ")?;
+                    f.write_str(" / ")?;
                 }
                 name.fmt(f)?;
             }

@@ -1,4 +1,4 @@
-//! Do the readings scatter more than what was stated of them explains, and which fit least?
+//! Do the readings scatter more than their stated uncertainties explain, and which fit least?
 //!
 //! Source: Birge, Phys. Rev. 40 (1932) 207: the ratio √(χ²/ν) is 1 when stated uncertainties are
 //! right; the limit of χ²/ν by Wilson and Hilferty ([`reduced_chi_square_limit`]); Baarda, A testing

@@ -492,10 +492,7 @@ fn a_square_tells_squareness_and_two_straightnesses() {
         ..plan
     };
     let seen = alone.observability(&observations).unwrap();
-    assert_eq!(
-        seen.to_string(),
-        "squareness of y to x from alignment angle 1"
-    );
+    assert_eq!(seen.to_string(), "squareness of y to x / alignment angle 1");
 }
 
 /// 0, 3, 3, 6 µm at 0, 1, 2, 3 m: slope 9/5 and offset 0.3 by least squares, slope 2 by the ends.

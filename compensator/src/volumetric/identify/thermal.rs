@@ -1,5 +1,5 @@
-//! What warmth adds to the errors, found from runs at two or more warmths: expansion of the
-//! scales, and guides that bend.
+//! What temperature adds to the errors, found from runs at two or more temperatures: expansion of
+//! the scales, and guides that bend.
 //!
 //! Source: the terms of [`crate::volumetric::model::Thermal`]; warming up a machine and measuring
 //! it again is ISO 230-3's idea. Each coefficient is one column of the design: its effect per
@@ -51,15 +51,15 @@ pub struct BendPlan {
     pub low: Metres,
     /// Where it ends.
     pub high: Metres,
-    /// Whether the arc also shows in sideways readings. Where films or supports grow too it is
-    /// found from angles and levers alone, and sideways readings belong to one warmth.
+    /// Whether the arc also shows in sideways readings. Where films or supports grow too, it is
+    /// found from angles and levers alone, and sideways readings belong to one temperature.
     pub sideways: bool,
     /// Where a detector sits on the slide whose displacements were taken off all readings: with
     /// them it took off what it saw of the tilt.
     pub seen_from: Option<Point>,
 }
 
-/// What warmth is planned to add. Empty when all runs count as made at one warmth.
+/// The thermal errors that are to be found. Empty when all runs count as made at one temperature.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ThermalPlan {
     /// By thermometer: what it shows when the functions hold as they are.
@@ -285,7 +285,7 @@ impl ThermalPlan {
         let sound = readings.into_iter().all(|it| it.is_finite());
         let fixed = self.fixed.array().into_iter().all(f64::is_finite);
         if !(sound && fixed && self.u.is_finite() && self.u >= 0.0) {
-            return refuse("a temperature, its uncertainty or the fixed point is no number");
+            return refuse("a temperature, its uncertainty or the fixed point is not a number");
         }
         if self.expansions.iter().any(|it| it.thermometers.is_empty()) {
             return refuse("an expansion has no thermometer");
@@ -295,7 +295,9 @@ impl ThermalPlan {
             let mut own = term.thermometers();
             own.sort_unstable();
             if own.windows(2).any(|it| it[0] == it[1]) || own.iter().any(|it| *it >= count) {
-                return refuse("a thermometer is taken twice for one coefficient, or is not there");
+                return refuse(
+                    "a thermometer is used twice for one coefficient, or does not exist",
+                );
             }
             if before.contains(&term.unknown()) {
                 return refuse("an expansion or a bend is planned twice");

@@ -58,7 +58,7 @@ fn check_thermal(thermal: &Thermal) -> Result<(), ModelError> {
     }
     for channel in &thermal.channels {
         if !(channel.low <= channel.reference && channel.reference <= channel.high) {
-            return refuse("a temperature range, which must contain its reference,");
+            return refuse("a temperature range that does not contain its reference");
         }
         let mut sums = ThermalSums::default();
         sums.add(channel, 1.0, true);
@@ -76,7 +76,7 @@ fn check_thermal(thermal: &Thermal) -> Result<(), ModelError> {
         }
         let mut before = thermal.bends[..at].iter();
         if before.any(|it| (it.axis, it.towards) == (bend.axis, bend.towards)) {
-            return refuse("a guide that bends in one direction twice");
+            return refuse("a guide with two bends in the same direction");
         }
     }
     Ok(())

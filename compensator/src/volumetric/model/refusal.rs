@@ -9,9 +9,9 @@ use crate::volumetric::inverse::LIPSCHITZ_MAX;
 /// Why a machine cannot be compensated.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A limit that is none.
+    /// A limit that is not usable.
     #[error("volumetric model: the limits must be positive and the slope at most {LIPSCHITZ_MAX}, \
-        seen {:.3} um, slope {}, {} m/s", size.um(), slope, rate.value())]
+             seen {:.3} um, slope {}, {} m/s", size.um(), slope, rate.value())]
     Limits {
         /// Limit of size.
         size: Metres,
@@ -20,16 +20,16 @@ pub enum ModelError {
         /// Limit of rate.
         rate: MetresPerSecond,
     },
-    /// A tool, displacement, roll or coefficient that is negative or no number, or a
-    /// temperature range that is none.
-    #[error("volumetric model: {what} is not a usable number")]
+    /// A tool, displacement, roll or coefficient that is negative or not a number, or a temperature
+    /// range that is not usable.
+    #[error("volumetric model: {what} is not usable")]
     NotUsable {
         /// What.
         what: &'static str,
     },
     /// A function that does not reach over the volume.
-    #[error("volumetric model: {function} is known from {} to {} mm, the volume reaches from {} \
-        to {} mm",
+    #[error("volumetric model: {function} is known from {} to {} mm, but the volume extends from \
+             {} to {} mm",
         units::Short(first.mm()), units::Short(last.mm()), units::Short(low.mm()),
         units::Short(high.mm()))]
     NotCovered {
@@ -46,7 +46,7 @@ pub enum ModelError {
     },
     /// A function whose effect alone exceeds the limit.
     #[error("volumetric model: {function} alone moves the tool by up to {:.3} um, the limit is \
-        {:.3} um; millimetres taken for micrometres, or degrees for arc-seconds?",
+             {:.3} um; millimetres taken for micrometres, or degrees for arc-seconds?",
         seen.um(), limit.um())]
     TooLarge {
         /// Which function.
@@ -58,7 +58,7 @@ pub enum ModelError {
     },
     /// Steeper than the limit allows.
     #[error("volumetric model: the deviation may change by {:.1} um per mm, the limit is {:.1}; \
-        {function} contributes most", seen * 1e3, limit * 1e3)]
+             {function} contributes most", seen * 1e3, limit * 1e3)]
     TooSteep {
         /// The bound of the slope.
         seen: f64,
@@ -70,7 +70,7 @@ pub enum ModelError {
     /// From a slope of 1 on there may be no command, or several, for a target.
     #[error(
         "volumetric model: the deviation may change by {seen:.3} per command; from 1 on the \
-        correction has no unique inverse; {function} contributes most"
+         correction has no unique inverse; {function} contributes most"
     )]
     NotContracting {
         /// The bound of the slope.
@@ -83,7 +83,7 @@ pub enum ModelError {
 /// Why there is no correction under these circumstances.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ConditionsError {
-    /// A tool offset beyond what was proven for.
+    /// A tool offset beyond the largest that the model was proven for.
     #[error("tool offset along {axis}: {} mm, at most {} mm are permitted", units::Short(seen.mm()),
         units::Short(limit.mm()))]
     Tool {
@@ -102,7 +102,7 @@ pub enum ConditionsError {
         /// Channels known.
         expected: usize,
     },
-    /// A temperature its coefficients are not known for.
+    /// A temperature for which the coefficients are not known.
     #[error("temperature channel {channel}: {seen}, known from {low} to {high}")]
     Temperature {
         /// Which channel, from 0.
@@ -114,10 +114,10 @@ pub enum ConditionsError {
         /// The highest known.
         high: Celsius,
     },
-    /// A temperature difference across a guide that its bend is not known for.
+    /// A temperature difference across a guide for which its bending is not known.
     #[error(
-        "axis {axis}: {seen:.2} K across its guide beyond the calibration's, its bend is known \
-        up to {limit:.2} K; a thermometer out of order?"
+        "axis {axis}: the temperature difference across its guide is {seen:.2} K away from that at \
+         calibration, its bending is known up to {limit:.2} K; is a thermometer out of order?"
     )]
     Gradient {
         /// Whose guide.
@@ -127,8 +127,8 @@ pub enum ConditionsError {
         /// The largest known.
         limit: f64,
     },
-    /// A displacement of a slider larger than believed.
-    #[error("axis {axis}: the detectors report {:.3} um, at most {:.3} um are believed",
+    /// A displacement of a slider larger than plausible.
+    #[error("axis {axis}: the detectors report {:.3} um, at most {:.3} um is plausible",
         seen.um(), limit.um())]
     Displacement {
         /// Whose slider.
@@ -138,8 +138,9 @@ pub enum ConditionsError {
         /// The largest believed.
         limit: Metres,
     },
-    /// A roll larger than believed.
-    #[error("axis {axis}: the detectors report a roll of {:.2} arcsec, at most {:.2} are believed",
+    /// A roll larger than plausible.
+    #[error("axis {axis}: the detectors report a roll of {:.2} arcsec, at most {:.2} arcsec is \
+             plausible",
         seen.arcsec(), limit.arcsec())]
     Roll {
         /// Whose slider.

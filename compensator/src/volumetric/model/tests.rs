@@ -320,11 +320,17 @@ fn a_gradient_that_nobody_measured_and_a_guide_that_cannot_bend_so_are_refused()
     for (change, text) in [
         (
             (&|it: &mut ThermalBend| it.over = 2) as &dyn Fn(&mut ThermalBend),
-            "a channel of a bending guide",
+            "a bending guide whose channels",
         ),
-        (&|it| it.under = Some(0), "a channel of a bending guide"),
-        (&|it| it.towards = Axis::X, "the direction of a bending"),
-        (&|it| it.high = it.low, "where it ends"),
+        (&|it| it.under = Some(0), "a bending guide whose channels"),
+        (
+            &|it| it.towards = Axis::X,
+            "the direction or the range of a bending",
+        ),
+        (
+            &|it| it.high = it.low,
+            "the direction or the range of a bending",
+        ),
         (&|it| it.bow = Metres(f64::NAN), "the bow of a bending"),
         (&|it| it.gradient_max = -1.0, "the bow of a bending"),
     ] {
@@ -335,7 +341,7 @@ fn a_gradient_that_nobody_measured_and_a_guide_that_cannot_bend_so_are_refused()
         it.thermal.channels = vec![channel(0.05); 2];
         it.thermal.bends = vec![bend(false); 2];
     });
-    assert!(twice.to_string().contains("twice"), "{twice}");
+    assert!(twice.to_string().contains("two bends"), "{twice}");
     // 1 mm per kelvin, 3 K: 3 mm in the middle of half a metre, a slope of 2.4 %.
     let steep = refused(&|it| it.bow = Metres(1e-3));
     assert!(matches!(steep, ModelError::TooSteep { .. }), "{steep}");

@@ -223,11 +223,11 @@ impl ThermalBend {
     pub(crate) fn trouble(&self, channels: usize) -> Option<&'static str> {
         let own = self.over < channels && self.under.is_none_or(|it| it < channels);
         if !own || self.under == Some(self.over) {
-            return Some("a channel of a bending guide, which must be two of the temperatures,");
+            return Some("a bending guide whose channels are not two different temperatures");
         }
         let ends = self.low.is_finite() && self.high.is_finite() && self.low < self.high;
         if self.axis == self.towards || !ends {
-            return Some("the direction of a bending guide, or where it ends,");
+            return Some("the direction or the range of a bending guide");
         }
         let sizes = [self.u.value(), self.gradient_max];
         let sound = sizes.into_iter().all(|it| it >= 0.0 && it.is_finite());

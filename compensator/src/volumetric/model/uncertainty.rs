@@ -1,4 +1,4 @@
-//! How sure the deviation is, by the uncertainties of all that makes it.
+//! The uncertainty of the deviation, from the uncertainties of all its contributions.
 
 use units::{Metres, Quantity, Radians};
 

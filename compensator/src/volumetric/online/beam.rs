@@ -1,4 +1,4 @@
-//! The place of a beam on a four-channel detector, or why it cannot be told.
+//! The position of a beam on a four-channel detector, or why it cannot be determined.
 //!
 //! Source: CN1214003A uses a beam splitter and a two-dimensional CCD; a detector with four
 //! analog channels says the same through the ratio of its currents. For a lateral-effect
@@ -85,11 +85,7 @@ pub struct BeamDetectorSettings {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// Limits of the intensity that leave nothing between them.
-    #[error(
-        "beam detector: an intensity from {} to {} leaves nothing between",
-        low,
-        high
-    )]
+    #[error("beam detector: an intensity from {} to {} leaves no range", low, high)]
     Intensity {
         /// Lower limit.
         low: Volts,

@@ -69,8 +69,8 @@ pub enum FeedStatus {
 impl fmt::Display for FeedStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Waiting(None) => f.write_str("not believed yet"),
-            Self::Waiting(Some(trouble)) => write!(f, "{trouble}; it was never believed"),
+            Self::Waiting(None) => f.write_str("no value accepted yet"),
+            Self::Waiting(Some(trouble)) => write!(f, "{trouble}; no value was ever accepted"),
             Self::Good => f.write_str("good"),
             Self::Tolerated(trouble) => write!(f, "{trouble}; tolerated so far"),
             Self::Held(trouble) => write!(f, "{trouble}; its last value is held"),

@@ -33,7 +33,7 @@ pub enum BeamDrift {
     },
 }
 
-/// A drift that is none.
+/// A drift that is not usable.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DriftError {
     /// Source and detector at the same place.

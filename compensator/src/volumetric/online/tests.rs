@@ -147,7 +147,7 @@ fn a_channel_that_gives_exactly_the_same_again_and_again_is_stuck_until_it_chang
         let Err(trouble @ Trouble::Stuck { input: 2, .. }) = seen else {
             panic!("{seen:?}")
         };
-        let text = "input 3 of it is stuck: exactly 2e0 (SI units) 4 times in a row";
+        let text = "its input 3 is stuck: exactly 2e0 (SI units) 4 times in a row";
         assert_eq!(trouble.to_string(), text);
     }
     sample(6, 2.0001).unwrap();

@@ -27,13 +27,13 @@ pub enum Trouble {
         limit: Volts,
     },
     /// The converter of a channel cannot show more.
-    #[error("a channel stands at the end of its converter's range, {seen}")]
+    #[error("a channel is at the end of its converter's range, {seen}")]
     AtEnd {
         /// What it shows.
         seen: Volts,
     },
     /// The same again and again, where noise must be.
-    #[error("input {} of it is stuck: exactly {seen:e} (SI units) {samples} times in a row",
+    #[error("its input {} is stuck: exactly {seen:e} (SI units) {samples} times in a row",
         input + 1)]
     Stuck {
         /// Which of the detector's inputs, from 0.
@@ -54,7 +54,8 @@ pub enum Trouble {
     },
     /// The beam is beside the calibrated part of the detector.
     #[error(
-        "the beam is beside the calibrated field: ratio {seen:.3}, {low:.3} to {high:.3} known"
+        "the beam is outside the calibrated field: ratio {seen:.3}, calibrated from {low:.3} to \
+         {high:.3}"
     )]
     Beside {
         /// Ratio of the channels.

@@ -45,10 +45,7 @@ fn all_that_is_wrong_with_keys_types_and_values_is_told_at_once() {
 #[test]
 fn a_value_of_another_type_says_how_it_is_written() {
     let key = "axis.x.resolution_nm";
-    let says = [
-        "a number is expected here, this is text",
-        "without quotes: 10",
-    ];
+    let says = ["expected a number here, this is text", "without quotes: 10"];
     check(
         LINEAR,
         "resolution_nm = 10.0",
@@ -56,16 +53,13 @@ fn a_value_of_another_type_says_how_it_is_written() {
         key,
         says,
     );
-    let says = ["text is expected here, this is a whole number", "\"7\""];
+    let says = ["expected text here, this is a whole number", "\"7\""];
     let (from, key) = ("name = \"linear\"", "machine.name");
     check(LINEAR, from, "name = 7", key, says);
-    let says = ["a list is expected here", "[...]"];
+    let says = ["expected a list here", "[...]"];
     let (from, key) = ("channels = [0, 1]", "analog.hall.channels");
     check(LINEAR, from, "channels = 0", key, says);
-    let says = [
-        "a whole number is expected here, this is a number",
-        "write 2",
-    ];
+    let says = ["expected a whole number here, this is a number", "write 2"];
     check(
         LINEAR,
         "node_id = 1\n",

@@ -82,7 +82,7 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
                     Short(value),
                     Short(motion.resolution_nm)
                 ),
-                "lower it, or let the drive count more coarsely",
+                "lower it, or use a coarser resolution",
             );
         }
     }
@@ -177,7 +177,7 @@ mod tests {
         check(AMPLIFIERS, from, "address = 128", key, "128");
         let (from, key) = ("baud_bit_per_s = 115200        #", "axis.u.line");
         let to = "baud_bit_per_s = 14400 #";
-        check(AMPLIFIERS, from, to, key, "no rate of an amplifier");
+        check(AMPLIFIERS, from, to, key, "not a bit rate of an amplifier");
         let (from, key) = ("line = \"vision\"", "camera.eye.line");
         let says = "amps belongs to amplifiers (axis.u.address)";
         check(AMPLIFIERS, from, "line = \"amps\"", key, says);

@@ -58,7 +58,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         if config.instrument.contains_key(name) {
             judge.say(
                 "",
-                format!("an instrument is called `{name}`, too"),
+                format!("an instrument is also called `{name}`"),
                 "give every instrument a name of its own",
             );
         }
@@ -119,7 +119,7 @@ fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
     if !BITRATES.contains(&bus.bitrate_bit_per_s) {
         judge.say(
             "bitrate_bit_per_s",
-            format!("{} is no CANopen bit rate", bus.bitrate_bit_per_s),
+            format!("{} bit/s is not a CANopen bit rate", bus.bitrate_bit_per_s),
             "CiA 301 has 10000, 20000, 50000, 125000, 250000, 500000, 800000, 1000000",
         );
     }

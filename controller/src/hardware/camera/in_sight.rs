@@ -78,14 +78,14 @@ impl Family for InSightConfig {
         if !(job.ends_with(".job") || job.ends_with(".jobx")) {
             judge.say(
                 "job",
-                format!("`{}` is no job", self.job),
+                format!("`{}` is not the name of a job", self.job),
                 "give the name that In-Sight Explorer shows, with `.job` or `.jobx`",
             );
         }
         if Cell::parse(&self.result_cell).is_none() {
             judge.say(
                 "result_cell",
-                format!("`{}` is no cell", self.result_cell),
+                format!("`{}` is not a cell", self.result_cell),
                 "give a letter and a row, such as \"C7\"",
             );
         }

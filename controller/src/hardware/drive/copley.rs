@@ -125,7 +125,10 @@ impl Family for CopleyAxisConfig {
         {
             judge.say(
                 "line",
-                format!("{} bit/s is no rate of an amplifier", line.baud_bit_per_s),
+                format!(
+                    "{} bit/s is not a bit rate of an amplifier",
+                    line.baud_bit_per_s
+                ),
                 format!("give serial.{name}.baud_bit_per_s one of {AMPLIFIER_RATES:?}"),
             );
         }

@@ -53,7 +53,7 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
         Which::Linear => super::linear::demo::show(&mut stand, args, output),
         Which::Uvw | Which::UvwCopley => super::platform::demo::show(&mut stand, args, output),
         Which::Rotary => super::rotary::demo::show(&mut stand, output),
-        Which::Volumetric => unreachable!("it was shown in virtual time"),
+        Which::Volumetric => unreachable!("the demonstration ran in virtual time"),
     }?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),

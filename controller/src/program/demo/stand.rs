@@ -22,8 +22,8 @@ pub(crate) struct DemoArgs {
     /// The emulated stage's errors, noise and drift; the same seed is the same stage.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Let the emulated machine live by the wall's clock, so many times as fast (10, say), for
-    /// whoever wants to watch; without it time passes as fast as the computer goes.
+    /// Run the emulated machine in real time, this many times as fast (10, say), to watch it;
+    /// without this option time passes as fast as the computer allows.
     #[arg(long, value_name = "FACTOR")]
     pub(crate) speed: Option<f64>,
     /// How often the power is cycled.
@@ -126,7 +126,7 @@ pub(crate) struct Shown {
 /// The last line of every demonstration: how long it took, and how long the machine lived.
 pub(crate) fn took(wall: Duration, lived: Time) -> String {
     format!(
-        "took {:.1} s; the emulated machine lived {:.0} s meanwhile",
+        "took {:.1} s, in which {:.0} s passed on the emulated machine",
         wall.as_secs_f64(),
         lived.seconds()
     )

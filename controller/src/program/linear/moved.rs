@@ -55,13 +55,13 @@ fn warning(moved: &Moved) -> Option<String> {
     match moved.corrected {
         Corrected::Within => None,
         Corrected::No => Some(
-            "NOT CORRECTED: the axis has no calibration, the drive went to the target by its encoder \
-             alone and the point is off by whatever the stage deviates there; run `truestage \
-             calibrate`, or activate a calibration with `truestage cal activate`"
+            "NOT CORRECTED: the axis has no calibration, so the drive went to the target by its \
+             encoder alone and the point is off by the deviation of the stage there; run \
+             `truestage calibrate`, or activate a calibration with `truestage cal activate`"
                 .into(),
         ),
         Corrected::Held { first, last } => Some(format!(
-            "{}; the correction of its end was held, and how the stage deviates here nobody \
+            "{}; the correction at its end was held, and the deviation of the stage here was never \
              measured; calibrate a wider range, or set end_policy = \"refuse\"",
             beyond(first, last)
         )),
@@ -70,8 +70,9 @@ fn warning(moved: &Moved) -> Option<String> {
             last,
             distance,
         } => Some(format!(
-            "{}; the correction of its end fades to nothing over {} mm, and how the stage deviates \
-             here nobody measured; calibrate a wider range, or set end_policy = \"refuse\"",
+            "{}; the correction at its end fades to zero over {} mm, and the deviation of the \
+             stage here was never measured; calibrate a wider range, or set end_policy = \
+             \"refuse\"",
             beyond(first, last),
             Short(distance.mm())
         )),
@@ -126,7 +127,8 @@ mod tests {
         let (first, last) = RANGE;
         check(Corrected::Within, Some(ID), "yes", None);
         check(Corrected::No, None, "no", Some("NOT CORRECTED"));
-        let said = "61 mm is BEYOND THE CALIBRATED RANGE of 0 to 60 mm; the correction of its end was held";
+        let said = "61 mm is BEYOND THE CALIBRATED RANGE of 0 to 60 mm; the correction at its end \
+                    was held";
         check(
             Corrected::Held { first, last },
             Some(ID),
@@ -138,11 +140,6 @@ mod tests {
             last,
             distance: Metres::from_mm(5.0),
         };
-        check(
-            fading,
-            Some(ID),
-            "fading",
-            Some("fades to nothing over 5 mm"),
-        );
+        check(fading, Some(ID), "fading", Some("fades to zero over 5 mm"));
     }
 }

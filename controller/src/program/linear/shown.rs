@@ -44,7 +44,7 @@ impl Show for LinearContent {
             }));
         }
         if values.is_empty() {
-            lines.push("  no position stands in both".into());
+            lines.push("  the two have no position in common".into());
         }
         Some((lines, values))
     }

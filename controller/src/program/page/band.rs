@@ -1,4 +1,4 @@
-//! How sure a curve is, as a band around it that is seen beside the curve.
+//! The uncertainty of a curve, as a band around it that is wide enough to be seen.
 
 use super::chart::{Mark, Series};
 

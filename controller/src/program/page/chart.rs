@@ -193,11 +193,11 @@ pub(crate) fn cross((x, y): (f64, f64), half: f64, reach: f64, unit: &str) -> St
     let (left, right, top, bottom) = (x - half, x + half, y - half, y + half);
     let unit = escape(unit);
     format!(
-        "<g stroke=\"#e4e9ef\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{0:.1}\" height=\"{0:.1}\" \
-         fill=\"none\"/><line x1=\"{left:.1}\" x2=\"{right:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
-         <line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{top:.1}\" y2=\"{bottom:.1}\"/></g>\
-         <g font-size=\"12\" fill=\"#566\"><text x=\"{left:.1}\" y=\"{1:.1}\">x from {2:.2} to \
-         {reach:.2} {unit}, y as far</text></g>",
+        "<g stroke=\"#e4e9ef\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{0:.1}\" \
+         height=\"{0:.1}\" fill=\"none\"/><line x1=\"{left:.1}\" x2=\"{right:.1}\" y1=\"{y:.1}\" \
+         y2=\"{y:.1}\"/><line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{top:.1}\" \
+         y2=\"{bottom:.1}\"/></g><g font-size=\"12\" fill=\"#566\"><text x=\"{left:.1}\" \
+         y=\"{1:.1}\">x from {2:.2} to {reach:.2} {unit}, the same for y</text></g>",
         2.0 * half,
         bottom + 18.0,
         -reach

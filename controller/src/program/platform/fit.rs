@@ -66,7 +66,7 @@ pub(crate) fn run(args: &ScrewArgs, output: Output) -> Ended {
     let file = args.data.display().to_string();
     let series = StrokeSeries::from_csv(&read(&args.data)?, &file)?;
     if args.method == Method::Patent && args.lead_mm.is_some() {
-        output.note("note: the patent's method knows no periodic error; --lead-mm has no effect");
+        output.note("note: the patent's method has no periodic error; --lead-mm has no effect");
     }
     let mut axes = Vec::new();
     for strokes in series.axes() {
@@ -156,7 +156,7 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
     }
     if fitted.lack_of_fit.is_some_and(|it| it.significant) {
         text += "\n  the strokes scatter more than their repetitions: the screw has errors that \
-                 this model does not know; the uncertainties contain them";
+                 this model does not describe; the uncertainties include them";
     }
     text += &outlier_lines(&fitted.outliers, &strokes.lines);
     Ok(Estimated {

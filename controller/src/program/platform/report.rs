@@ -1,4 +1,5 @@
-//! Pages of an alignment platform: what each pose was off, what each screw does, where the zero is.
+//! Pages of an alignment platform: the error of each pose, the deviations of each screw, and where
+//! the zero is.
 
 use core::fmt::Write as _;
 

@@ -42,7 +42,7 @@ fn whole_only(args: &AxisArgs) -> Result<(), Failure> {
     };
     Err(Failure::Usage {
         what: format!("{axis} is part of a platform, whose screws only work together"),
-        help: "leave --axis out: the verb is for all of them".into(),
+        help: "leave --axis out: the command is for all of them".into(),
     })
 }
 
@@ -80,8 +80,9 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     never_resumed(args.resume.is_some())?;
     if args.accept_drift {
         return Err(Failure::Usage {
-            what: "a platform that drifted is not calibrated".into(),
-            help: "leave --accept-drift out; wait for the temperature, or set closure_limit_um"
+            what: "a platform that has drifted cannot be calibrated".into(),
+            help: "leave --accept-drift out; wait until the temperature has settled, or raise \
+                   closure_limit_um"
                 .into(),
         });
     }
@@ -146,7 +147,7 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         with_zeroed_platform(&args.machine, "move", output, possible, run)?;
     let calibrated = calibrations.iter().all(|(_, id)| id.is_some());
     let mut text = format!(
-        "platform: told to be at {}, the camera sees it at {}",
+        "platform: target {}, the camera sees it at {}",
         pose_text(target),
         pose_text(seen)
     );
@@ -181,7 +182,7 @@ fn moved_text(moved: &PoseMoved) -> String {
     let mut text = format!("\nscrews: {}{skew}", set_points.join(", "));
     for it in &moved.taken_up {
         let doubt = it.standard_uncertainty.map_or(String::new(), |u| {
-            format!(" (its place was uncertain by {:.3} µm)", u.um())
+            format!(" (standard uncertainty of its place {:.3} µm)", u.um())
         });
         text += &format!("\nplay of {} taken up first{doubt}", it.axis);
     }
@@ -352,7 +353,7 @@ fn target_pose(words: &[String]) -> Result<Pose, Failure> {
     let mut named = Vec::new();
     for word in words {
         let usage = || Failure::Usage {
-            what: format!("`{word}` is no part of a pose"),
+            what: format!("`{word}` is not part of a pose"),
             help: "write x=1mm, y=-300um, theta=20arcsec or theta=0.5deg, each once".into(),
         };
         let (name, value) = word.split_once('=').ok_or_else(usage)?;

@@ -25,7 +25,8 @@ const SHOWN: usize = 8;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum PlanCommand {
-    /// Offsets of a plate on a rotary table that amplify noise least, or what given ones do.
+    /// Offsets of a plate on a rotary table that amplify noise least, or the amplification of given
+    /// ones.
     Rotary(PlanArgs),
 }
 
@@ -63,16 +64,17 @@ pub(crate) struct RotaryArgs {
     /// Lines of the plate; one more than the largest in the file when not given.
     #[arg(long)]
     lines: Option<usize>,
-    /// Standard uncertainty of one reading, to be propagated besides what the residuals say.
+    /// Standard uncertainty of one reading, to be propagated in addition to that from the
+    /// residuals.
     #[arg(long, value_name = "ARCSEC")]
     reading_noise_arcsec: Option<f64>,
-    /// Refuse what amplifies noise more than this.
+    /// Refuse a series that amplifies noise more than this.
     #[arg(long, value_name = "FACTOR", default_value_t = amplification_max())]
     amplification_limit: f64,
     /// Store it as a calibration of this machine.
     #[arg(long, value_name = "CONFIG")]
     save: Option<PathBuf>,
-    /// The rotary axis it belongs to; the only one when there is one.
+    /// The rotary axis it belongs to; may be left out when there is only one.
     #[arg(long)]
     axis: Option<String>,
     /// With --save: the plate's serial number. Only with that plate the stored table can be
@@ -224,7 +226,7 @@ fn solution_text(solution: &Solution) -> String {
     }
     for it in &solution.outliers {
         let (name, residual) = (name(&it.reading), it.residual.arcsec());
-        text += &format!("\n  left out: {name}, {residual:+.3} ″ from what the others say");
+        text += &format!("\n  left out: {name}, {residual:+.3} ″ from what the others predict");
     }
     for it in &solution.missing {
         text += &format!("\n  missing: {}", name(it));
@@ -245,8 +247,8 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
         (None, 1) => axes.keys().next().expect("there is one").clone(),
         (None, 0) => {
             return Err(Failure::Usage {
-                what: format!("{}: no axis is a rotary one", path.display()),
-                help: "a rotary error table cannot be stored for any of them".into(),
+                what: format!("{}: this machine has no rotary axis", path.display()),
+                help: "a rotary error table can be stored only for a rotary axis".into(),
             });
         }
         (None, _) => {

@@ -39,8 +39,8 @@ pub(crate) fn render_with(
     if header.verb == "calibrate" {
         html += &match residuals_of(journal) {
             Some(it) => residuals(&it),
-            None => "<p class=\"note\">The placements read so far do not part table and \
-                     plate.</p>"
+            None => "<p class=\"note\">The placements read so far do not separate the errors of \
+                     table and plate.</p>"
                 .to_owned(),
         };
     }
@@ -174,7 +174,7 @@ fn calibration(content: &RotaryContent) -> String {
         content.degrees_of_freedom,
         content.noise_amplification,
         chart(
-            "Table error and how sure it is",
+            "Table error and its standard uncertainty",
             ("table angle (°)", "reading − true angle (″)"),
             &table_series,
             None,
@@ -229,8 +229,8 @@ fn residuals(each: &[(Radians, Radians)]) -> String {
         .map(|(at, residual)| (at.degrees(), residual.arcsec()));
     let dots = [series("one reading", BLUE, Mark::Dots, points.collect())];
     format!(
-        "<h2>Residuals</h2><p>What is left of each reading, all placements together.</p>\
-         <figure>{}</figure>",
+        "<h2>Residuals</h2><p>What the fit leaves of each reading, all placements \
+         together.</p><figure>{}</figure>",
         chart(
             "Residuals of all placements",
             ("table angle (°)", "reading − model (″)"),
@@ -246,7 +246,8 @@ fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog
     let offset = offset.unwrap_or(0.0);
     let mut html = format!("<h2>As found and as left{}</h2>", escape(name));
     if !judged.plate_known {
-        html += "<p>No calibration knows the plate: its errors are in these deviations.</p>";
+        html += "<p>No calibration contains this plate: its errors are part of these \
+                 deviations.</p>";
     }
     html += "<table><tr><th></th><th>largest (″)</th><th>rms (″)</th></tr>";
     let left = judged.left_rad.as_ref();

@@ -167,7 +167,7 @@ pub(crate) fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&s
         .standard_uncertainty
         .map_or(String::new(), |u| format!(", u = {:.4}″", u.arcsec()));
     format!(
-        "axis {axis}: told {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
+        "axis {axis}: target {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
         moved.target.degrees(),
         moved.set_point.degrees(),
         moved.expected.degrees(),
@@ -181,9 +181,9 @@ fn uncorrected(axis: &str, calibration: Option<&str>) -> String {
         return String::new();
     }
     format!(
-        "\naxis {axis}: NOT CORRECTED: the axis has no calibration and is off by whatever its encoder \
-         deviates there; run `truestage calibrate`, or activate a calibration with `truestage cal \
-         activate`"
+        "\naxis {axis}: NOT CORRECTED: the axis has no calibration and is off by the deviation of \
+         its encoder there; run `truestage calibrate`, or activate a calibration with `truestage \
+         cal activate`"
     )
 }
 
@@ -226,7 +226,8 @@ pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
         let (line, offset) = (it.reading.line, it.reading.offset);
         let residual = it.residual.arcsec();
         text += &format!(
-            "\n  left out: line {line} at offset {offset}, {residual:+.3}″ from what the others say"
+            "\n  left out: line {line} at offset {offset}, {residual:+.3}″ from what the others \
+             predict"
         );
     }
     if !solution.missing.is_empty() {
@@ -258,7 +259,7 @@ pub(crate) fn verified_text(verified: &RotaryVerified) -> String {
     let whose = if verified.plate_known {
         ""
     } else {
-        " (table and plate together: no calibration knows the plate)"
+        " (errors of table and plate together: no calibration contains this plate)"
     };
     let mut text = figures_text("as found", &verified.found) + whose;
     if let Some(left) = &verified.left {
@@ -270,7 +271,7 @@ pub(crate) fn verified_text(verified: &RotaryVerified) -> String {
     }
     if let Some(noise) = verified.noise {
         text += &format!(
-            "\n  the scatter of these readings, {:.3}″ rms, is in it",
+            "\n  this includes the scatter of these readings, {:.3}″ rms",
             noise.arcsec()
         );
     }
@@ -317,7 +318,7 @@ fn target(text: &str) -> Result<(String, Radians), Failure> {
         Some((named?, angle(value)?))
     });
     parsed.ok_or_else(|| Failure::Usage {
-        what: format!("`{text}` is no target"),
+        what: format!("`{text}` is not a target"),
         help: "write AXIS=ANGLE with a unit: c=90deg, c=-30arcmin, c=20arcsec, c=1.5rad".into(),
     })
 }

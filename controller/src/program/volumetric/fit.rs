@@ -216,7 +216,7 @@ fn save(
     if seen != expected {
         return Err(Failure::Usage {
             what: format!("temperatures of {seen} thermometers, the machine has {expected}"),
-            help: "say with --temperatures-c what they showed when the lines were read".into(),
+            help: "give with --temperatures-c what they showed when the lines were read".into(),
         });
     }
     let store = store_of(&machine.machine);
@@ -263,7 +263,7 @@ fn same_machine(
         if expected != seen {
             return Err(Failure::Usage {
                 what: format!(
-                    "{}: its {what} is `{expected}`, that of the machine `{seen}`",
+                    "{}: its {what} is `{expected}`, but that of the machine is `{seen}`",
                     path.display()
                 ),
                 help: "give the configuration that the run was made with".into(),
@@ -283,7 +283,8 @@ fn stored_text(config: &Path, (geometry, references): &(String, Option<String>))
     };
     let then = match references {
         Some(id) => format!("{} with its references", activate(id)),
-        None => "`truestage reference` while the machine is as warm as it was then".to_owned(),
+        None => "`truestage reference` while the machine has the temperature that it had then"
+            .to_owned(),
     };
     format!(
         "\nstored as {}; use it with {}, then {then}",
@@ -384,7 +385,7 @@ mod tests {
             let refused = desk.save(path).expect_err("they scatter");
             assert_eq!(refused.exit_code(), 5, "{refused}");
             let text = refused.to_string();
-            assert!(text.contains("times as much as was stated"), "{text}");
+            assert!(text.contains("times as much as their stated"), "{text}");
             assert!(text.contains(&format!("line {}", DIAGONAL + 1)), "{text}");
             assert!(desk.store.list().unwrap().is_empty());
         }

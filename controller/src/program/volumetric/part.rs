@@ -72,7 +72,8 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     }
     if let Some(kept) = &followed.kept {
         text += &format!(
-            "\nmade without what the detectors saw; {} keeps that: all later parts are made with it\n{}",
+            "\nthe errors that the detectors saw were not corrected in this part; {} keeps them: \
+             all later parts are made with them\n{}",
             short(&kept.id),
             kept_text(kept)
         );
@@ -90,8 +91,8 @@ fn before_it_moves(file: &Path, path: &CsvPath) -> String {
         .collect();
     let [from, to] = departure.lines;
     format!(
-        "{}: {} points along the cubic spline through the rows; it leaves their straight joins by \
-         {:.3} mm at most, at {:.3} s (lines {from} to {to}), {} mm",
+        "{}: {} points along the cubic spline through the rows; it departs from the straight lines \
+         between them by {:.3} mm at most, at {:.3} s (lines {from} to {to}), {} mm",
         file.display(),
         points.len(),
         departure.size.mm(),
@@ -122,8 +123,7 @@ fn judged(
     let path = read_path(text, engine.axes(), engine.period());
     let path = path.map_err(|source| Failure::Usage {
         what: format!("{}: {source}", file.display()),
-        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm, README.md says more"
-            .into(),
+        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm; see README.md".into(),
     })?;
     let checked = mover.check_path(&path.points);
     checked.map_err(|source| refused(source.into()))?;
@@ -205,7 +205,7 @@ impl CorrectedPath {
         let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
         if self.degraded > 0 {
             let (degraded, periods) = (self.degraded, self.periods);
-            text += &format!("\nnot all was known in {degraded} of {periods} periods");
+            text += &format!("\nthe correction lacked a value in {degraded} of {periods} periods");
         }
         if let Some(lack) = &self.without {
             text += &format!("; without {lack}");
@@ -253,7 +253,7 @@ fn kept_text(kept: &Remembered) -> String {
     });
     let axes: Vec<String> = axes.collect();
     format!(
-        "recorded along {}; beyond, the ends hold{}",
+        "recorded along {}; beyond that, the values at the ends hold{}",
         axes.join(", "),
         foreign_text(kept.foreign.as_deref())
     )
@@ -264,8 +264,8 @@ fn foreign_text(foreign: Option<&str>) -> String {
     let foreign = foreign.map(short);
     foreign.map_or_else(String::new, |it| {
         format!(
-            "\nthe second memory {it} counts beyond another first one: before the next part record it \
-             again (`truestage memory record`) or clear it (`truestage memory clear`)"
+            "\nthe second memory {it} counts from another first memory: before the next part, \
+             record it again (`truestage memory record`) or clear it (`truestage memory clear`)"
         )
     })
 }
@@ -287,8 +287,8 @@ pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
         .volumetric()?
         .clear_memory(&session.store, which)?;
     let text = match &before {
-        Some(id) => format!("{} is kept no more", short(id)),
-        None => "nothing was kept".into(),
+        Some(id) => format!("{} is no longer in use", short(id)),
+        None => "no memory was in use".into(),
     };
     let text = text + &foreign_text(foreign.as_deref());
     output.result(

@@ -164,7 +164,7 @@ fn curves(day: &[HourOfDay<'_>]) -> String {
     html + &temperatures(&readings)
 }
 
-const ALONG: (&str, &str) = ("way along the line (mm)", "deviation (µm)");
+const ALONG: (&str, &str) = ("distance along the line (mm)", "deviation (µm)");
 
 fn line(name: &'static str, colour: &'static str, points: Vec<(f64, f64)>) -> Series {
     Series {
@@ -313,7 +313,7 @@ pub(crate) fn geometry(content: &GeometryContent) -> String {
     if content.bends.is_empty() && content.expansions.is_empty() {
         return html;
     }
-    html += "<h2>What warmth does</h2><table><tr><th></th><th></th><th>u</th></tr>";
+    html += "<h2>Thermal effects</h2><table><tr><th></th><th></th><th>u</th></tr>";
     for it in &content.expansions {
         let _ = write!(
             html,

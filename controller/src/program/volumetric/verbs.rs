@@ -94,9 +94,9 @@ fn has_a_volume(config: &MachineConfig) -> Result<(), Failure> {
     Err(Failure::Usage {
         what:
             "`reference` is for three axes corrected throughout their volume, and this machine has \
-               no [volumetric]"
+             no [volumetric]"
                 .into(),
-        help: "to find an axis's origin run `truestage zero`".into(),
+        help: "to find the origin of an axis, run `truestage zero`".into(),
     })
 }
 
@@ -139,7 +139,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         Some(minutes) => {
             return Err(Failure::Usage {
                 what: format!("--warm-up-min is {minutes}"),
-                help: "give the minutes for which the axes go to and fro".into(),
+                help: "give the minutes for which the axes move to and fro".into(),
             });
         }
     };
@@ -199,13 +199,15 @@ pub(crate) fn unknown_text(unknown: &UnknownRecord) -> String {
     let mut text = String::new();
     for [axis, towards] in &unknown.bends {
         text += &format!(
-            "\n  guide of {axis} bends towards {towards}: not measured, for all lines were read at one warmth; it \
-             is not corrected and in no uncertainty: calibrate with --warm-up-min"
+            "\n  guide of {axis} bends towards {towards}: not measured, because all lines were \
+             read at the same temperature; it is not corrected and not included in any \
+             uncertainty: calibrate with --warm-up-min"
         );
     }
     for name in &unknown.without_effect {
         text += &format!(
-            "\n  {name}: taken as zero, no tool given shows it: give second_tool_offset_mm"
+            "\n  {name}: taken as zero, because no given tool offset shows it: give \
+             second_tool_offset_mm"
         );
     }
     text

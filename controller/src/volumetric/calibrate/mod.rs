@@ -1,5 +1,5 @@
-//! Calibrate: lines by laser interferometer and by the machine's own detectors, cold and, for what
-//! warmth does, warm; one identification of all of them with its covariance.
+//! Calibrate: lines by laser interferometer and by the machine's own detectors, cold and, for the
+//! thermal errors, warm; one identification of all of them with its covariance.
 //!
 //! The references of the detectors are taken first: what the tables hold for is the machine as it
 //! was then. While lines are read it goes on warming up. What the detectors see of that, and what
@@ -61,7 +61,7 @@ const WHOLE: &str = "volume";
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmUp {
-    /// It is not wanted: what scales and structure do in warmth is taken from the configuration, and
+    /// No warming up: the expansion of scales and structure is taken from the configuration, and
     /// how guides bend stays unknown.
     None,
     /// Something else warms it for so long, while the axes are switched off.
@@ -85,8 +85,8 @@ pub struct VolumetricCalibrated {
     pub agreement: AgreementRecord,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
-    /// What stays unknown: guides that bend by the configuration, by how much nobody knows, for no
-    /// warm lines told it; errors that no line sees.
+    /// What stays unknown: by how much those guides bend that bend according to the configuration,
+    /// because no warm lines were read; errors that no line sees.
     pub unknown: UnknownRecord,
     /// Where every reading is.
     pub journal: PathBuf,

@@ -18,10 +18,10 @@ use crate::volumetric::{
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 
 /// How the errors of the machine of `config` are found, and by which lines; `is_warm`: with lines
-/// that are read again when it is warmer, which tell what warmth does.
+/// that are read again when it is warmer, which determine the thermal errors.
 ///
 /// # Errors
-/// When it is not configured, or chain or volume are none.
+/// When it is not configured, or the chain or the volume is invalid.
 pub(crate) fn volume_plan(
     config: &VolumetricConfig,
     is_warm: bool,

@@ -1,4 +1,4 @@
-//! Readings that scatter too much, in the words of who set the lines up.
+//! Readings that scatter too much, named by the lines that the operator set up.
 
 use core::fmt;
 
@@ -96,8 +96,9 @@ impl fmt::Display for Scatter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the readings scatter {:.2} times as much as was stated of them, {:.2} times is the limit \
-             ({} readings beyond the unknowns); nothing was stored, what was in use stays in use",
+            "the readings scatter {:.2} times as much as their stated uncertainties, the limit is \
+             {:.2} times ({} readings beyond the unknowns); nothing was stored, what was in use \
+             stays in use",
             self.seen, self.limit, self.spare
         )?;
         for (at, it) in self.worst.iter().enumerate() {
@@ -105,16 +106,16 @@ impl fmt::Display for Scatter {
             let head = if at == 0 { "; look first at" } else { "," };
             write!(
                 f,
-                "{head} line {} ({}) at ({x:.3}, {y:.3}, {z:.3}) mm, {} off what the others say, {:.0} \
-                 times what is to be expected",
+                "{head} line {} ({}) at ({x:.3}, {y:.3}, {z:.3}) mm, {} off what the others \
+                 predict, {:.0} times what is expected",
                 it.line, it.purpose, it.off, it.times
             )?;
         }
         f.write_str(
-            "; a lost beam, steps of half a wavelength, a loose reflector, vibration or a machine that \
-             changed between two lines are usual causes: mend that and calibrate again; or the nodes are \
-             too far apart for errors that change so fast (step_mm), or the instrument does not do what \
-             is stated of it (instrument_standard_uncertainty_nm)",
+            "; a lost beam, steps of half a wavelength, a loose reflector, vibration or a machine \
+             that changed between two lines are usual causes: remove the cause and calibrate \
+             again; or the nodes are too far apart for errors that change so fast (step_mm), or \
+             the instrument is less certain than stated (instrument_standard_uncertainty_nm)",
         )
     }
 }
@@ -146,7 +147,7 @@ mod tests {
         .to_string();
         for part in [
             "546.00 times",
-            "2.00 times is the limit",
+            "the limit is 2.00 times",
             "210 readings",
             "nothing was stored",
             "line 17 (squarenesses) at (500.000, 400.000, 300.000) mm, +1000.00 um off",

@@ -71,7 +71,7 @@ fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
             ),
             (true, false) => judge.say(
                 key,
-                "a beam that drifts like this has no such key",
+                "a beam that drifts like this does not take this key",
                 "remove it",
             ),
             (true, true) | (false, false) => {}
@@ -118,7 +118,7 @@ fn check_saturation(
     judge.say(
         "saturation_v",
         format!(
-            "channel {channel} of {} is read up to {range_v} V only",
+            "channel {channel} of {} reads only up to {range_v} V",
             detector.analog
         ),
         format!("give at most {range_v}"),
@@ -166,8 +166,8 @@ fn claim<'a>(
     } else if !taken.insert(input) {
         judge.say(
             key,
-            format!("channel {channel} of {module} belongs to another detector already"),
-            "each input is one detector's",
+            format!("channel {channel} of {module} already belongs to another detector"),
+            "each input belongs to one detector only",
         );
     }
 }

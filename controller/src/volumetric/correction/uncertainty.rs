@@ -1,4 +1,4 @@
-//! How sure the correction is: by what stands behind each value that is used.
+//! The uncertainty of the correction, from the uncertainty of each value that is used.
 
 use compensator::volumetric::Point;
 use compensator::volumetric::model::Conditions;

@@ -199,7 +199,7 @@ impl WorkVolume<'_> {
         })
     }
 
-    /// Nothing is measured any more: the instrument may be packed up.
+    /// The measurement has ended: the instrument may be packed up.
     ///
     /// # Errors
     /// When nobody can be told.

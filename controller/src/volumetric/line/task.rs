@@ -90,8 +90,8 @@ fn millimetres(point: Point) -> String {
     format!("({x:.3}, {y:.3}, {z:.3}) mm")
 }
 
-/// Who sets lines up. The machine lives on while it waits: it asks once, and then again and again
-/// whether it has been done. The axes are switched off meanwhile; that is no safe stop.
+/// Who sets up lines. The machine keeps running while it waits: it asks once, and then repeatedly
+/// whether it has been done. The axes are switched off meanwhile, which is not a safe stop.
 pub trait LineOperator {
     /// Asks for a line.
     ///

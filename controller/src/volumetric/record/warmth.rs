@@ -1,4 +1,4 @@
-//! What warmth does to three axes, as it was found with their errors.
+//! The thermal errors of three axes, as they were found together with their other errors.
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::identify::{

@@ -1,4 +1,4 @@
-//! What every CANopen device has in common: who it is, whether it lives, how it starts.
+//! What every CANopen device has in common: identity, heartbeat, start procedure.
 //!
 //! Source: CiA 301 (7.3.2 NMT, 7.2.8.3.2 heartbeat, 7.2.7 EMCY); the order of the start
 //! procedure follows CiA 302-2: boot-up or answer, device type, identity, configuration,
@@ -372,7 +372,7 @@ impl CanopenNode {
     }
 
     fn probe(&mut self, now: Time) {
-        let step = Step::read(identity::DEVICE_TYPE, "asking who it is");
+        let step = Step::read(identity::DEVICE_TYPE, "reading its identity");
         self.run_script(now, Script::new([step]));
     }
 

@@ -85,7 +85,7 @@ pub struct NodeSettings {
     pub sync_period: Duration,
     /// So many SYNCs without process data are an alarm.
     pub missed_pdos_max: u32,
-    /// How often reads and configuration writes are begun anew.
+    /// How often reads and configuration writes are repeated.
     pub retry: Retry,
     /// How long each thing is waited for.
     pub timeouts: NodeTimeouts,

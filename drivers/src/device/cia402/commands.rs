@@ -74,7 +74,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             } => self.begin_move(now, (target, speed, acceleration), true),
             AxisCommand::Start => match prepared {
                 Some(prepared) => self.begin_prepared(now, prepared),
-                None => self.refuse("starting", "a move that was prepared right before"),
+                None => self.refuse("starting", "a move that was prepared immediately before"),
             },
             AxisCommand::HomeNegativeLimit { position, speed } => {
                 self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));

@@ -1,8 +1,9 @@
 //! Whether the axis goes where its drive wants it to.
 //!
 //! The demand is the position and the following error (0x60F4 = demand − actual). When both have
-//! left the place where the motion began, in opposite directions, then phases, encoder or
-//! polarity are exchanged: the further the axis goes the harder the drive pushes it on.
+//! left the place where the motion began, in opposite directions, then the motor phases are
+//! swapped, or the encoder or the polarity is reversed: the further the axis goes, the harder the
+//! drive pushes it on.
 
 use units::{Coordinate, Counts};
 

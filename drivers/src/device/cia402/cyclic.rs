@@ -10,7 +10,7 @@
 //! ([`Cia402Settings::synchronous_start`](super::Cia402Settings::synchronous_start)).
 //!
 //! Of the statusword two bits are watched meanwhile: 12, "drive follows the command value", and 11,
-//! "internal limit active". A drive that never sets bit 12 is not reproached with it.
+//! "internal limit active". For a drive that never sets bit 12 this is no alarm.
 //!
 //! Absent: offsets of velocity and torque (0x60B1, 0x60B2), modes 9 and 10.
 
@@ -142,7 +142,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return self.refuse(ENTERING, needs);
         }
         if !self.settings.synchronous_start {
-            let needs = "command PDOs that count at the SYNC: set synchronous_start for this axis";
+            let needs = "command PDOs that take effect at the SYNC: set synchronous_start for this \
+                         axis";
             return self.refuse(ENTERING, needs);
         }
         let Some((value, index)) = interpolation_period(period) else {
@@ -239,7 +240,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return Err(DeviceError::NotPossible {
                 device: self.node.name(),
                 step: "following a set-point",
-                needs: "an enabled drive in cyclic synchronous position, busy with nothing else",
+                needs: "an enabled drive in cyclic synchronous position, with nothing else under \
+                        way",
             });
         }
         let object = TARGET_POSITION.object;

@@ -93,7 +93,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
         let search = place.speed();
         if search.is_none() && !self.image.stands() {
-            self.refuse("homing here", "an axis that stands");
+            self.refuse("homing here", "an axis that stands still");
             return;
         }
         let method = place.method(self.settings.scale.resolution() < Q::ZERO);

@@ -1,4 +1,4 @@
-//! The newest process data of a drive, and whether it can be believed.
+//! The newest process data of a drive, and whether they are plausible.
 
 use core::time::Duration;
 use units::{Counts, Time};

@@ -348,8 +348,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         if now >= change.deadline {
             let (since, seen) = (change.since, self.seen_status());
             let awaited = match change.phase {
-                LatchPhase::SwitchingOff | LatchPhase::AwaitingOff => "the touch probe being off",
-                LatchPhase::SwitchingOn | LatchPhase::AwaitingOn => "the touch probe being armed",
+                LatchPhase::SwitchingOff | LatchPhase::AwaitingOff => {
+                    "the touch probe to be switched off"
+                }
+                LatchPhase::SwitchingOn | LatchPhase::AwaitingOn => "the touch probe to be armed",
             };
             self.time_out(now, since, awaited, seen);
         }
@@ -364,7 +366,7 @@ impl<Q: Coordinate> PositionLatch<Q> for Cia402Drive<Q> {
             self.outcome = Some(Err(DeviceError::NotPossible {
                 device: self.node.name(),
                 step: STEP,
-                needs: "a drive that does nothing else",
+                needs: "a drive with nothing else under way",
             }));
             return;
         }
@@ -376,7 +378,7 @@ impl<Q: Coordinate> PositionLatch<Q> for Cia402Drive<Q> {
             _ if !self.node.is_in_service() => self.refuse_out_of_service(),
             LatchCommand::Disarm => self.begin_latch(now, None),
             LatchCommand::Arm { .. } if !self.image.stands() => {
-                self.refuse(STEP, "an axis that stands");
+                self.refuse(STEP, "an axis that stands still");
             }
             LatchCommand::Arm { repeat, spacing } => {
                 let speed_max = self.latch_speed_max(spacing).value();

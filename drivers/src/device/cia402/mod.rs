@@ -6,13 +6,13 @@
 //! Process data: TPDO 1 carries statusword, position and mode, TPDO 2 (if wanted) the following
 //! error, TPDO 3 (if wanted) the touch probe, all at every SYNC. RPDO 1 carries controlword **and**
 //! target position in one frame, taken over at once (or, in a group that starts together, at the
-//! next SYNC): no adapter that re-orders frames can part a target from the edge that
-//! makes it count, and a quick stop waits for no SDO. Velocity and accelerations change seldom;
-//! they are written by SDO, read back, before the move that needs them.
+//! next SYNC): no adapter that re-orders frames can separate a target from the edge that makes it
+//! take effect, and a quick stop waits for no SDO. Velocity and accelerations change seldom; they
+//! are written by SDO, read back, before the move that needs them.
 //!
-//! Nothing is concluded from a command having been sent: each step waits for the statusword,
-//! and a controlword that seems to be without effect is sent again. All levels, no edge but the
-//! fault reset's: a repetition is harmless.
+//! Nothing is concluded from a command having been sent: each step waits for the statusword, and a
+//! controlword that seems to be without effect is sent again. All bits act by their level, except
+//! for the edge of the fault reset: a repetition is harmless.
 //!
 //! Absent: cyclic synchronous velocity and torque, interpolated position, the second touch probe.
 

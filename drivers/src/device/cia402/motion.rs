@@ -58,10 +58,10 @@ impl Move {
         match self.phase {
             MovePhase::Preparing => "the move's parameters",
             MovePhase::AwaitingMode => "the mode profile position",
-            MovePhase::Releasing => "the release of an older set-point",
-            MovePhase::Raising => "the acknowledge of the set-point",
-            MovePhase::Lowering => "the release of the set-point",
-            MovePhase::Running => "the target reached",
+            MovePhase::Releasing => "an older set-point to be released",
+            MovePhase::Raising => "the set-point to be acknowledged",
+            MovePhase::Lowering => "the set-point to be released",
+            MovePhase::Running => "the target to be reached",
         }
     }
 }
@@ -308,7 +308,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 && !sample.status.contains(Statusword::MODE_12)
         });
         if !ready || self.on_the_wire(prepared.set_point) != Some(self.target) {
-            self.refuse("starting", "a drive that is still as it was prepared");
+            self.refuse(
+                "starting",
+                "a drive whose mode and set-point have not changed since the move was prepared",
+            );
             return;
         }
         self.reached = None;
@@ -431,7 +434,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         if now >= halt.deadline {
             let since = halt.since;
             let seen = self.seen_status();
-            self.time_out(now, since, "the axis standing after a halt", seen);
+            self.time_out(now, since, "the axis to stand still after a halt", seen);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What a drive says of itself, and what of it is an alarm.
+//! What a drive reports of itself, and what of it is an alarm.
 
 use units::{Coordinate, Time};
 use wire::can::CanFrame;

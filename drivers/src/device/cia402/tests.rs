@@ -710,7 +710,7 @@ fn a_set_point_that_is_not_acknowledged_times_out() {
     assert!(
         error
             .to_string()
-            .contains("the acknowledge of the set-point"),
+            .contains("the set-point to be acknowledged"),
         "{error}"
     );
 }

@@ -16,7 +16,7 @@ use crate::device::{DeviceError, Seen, Urgency};
 
 const PREPARING: &str = "setting the homing parameters";
 const STARTING: &str = "starting the homing";
-const RESOLVING: &str = "finding out whether homing has begun";
+const RESOLVING: &str = "checking whether homing has begun";
 const LIMITING: &str = "setting the software limits";
 /// The way off the switch is so much slower than the way to it.
 const SLOWER: i64 = 5;
@@ -85,7 +85,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
         let search = place.speed();
         if search.is_none() && self.image.events.contains(EventStatus::IN_MOTION) {
-            self.refuse("homing here", "an axis that stands");
+            self.refuse("homing here", "an axis that stands still");
             return;
         }
         let steps = self.homing_steps(position, place);

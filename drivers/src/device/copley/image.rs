@@ -1,4 +1,4 @@
-//! The newest look at an amplifier, and whether it can be believed.
+//! The newest state read from an amplifier, and whether it is plausible.
 
 use core::time::Duration;
 use std::collections::VecDeque;

@@ -5,14 +5,14 @@
 //! supervision of one axis.
 //!
 //! Up to some four amplifiers share a line. Each has a driver of its own, which takes its turn
-//! ([`LineUse`]) for one exchange at a time: command and reply, and what has to be
-//! done when the reply is missing (`link`). Urgency decides whose turn it is: stops, then starts,
-//! then steps of commands, then looks at how things are.
+//! ([`LineUse`]) for one exchange at a time: command and reply, and what has to be done when the
+//! reply is missing (`link`). Urgency decides whose turn it is: stops, then starts, then steps of
+//! commands, then readings of the amplifier's state.
 //!
-//! Nothing guards the digits on the line: what a move needs is read back before it can begin, and
-//! a position that cannot be is not believed. `ok` says only that a command was understood:
-//! motion is what the trajectory status says. A lost reply to `t 1` is never answered by another
-//! `t 1` before that status and the commanded position have shown that nothing has begun.
+//! The protocol has no checksum: what a move needs is read back before it can begin, and an
+//! impossible position is rejected. `ok` says only that a command was understood: motion is what
+//! the trajectory status says. A lost reply to `t 1` is never answered by another `t 1` before that
+//! status and the commanded position have shown that nothing has begun.
 //!
 //! The amplifier's own coordinates stay as its homing made them, 0 at home; which coordinate that
 //! is, this driver remembers. The home offset (0xc6) is kept 0, since amplifiers move by it.
@@ -353,7 +353,7 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
         let (baud, at_reset) = (self.settings.baud, BAUD_AT_RESET);
         self.link.is_searching().then(|| {
             format!(
-                "the amplifier at the cable, at {baud} bit/s and, after a BREAK, {at_reset} bit/s"
+                "the amplifier with address 0, at {baud} bit/s and, after a BREAK, {at_reset} bit/s"
             )
         })
     }
@@ -437,7 +437,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
             } => self.begin_move(now, (target, speed, acceleration), false),
             AxisCommand::Start => match prepared {
                 Some(plan) => self.begin_prepared(now, plan),
-                None => self.refuse("starting", "a move that was prepared right before"),
+                None => self.refuse("starting", "a move that was prepared immediately before"),
             },
             AxisCommand::HomeNegativeLimit { position, speed } => {
                 self.begin_homing(now, position, HomingPlace::NegativeLimit(speed));
@@ -445,7 +445,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
             AxisCommand::HomeNextIndex { .. } => {
                 self.refuse(
                     "homing on the next index mark",
-                    "a drive that looks for it itself",
+                    "a drive that searches for the mark by itself",
                 );
             }
             AxisCommand::HomeIndex { position, speed } => {

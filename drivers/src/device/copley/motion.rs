@@ -15,7 +15,7 @@ use crate::device::{DeviceError, Urgency};
 
 const LOADING: &str = "loading the move";
 const STARTING: &str = "starting the move";
-const RESOLVING: &str = "finding out whether the move has begun";
+const RESOLVING: &str = "checking whether the move has begun";
 
 /// A move, in the amplifier's units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -280,7 +280,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         if now >= motion.deadline {
             let since = motion.since;
             let seen = self.seen_position();
-            self.time_out(now, since, "the target reached", seen);
+            self.time_out(now, since, "the target to be reached", seen);
         }
     }
 
@@ -313,7 +313,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         if now >= halt.deadline {
             let since = halt.since;
             let seen = self.seen_events();
-            self.time_out(now, since, "the axis standing after a halt", seen);
+            self.time_out(now, since, "the axis to stand still after a halt", seen);
         }
     }
 }

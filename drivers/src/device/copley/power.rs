@@ -265,13 +265,13 @@ impl<Q: Coordinate> CopleyAxis<Q> {
                 self.disable(now, deadline, Urgency::Stop);
             }
             Phase::Checking | Phase::Enabling | Phase::AwaitingOn => {
-                self.time_out(now, since, "the amplifier being enabled", seen);
+                self.time_out(now, since, "the amplifier to be enabled", seen);
             }
             Phase::Disabling | Phase::AwaitingOff => {
-                self.time_out(now, since, "the amplifier being disabled", seen);
+                self.time_out(now, since, "the amplifier to be disabled", seen);
             }
             Phase::Listing | Phase::Clearing => {
-                self.time_out(now, since, "the faults being cleared", seen);
+                self.time_out(now, since, "the faults to be cleared", seen);
             }
         }
     }

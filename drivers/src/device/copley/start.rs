@@ -1,4 +1,4 @@
-//! The start: find it, ask who it is, set it up, look at it.
+//! The start: find the amplifier, read its identity, set it up, read its state.
 
 use units::{Coordinate, Counts, Time};
 use wire::copley::{Bank, DesiredState, EventStatus, Parameter};
@@ -8,7 +8,7 @@ use super::{Activity, CopleyAxis, read};
 use crate::device::copley::script::{Script, Step};
 use crate::device::{DeviceError, Identity, Urgency};
 
-const ASKING: &str = "asking who it is";
+const ASKING: &str = "reading its identity";
 
 /// How far the start is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! One exchange after the other: the steps of a command, and looks in between.
+//! One exchange after the other: the steps of a command, and readings of the state in between.
 
 use core::time::Duration;
 use units::{Coordinate, Time};
@@ -89,8 +89,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         self.kept = false;
         self.purpose = Purpose::Nothing;
         if !matches!(self.activity, Activity::Idle) {
-            let awaited = "an answer of the amplifier at the cable, at the line's rate or 9600 \
-                           after a BREAK";
+            let awaited = "an answer from the amplifier with address 0, at the line's rate or, \
+                           after a BREAK, at 9600 bit/s";
             let error = DeviceError::Timeout {
                 device: self.name(),
                 awaited,

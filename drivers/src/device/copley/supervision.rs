@@ -1,4 +1,4 @@
-//! Looking at the amplifier again and again, and what of it is an alarm.
+//! The periodic reading of the amplifier's state, and what of it is an alarm.
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};

@@ -291,7 +291,11 @@ impl InSight {
             // Somebody else triggers, or the job was loaded anew: which picture this is, and
             // when it was taken, nobody knows.
             self.counts.strangers += 1;
-            return self.failed(now, Question::Result, "a picture that nobody else triggers");
+            return self.failed(
+                now,
+                Question::Result,
+                "a picture that no other program triggers",
+            );
         }
         self.counts.pictures += 1;
         let Work::Measuring(measurement) = &mut self.work else {

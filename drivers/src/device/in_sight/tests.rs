@@ -370,7 +370,7 @@ fn somebody_elses_trigger_spoils_a_picture_and_is_counted() {
         bench.answers(&["1", "uvw.job"]);
         bench.result(count);
     }
-    assert!(bench.failure().contains("nobody else triggers"));
+    assert!(bench.failure().contains("no other program triggers"));
 }
 
 #[test]
@@ -398,7 +398,7 @@ fn pictures_without_target_or_judged_bad_are_left_out_up_to_a_limit() {
     let hidden = "1,0,0.000,0.000,0.000,40.000";
     let judged = "2,0,9.000,9.000,9.000,45.000";
     let (_, told) = rejected(&[absent; 4]);
-    assert!(told.contains("0 good pictures of 2"), "{told}");
+    assert!(told.contains("0 of 2 pictures were good"), "{told}");
     assert!(
         told.contains("4 showed no target and 0 were judged bad"),
         "{told}"

@@ -11,7 +11,7 @@ pub(super) const FAULTY: Alarm = Alarm::Own(&OwnAlarm {
 });
 pub(super) const SET_OTHERWISE: Alarm = Alarm::Own(&OwnAlarm {
     device: NAME,
-    what: "shows something else than before",
+    what: "its settings or the form of its values have changed",
     remedy: "set it back to one input, millimetres or inches, without a series; set a new datum",
 });
 pub(super) const JUMPED: Alarm = Alarm::Own(&OwnAlarm {

@@ -20,7 +20,7 @@ pub struct Nd287Settings {
     pub retries: u32,
     /// This many damaged lines in a row raise an alarm.
     pub garbage_lines_max: u64,
-    /// A value that is owed for this long is no late one: the count is taken for lost.
+    /// When a value has been due for this long it is not just late: the count is considered lost.
     pub silent_after: Duration,
 }
 

@@ -11,7 +11,7 @@ pub(super) enum Continuity {
     Doubtful,
     /// This many are missing before it.
     Gap(u64),
-    /// The firmware began to count anew.
+    /// The firmware's sequence number started again.
     Restart,
 }
 

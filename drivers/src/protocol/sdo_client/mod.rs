@@ -132,7 +132,7 @@ impl SdoClient {
         }
     }
 
-    /// Sets how often reads and idempotent writes are begun anew.
+    /// Sets how often reads and idempotent writes are repeated.
     #[must_use]
     pub const fn with_retry(mut self, retry: Retry) -> Self {
         self.retry = retry;
@@ -161,8 +161,8 @@ impl SdoClient {
         self.begin(now, object, Direction::Write(data.to_vec()), method, false)
     }
 
-    /// Begins to write `object`, where writing the same value twice does no harm: a failed
-    /// transfer is begun anew as [`SdoClient::with_retry`] allows.
+    /// Begins to write `object`, where writing the same value twice does no harm: a failed transfer
+    /// is repeated as [`SdoClient::with_retry`] allows.
     ///
     /// # Errors
     /// When a transfer runs.

@@ -57,7 +57,7 @@ pub enum Method {
     Block,
 }
 
-/// How often a failed transfer is begun anew.
+/// How often a failed transfer is repeated.
 ///
 /// # Example
 ///
@@ -111,7 +111,7 @@ pub enum SdoFailure {
         attempts: u32,
     },
     /// The server broke the protocol and was aborted.
-    #[error("{object}: broken off with {code} ({attempts} attempts)")]
+    #[error("{object}: aborted by this controller with {code} ({attempts} attempts)")]
     Protocol {
         object: Object,
         code: AbortCode,
@@ -161,7 +161,7 @@ pub struct Counters {
 
 /// A transfer was asked for while another one runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an SDO transfer with this server runs already")]
+#[error("an SDO transfer with this server is already running")]
 pub struct Busy;
 
 /// Whether the server cannot just now: worth another attempt after a pause.

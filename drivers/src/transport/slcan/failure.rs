@@ -27,11 +27,11 @@ impl fmt::Display for SlcanFailure {
         match self {
             Self::Silent { step, waited } => write!(
                 f,
-                "did not answer to `{step}` within {waited:?}; is it an SLCAN adapter (or are two \
-                 serial ports swapped?), is its baud rate right?"
+                "did not answer `{step}` within {waited:?}; is it an SLCAN adapter (or are two \
+                 serial ports swapped), and is its baud rate right?"
             ),
             Self::Refused { step } => write!(f, "refused `{step}`; unplug it and try again"),
-            Self::Gone => f.write_str("vanished while it was set up"),
+            Self::Gone => f.write_str("disappeared while it was being set up"),
         }
     }
 }

@@ -269,7 +269,7 @@ where
     let node = NodeId::new(raw);
     node.map(NodeId::raw).ok_or_else(|| {
         D::Error::custom(format_args!(
-            "node_id {raw} is no CANopen node, these are 1 to 127"
+            "node_id {raw} is not a CANopen node; nodes are 1 to 127"
         ))
     })
 }

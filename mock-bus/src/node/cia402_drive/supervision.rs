@@ -1,5 +1,5 @@
-//! The drive looks after itself: safe torque off, following error, limit switches, heartbeat,
-//! faults and their reset.
+//! The drive's own supervision: safe torque off, following error, limit switches, heartbeat, faults
+//! and their reset.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! The amplifier looks after itself, and says how it is.
+//! The amplifier's own supervision, and the state that it reports.
 
 use units::Time;
 use wire::copley::{EventStatus, Faults, Parameter, TrajectoryStatus};

@@ -1,14 +1,14 @@
 //! Emulated Copley Controls servo amplifiers behind one serial line.
 //!
 //! Source: ASCII Programmer's Guide, 16-01196 rev. 01 (pages below are its). One amplifier is at
-//! the cable; it obeys lines without a node number and hands the others on over CAN (p. 63).
-//! The rate of the line is that amplifier's alone: 9600 bit/s after power-on, reset and BREAK
-//! (p. 7), and its reply to a new rate comes at the new rate (p. 42).
+//! the cable; it obeys commands without a node number and forwards the others over CAN (p. 63). The
+//! rate of the line is that amplifier's alone: 9600 bit/s after power-on, reset and BREAK (p. 7),
+//! and its reply to a new rate comes at the new rate (p. 42).
 //!
-//! Impolite in what the guide warns of: at another rate than the host's it hears and says
-//! garbage, a low level of more than a byte's length is a BREAK, also when it is only the bits of
-//! a much slower host; for 100 ms after a change of rate it is deaf; a node that does not answer
-//! is error 32; `ok` to `t 1` says nothing about motion.
+//! It does what the guide warns of: at another rate than the host's it receives and sends garbage,
+//! a low level of more than a byte's length is a BREAK, also when it is only the bits of a much
+//! slower host; for 100 ms after a change of rate it is deaf; a node that does not answer is error
+//! 32; `ok` to `t 1` says nothing about motion.
 //!
 //! Absent: several axes in one amplifier, S-curves, velocity moves, writing the position,
 //! copying to and from flash, program registers, homing other than 512, 513, 529, 545

@@ -29,7 +29,9 @@ pub(crate) fn residuals(read: &VolumeLog, stored: Option<&GeometryContent>) -> S
         Ok(it) => it,
         Err(failure) => {
             let why = escape(&failure.to_string());
-            return format!("<p class=\"note\">No errors follow from these readings: {why}.</p>");
+            return format!(
+                "<p class=\"note\">No errors can be found from these readings: {why}.</p>"
+            );
         }
     };
     let points = (0..).zip(&evaluated.found.residuals);
