@@ -93,6 +93,16 @@ impl Emulated {
         self.simulation.borrow_mut()
     }
 
+    /// As [`EmulatedOnPtys::power_cycle`].
+    pub fn power_cycle(&self, drift: HallDrift) {
+        self.simulation_mut().power_cycle(drift);
+    }
+
+    /// As [`EmulatedOnPtys::turn_plate`].
+    pub fn turn_plate(&self, lines: f64) {
+        self.simulation_mut().turn_plate(lines);
+    }
+
     fn host_port(&self, simulated: Port) -> Option<Port> {
         self.ports
             .iter()

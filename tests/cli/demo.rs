@@ -103,6 +103,42 @@ fn the_rotary_table_shows_its_cycle() {
     check("rotary", "/verified/as_found/largest_arcsec", left, 0.3);
 }
 
+/// What is shown without terminals, and how soon, is the only difference.
+#[test]
+fn without_terminals_it_is_the_same() {
+    for machine in ["linear", "uvw", "rotary"] {
+        let Some((on_terminals, _)) = shown(machine) else {
+            return;
+        };
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let words = [
+            "demo",
+            "--machine",
+            machine,
+            "--data-dir",
+            ".",
+            "--in-process",
+        ];
+        let in_process = truestage(folder.path(), &words).with_code(0);
+        assert_eq!(figures(in_process), figures(on_terminals), "{machine}");
+    }
+}
+
+/// The numbers without the time on the wall, which is another one in every run, as are the names of files and the
+/// hashes of records, which say when they were made.
+fn figures(said: Value) -> Value {
+    match said {
+        Value::Object(fields) => fields
+            .into_iter()
+            .filter(|(key, _)| key != "wall_s")
+            .map(|(key, value)| (key, figures(value)))
+            .collect(),
+        Value::Array(values) => values.into_iter().map(figures).collect(),
+        Value::String(_) => Value::Null,
+        number => number,
+    }
+}
+
 /// The errors of the machine and their drift by far exceed what is left of them when it is corrected
 /// by what it sees; its tables alone drift away.
 #[test]

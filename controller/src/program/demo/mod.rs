@@ -2,8 +2,10 @@
 //!
 //! The emulated devices run in a thread of their own behind pseudo-terminals: CAN as SLCAN,
 //! everything else as serial lines. The controller side is the one of every other verb. Both
-//! share a clock that waits for them, so that every computer shows the same.
+//! share a clock that waits for them, so that every computer shows the same; so does the
+//! machine in this process (`--in-process`), sooner.
 
+pub(crate) mod emulation;
 pub(crate) mod stand;
 
 use std::io::IsTerminal;
@@ -11,14 +13,15 @@ use std::time::Instant;
 
 use machine::records::Lease;
 
+use self::emulation::Emulation;
 pub(crate) use self::stand::DemoArgs;
 use self::stand::{Stand, Which};
 use crate::config::{self, Loaded};
-use crate::emulated::EmulatedOnPtys;
+use crate::emulated::{Emulated, EmulatedOnPtys};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
-use crate::{Failure, Machine, ports, store_of};
+use crate::{Failure, Machine, store_of};
 
 pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     if args.machine == Which::Volumetric {
@@ -29,15 +32,10 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = args.machine.files();
-    let emulated = match args.speed {
-        None => EmulatedOnPtys::in_lockstep(description, args.seed)?,
-        Some(speed) => EmulatedOnPtys::start(description, args.seed, speed)?,
-    };
-    let pace = emulated.pace("truestage demo")?;
-    loaded.patience = pace.patience();
-    let overrides = emulated.overrides(&loaded.config)?;
-    let transport = ports::open(&loaded.config, &overrides, ports::Use::Measurement, pace)?;
-    let mut machine = Machine::new(&loaded, Box::new(transport));
+    let emulated = emulation(args, description, &loaded)?;
+    let (transport, patience) = emulated.connect(&loaded.config)?;
+    loaded.patience = patience;
+    let mut machine = Machine::new(&loaded, transport);
     machine.observe(Box::new(Bars::new(
         output.is_json() || !std::io::stderr().is_terminal(),
     )));
@@ -61,6 +59,18 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
     }
 }
 
+fn emulation(args: &DemoArgs, description: &str, loaded: &Loaded) -> Result<Emulation, Failure> {
+    if args.in_process {
+        let emulated = Emulated::new(description, args.seed, &loaded.config)?;
+        return Ok(Emulation::InProcess(emulated));
+    }
+    let emulated = match args.speed {
+        None => EmulatedOnPtys::in_lockstep(description, args.seed)?,
+        Some(speed) => EmulatedOnPtys::start(description, args.seed, speed)?,
+    };
+    Ok(Emulation::OnPtys(Box::new(emulated)))
+}
+
 fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
     if let Some(speed) = args.speed
         && !(speed.is_finite() && speed > 0.0)
@@ -78,7 +88,7 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
     Ok(loaded)
 }
 
-fn announce(args: &DemoArgs, loaded: &Loaded, emulated: &EmulatedOnPtys, output: Output) {
+fn announce(args: &DemoArgs, loaded: &Loaded, emulated: &Emulation, output: Output) {
     let machine = &loaded.config.machine;
     output.note(&format!(
         "truestage demo: emulated machine `{}` (stage {}), seed {}{}",

@@ -8,7 +8,8 @@ use machine::records::JournalHeader;
 use serde_json::Value;
 use units::Time;
 
-use crate::emulated::{EmulatedOnPtys, HallDrift};
+use super::emulation::Emulation;
+use crate::emulated::HallDrift;
 use crate::{Failure, Machine, Store};
 
 /// How long the mains stays off, and what the drives take to boot, in machine time.
@@ -26,6 +27,10 @@ pub(crate) struct DemoArgs {
     /// without this option time passes as fast as the computer allows.
     #[arg(long, value_name = "FACTOR")]
     pub(crate) speed: Option<f64>,
+    /// Emulate in this process, without terminals: the same frames and figures, sooner. Three axes
+    /// always are.
+    #[arg(long, conflicts_with = "speed")]
+    pub(crate) in_process: bool,
     /// How often the power is cycled.
     #[arg(long, default_value_t = 3)]
     pub(crate) power_cycles: u64,
@@ -86,14 +91,14 @@ impl Which {
 pub(crate) struct Stand {
     pub(crate) machine: Machine,
     pub(crate) store: Store,
-    pub(crate) emulated: EmulatedOnPtys,
+    pub(crate) emulated: Emulation,
     pub(crate) started: Instant,
 }
 
 /// Switches the machine off and everything's power off and on, `drift` meanwhile, and starts again.
 pub(crate) fn power_cycle(
     machine: &mut Machine,
-    emulated: &EmulatedOnPtys,
+    emulated: &Emulation,
     drift: HallDrift,
 ) -> Result<(), Failure> {
     machine.shut_down()?;

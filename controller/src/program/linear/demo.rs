@@ -8,9 +8,10 @@ use machine::records::read_journal;
 use serde_json::{Value, json};
 use units::{Metres, Time, Volts};
 
-use crate::emulated::{DriftLimits, EmulatedOnPtys, HallDrift};
+use crate::emulated::{DriftLimits, HallDrift};
 use crate::linear::ZeroEntry;
 use crate::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
+use crate::program::demo::emulation::Emulation;
 use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
 use crate::program::linear::report::{self, Page, Section};
 use crate::program::output::Output;
@@ -66,7 +67,7 @@ pub(crate) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result
 fn tell(
     machine: &mut Machine,
     store: &Store,
-    emulated: &EmulatedOnPtys,
+    emulated: &Emulation,
     args: &DemoArgs,
     output: Output,
 ) -> Result<Story, Failure> {
@@ -113,7 +114,7 @@ const fn options(compensated: bool, calibration: Option<String>) -> VerifyOption
 fn rezero(
     machine: &mut Machine,
     store: &Store,
-    emulated: &EmulatedOnPtys,
+    emulated: &Emulation,
     drift: HallDrift,
     first: &Zeroed,
 ) -> Result<Rezero, Failure> {

@@ -7,7 +7,8 @@ use machine::records::read_journal;
 use serde_json::json;
 use units::Radians;
 
-use crate::emulated::{EmulatedOnPtys, HallDrift};
+use crate::emulated::HallDrift;
+use crate::program::demo::emulation::Emulation;
 use crate::program::demo::stand::{Shown, Stand, power_cycle, took, write_page};
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
@@ -37,7 +38,7 @@ struct Story {
 
 /// The person who turns the plate, here the emulator's own hand.
 struct Hand<'a> {
-    emulated: &'a EmulatedOnPtys,
+    emulated: &'a Emulation,
     lies_at: f64,
     output: Output,
 }
