@@ -123,8 +123,8 @@ pub enum Failure {
     /// Interferometer and encoder disagree beyond reason.
     #[error(
         "axis {axis}: over {:.3} mm the instrument differs from the encoder by {ppm:.0} ppm, \
-         the limit is {limit_ppm:.0} ppm; {cause}",
-        travel.mm()
+         the limit is {limit_ppm:.0} ppm; {cause}{}",
+        travel.mm(), advice::of_scale(*ppm)
     )]
     ScaleMismatch {
         /// Which axis.
@@ -182,8 +182,8 @@ pub enum Failure {
     /// The same place measured at the beginning and the end differs too much.
     #[error(
         "axis {axis}: closure error {:.3} µm, the limit is {:.3} µm; thermal drift or a loose \
-         instrument: nothing was saved",
-        seen.um(), limit.um()
+         instrument: nothing was saved. {}",
+        seen.um(), limit.um(), advice::of_closure(*seen)
     )]
     Closure {
         /// Which axis.

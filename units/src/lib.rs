@@ -32,7 +32,7 @@ pub use quantity::{
     Celsius, Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared, Pascals,
     Quantity, Radians, RadiansPerSecond, RadiansPerSecondSquared, RelativeHumidity, Volts,
 };
-pub use short::{Short, ShortSpan};
+pub use short::{Several, Short, ShortSpan};
 pub use time::Time;
 
 /// The direction from which a target is reached.

@@ -26,6 +26,25 @@ impl fmt::Display for Short {
     }
 }
 
+/// Shows a number with its noun: `1 attempt`, `3 attempts`. For nouns whose plural ends in an s.
+///
+/// ```
+/// use units::Several;
+///
+/// assert_eq!(Several(1, "row").to_string(), "1 row");
+/// assert_eq!(Several(0, "row").to_string(), "0 rows");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Several<N>(pub N, pub &'static str);
+
+impl<N: fmt::Display + Copy + PartialEq + From<u8>> fmt::Display for Several<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number, noun) = *self;
+        let ending = if number == N::from(1) { "" } else { "s" };
+        write!(f, "{number} {noun}{ending}")
+    }
+}
+
 /// A span of time as people read it: four significant digits at most, in the unit that fits.
 ///
 /// # Example

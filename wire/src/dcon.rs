@@ -352,7 +352,8 @@ fn parse_channel(text: &str, channel: usize) -> Option<Result<f64, DconError>> {
 mod tests {
     use super::*;
 
-    /// Advantech ADAM-4000 manual, checksum example: `#012` gives `B6`… here the sum itself.
+    /// Advantech ADAM-4000 manual, the chapter on the checksum: the sum of the characters' codes, modulo 256, in two
+    /// hexadecimal digits.
     #[test]
     fn the_checksum_is_the_sum_of_the_characters() {
         assert_eq!(checksum("$012"), 0xB7);

@@ -12,7 +12,7 @@ use bitflags::bitflags;
 pub const VACUUM_WAVELENGTH_M: f64 = 632.991_372e-9;
 /// Samples per second at the default setting.
 pub const DEFAULT_SAMPLE_RATE_HZ: f64 = 610.35;
-/// The distance field counts these per half wavelength's 256 phase steps.
+/// The phase field divides half a wavelength, which is one unit of the distance field, into so many steps.
 pub const PHASE_STEPS: f64 = 256.0;
 const SEQUENCE_LIMIT: u64 = 1 << 32;
 

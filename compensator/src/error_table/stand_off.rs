@@ -28,7 +28,7 @@ use super::ErrorTable;
 use crate::significance::student_limit;
 
 /// The share of good tables in which a position is held for wrong.
-pub const FALSE_ALARMS: f64 = 1e-3;
+pub const FALSE_ALARMS: f64 = 1e-4;
 
 /// How many wrong positions are looked for at most.
 const WRONG_MAX: usize = 4;
@@ -78,6 +78,8 @@ pub struct StandOff {
     pub from: Metres,
     /// The last neighbour.
     pub to: Metres,
+    /// Whether this approach to it begins where the stage turns, just beyond the end of the table.
+    pub is_after_turn: bool,
 }
 
 impl ErrorTable {
@@ -261,6 +263,10 @@ impl Differences {
         let (approach, differences) = &self.sides[side];
         let weight = self.weights[at][place];
         let node = &nodes[place];
+        let is_after_turn = match approach {
+            Approach::Forward => at + place == 0,
+            Approach::Reverse => at + place + 1 == table.nodes().len(),
+        };
         StandOff {
             position: node.position,
             approach: *approach,
@@ -269,6 +275,7 @@ impl Differences {
             limit: Metres(limit / weight.abs()),
             from: nodes[0].position,
             to: nodes[self.order.intervals].position,
+            is_after_turn,
         }
     }
 }

@@ -6,8 +6,14 @@ use units::portable::{log10, powi};
 
 /// What to do about a position that stands off its neighbours.
 pub(super) fn of_stand_off(axis: &str, refused: &StandOff) -> String {
+    let turn = if refused.is_after_turn {
+        ". The stage turns just before this position: where it takes up its lost motion slowly, or arrives \
+         otherwise after a short way, a longer `overrun_mm` in the section of the run helps"
+    } else {
+        ""
+    };
     format!(
-        ". Measure again, and finer around it: a knock, dirt on the scale, a loose reflector, a \
+        "{turn}. Measure again, and finer around it: a knock, dirt on the scale, a loose reflector, a \
          count lost in every run? `jump_limit_um = {}` in [axis.{axis}.compensation] would accept \
          it, which is wise only when finer positions show the same place again: what is accepted is \
          taken for the stage",
@@ -32,6 +38,31 @@ pub(super) fn of_limit(axis: &str, refused: &CompensationError) -> String {
     )
 }
 
+/// What to do about a scale beyond its limit, when none of the mistakes that are known by their factor made it.
+pub(super) fn of_scale(ppm: f64) -> String {
+    /// An encoder is off by less: beyond it something is set up wrongly.
+    const PLAUSIBLE_PPM: f64 = 10_000.0;
+    if ppm.abs() > PLAUSIBLE_PPM {
+        return String::new();
+    }
+    format!(
+        ". `scale_limit_ppm = {}` would let it pass, which is wise only where the encoder is known to be off by \
+         that much",
+        rounded_up(ppm.abs())
+    )
+}
+
+/// What to do about a place that is not found again.
+pub(super) fn of_closure(seen: Metres) -> String {
+    if !seen.value().is_finite() {
+        return "It is no number: the instrument said nothing usable".to_owned();
+    }
+    format!(
+        "`closure_limit_um = {}` would let it pass, which is wise only where the stage returns to no place better",
+        enough(seen.abs())
+    )
+}
+
 /// Micrometres that are enough for `length`, and short to write.
 fn enough(length: Metres) -> String {
     rounded_up(length.um())
@@ -49,6 +80,19 @@ fn rounded_up(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_would_let_a_refusal_pass_is_told_unless_it_is_a_mistake_of_another_size() {
+        assert!(
+            of_scale(-1250.6).contains("`scale_limit_ppm = 1300`"),
+            "{}",
+            of_scale(-1250.6)
+        );
+        assert_eq!(of_scale(1e6), "");
+        let closure = of_closure(Metres::from_um(-1.234));
+        assert!(closure.contains("`closure_limit_um = 1.3`"), "{closure}");
+        assert!(of_closure(Metres(f64::NAN)).contains("no number"));
+    }
 
     #[test]
     fn the_number_that_would_do_is_short_and_enough() {

@@ -162,7 +162,7 @@ pub enum EndPolicyName {
 /// a good one stands off is a matter of the stage, its noise and its step, so the table itself says
 /// it: over every 3 and every 5 neighbouring positions the line or cubic through them is taken out,
 /// and what is left of the largest is compared with the rest (Student's t, both approaches
-/// together). The limit is set for one good table in 1000, and is never below half of what the
+/// together). The limit is set for one good table in 10 000, and is never below half of what the
 /// instrument counts (0.158 µm with a linear interferometer). `calibrate` prints which error of one
 /// position would have been noticed; a refusal names position, error, limit, and the
 /// `jump_limit_um` that would accept it. Give it only where finer positions have shown that the

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
+use units::Several;
 
 use crate::config;
 use crate::program::output::{Ended, Output};
@@ -12,16 +13,15 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let machine = &loaded.config.machine;
     let text = format!(
-        "{}: sound; machine {} (stage {}), {} axes, {} analog modules, {} instruments, \
-         {} cameras\n\
+        "{}: sound; machine {} (stage {}), {}, {}, {}, {}\n\
          calibrations of it carry the configuration hash {}",
         path.display(),
         machine.name,
         machine.stage_serial,
-        loaded.config.axis.len() + loaded.config.rotary.len(),
-        loaded.config.analog.len(),
-        loaded.config.instrument.len(),
-        loaded.config.camera.len(),
+        axes_text(loaded.config.axis.len() + loaded.config.rotary.len()),
+        Several(loaded.config.analog.len(), "analog module"),
+        Several(loaded.config.instrument.len(), "instrument"),
+        Several(loaded.config.camera.len(), "camera"),
         &loaded.hash.as_str()[..12],
     );
     let notes = text::table_notes(&loaded.config);
@@ -30,4 +30,11 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
         &text,
         &json!({"ok": true, "machine": machine.name, "hash": loaded.hash.as_str(), "notes": notes}),
     )
+}
+
+fn axes_text(count: usize) -> String {
+    match count {
+        1 => "1 axis".to_owned(),
+        count => format!("{count} axes"),
+    }
 }

@@ -41,8 +41,8 @@ pub enum DeviceError {
         step: &'static str,
     },
     /// A transfer was not answered.
-    #[error("{node}, {object}: no answer within {} ({attempts} attempts) while {step}",
-        units::ShortSpan(*waited))]
+    #[error("{node}, {object}: no answer within {} ({}) while {step}",
+        units::ShortSpan(*waited), units::Several(*attempts, "attempt"))]
     SdoTimeout {
         node: NodeId,
         object: Object,
@@ -155,8 +155,9 @@ pub enum DeviceError {
     },
     /// An amplifier on a serial line did not answer.
     #[error(
-        "{device}: no answer ({attempts} attempts) while {step}; check its power, its address, the \
-         cable and the line's baud rate"
+        "{device}: no answer ({}) while {step}; check its power, its address, the cable and the line's \
+         baud rate",
+        units::Several(*attempts, "attempt")
     )]
     Unanswered {
         device: DeviceName,

@@ -22,7 +22,7 @@ pub enum Cause {
     #[error("the program that writes the path has ended; all axes were stopped together")]
     HostGone,
     /// A point was outside the limits, although it had been checked.
-    #[error("a point for axis number {axis} is outside the limits; all axes were stopped")]
+    #[error("a point for axis {} of the path (counted from 1) is outside the limits; all axes were stopped", axis + 1)]
     PathRefused {
         /// Which axis, in the order of the engine's axes.
         axis: usize,
@@ -40,8 +40,9 @@ pub enum Cause {
     GivenUp,
     /// The computer was late by more than a period; what was queued is not replayed.
     #[error(
-        "the loop was late by {periods} periods (the computer was held up): the queued path was \
-         dropped, all axes were stopped together"
+        "the loop was late by {} (the computer was held up): the queued path was dropped, all axes were \
+         stopped together",
+        units::Several(*periods, "period")
     )]
     Overrun {
         /// How many SYNCs were missed.

@@ -48,7 +48,7 @@ pub enum CsvFault {
         units::Short(*before))]
     Order { before: f64, seen: f64 },
     /// Nothing to drive.
-    #[error("the file has {rows} rows; a path needs two or more")]
+    #[error("the file has {}; a path needs two or more", units::Several(*rows, "row"))]
     Rows { rows: usize },
     /// Longer than anybody meant.
     #[error("the path takes {} s; at most one day is possible", units::Short(*seconds))]
@@ -438,7 +438,7 @@ mod tests {
         );
         check(
             &head("0,0,0\n"),
-            "line 4: the file has 1 rows; a path needs two or more",
+            "line 4: the file has 1 row; a path needs two or more",
         );
         check(
             "",

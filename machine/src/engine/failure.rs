@@ -123,8 +123,9 @@ pub enum EngineFailure {
     },
     /// So many SYNCs were missed that the drives reacted by themselves.
     #[error(
-        "the loop was late by {periods} periods (the computer was held up), then: {then}; all \
-         drives were stopped at once; give the computer less to do, or allow SCHED_FIFO"
+        "the loop was late by {} (the computer was held up), then: {then}; all drives were stopped at \
+         once; give the computer less to do, or allow SCHED_FIFO",
+        units::Several(*periods, "period")
     )]
     HeldUp {
         /// How many SYNCs were missed.

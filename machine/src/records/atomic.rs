@@ -15,6 +15,9 @@ const ORDINARY_MODE: u32 = 0o666;
 /// replaced keeps its mode; a new one has the ordinary one, because a calibration is for everybody
 /// who uses the machine, while a temporary file is for its maker only.
 ///
+/// # Errors
+/// When the folder cannot be made or written to, or the disk is full; what was done, and where.
+///
 /// # Example
 ///
 /// ```

@@ -72,7 +72,7 @@ pub enum Method {
 /// client.poll_transmit();
 /// client.handle_timeout(client.poll_timeout());
 /// let Some(Err(failure)) = client.poll_outcome() else { unreachable!("nobody answered") };
-/// let text = "0x1008:00: no answer to a read within 500ms (1 attempts)";
+/// let text = "0x1008:00: no answer to a read within 500ms (1 attempt)";
 /// assert_eq!(failure.to_string(), text);
 /// let abort = client.poll_transmit().map(|it| it.to_string());
 /// assert_eq!(abort, Some("602#8008100000000405".into()));
@@ -103,7 +103,7 @@ pub enum SdoFailure {
     #[error("{object}: the server aborted with {code}")]
     Aborted { object: Object, code: AbortCode },
     /// The server did not answer; it was told so by an abort.
-    #[error("{object}: no {awaited} within {waited:?} ({attempts} attempts)")]
+    #[error("{object}: no {awaited} within {waited:?} ({})", units::Several(*attempts, "attempt"))]
     TimedOut {
         object: Object,
         awaited: &'static str,
@@ -111,7 +111,7 @@ pub enum SdoFailure {
         attempts: u32,
     },
     /// The server broke the protocol and was aborted.
-    #[error("{object}: aborted by this controller with {code} ({attempts} attempts)")]
+    #[error("{object}: aborted by this controller with {code} ({})", units::Several(*attempts, "attempt"))]
     Protocol {
         object: Object,
         code: AbortCode,
