@@ -15,6 +15,7 @@
 //! | [`platform`] | which strokes bring an alignment platform into a pose, and back (system S1)? |
 //! | [`volumetric`] | where is the tool of three axes really, now, and which command puts it right (system S4)? |
 //! | [`air`], [`length_correction`] | what does the interferometer's reading mean at 20 °C? |
+//! | [`budget`] | how uncertain is a calibrated place, and what makes it so? |
 //! | [`apply`] | how does a correction get onto a moving axis without a bump? |
 //! | [`interpolation`], [`least_squares`], [`significance`], [`uncertainty`] | the numerics under them |
 //!
@@ -56,6 +57,7 @@
 
 pub mod air;
 pub mod apply;
+pub mod budget;
 pub mod data;
 pub mod error_table;
 pub mod hall_zero;

@@ -91,6 +91,19 @@ pub struct Fitted {
     pub s_forward: Option<Metres>,
     /// The same in reverse.
     pub s_reverse: Option<Metres>,
+    /// How the repetitions forward are counted.
+    pub repeats_forward: Repeats,
+    /// The same in reverse.
+    pub repeats_reverse: Repeats,
+}
+
+/// How often the positions of one approach were measured, without what was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Repeats {
+    /// Measurements at the position that has the fewest.
+    pub fewest: usize,
+    /// Degrees of freedom of the pooled scatter: all measurements less all positions.
+    pub degrees_of_freedom: usize,
 }
 
 /// Why measurements give no table.
@@ -221,6 +234,8 @@ pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, Fi
         drift,
         s_forward,
         s_reverse,
+        repeats_forward: cells.repeats(Approach::Forward),
+        repeats_reverse: cells.repeats(Approach::Reverse),
     })
 }
 
@@ -336,6 +351,15 @@ impl Cells {
         for (run, deviation) in self.groups.values_mut().flatten() {
             let own = drift.runs.iter().find(|r| r.run == *run);
             *deviation -= own.map_or(0.0, |r| r.offset.value());
+        }
+    }
+
+    fn repeats(&self, approach: Approach) -> Repeats {
+        let counts = self.groups.iter().filter(|(key, _)| key.1 == approach);
+        let counts: Vec<usize> = counts.map(|(_, values)| values.len()).collect();
+        Repeats {
+            fewest: counts.iter().copied().min().unwrap_or(0),
+            degrees_of_freedom: counts.iter().map(|it| it.saturating_sub(1)).sum(),
         }
     }
 

@@ -26,6 +26,7 @@ mod robust;
 mod series;
 mod slip;
 mod stand_off;
+pub mod uncertainty;
 
 use units::{Approach, Metres};
 
@@ -33,7 +34,7 @@ pub use crate::interpolation::Interpolation;
 pub(crate) use curve::Curve;
 
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
-pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, RunDrift, analyse, fit};
+pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, Repeats, RunDrift, analyse, fit};
 pub use robust::{MeasuredPoint, Robust};
 pub use series::{LinearFault, LinearSeries, Measurement, SeriesError};
 pub use slip::{Change, SLIP_FALSE_ALARMS, Slip, find_slip};

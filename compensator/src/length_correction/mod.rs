@@ -30,6 +30,7 @@ use units::portable::{cos, tan};
 use units::{Celsius, Metres, Pascals, Radians, RelativeHumidity};
 
 use crate::air;
+use crate::budget::{self, Correlation, Evaluation};
 use crate::uncertainty::combine;
 use environment::check_channels;
 pub use environment::{
@@ -151,6 +152,24 @@ pub enum Source {
     ExpansionCoefficient,
 }
 
+impl Source {
+    /// What a budget calls it, and the unit that it is stated in.
+    pub const fn name(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Wavelength => ("wavelength or scale", "m/m"),
+            Self::AirEquation => ("equation for the index of air", "m/m"),
+            Self::AirTemperature => ("air temperature", "K"),
+            Self::Pressure => ("air pressure", "Pa"),
+            Self::Humidity => ("relative humidity", "1"),
+            Self::CarbonDioxide => ("carbon dioxide", "umol/mol"),
+            Self::DeadPath => ("dead path", "m"),
+            Self::Cosine => ("angle of the beam", "rad"),
+            Self::MaterialTemperature => ("material temperature", "K"),
+            Self::ExpansionCoefficient => ("coefficient of expansion", "1/K"),
+        }
+    }
+}
+
 /// One line of an uncertainty budget.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contribution {
@@ -267,68 +286,109 @@ impl LengthCorrection {
         optical: Metres,
         environment: &Environment,
     ) -> Result<Vec<Contribution>, EnvironmentError> {
-        let corrected = self.correct(optical, environment)?;
+        let length = self.correct(optical, environment)?.displacement;
+        let lines = self.contributions(environment)?;
+        let line = |(source, it): (Source, budget::Contribution)| Contribution {
+            source,
+            standard_uncertainty: it.share(length),
+        };
+        Ok(lines.into_iter().map(line).collect())
+    }
+
+    /// What contributes to the uncertainty of every length corrected in `environment`: most of it as
+    /// the same share of all lengths, since one sensor and one coefficient correct them all.
+    ///
+    /// # Errors
+    /// As [`correct`](Self::correct).
+    pub fn contributions(
+        &self,
+        environment: &Environment,
+    ) -> Result<Vec<(Source, budget::Contribution)>, EnvironmentError> {
         let (s, u) = (&self.settings, &self.settings.u_environment);
-        let length = corrected.displacement.abs().value();
-        let mut lines = vec![(Source::Wavelength, length * s.u_relative_wavelength)];
+        let index = index(s, environment)?;
+        let mut lines = vec![scale(Source::Wavelength, s.u_relative_wavelength, 1.0)];
         if s.air {
-            let Environment {
-                air_temperature,
-                pressure,
-                humidity,
-                ..
-            } = *environment;
-            let (wavelength, co2) = (s.vacuum_wavelength, s.co2_umol_per_mol);
-            let d = air::sensitivities(wavelength, air_temperature, pressure, humidity, co2)?;
-            lines.extend([
-                (
-                    Source::AirEquation,
-                    length * air::EQUATION_STANDARD_UNCERTAINTY,
-                ),
-                (
-                    Source::AirTemperature,
-                    length * d.per_kelvin * u.air_temperature.value(),
-                ),
-                (Source::Pressure, length * d.per_pascal * u.pressure.value()),
-                (
-                    Source::Humidity,
-                    length * d.per_humidity * u.humidity.value(),
-                ),
-                (
-                    Source::CarbonDioxide,
-                    length * d.per_co2_umol_per_mol * u.co2_umol_per_mol,
-                ),
-            ]);
-            if let Some(dead) = s.dead_path {
-                let change = (corrected.index - self.index_at_datum) / corrected.index;
-                lines.push((Source::DeadPath, change * dead.u_length.value()));
-            }
+            lines.extend(air_lines(s, environment)?);
+        }
+        if let Some(dead) = s.dead_path.filter(|_| s.air) {
+            let change = (index - self.index_at_datum) / index;
+            let line = line(Source::DeadPath, dead.u_length.value(), change);
+            lines.push((
+                Source::DeadPath,
+                budget::Contribution {
+                    correlation: Correlation::CommonOffset,
+                    ..line
+                },
+            ));
         }
         if let Some(cosine) = s.cosine {
             let (angle, u) = (cosine.angle.value(), cosine.u_angle.value());
             // First order, and the second order that is left when the angle itself is zero.
             let relative = combine(&[tan(angle) * u, u * u / 2.0_f64.sqrt()]);
-            lines.push((Source::Cosine, length * relative));
+            let per_radian = if u > 0.0 { relative / u } else { 0.0 };
+            lines.push(scale(Source::Cosine, u, per_radian));
         }
         if let Some(material) = s.material_expansion {
             let excess = (environment.material_temperature - REFERENCE_TEMPERATURE).value();
             let u_temperature = u.material_temperature.value();
             lines.extend([
-                (
+                scale(
                     Source::MaterialTemperature,
-                    length * material.per_kelvin * u_temperature,
+                    u_temperature,
+                    material.per_kelvin,
                 ),
-                (
-                    Source::ExpansionCoefficient,
-                    length * excess * material.u_per_kelvin,
-                ),
+                scale(Source::ExpansionCoefficient, material.u_per_kelvin, excess),
             ]);
         }
-        let line = |(source, u): (Source, f64)| Contribution {
-            source,
-            standard_uncertainty: Metres(u.abs()),
-        };
-        Ok(lines.into_iter().map(line).collect())
+        Ok(lines)
+    }
+}
+
+fn air_lines(
+    s: &Settings,
+    environment: &Environment,
+) -> Result<[(Source, budget::Contribution); 5], EnvironmentError> {
+    let (u, it) = (&s.u_environment, environment);
+    let d = air::sensitivities(
+        s.vacuum_wavelength,
+        it.air_temperature,
+        it.pressure,
+        it.humidity,
+        s.co2_umol_per_mol,
+    )?;
+    Ok([
+        scale(Source::AirEquation, air::EQUATION_STANDARD_UNCERTAINTY, 1.0),
+        scale(
+            Source::AirTemperature,
+            u.air_temperature.value(),
+            d.per_kelvin,
+        ),
+        scale(Source::Pressure, u.pressure.value(), d.per_pascal),
+        scale(Source::Humidity, u.humidity.value(), d.per_humidity),
+        scale(
+            Source::CarbonDioxide,
+            u.co2_umol_per_mol,
+            d.per_co2_umol_per_mol,
+        ),
+    ])
+}
+
+/// An input that stretches every length: so many metres per metre for one of its units.
+fn scale(source: Source, value: f64, sensitivity: f64) -> (Source, budget::Contribution) {
+    (source, line(source, value, sensitivity))
+}
+
+fn line(source: Source, value: f64, sensitivity: f64) -> budget::Contribution {
+    let (name, unit) = source.name();
+    budget::Contribution {
+        name: name.to_owned(),
+        evaluation: Evaluation::B,
+        value,
+        unit: unit.to_owned(),
+        sensitivity,
+        degrees_of_freedom: None,
+        correlation: Correlation::CommonScale,
+        approach: None,
     }
 }
 
