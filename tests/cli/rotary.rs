@@ -14,7 +14,16 @@ fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
 }
 
+/// With `--lines 36`, unless `words` say otherwise.
 fn fit(folder: &Path, rows: &str, words: &[&str]) -> Ended {
+    let lines: &[&str] = match words.contains(&"--lines") {
+        true => &[],
+        false => &["--lines", "36"],
+    };
+    fit_as_told(folder, rows, &[lines, words].concat())
+}
+
+fn fit_as_told(folder: &Path, rows: &str, words: &[&str]) -> Ended {
     fs::write(folder.join("data.csv"), format!("{HEADER}{rows}")).expect("a file can be written");
     truestage(folder, &[&["fit", "rotary", "data.csv"], words].concat())
 }
@@ -143,6 +152,30 @@ fn the_patents_two_placements_give_its_recursion_and_no_uncertainty_of_their_own
     check_near(u[5], 0.1 * (1295.0_f64 / 216.0).sqrt(), 1e-9);
 }
 
+#[test]
+fn a_plate_whose_last_line_was_never_read_is_evaluated_with_all_its_lines_or_not_at_all() {
+    let folder = folder();
+    let mut rows = readings(&[0, 1, 7, 11], 0.05);
+    rows.retain(|(_, line, _)| *line != LINES - 1);
+    let refused = fit_as_told(folder.path(), &csv(&rows), &[]).with_code(2);
+    let refused = refused["error"].to_string();
+    for says in [
+        "data.csv:141:4",
+        "the plate has 35 lines or more",
+        "`--lines`",
+    ] {
+        assert!(refused.contains(says), "`{says}` is not in {refused}");
+    }
+    let result = fit(folder.path(), &csv(&rows), &[]).with_code(0);
+    let errors = numbers(&result["table_error_arcsec"]);
+    let u = numbers(&result["standard_uncertainty_arcsec"]);
+    assert_eq!(errors.len(), LINES);
+    for (position, (error, u)) in errors.iter().zip(&u).enumerate() {
+        check_near(*error, table(position), 4.5 * u);
+    }
+    assert_eq!(result["plate_error_arcsec"][LINES - 1], Value::Null);
+}
+
 #[track_caller]
 fn check_refused(rows: &str, words: &[&str], says: &[&str]) {
     let folder = folder();
@@ -216,26 +249,13 @@ fn what_cannot_be_used_is_told_with_file_line_and_cause_and_nothing_is_stored() 
         &[],
         &["data.csv:110:1", "`offset` is 36"],
     );
-    check_refused(
-        &with("7,36,1.0"),
-        &[],
-        &["data.csv:110:3", "line 36 is read in 1 of 3"],
-    );
-    check_refused(
-        &with("7,36,1.0"),
-        &["--lines", "36"],
-        &["data.csv:110:3", "has 36 lines"],
-    );
+    check_refused(&with("7,36,1.0"), &[], &["data.csv:110:3", "has 36 lines"]);
     check_refused(
         &csv(&rows[..LINES]),
         &[],
         &["data.csv:37:1", "one placement cannot separate"],
     );
-    check_refused(
-        &csv(&rows[..90]),
-        &["--lines", "36"],
-        &["data.csv:91:1", "18 of 36 lines"],
-    );
+    check_refused(&csv(&rows[..90]), &[], &["data.csv:91:1", "18 of 36 lines"]);
 }
 
 #[test]

@@ -173,18 +173,16 @@ pub enum RotaryFault {
         /// The lines of the plate.
         lines: usize,
     },
-    /// The number of lines cannot be told from the file.
+    /// The file does not say how many lines the plate has.
     #[error(
-        "line {line} is read in {seen} of {placements} placements, so the number of lines is not \
-         clear from the file (lines count from 0): state how many lines the plate has"
+        "the number of lines of the plate is not given, and the file does not tell it: its largest \
+         line is {largest}, so the plate has {} lines or more, as lines that were never read leave \
+         no row; count the lines of the plate and give their number (`--lines`)",
+        largest + 1
     )]
     UnknownLines {
-        /// The first or the last line.
-        line: usize,
-        /// How many placements have it.
-        seen: usize,
-        /// Of how many.
-        placements: usize,
+        /// The largest line in the file.
+        largest: usize,
     },
 }
 
@@ -197,10 +195,10 @@ pub enum RotaryFault {
 /// use compensator::rotary::RotarySeries;
 ///
 /// let csv = "offset,line,deviation_arcsec\n0,0,8\n0,1,4\n0,2,3\n1,0,-2\n1,1,-3\n1,2,-1\n";
-/// let series = RotarySeries::from_csv(csv, "table.csv", None)?;
+/// let series = RotarySeries::from_csv(csv, "table.csv", Some(3))?;
 /// assert_eq!((series.lines(), series.offsets()), (3, vec![0, 1]));
 /// let one_placement = "offset,line,deviation_arcsec\n0,0,8\n0,1,4\n0,2,3\n";
-/// assert!(RotarySeries::from_csv(one_placement, "table.csv", None).is_err());
+/// assert!(RotarySeries::from_csv(one_placement, "table.csv", Some(3)).is_err());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -251,7 +249,9 @@ impl RotarySeries {
     /// Reads the CSV format `offset,line,deviation_arcsec` (columns in any order, `#` comment
     /// lines, decimal points; the rows of one placement together, its lines in any order).
     ///
-    /// Without `lines` the plate ends with the largest line of the file.
+    /// `lines` is what the plate has. Nothing in a file proves it: were the last lines never read, a
+    /// smaller plate would be evaluated, whose readings fit almost as well. So `None` is an error,
+    /// which says how many lines there are at least.
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
@@ -357,9 +357,7 @@ fn read_blocks(table: &Table<RotaryFault>) -> Result<Vec<Block>, DataError<Rotar
     Ok(blocks)
 }
 
-/// How many lines the plate has: as given, or one more than the largest in the file. Then the
-/// first and the last line must stand in most placements, or else a line numbered from 1, or
-/// one too many by a slip, would silently make another plate of it.
+/// How many lines the plate has, as `given`: all lines of the file must be among them.
 fn count_lines(
     table: &Table<RotaryFault>,
     blocks: &[Block],
@@ -373,32 +371,16 @@ fn count_lines(
     };
     let ends = blocks.iter().filter_map(last);
     let (largest, row) = ends.max().expect("every block has a row");
-    if let Some(lines) = given {
-        let fault = RotaryFault::TooLarge {
+    let fault = match given {
+        Some(lines) if largest < lines => return Ok(lines),
+        Some(lines) => RotaryFault::TooLarge {
             column: FORMAT.columns[LINE],
             seen: largest,
             lines,
-        };
-        return if largest < lines {
-            Ok(lines)
-        } else {
-            Err(table.fail(row, LINE, fault.into()))
-        };
-    }
-    for line in [0, largest] {
-        let having = blocks.iter().filter_map(|it| it.readings.get(&line));
-        let (seen, placements) = (having.clone().count(), blocks.len());
-        if 2 * seen <= placements {
-            let row = having.map(|(row, _)| *row).next().unwrap_or(0);
-            let fault = RotaryFault::UnknownLines {
-                line,
-                seen,
-                placements,
-            };
-            return Err(table.fail(row, LINE, fault.into()));
-        }
-    }
-    Ok(largest + 1)
+        },
+        None => RotaryFault::UnknownLines { largest },
+    };
+    Err(table.fail(row, LINE, fault.into()))
 }
 
 /// The rule of [`Design`](crate::rotary::Design), with the place of the last offset.

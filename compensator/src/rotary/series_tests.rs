@@ -23,13 +23,13 @@ fn check_row(at: usize, row: &str, column: usize, says: &str) {
     let mut rows = good(4);
     row.clone_into(&mut rows[at - 1]);
     let text = format!("{HEADER}{}\n", rows.join("\n"));
-    check_text(&text, None, at + 1, column, says);
+    check_text(&text, Some(4), at + 1, column, says);
 }
 
 #[test]
 fn a_good_file_is_read_with_columns_in_any_order_and_a_line_left_out() {
     let text = "# plate 7\nline,deviation_arcsec,offset\n0,1,0\n1,2,0\n2,3,0\n\n2,4,2\n0,-5,2\n";
-    let series = RotarySeries::from_csv(text, "plate.csv", None).unwrap();
+    let series = RotarySeries::from_csv(text, "plate.csv", Some(3)).unwrap();
     assert_eq!((series.lines(), series.offsets()), (3, vec![0, 2]));
     let arcsec = |it: &Option<Radians>| it.map(|it| (it.arcsec() * 1e9).round() / 1e9);
     let read = |at: usize| -> Vec<_> {
@@ -98,7 +98,7 @@ fn a_line_or_offset_that_repeats_is_named_with_its_first_place() {
         "offset 0 appears again after another one (it began in row 2",
     );
     let again = format!("{HEADER}{0}\n{0}\n", good(4)[..4].join("\n"));
-    check_text(&again, None, 6, 3, "no offset is used twice");
+    check_text(&again, Some(4), 6, 3, "no offset is used twice");
 }
 
 #[test]
@@ -106,43 +106,55 @@ fn wrong_counts_are_refused() {
     let one = format!("{HEADER}{}\n", good(4)[..4].join("\n"));
     check_text(
         &one,
-        None,
+        Some(4),
         5,
         1,
         "one placement cannot separate the errors of table and plate",
     );
     let short = format!("{HEADER}{}\n", good(4)[..5].join("\n"));
-    check_text(&short, None, 5, 3, "line 3 is read in 1 of 2 placements");
     check_text(&short, Some(4), 6, 1, "ends with 1 of 4 lines");
     let whole = format!("{HEADER}{}\n", good(4).join("\n"));
     check_text(&whole, Some(3), 9, 3, "`line` is 3; the plate has 3 lines");
     let from_one = whole.replace(",3,", ",4,").replace(",0,", ",3,");
-    check_text(&from_one, None, 2, 3, "line 0 is read in 0 of 2 placements");
+    check_text(
+        &from_one,
+        Some(4),
+        9,
+        3,
+        "`line` is 4; the plate has 4 lines, so 0 to 3",
+    );
     let far = whole.replace("\n1,", "\n4,");
-    check_text(&far, None, 6, 1, "`offset` is 4; the plate has 4 lines");
+    check_text(&far, Some(4), 6, 1, "`offset` is 4; the plate has 4 lines");
 }
 
 #[test]
 fn offsets_that_cannot_part_table_and_plate_are_refused_at_the_last_of_them() {
     let whole = format!("{HEADER}{}\n", good(4).join("\n"));
     let opposite = whole.replace("\n1,", "\n2,");
-    check_text(&opposite, None, 6, 1, "harmonic 2 and its multiples");
+    check_text(&opposite, Some(4), 6, 1, "harmonic 2 and its multiples");
 }
 
 #[test]
-fn a_line_missing_everywhere_is_accepted_where_it_cannot_be_the_last() {
-    let rows = good(5).into_iter().filter(|row| !row.contains(",2,"));
-    let text = format!("{HEADER}{}\n", rows.collect::<Vec<_>>().join("\n"));
-    let series = RotarySeries::from_csv(&text, "plate.csv", None).unwrap();
-    assert_eq!(series.lines(), 5);
-    assert!(
-        series
-            .placements()
-            .iter()
-            .all(|it| it.readings[2].is_none())
-    );
-    let wider = RotarySeries::from_csv(&text, "plate.csv", Some(6)).unwrap();
-    assert_eq!(wider.lines(), 6);
+fn a_line_missing_everywhere_is_accepted_the_last_one_too() {
+    for gone in [0, 2, 4] {
+        let rows = good(5).into_iter();
+        let rows = rows.filter(|row| !row.contains(&format!(",{gone},")));
+        let text = format!("{HEADER}{}\n", rows.collect::<Vec<_>>().join("\n"));
+        let series = RotarySeries::from_csv(&text, "plate.csv", Some(5)).unwrap();
+        assert_eq!(series.lines(), 5);
+        let mut placements = series.placements().iter();
+        assert!(placements.all(|it| it.readings[gone].is_none()));
+    }
+}
+
+#[test]
+fn the_number_of_lines_is_never_guessed() {
+    let whole = format!("{HEADER}{}\n", good(5).join("\n"));
+    let without_last = whole.replace("0,4,0.5\n", "").replace("1,4,0.5\n", "");
+    let says = "its largest line is 3, so the plate has 4 lines or more";
+    check_text(&without_last, None, 9, 3, says);
+    check_text(&whole, None, 11, 3, "the plate has 5 lines or more");
+    check_text(&whole, None, 11, 3, "give their number (`--lines`)");
 }
 
 #[test]

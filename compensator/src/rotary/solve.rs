@@ -201,7 +201,7 @@ impl Solution {
 /// use compensator::rotary::{RotarySeries, SolveOptions, solve};
 ///
 /// let csv = "offset,line,deviation_arcsec\n0,0,8\n0,1,4\n0,2,3\n1,0,-2\n1,1,-3\n1,2,-1\n";
-/// let series = RotarySeries::from_csv(csv, "table.csv", None)?;
+/// let series = RotarySeries::from_csv(csv, "table.csv", Some(3))?;
 /// let solution = solve(&series, &SolveOptions::default())?;
 /// for (seen, expected) in solution.table_error.iter().zip([2.0, -1.0, -1.0]) {
 ///     assert!((seen.arcsec() - expected).abs() < 1e-9);

@@ -61,7 +61,7 @@ enum CriterionName {
 pub(crate) struct RotaryArgs {
     /// The data file; line n of a placement with offset s is read at table position n + s.
     data: PathBuf,
-    /// Lines of the plate; one more than the largest in the file when not given.
+    /// Lines of the plate: the file cannot tell, as lines that were never read leave no row.
     #[arg(long)]
     lines: Option<usize>,
     /// Standard uncertainty of one reading, to be propagated in addition to that from the
