@@ -1,6 +1,6 @@
 //! Why the machine stopped or refused: each says where, what was expected, what was seen.
 
-mod advice;
+pub(crate) mod advice;
 mod exit_code;
 
 use std::path::PathBuf;

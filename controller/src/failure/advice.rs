@@ -64,12 +64,12 @@ pub(super) fn of_closure(seen: Metres) -> String {
 }
 
 /// Micrometres that are enough for `length`, and short to write.
-fn enough(length: Metres) -> String {
+pub(crate) fn enough(length: Metres) -> String {
     rounded_up(length.um())
 }
 
 /// Two digits, never less than `value`.
-fn rounded_up(value: f64) -> String {
+pub(crate) fn rounded_up(value: f64) -> String {
     // A decade of ten thousandths and less is beyond what any key takes.
     let digit = powi(10.0, log10(value.max(1e-4)).floor() as i32 - 1);
     let decimals = (-log10(digit).round()).max(0.0) as usize;

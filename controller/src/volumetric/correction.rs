@@ -24,14 +24,15 @@ use compensator::volumetric::online::{
     MovingState,
 };
 use compensator::volumetric::{Axis, NoCorrection, Point};
-use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
+use units::{Celsius, Metres, Quantity, Radians};
 
 use crate::config::MachineConfig;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::inputs::{RollReader, confirmed_by_samples, place_of_voltage, sample};
+use crate::volumetric::limits;
 use crate::volumetric::settings::{
-    beam_detector, feed_settings, influences, model_limits, point_of_mm, thermal, volume_axis,
-    volumetric_chain, work_volume,
+    beam_detector, feed_settings, influences, point_of_mm, thermal, volume_axis, volumetric_chain,
+    work_volume,
 };
 use crate::volumetric::thermometers::Thermometers;
 use crate::volumetric::{
@@ -111,8 +112,7 @@ impl VolumetricCorrection {
         if seen != expected {
             return Err(VolumetricFailure::Temperatures { seen, expected });
         }
-        let model = model(own, &state)?;
-        check_speed(config, own, &model)?;
+        let model = limits::within(model(own, &state)?, config, own, &state.temperatures)?;
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(own.beam.each()) {
             if let Some(beam) = beam {
@@ -316,16 +316,13 @@ fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {
     config.feed.as_ref().ok_or(missing)
 }
 
-fn model(
-    config: &VolumetricConfig,
-    state: &VolumetricState,
-) -> Result<VolumetricModel, VolumetricFailure> {
+fn model(config: &VolumetricConfig, state: &VolumetricState) -> Result<Model, VolumetricFailure> {
     let mut thermal = thermal(config, &state.temperatures);
     for expansion in &state.expansions {
         expansion.apply(&mut thermal.channels);
     }
     thermal.bends = bends(config, state)?;
-    let machine = Model {
+    Ok(Model {
         chain: volumetric_chain(config)?,
         volume: work_volume(config)?,
         axes: state.axes.clone(),
@@ -337,11 +334,7 @@ fn model(
             .roll
             .as_ref()
             .map_or(Radians::ZERO, |it| Radians::from_arcsec(it.roll_max_arcsec)),
-    };
-    Ok(VolumetricModel::new(
-        machine,
-        model_limits(&config.compensation),
-    )?)
+    })
 }
 
 /// Where the detector on the slide of `axis` sits, and what tilts that slide beyond `references`.
@@ -371,23 +364,6 @@ pub(super) fn bends(
         Ok(found.thermal_bend(own.gradient_max_k, is_watched))
     };
     state.bends.iter().map(bend).collect()
-}
-
-fn check_speed(
-    config: &MachineConfig,
-    volumetric: &VolumetricConfig,
-    model: &VolumetricModel,
-) -> Result<(), VolumetricFailure> {
-    let axes = volumetric
-        .axes
-        .iter()
-        .map(|it| config.axis[it].motion.speed_max_mm_per_s);
-    let axes = MetresPerSecond(axes.fold(0.0, f64::max) * 1e-3);
-    let seen = model.speed_max();
-    if seen < axes {
-        return Err(VolumetricFailure::TooFast { seen, axes });
-    }
-    Ok(())
 }
 
 fn watched_beam(

@@ -7,9 +7,10 @@ use compensator::volumetric::identify::IdentifyError;
 use compensator::volumetric::model::{ChainError, ConditionsError, ModelError};
 use compensator::volumetric::online::{MemoryError, RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
-use units::{Celsius, Metres, MetresPerSecond, Radians};
+use units::{Celsius, Metres, Radians};
 
 use crate::volumetric::calibrate::Scatter;
+use crate::volumetric::limits::{BeyondLimits, NotWithin};
 use crate::volumetric::settings::BeamDetectorError;
 use machine::engine::{Cause, Lack, PushError};
 
@@ -272,18 +273,9 @@ pub enum VolumetricFailure {
     /// The errors cannot be compensated.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// At the axes' full speed the correction would have to change too fast.
-    #[error(
-        "the correction may have to change faster than rate_limit_um_per_s above {:.1} mm/s, but \
-         the axes together reach {:.1} mm/s; raise the limit or lower their speed_max_mm_per_s",
-        seen.value() * 1e3, axes.value() * 1e3
-    )]
-    TooFast {
-        /// The speed up to which it is proven not to.
-        seen: MetresPerSecond,
-        /// What the axes reach.
-        axes: MetresPerSecond,
-    },
+    /// The configuration does not let a correction like this pass.
+    #[error("three axes: {0}")]
+    Limits(BeyondLimits),
     /// The correction was to be switched on, and something that it is computed from is missing.
     #[error("not corrected: {lack}; the machine was not moved")]
     Lacking {
@@ -359,6 +351,16 @@ pub enum VolumetricFailure {
     },
 }
 
+impl From<NotWithin> for VolumetricFailure {
+    fn from(reason: NotWithin) -> Self {
+        match reason {
+            NotWithin::Limits(beyond) => Self::Limits(beyond),
+            NotWithin::Model(source) => Self::Model(source),
+            NotWithin::Conditions(source) => Self::Conditions(source),
+        }
+    }
+}
+
 impl VolumetricFailure {
     /// As [`crate::Failure::exit_code`].
     pub const fn exit_code(&self) -> u8 {
@@ -393,7 +395,7 @@ impl VolumetricFailure {
             | Self::Conditions(_)
             | Self::NoCorrection(_)
             | Self::Model(_)
-            | Self::TooFast { .. }
+            | Self::Limits(_)
             | Self::Path { .. } => 3,
             Self::NoSamples { .. }
             | Self::NoLight { .. }

@@ -11,6 +11,7 @@
 //! | `verify` | a line that no calibration uses, read with the correction on |
 //! | `state` | what is stored, put together: errors, references, memories |
 //! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
+//! | `limits` | whether the configuration lets that pass, and which limits would |
 //! | `line` | lines of the tool's way that a laser interferometer measures: set up, travelled, read |
 //! | `inputs` | which of the engine's channels belong to each detector, and whether its value is accepted |
 //! | `thermometers` | the same for the thermometers; those that belong together fail together |
@@ -24,6 +25,7 @@ mod failure;
 pub(crate) mod first_part;
 mod handle;
 mod inputs;
+mod limits;
 pub(crate) mod line;
 mod log;
 mod memory;

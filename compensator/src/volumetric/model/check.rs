@@ -10,7 +10,6 @@ use super::{Machine, ModelError};
 use crate::error_table::Limits;
 use crate::volumetric::function::Pieces;
 use crate::volumetric::inverse::LIPSCHITZ_MAX;
-use crate::volumetric::point::cross_bound;
 use crate::volumetric::{Axis, Volume};
 
 pub(super) fn check_limits(limits: &Limits) -> Result<(), ModelError> {
@@ -193,16 +192,13 @@ pub(super) fn check_functions(
     limit: Metres,
 ) -> Result<(), ModelError> {
     for axis in Axis::ALL {
-        let (packed, lever) = (&axes[axis.index()], bounds.levers[axis.index()]);
+        let lever = bounds.levers[axis.index()];
+        let effects = axes[axis.index()].largest_effects(lever).map(Metres);
         for k in Axis::ALL {
-            let mut tilt = [0.0; 3];
-            tilt[k.index()] = packed.largest[3 + k.index()];
-            let about = cross_bound(tilt, lever).into_iter().fold(0.0, f64::max);
             for (function, seen) in [
-                (ErrorName::Along(axis, k), packed.largest[k.index()]),
-                (ErrorName::About(axis, k), about),
+                (ErrorName::Along(axis, k), effects[k.index()]),
+                (ErrorName::About(axis, k), effects[3 + k.index()]),
             ] {
-                let seen = Metres(seen);
                 if seen.value().is_nan() || seen > limit {
                     return Err(ModelError::TooLarge {
                         function,

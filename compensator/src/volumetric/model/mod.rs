@@ -39,6 +39,7 @@ mod bound;
 mod chain;
 mod check;
 mod errors;
+mod extreme;
 mod pack;
 mod refusal;
 mod thermal;
@@ -48,6 +49,7 @@ use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 pub use chain::{Chain, ChainError};
 pub use errors::{AxisErrors, ErrorName, Squareness};
+pub use extreme::Extreme;
 pub use refusal::{ConditionsError, ModelError};
 pub(in crate::volumetric) use thermal::Arc;
 pub use thermal::{Thermal, ThermalBend, ThermalChannel};

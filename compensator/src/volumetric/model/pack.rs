@@ -3,7 +3,7 @@
 use crate::interpolation::Segment;
 use crate::volumetric::find::Finder;
 use crate::volumetric::function::Pieces;
-use crate::volumetric::point::V4;
+use crate::volumetric::point::{V3, V4, cross_bound};
 
 /// Nodes nearer together than this are one: no error function changes within a nanometre.
 pub(super) const SAME_NODE_M: f64 = 1e-9;
@@ -82,6 +82,26 @@ impl PackedAxis {
             pieces: all.iter().map(|it| it.0).collect(),
             finder: Finder::new(breaks),
         }
+    }
+
+    /// Where its pieces begin, and the end of the last.
+    pub(super) fn breaks(&self) -> Vec<f64> {
+        let starts = self.pieces.iter().map(|it| it.along[0][3]);
+        let end = self.pieces.last().map(|it| it.along[1][3]);
+        starts.chain(end).collect()
+    }
+
+    /// By how much each function by itself moves the tool at most, where its tilts act on `lever`:
+    /// displacements, then tilts.
+    pub(super) fn largest_effects(&self, lever: V3) -> [f64; 6] {
+        core::array::from_fn(|lane| {
+            if lane < 3 {
+                return self.largest[lane];
+            }
+            let mut tilt = [0.0; 3];
+            tilt[lane - 3] = self.largest[lane];
+            cross_bound(tilt, lever).into_iter().fold(0.0, f64::max)
+        })
     }
 
     /// The position within the range, beyond which the ends' values hold, and its piece.

@@ -370,6 +370,30 @@ fn uncertainties_combine_with_their_levers() {
     check_um(u, [0.02_f64.sqrt(), 0.27_f64.sqrt(), 0.02_f64.sqrt()]);
 }
 
+/// By trying places all over the volume: none is beyond the one found, and it is one of them.
+#[test]
+fn the_largest_deviation_of_the_volume_is_found_with_its_place() {
+    for chain in ["FXYZ", "XFYZ", "ZYXF"] {
+        let model = VolumetricModel::new(full(chain, 5), limits()).unwrap();
+        let now = warm(&model, Point::from_mm(100.0, 0.0, -50.0));
+        let found = model.largest_deviation(&now);
+        let there = model.deviation(found.at, &now).unwrap();
+        assert_eq!(there.along(found.along), found.deviation);
+        let mut most = 0.0_f64;
+        for n in 0..21_usize.pow(3) {
+            let share = |k: usize| (n / 21_usize.pow(k as u32) % 21) as f64 / 20.0;
+            let high = model.machine().volume.high().array();
+            let low = model.machine().volume.low().array();
+            let at = core::array::from_fn(|k| low[k] + (high[k] - low[k]) * share(k));
+            let deviation = model.deviation(Point::of(at), &now).unwrap().array();
+            most = deviation.into_iter().map(f64::abs).fold(most, f64::max);
+        }
+        let found = found.deviation.abs().value();
+        assert!(found >= most * 0.97, "{chain}: {found}, not {most}");
+        assert!(model.largest_alone().value() > 0.0);
+    }
+}
+
 #[test]
 fn what_is_outside_or_beyond_the_limits_is_refused_by_name() {
     let mut tilted = machine("FXYZ");

@@ -300,6 +300,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
+    use crate::Edit;
     use crate::Store;
     use crate::program::stored_tests::lines_of;
 
@@ -318,12 +319,17 @@ mod tests {
 
     impl Desk {
         fn new() -> Self {
+            Self::with(str::to_owned)
+        }
+
+        /// Of a machine whose file `change` has changed.
+        fn with(change: impl Fn(&str) -> String) -> Self {
             let folder = tempfile::tempdir().unwrap();
             let config = folder.path().join("machine.toml");
             let data = format!("data_dir = {:?}", folder.path().join("data"));
             let text = MACHINE.replace("data_dir = \"machine-data\"", &data);
             assert_ne!(text, MACHINE);
-            fs::write(&config, text).unwrap();
+            fs::write(&config, change(&text)).unwrap();
             let loaded = config::load(&config).unwrap();
             Self {
                 folder,
@@ -393,6 +399,41 @@ mod tests {
         desk.save(sound).expect("it is sound");
         assert_eq!(desk.store.list().unwrap().len(), 2);
         drop(desk.folder);
+    }
+
+    /// Limits between what one function needs and what all together do, and the ones that are named.
+    #[test]
+    fn limits_that_would_stop_a_path_are_refused_before_anything_is_stored_with_the_ones_that_do() {
+        let limited = |size: &str, slope: &str| {
+            Desk::with(|text| {
+                text.edit("size_limit_um = 250.0", &format!("size_limit_um = {size}"))
+                    .edit("displacement_max_um = 60.0", "displacement_max_um = 10.0")
+                    .edit("slope_limit = 0.01", &format!("slope_limit = {slope}"))
+            })
+        };
+        let save = |desk: &Desk| desk.save(desk.journal("run.jsonl", |_, _| ()));
+        let number = |text: &str, key: &str| {
+            let after = text.split(&format!("`{key} = ")).nth(1)?;
+            after.split('`').next().map(str::to_owned)
+        };
+        let mut seen = Vec::new();
+        for (size, slope) in [("12.0", "0.01"), ("80.0", "0.01"), ("250.0", "0.0001")] {
+            let desk = limited(size, slope);
+            let refused = save(&desk).expect_err("it is beyond").to_string();
+            assert!(refused.contains("is wise only where"), "{refused}");
+            assert!(desk.store.list().unwrap().is_empty());
+            let size = number(&refused, "size_limit_um").unwrap_or(size.to_owned());
+            let slope = number(&refused, "slope_limit").unwrap_or(slope.to_owned());
+            save(&limited(&size, &slope)).expect("the numbers named do");
+            seen.push(refused);
+        }
+        assert!(seen[0].contains("alone moves the tool"), "{}", seen[0]);
+        assert!(
+            seen[1].contains("a path there would be stopped"),
+            "{}",
+            seen[1]
+        );
+        assert!(seen[2].contains("may change by"), "{}", seen[2]);
     }
 
     #[test]
