@@ -120,7 +120,7 @@ impl Machine {
     /// When there is no such axis.
     pub fn linear(&mut self, axis: &str) -> Result<LinearStage<'_>, Failure> {
         let Some((axis, config)) = self.config.axis.get_key_value(axis) else {
-            return Err(no_such_axis(axis, &self.core.axis_names()));
+            return Err(no_such_axis(axis, &self.core.devices().axis_names()));
         };
         let memory = self.linear.entry(axis.clone()).or_default();
         Ok(LinearStage {
@@ -137,7 +137,7 @@ impl Machine {
     /// When there is no such axis.
     pub fn rotary(&mut self, axis: &str) -> Result<RotaryTable<'_>, Failure> {
         let Some((axis, config)) = self.config.rotary.get_key_value(axis) else {
-            return Err(no_such_axis(axis, &self.core.rotary_names()));
+            return Err(no_such_axis(axis, &self.core.devices().rotary_names()));
         };
         let memory = self.rotary.entry(axis.clone()).or_default();
         Ok(RotaryTable {

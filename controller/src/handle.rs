@@ -39,7 +39,7 @@ impl Core<'_> {
         let corrections = config.corrections();
         InstrumentRecord {
             name: name.to_owned(),
-            identity: self.identity(name).unwrap_or_default().name,
+            identity: self.devices().identity(name).unwrap_or_default().name,
             air_corrected: corrections.air,
             material_corrected: corrections.material_expansion.is_some(),
             dead_path_corrected: corrections.dead_path.is_some(),

@@ -65,7 +65,7 @@ pub(crate) fn this_machine(
 }
 
 pub(crate) fn drive_record(machine: &machine::Machine, axis: &str) -> IdentityRecord {
-    let identity = machine.identity(axis);
+    let identity = machine.devices().identity(axis);
     identity
         .as_ref()
         .map(IdentityRecord::from)

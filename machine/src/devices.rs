@@ -1,18 +1,27 @@
-//! The devices of a machine by number: linear axes, rotary axes, analog modules, instruments,
-//! cameras.
+//! The devices of a machine, by name and by number: linear axes, rotary axes, analog modules,
+//! instruments, cameras.
 
 use std::collections::BTreeMap;
 
 use drivers::device::{
-    AnalogInput, Axis, Device, DisplacementInstrument, Identity, PoseInstrument, RotaryAxis,
-    ServoDrive,
+    AnalogInput, Axis, AxisReading, Device, DisplacementInstrument, Identity, LineUse,
+    PoseInstrument, RotaryAxis, ServoDrive,
 };
-use units::Time;
-use wire::Port;
+use units::{Radians, Time};
+use wire::{Payload, Port};
 
 use crate::failure::Failure;
-use crate::machine::Machine;
+use crate::parts::Camera;
 use crate::unit::Unit;
+
+/// The devices of a machine. Their numbers are those of the lists one after the other.
+pub struct Devices {
+    pub(crate) axes: Vec<Unit<dyn Axis>>,
+    pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
+    pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
+    pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
+    pub(crate) cameras: Vec<Camera>,
+}
 
 /// Any device, with its port.
 pub(crate) struct UnitMut<'a> {
@@ -41,9 +50,9 @@ as_device!(
     PoseInstrument
 );
 
-impl Machine {
+impl Devices {
     /// Lets `act` see every device and its port, in the order of their numbers.
-    pub(crate) fn each_device(&mut self, mut act: impl FnMut(Port, &mut dyn Device)) {
+    pub(crate) fn each(&mut self, mut act: impl FnMut(Port, &mut dyn Device)) {
         for unit in &mut self.axes {
             act(unit.port, &mut *unit.device);
         }
@@ -62,13 +71,13 @@ impl Machine {
     }
 
     /// When the first deadline of any device is.
-    pub(crate) fn next_device_deadline(&self) -> Time {
-        let deadlines = self.devices().map(|(_, device)| device.poll_timeout());
+    pub(crate) fn next_deadline(&self) -> Time {
+        let deadlines = self.named().map(|(_, device)| device.poll_timeout());
         deadlines.fold(Time::NEVER, Time::min)
     }
 
     /// Every device with its name.
-    fn devices(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
+    fn named(&self) -> impl Iterator<Item = (&String, &dyn Device)> {
         let axes = self.axes.iter().map(|it| (&it.name, &*it.device as _));
         let rotaries = self.rotaries.iter().map(|it| (&it.name, &*it.device as _));
         let analogs = self.analogs.iter().map(|it| (&it.name, &*it.device as _));
@@ -81,13 +90,13 @@ impl Machine {
     }
 
     /// The names of all devices: axes, rotary axes, analog modules, instruments and cameras.
-    pub fn device_names(&self) -> Vec<String> {
-        self.devices().map(|(name, _)| name.clone()).collect()
+    pub fn names(&self) -> Vec<String> {
+        self.named().map(|(name, _)| name.clone()).collect()
     }
 
     /// What every device said it is, by its name in the configuration.
     pub fn identities(&self) -> BTreeMap<String, Identity> {
-        self.devices()
+        self.named()
             .filter_map(|(name, device)| Some((name.clone(), device.identity()?)))
             .collect()
     }
@@ -95,13 +104,13 @@ impl Machine {
     /// What the device `name` said it is; `None` when it has not said that, or there is no such
     /// device.
     pub fn identity(&self, name: &str) -> Option<Identity> {
-        let (_, device) = self.devices().find(|(own, _)| *own == name)?;
+        let (_, device) = self.named().find(|(own, _)| *own == name)?;
         device.identity()
     }
 
     /// Counters of every device: dropped, late, mismatched and the like.
     pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
-        self.devices()
+        self.named()
             .flat_map(|(name, device)| {
                 let counters = device.counters().into_iter();
                 counters.map(move |(what, count)| (name.clone(), what, count))
@@ -109,17 +118,17 @@ impl Machine {
             .collect()
     }
 
-    pub(crate) fn device_count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.instrument_device(self.instruments.len()) + self.cameras.len()
     }
 
-    pub(crate) fn device_name(&self, at: usize) -> String {
-        let (name, _) = self.devices().nth(at).expect("a device has a number");
+    pub(crate) fn name(&self, at: usize) -> String {
+        let (name, _) = self.named().nth(at).expect("a device has a number");
         name.clone()
     }
 
-    /// Device number `at`, in the order of [`Machine::device_names`].
-    pub(crate) fn device_mut(&mut self, at: usize) -> UnitMut<'_> {
+    /// Device number `at`, in the order of [`Devices::names`].
+    pub(crate) fn unit_mut(&mut self, at: usize) -> UnitMut<'_> {
         let (axes, drives) = (self.axes.len(), self.drive_count());
         let machines_own = drives + self.analogs.len();
         let instruments = machines_own + self.instruments.len();
@@ -159,17 +168,147 @@ impl Machine {
 
     /// The number of a named axis, linear or rotary.
     pub(crate) fn drive_index(&self, axis: &str) -> Result<usize, Failure> {
-        let mut names = self.device_names();
+        let mut names = self.names();
         names.truncate(self.drive_count());
-        let at = names.iter().position(|name| name == axis);
-        at.ok_or_else(|| Failure::NoSuchAxis {
-            axis: axis.to_owned(),
-            known: names.join(", "),
-        })
+        place_of_axis(axis, &names)
+    }
+
+    /// The number of a named linear axis.
+    pub(crate) fn axis_index(&self, axis: &str) -> Result<usize, Failure> {
+        let found = self.axes.iter().position(|unit| unit.name == axis);
+        found.map_or_else(|| place_of_axis(axis, &self.axis_names()), Ok)
+    }
+
+    /// The number of a named rotary axis among those.
+    pub(crate) fn rotary_index(&self, axis: &str) -> Result<usize, Failure> {
+        place_of_axis(axis, &self.rotary_names())
+    }
+
+    /// The number of a named instrument among those.
+    pub(crate) fn instrument_index(&self, name: &str) -> Result<usize, Failure> {
+        place_of(name, "instrument", &names_of(&self.instruments))
+    }
+
+    /// The number of a named image controller among those.
+    pub(crate) fn camera_index(&self, name: &str) -> Result<usize, Failure> {
+        place_of(name, "camera", &self.camera_names())
     }
 
     /// The number, among all devices, of instrument number `at`.
     pub(crate) fn instrument_device(&self, at: usize) -> usize {
         self.drive_count() + self.analogs.len() + at
     }
+
+    /// The number, among all devices, of camera number `at`.
+    pub(crate) fn camera_device(&self, at: usize) -> usize {
+        self.instrument_device(self.instruments.len()) + at
+    }
+
+    /// The names of the linear axes.
+    pub fn axis_names(&self) -> Vec<String> {
+        names_of(&self.axes)
+    }
+
+    /// The names of the rotary axes.
+    pub fn rotary_names(&self) -> Vec<String> {
+        names_of(&self.rotaries)
+    }
+
+    /// The names of the image controllers.
+    pub fn camera_names(&self) -> Vec<String> {
+        let names = self.cameras.iter().map(|it| it.unit.name.clone());
+        names.collect()
+    }
+
+    /// The newest sample of the rotary axis `axis`; its position counts on over the turns.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn rotary_reading(&self, axis: &str) -> Result<Option<AxisReading<Radians>>, Failure> {
+        Ok(self.rotaries[self.rotary_index(axis)?].device.reading())
+    }
+
+    /// The driver of `instrument`.
+    ///
+    /// # Errors
+    /// When there is no such instrument.
+    pub fn instrument(&self, instrument: &str) -> Result<&dyn DisplacementInstrument, Failure> {
+        Ok(&*self.instruments[self.instrument_index(instrument)?].device)
+    }
+
+    /// The driver of the analog module `module`.
+    ///
+    /// # Errors
+    /// When there is no such module.
+    pub fn analog(&self, module: &str) -> Result<&dyn AnalogInput, Failure> {
+        let at = place_of(module, "analog module", &names_of(&self.analogs))?;
+        Ok(&*self.analogs[at].device)
+    }
+
+    /// The drivers of all analog modules, in the order of their names.
+    pub fn analogs(&self) -> impl Iterator<Item = &dyn AnalogInput> {
+        self.analogs.iter().map(|unit| &*unit.device as _)
+    }
+
+    /// The first linear axis or module without a sample newer than `resumed`.
+    pub(crate) fn silent_since(&self, resumed: Time) -> Option<String> {
+        let is_old = |at: Option<Time>| at.is_none_or(|at| at <= resumed);
+        let axis = self
+            .axes
+            .iter()
+            .find(|it| is_old(it.device.reading().map(|it| it.at)));
+        let module = || {
+            let modules = self.analogs.iter();
+            let mut silent = modules.filter(|it| is_old(it.device.last_sample()));
+            silent.next().map(|it| it.name.clone())
+        };
+        axis.map(|it| it.name.clone()).or_else(module)
+    }
+
+    /// What device number `at` wants to send, when it has its turn.
+    pub(crate) fn next_payload(&mut self, at: usize) -> Option<(Port, Payload)> {
+        let unit = self.unit_mut(at);
+        let (port, own) = (unit.port, unit.device.line_use());
+        if own == LineUse::Unshared {
+            return unit.device.poll_transmit().map(|payload| (port, payload));
+        }
+        if !self.may_speak(at, port, own) {
+            return None;
+        }
+        let payload = self.unit_mut(at).device.poll_transmit()?;
+        Some((port, payload))
+    }
+
+    /// Whether device number `at` has its turn on a line that it shares.
+    fn may_speak(&mut self, at: usize, port: Port, own: LineUse) -> bool {
+        let others: Vec<_> = (0..self.count())
+            .filter(|other| *other != at)
+            .filter_map(|other| {
+                let unit = self.unit_mut(other);
+                (unit.port == port).then(|| (unit.device.line_use(), other < at))
+            })
+            .collect();
+        own.may_speak(others)
+    }
+}
+
+fn names_of<D: ?Sized>(units: &[Unit<D>]) -> Vec<String> {
+    units.iter().map(|unit| unit.name.clone()).collect()
+}
+
+fn place_of_axis(axis: &str, names: &[String]) -> Result<usize, Failure> {
+    let at = names.iter().position(|name| name == axis);
+    at.ok_or_else(|| Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: names.join(", "),
+    })
+}
+
+fn place_of(name: &str, what: &'static str, names: &[String]) -> Result<usize, Failure> {
+    let place = names.iter().position(|it| it == name);
+    place.ok_or_else(|| Failure::NoSuchDevice {
+        what,
+        name: name.to_owned(),
+        known: names.join(", "),
+    })
 }

@@ -2,11 +2,10 @@
 
 use core::time::Duration;
 
-use drivers::device::{AnalogInput, DisplacementInstrument, DisplacementReading};
+use drivers::device::DisplacementReading;
 
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::unit::Unit;
 
 impl Machine {
     /// Starts `instrument`, unless it runs already (its datum stands then), and counts its alarms
@@ -15,8 +14,8 @@ impl Machine {
     /// # Errors
     /// When there is no such instrument, or it does not answer or is another one.
     pub fn use_instrument(&mut self, instrument: &str) -> Result<(), Failure> {
-        let at = self.instrument_index(instrument)?;
-        self.use_device(self.instrument_device(at), instrument)
+        let at = self.devices.instrument_index(instrument)?;
+        self.use_device(self.devices.instrument_device(at), instrument)
     }
 
     /// No instrument or camera is in use from now on: an operator may reach into its beam.
@@ -30,22 +29,14 @@ impl Machine {
         self.started_instruments.clear();
     }
 
-    /// The driver of `instrument`.
-    ///
-    /// # Errors
-    /// When there is no such instrument.
-    pub fn instrument(&self, instrument: &str) -> Result<&dyn DisplacementInstrument, Failure> {
-        Ok(&*self.instruments[self.instrument_index(instrument)?].device)
-    }
-
     /// Makes `instrument` read zero from now on.
     ///
     /// # Errors
     /// When there is no such instrument.
     pub fn set_instrument_datum(&mut self, instrument: &str) -> Result<(), Failure> {
-        let at = self.instrument_index(instrument)?;
+        let at = self.devices.instrument_index(instrument)?;
         let now = self.now();
-        self.instruments[at].device.set_datum(now);
+        self.devices.instruments[at].device.set_datum(now);
         Ok(())
     }
 
@@ -60,48 +51,19 @@ impl Machine {
         samples: u32,
         rate_hz: f64,
     ) -> Result<DisplacementReading, Failure> {
-        let at = self.instrument_index(instrument)?;
+        let at = self.devices.instrument_index(instrument)?;
         let now = self.now();
-        self.instruments[at].device.begin_average(now, samples);
+        self.devices.instruments[at]
+            .device
+            .begin_average(now, samples);
         // Four times the nominal time: the stream comes in batches over USB.
         let limit = Duration::from_secs_f64(1.0 + 4.0 * f64::from(samples) / rate_hz);
-        self.await_outcome(self.instrument_device(at), "average of readings", limit)?;
-        let average = self.instruments[at].device.average();
+        self.await_outcome(
+            self.devices.instrument_device(at),
+            "average of readings",
+            limit,
+        )?;
+        let average = self.devices.instruments[at].device.average();
         Ok(average.expect("an average that ended well is there"))
     }
-
-    /// The driver of the analog module `module`.
-    ///
-    /// # Errors
-    /// When there is no such module.
-    pub fn analog(&self, module: &str) -> Result<&dyn AnalogInput, Failure> {
-        let at = place_of(&self.analogs, "analog module", module)?;
-        Ok(&*self.analogs[at].device)
-    }
-
-    /// The drivers of all analog modules, in the order of their names.
-    pub fn analogs(&self) -> impl Iterator<Item = &dyn AnalogInput> {
-        self.analogs.iter().map(|unit| &*unit.device as _)
-    }
-
-    fn instrument_index(&self, name: &str) -> Result<usize, Failure> {
-        place_of(&self.instruments, "instrument", name)
-    }
-}
-
-fn place_of<D: ?Sized>(
-    units: &[Unit<D>],
-    what: &'static str,
-    name: &str,
-) -> Result<usize, Failure> {
-    let place = units.iter().position(|unit| unit.name == name);
-    place.ok_or_else(|| Failure::NoSuchDevice {
-        what,
-        name: name.to_owned(),
-        known: units
-            .iter()
-            .map(|unit| unit.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", "),
-    })
 }

@@ -1,12 +1,10 @@
 //! One machine: its devices, its transport, and what its drives remember.
 
 use core::time::Duration;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use compensator::apply::ApproachTracker;
-use drivers::device::{
-    AnalogInput, Axis, AxisCommand, AxisReading, DisplacementInstrument, DriveCommand, RotaryAxis,
-};
+use drivers::device::{AxisCommand, AxisReading, DriveCommand};
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
 use units::{Metres, Time};
@@ -14,14 +12,16 @@ use wire::Port;
 use wire::cia402::PowerState;
 
 use crate::bus_watch::BusWatch;
+use crate::devices::Devices;
 use crate::failure::Failure;
 use crate::host_watch::HostWatch;
-use crate::observer::{Observer, Silent};
+use crate::notices::Notices;
+use crate::observer::Observer;
 use crate::outbox::Outbox;
-use crate::parts::{AxisSettings, Bus, Camera, Parts};
+use crate::parts::{AxisSettings, Bus, Parts};
 use crate::patience::Patience;
+use crate::ports::Ports;
 use crate::stop_request::StopRequest;
-use crate::unit::Unit;
 
 /// How alarms are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,19 +68,14 @@ pub struct Machine {
     pub(crate) patience: Patience,
     pub(crate) transport: Box<dyn Transport>,
     pub(crate) outbox: Outbox,
-    pub(crate) buses: Vec<Bus>,
-    pub(crate) lines: BTreeMap<Port, String>,
-    pub(crate) axes: Vec<Unit<dyn Axis>>,
-    /// In the order of `axes`.
+    pub(crate) ports: Ports,
+    pub(crate) devices: Devices,
+    /// By the numbers of the linear axes.
     pub(crate) settings: Vec<AxisSettings>,
-    /// In the order of `axes`: the direction of the last motion.
+    /// By the numbers of the linear axes: the direction of the last motion.
     pub(crate) approach: Vec<ApproachTracker>,
-    pub(crate) rotaries: Vec<Unit<dyn RotaryAxis>>,
     /// By the numbers of the drives: zeroed since it was last powered.
     pub(crate) zeroed: Vec<bool>,
-    pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
-    pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
-    pub(crate) cameras: Vec<Camera>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
@@ -89,9 +84,7 @@ pub struct Machine {
     pub(crate) started_instruments: BTreeSet<String>,
     /// The instrument or camera whose readings a procedure needs now: only its alarms count.
     pub(crate) instrument_in_use: Option<String>,
-    pub(crate) observer: Box<dyn Observer>,
-    /// Warnings for which there is no time now: whoever takes them may make their writer wait.
-    pub(crate) held_back: Option<Vec<String>>,
+    pub(crate) notices: Notices,
     pub(crate) stop: StopRequest,
     /// Whether its cyclic loops ask for SCHED_FIFO and locked memory.
     pub(crate) real_time: bool,
@@ -113,22 +106,25 @@ impl Machine {
             host_watch: HostWatch::default(),
             approach: vec![ApproachTracker::new(); axes.len()],
             zeroed: vec![false; axes.len() + parts.rotaries.len()],
-            axes,
+            devices: Devices {
+                axes,
+                rotaries: parts.rotaries,
+                analogs: parts.analogs,
+                instruments: parts.instruments,
+                cameras: parts.cameras,
+            },
             settings,
-            rotaries: parts.rotaries,
-            analogs: parts.analogs,
-            instruments: parts.instruments,
-            cameras: parts.cameras,
-            buses: parts.buses,
-            lines: parts.lines,
+            ports: Ports {
+                buses: parts.buses,
+                lines: parts.lines,
+            },
             patience: parts.patience,
             transport,
             outbox: Outbox::default(),
             supervision: Supervision::Off,
             started_instruments: BTreeSet::new(),
             instrument_in_use: None,
-            observer: Box::new(Silent),
-            held_back: None,
+            notices: Notices::default(),
             stop: StopRequest::default(),
             real_time: false,
         }
@@ -143,12 +139,12 @@ impl Machine {
 
     /// Who is told about progress.
     pub fn observe(&mut self, observer: Box<dyn Observer>) {
-        self.observer = observer;
+        self.notices.observer = observer;
     }
 
     /// The observer that is told about progress.
     pub fn observer(&mut self) -> &mut dyn Observer {
-        &mut *self.observer
+        &mut *self.notices.observer
     }
 
     /// How much longer than usual things are waited for.
@@ -171,9 +167,9 @@ impl Machine {
         self.transport.now()
     }
 
-    /// The names of the axes.
-    pub fn axis_names(&self) -> Vec<String> {
-        self.axes.iter().map(|unit| unit.name.clone()).collect()
+    /// Its devices: who they are, and what they have said.
+    pub const fn devices(&self) -> &Devices {
+        &self.devices
     }
 
     /// Within which `axis` is moved.
@@ -181,13 +177,14 @@ impl Machine {
     /// # Errors
     /// When there is no such linear axis.
     pub fn axis_settings(&self, axis: &str) -> Result<&AxisSettings, Failure> {
-        Ok(&self.settings[self.axis_index(axis)?])
+        Ok(&self.settings[self.devices.axis_index(axis)?])
     }
 
     /// Whether the (linear or rotary) `axis` was zeroed since its drive was last powered.
     pub fn is_zeroed(&self, axis: &str) -> bool {
-        self.drive_index(axis)
-            .is_ok_and(|at| self.zeroed[at] && self.drive(at).is_homed())
+        self.devices
+            .drive_index(axis)
+            .is_ok_and(|at| self.zeroed[at] && self.devices.drive(at).is_homed())
     }
 
     /// Says that `axis` has its zero, until its drive loses power or the machine is started anew;
@@ -196,7 +193,7 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn set_zeroed(&mut self, axis: &str, zeroed: bool) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
+        let at = self.devices.drive_index(axis)?;
         self.zeroed[at] = zeroed;
         Ok(())
     }
@@ -206,7 +203,7 @@ impl Machine {
     /// # Errors
     /// When there is no such axis, or it was not zeroed.
     pub fn require_zeroed(&self, axis: &str) -> Result<(), Failure> {
-        self.drive_index(axis)?;
+        self.devices.drive_index(axis)?;
         if self.is_zeroed(axis) {
             return Ok(());
         }
@@ -220,7 +217,8 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn reading(&self, axis: &str) -> Result<Option<AxisReading>, Failure> {
-        Ok(self.axis(axis)?.device.reading())
+        let at = self.devices.axis_index(axis)?;
+        Ok(self.devices.axes[at].device.reading())
     }
 
     /// The newest power state of the (linear or rotary) `axis`, `None` before its drive has
@@ -229,7 +227,10 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn power_state(&self, axis: &str) -> Result<Option<PowerState>, Failure> {
-        Ok(self.drive(self.drive_index(axis)?).power_state())
+        Ok(self
+            .devices
+            .drive(self.devices.drive_index(axis)?)
+            .power_state())
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
@@ -242,11 +243,11 @@ impl Machine {
         self.catch_up();
         self.zeroed.fill(false);
         self.approach.iter_mut().for_each(ApproachTracker::forget);
-        self.set_sync(true)?;
-        let machine_devices = self.instrument_device(0);
+        self.ports.set_sync(&mut *self.transport, true)?;
+        let machine_devices = self.devices.instrument_device(0);
         let now = self.now();
         for at in 0..machine_devices {
-            self.device_mut(at).device.start(now);
+            self.devices.unit_mut(at).device.start(now);
         }
         for at in 0..machine_devices {
             self.await_start(at)?;
@@ -260,7 +261,7 @@ impl Machine {
     pub(crate) fn use_device(&mut self, at: usize, name: &str) -> Result<(), Failure> {
         if !self.started_instruments.contains(name) {
             let now = self.now();
-            self.device_mut(at).device.start(now);
+            self.devices.unit_mut(at).device.start(now);
             self.await_start(at)?;
             self.started_instruments.insert(name.to_owned());
         }
@@ -280,10 +281,10 @@ impl Machine {
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
-        let at = self.axis_index(axis)?;
+        let at = self.devices.axis_index(axis)?;
         self.require_supervised(at)?;
         let now = self.now();
-        self.axes[at].device.command(now, command.into());
+        self.devices.axes[at].device.command(now, command.into());
         self.await_outcome(at, step, limit)
     }
 
@@ -292,9 +293,9 @@ impl Machine {
     /// # Errors
     /// When there is no such linear axis.
     pub fn begin(&mut self, axis: &str, command: AxisCommand) -> Result<(), Failure> {
-        let at = self.axis_index(axis)?;
+        let at = self.devices.axis_index(axis)?;
         let now = self.now();
-        self.axes[at].device.command(now, command);
+        self.devices.axes[at].device.command(now, command);
         Ok(())
     }
 
@@ -304,8 +305,8 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn outcome(&mut self, axis: &str) -> Result<Option<Result<(), Failure>>, Failure> {
-        let at = self.axis_index(axis)?;
-        let outcome = self.axes[at].device.poll_outcome();
+        let at = self.devices.axis_index(axis)?;
+        let outcome = self.devices.axes[at].device.poll_outcome();
         let device = || axis.to_owned();
         Ok(outcome.map(|it| {
             it.map_err(|source| Failure::Device {
@@ -321,7 +322,7 @@ impl Machine {
         if self.supervision == Supervision::On {
             return Ok(());
         }
-        let device = self.device_name(at);
+        let device = self.devices.name(at);
         Err(Failure::NotStarted { device })
     }
 
@@ -337,36 +338,8 @@ impl Machine {
             self.require_supervised(at)?;
         }
         let now = self.now();
-        self.drive_mut(at).control(now, command);
+        self.devices.drive_mut(at).control(now, command);
         self.await_outcome(at, step, limit)
-    }
-
-    pub(crate) fn set_sync(&mut self, on: bool) -> Result<(), Failure> {
-        for bus in &self.buses {
-            let period = on.then_some(bus.sync_period);
-            self.transport
-                .set_sync(bus.port, period)
-                .map_err(|source| Failure::Send {
-                    device: format!("SYNC on {}", bus.name),
-                    source,
-                })?;
-        }
-        Ok(())
-    }
-
-    fn axis(&self, axis: &str) -> Result<&Unit<dyn Axis>, Failure> {
-        let at = self.axis_index(axis)?;
-        Ok(&self.axes[at])
-    }
-
-    pub(crate) fn axis_index(&self, axis: &str) -> Result<usize, Failure> {
-        self.axes
-            .iter()
-            .position(|unit| unit.name == axis)
-            .ok_or_else(|| Failure::NoSuchAxis {
-                axis: axis.to_owned(),
-                known: self.axis_names().join(", "),
-            })
     }
 
     /// The soft limits of `axis`, the lower one first.

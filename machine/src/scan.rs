@@ -17,6 +17,7 @@ use wire::{Arrival, Input, Payload, Port};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::parts::{Bus, ExpectedNode};
+use crate::waiting::Watched;
 
 /// What a scan says of one node or device.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,8 +72,19 @@ impl Machine {
     /// # Errors
     /// When a bus or line cannot be used.
     pub fn scan(&mut self) -> Result<Vec<Found>, Failure> {
+        Scan { machine: self }.everywhere()
+    }
+}
+
+/// A scan that is under way.
+struct Scan<'m> {
+    machine: &'m mut Machine,
+}
+
+impl Scan<'_> {
+    fn everywhere(&mut self) -> Result<Vec<Found>, Failure> {
         let mut found = Vec::new();
-        for bus in self.buses.clone() {
+        for bus in self.machine.ports.buses.clone() {
             found.extend(self.scan_can(&bus)?);
         }
         found.extend(self.scan_serial()?);
@@ -84,14 +96,16 @@ impl Machine {
         let mut answers = Answers::new();
         let all: Vec<_> = (1..=127).filter_map(NodeId::new).collect();
         let awaited: Vec<_> = expected.keys().copied().collect();
-        self.observer
+        self.machine
+            .notices
+            .observer
             .waiting(&format!("{name}: asking nodes 1 to 127 for their identity"));
         self.ask_once(port, &all, DEVICE_TYPE, &mut answers)?;
         let silent = silent(&awaited, DEVICE_TYPE, &answers);
         if !silent.is_empty() {
             let nodes: Vec<_> = silent.iter().map(ToString::to_string).collect();
             let text = format!("{name}: {} did not answer, asking again", nodes.join(", "));
-            self.observer.waiting(&text);
+            self.machine.notices.observer.waiting(&text);
         }
         self.ask_again(port, &awaited, DEVICE_TYPE, &mut answers)?;
         let present: Vec<_> = answers.keys().copied().collect();
@@ -119,10 +133,10 @@ impl Machine {
         object: Object,
         answers: &mut Answers,
     ) -> Result<(), Failure> {
-        let until = self.now() + self.patience.of(AGAIN_LIMIT);
+        let until = self.machine.now() + self.machine.patience.of(AGAIN_LIMIT);
         loop {
             let silent = silent(awaited, object, answers);
-            if silent.is_empty() || self.now() >= until {
+            if silent.is_empty() || self.machine.now() >= until {
                 return Ok(());
             }
             self.ask_once(port, &silent, object, answers)?;
@@ -141,7 +155,8 @@ impl Machine {
             for node in batch {
                 let request = SdoRequest::UploadInitiate { object }.emit();
                 let frame = CanFrame::standard(node.cob_id(Function::SdoRequest), &request);
-                self.transport
+                self.machine
+                    .transport
                     .send(port, &Payload::Frame(frame))
                     .map_err(|source| Failure::Send {
                         device: format!("{node} while scanning"),
@@ -161,13 +176,13 @@ impl Machine {
         (nodes, object): (&[NodeId], Object),
         answers: &mut Answers,
     ) -> Result<(), Failure> {
-        let until = self.now() + limit;
-        while self.now() < until && !silent(nodes, object, answers).is_empty() {
-            if let Some(arrival) = self.transport.receive(until) {
+        let until = self.machine.now() + limit;
+        while self.machine.now() < until && !silent(nodes, object, answers).is_empty() {
+            if let Some(arrival) = self.machine.transport.receive(until) {
                 note_answer(&arrival, port, answers);
             }
-            if self.stop.is_requested() {
-                return Err(self.stop.failure());
+            if self.machine.stop.is_requested() {
+                return Err(self.machine.stop.failure());
             }
         }
         Ok(())
@@ -176,22 +191,19 @@ impl Machine {
     /// Everything on a serial line: amplifiers, analog modules and instruments.
     fn scan_serial(&mut self) -> Result<Vec<Found>, Failure> {
         let mut asked = self.ask_lines();
-        let begun = self.now();
-        let deadline = begun + self.patience.of(SERIAL_LIMIT);
-        let mut tell = self.silent_until();
-        while self.take_outcomes(&mut asked) && self.now() < deadline {
-            if self.now() >= tell {
-                for it in asked.iter().filter(|it| it.result.is_none()) {
-                    self.tell_waiting(it.at, self.now().since(begun), deadline.since(begun));
-                }
-                tell = self.silent_until();
-            }
-            match self.tick(deadline.min(tell)) {
+        let limit = SERIAL_LIMIT;
+        let mut wait = Watched::new(self.machine.now(), limit, self.machine.patience);
+        while self.take_outcomes(&mut asked) && !wait.is_over(self.machine.now()) {
+            let now = self.machine.now();
+            let silent = asked.iter().filter(|it| it.result.is_none());
+            let (devices, notices) = (&mut self.machine.devices, &mut self.machine.notices);
+            wait.tell(now, silent.map(|it| it.at), devices, &mut *notices.observer);
+            match self.machine.tick(wait.next()) {
                 Ok(()) => {}
                 Err(failure) => self.blame(failure, &mut asked)?,
             }
         }
-        let waited = self.now().since(begun);
+        let waited = wait.waited(self.machine.now());
         let found = asked
             .into_iter()
             .map(|it| self.found_on_line(it, waited))
@@ -201,23 +213,26 @@ impl Machine {
 
     /// Asks every device on a serial line who it is.
     fn ask_lines(&mut self) -> Vec<Asked> {
-        let now = self.now();
+        let now = self.machine.now();
         let mut asked = Vec::new();
-        for at in 0..self.device_count() {
-            let port = self.device_mut(at).port;
-            if self.lines.contains_key(&port) {
-                self.device_mut(at).device.identify(now);
+        for at in 0..self.machine.devices.count() {
+            let port = self.machine.devices.unit_mut(at).port;
+            if self.machine.ports.lines.contains_key(&port) {
+                self.machine.devices.unit_mut(at).device.identify(now);
                 let result = None;
                 asked.push(Asked { at, port, result });
             }
         }
-        let names: Vec<_> = asked.iter().map(|it| self.device_name(it.at)).collect();
+        let names: Vec<_> = asked
+            .iter()
+            .map(|it| self.machine.devices.name(it.at))
+            .collect();
         if !names.is_empty() {
             let text = format!(
                 "serial lines: asking {} for their identity",
                 names.join(", ")
             );
-            self.observer.waiting(&text);
+            self.machine.notices.observer.waiting(&text);
         }
         asked
     }
@@ -226,8 +241,8 @@ impl Machine {
     fn take_outcomes(&mut self, asked: &mut [Asked]) -> bool {
         let mut is_waited_for = false;
         for it in asked.iter_mut().filter(|it| it.result.is_none()) {
-            if let Some(outcome) = self.device_mut(it.at).device.poll_outcome() {
-                let device = self.device_name(it.at);
+            if let Some(outcome) = self.machine.devices.unit_mut(it.at).device.poll_outcome() {
+                let device = self.machine.devices.name(it.at);
                 let failed = |source| Failure::Device { device, source }.to_string();
                 it.result = Some(outcome.map_err(failed));
             }
@@ -239,9 +254,9 @@ impl Machine {
     /// A line that cannot be used is the trouble of those on it, and of nobody else.
     fn blame(&self, failure: Failure, asked: &mut [Asked]) -> Result<(), Failure> {
         let is_theirs = |it: &Asked| match &failure {
-            Failure::Link { port, .. } => self.port_name(it.port) == *port,
+            Failure::Link { port, .. } => self.machine.ports.name(it.port) == *port,
             Failure::Send { device, .. } | Failure::Alarm { device, .. } => {
-                self.device_name(it.at) == *device
+                self.machine.devices.name(it.at) == *device
             }
             _ => false,
         };
@@ -258,7 +273,7 @@ impl Machine {
     fn found_on_line(&mut self, asked: Asked, waited: Duration) -> Found {
         let Asked { at, port, result } = asked;
         let result = result.unwrap_or_else(|| {
-            let (device, step) = (self.device_name(at), "answer");
+            let (device, step) = (self.machine.devices.name(at), "answer");
             let overdue = Failure::Overdue {
                 device,
                 step,
@@ -266,11 +281,11 @@ impl Machine {
             };
             Err(overdue.to_string())
         });
-        let identity = self.device_mut(at).device.identity();
+        let identity = self.machine.devices.unit_mut(at).device.identity();
         Found {
-            port: self.port_name(port),
+            port: self.machine.ports.name(port),
             node: None,
-            name: Some(self.device_name(at)),
+            name: Some(self.machine.devices.name(at)),
             identity: identity.filter(|_| result.is_ok()),
             mismatches: result.err().into_iter().collect(),
         }

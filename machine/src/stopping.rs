@@ -4,7 +4,6 @@ use core::time::Duration;
 
 use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
-use units::Time;
 
 use crate::failure::{Failure, Layered};
 use crate::machine::{Machine, Supervision};
@@ -22,11 +21,11 @@ impl Machine {
     pub fn shut_down(&mut self) -> Result<(), Failure> {
         let mut result = Ok(());
         self.supervision = Supervision::Stopping;
-        for at in 0..self.drive_count() {
+        for at in 0..self.devices.drive_count() {
             result = result.and(self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT));
         }
         self.supervision = Supervision::Off;
-        result.and(self.set_sync(false))
+        result.and(self.ports.set_sync(&mut *self.transport, false))
     }
 
     /// Rests for `span`: every axis is switched off and no SYNC is sent, while heartbeats go on, so
@@ -36,18 +35,18 @@ impl Machine {
     /// When an axis cannot be disabled, a bus fails, somebody asks to stop, or a device is silent
     /// afterwards.
     pub fn idle(&mut self, span: Duration) -> Result<(), Failure> {
-        for at in 0..self.drive_count() {
+        for at in 0..self.devices.drive_count() {
             self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT)?;
         }
         // Without SYNC the silence of the devices is no alarm.
         self.supervision = Supervision::Off;
-        self.set_sync(false)?;
+        self.ports.set_sync(&mut *self.transport, false)?;
         let until = self.now() + span;
         self.run_until(until)?;
-        self.set_sync(true)?;
+        self.ports.set_sync(&mut *self.transport, true)?;
         let resumed = self.now();
         let deadline = resumed + self.patience.of(AWAKE_LIMIT);
-        while let Some(device) = self.silent_since(resumed) {
+        while let Some(device) = self.devices.silent_since(resumed) {
             if self.now() >= deadline {
                 return Err(Failure::Overdue {
                     device,
@@ -59,21 +58,6 @@ impl Machine {
         }
         self.supervision = Supervision::On;
         Ok(())
-    }
-
-    /// The first drive or module without a sample newer than `resumed`.
-    fn silent_since(&self, resumed: Time) -> Option<String> {
-        let is_old = |at: Option<Time>| at.is_none_or(|at| at <= resumed);
-        let axis = self
-            .axes
-            .iter()
-            .find(|it| is_old(it.device.reading().map(|it| it.at)));
-        let module = || {
-            let modules = self.analogs.iter();
-            let mut silent = modules.filter(|it| is_old(it.device.last_sample()));
-            silent.next().map(|it| it.name.clone())
-        };
-        axis.map(|it| it.name.clone()).or_else(module)
     }
 
     /// Runs `procedure`; when it fails, stops and disables every axis before the failure is
@@ -112,31 +96,24 @@ impl Machine {
         // Nothing that waited may be sent after the stop.
         self.outbox.clear();
         let now = self.now();
-        for at in 0..self.drive_count() {
-            self.drive_mut(at).control(now, DriveCommand::QuickStop);
+        for at in 0..self.devices.drive_count() {
+            self.devices
+                .drive_mut(at)
+                .control(now, DriveCommand::QuickStop);
         }
-        for at in 0..self.drive_count() {
+        for at in 0..self.devices.drive_count() {
             // A drive that is gone cannot confirm; the others must still be stopped.
             let stopped = self.await_outcome(at, "quick stop", STOP_LIMIT);
-            self.tell_unconfirmed(at, stopped);
+            let axis = self.devices.name(at);
+            self.notices.tell_unconfirmed(&axis, stopped);
         }
-        for at in 0..self.drive_count() {
+        for at in 0..self.devices.drive_count() {
             let disabled = self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT);
-            self.tell_unconfirmed(at, disabled);
+            let axis = self.devices.name(at);
+            self.notices.tell_unconfirmed(&axis, disabled);
         }
         self.approach.iter_mut().for_each(ApproachTracker::forget);
-        let _ = self.set_sync(false);
+        let _ = self.ports.set_sync(&mut *self.transport, false);
         self.supervision = Supervision::Off;
-    }
-
-    /// The operator must not read "stopped" of an axis that did not say so.
-    fn tell_unconfirmed(&mut self, at: usize, outcome: Result<(), Failure>) {
-        if let Err(failure) = outcome {
-            let axis = self.device_name(at);
-            self.observer.warning(&format!(
-                "axis {axis} did not confirm that it stopped ({failure}); its drive monitors our \
-                 heartbeat and stops by itself: make sure that it stands still before you reach in"
-            ));
-        }
     }
 }

@@ -18,7 +18,7 @@ impl Machine {
     /// # Errors
     /// When the drive refuses or does not answer in time.
     pub fn enable(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
+        let at = self.devices.drive_index(axis)?;
         self.control(at, DriveCommand::Enable, "enable", Duration::from_secs(5))
     }
 
@@ -27,7 +27,7 @@ impl Machine {
     /// # Errors
     /// When the drive refuses or does not answer in time.
     pub fn disable(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
+        let at = self.devices.drive_index(axis)?;
         let limit = Duration::from_secs(5);
         self.control(at, DriveCommand::Disable, "disable", limit)
     }
@@ -37,7 +37,7 @@ impl Machine {
     /// # Errors
     /// When the fault does not go: its cause is still there.
     pub fn reset_fault(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.drive_index(axis)?;
+        let at = self.devices.drive_index(axis)?;
         let limit = Duration::from_secs(5);
         self.control(at, DriveCommand::ResetFault, "fault reset", limit)
     }
@@ -66,12 +66,14 @@ impl Machine {
     /// # Errors
     /// When there is no such axis, the machine is not started, or a motion does not end well.
     pub fn start_together(&mut self, axes: &[&str]) -> Result<(), Failure> {
-        let numbers = axes.iter().map(|axis| self.axis_index(axis));
+        let numbers = axes.iter().map(|axis| self.devices.axis_index(axis));
         let numbers: Vec<_> = numbers.collect::<Result<_, _>>()?;
         let now = self.now();
         for at in &numbers {
             self.require_supervised(*at)?;
-            self.axes[*at].device.command(now, AxisCommand::Start);
+            self.devices.axes[*at]
+                .device
+                .command(now, AxisCommand::Start);
         }
         for at in numbers {
             self.await_outcome(at, "move", self.settings[at].move_timeout)?;
@@ -84,7 +86,9 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn started_at(&self, axis: &str) -> Result<Option<Time>, Failure> {
-        Ok(self.axes[self.axis_index(axis)?].device.started_at())
+        Ok(self.devices.axes[self.devices.axis_index(axis)?]
+            .device
+            .started_at())
     }
 
     /// The direction of the last motion of `axis`.
@@ -92,7 +96,7 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn approach(&self, axis: &str) -> Result<ApproachTracker, Failure> {
-        Ok(self.approach[self.axis_index(axis)?])
+        Ok(self.approach[self.devices.axis_index(axis)?])
     }
 
     /// Forgets from which side `axis` came to its position.
@@ -100,7 +104,7 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn forget_approach(&mut self, axis: &str) -> Result<(), Failure> {
-        let at = self.axis_index(axis)?;
+        let at = self.devices.axis_index(axis)?;
         self.approach[at].forget();
         Ok(())
     }
@@ -141,7 +145,7 @@ impl Machine {
         target: Metres,
         speed: MetresPerSecond,
     ) -> Result<(), Failure> {
-        let at = self.axis_index(axis)?;
+        let at = self.devices.axis_index(axis)?;
         let (acceleration, limit) = {
             let settings = &self.settings[at];
             (settings.acceleration, settings.move_timeout)

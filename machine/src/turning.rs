@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use drivers::device::{AxisCommand, AxisReading, LatchCommand, Latched};
+use drivers::device::{AxisCommand, LatchCommand, Latched, RotaryAxis};
 use units::{Radians, RadiansPerSecond};
 
 use crate::failure::Failure;
@@ -11,86 +11,85 @@ use crate::machine::Machine;
 /// The longest a drive may take to arm or disarm its touch probe.
 const LATCH_LIMIT: Duration = Duration::from_secs(5);
 
-impl Machine {
-    /// The names of the rotary axes.
-    pub fn rotary_names(&self) -> Vec<String> {
-        self.rotaries.iter().map(|unit| unit.name.clone()).collect()
-    }
+/// A rotary axis of a machine, to be turned.
+pub struct Turning<'m> {
+    machine: &'m mut Machine,
+    /// Its number among the rotary axes.
+    at: usize,
+}
 
-    /// The newest sample of the rotary axis `axis`; its position counts on over the turns.
+impl Machine {
+    /// The rotary axis `axis`, to be turned.
     ///
     /// # Errors
     /// When there is no such axis.
-    pub fn rotary_reading(&self, axis: &str) -> Result<Option<AxisReading<Radians>>, Failure> {
-        Ok(self.rotaries[self.rotary_index(axis)?].device.reading())
+    pub fn turning(&mut self, axis: &str) -> Result<Turning<'_>, Failure> {
+        let at = self.devices.rotary_index(axis)?;
+        Ok(Turning { machine: self, at })
     }
+}
 
-    /// Gives `command` to the rotary axis `axis` and waits until it is done, for `limit` at most;
-    /// `step` is its name for a person.
+impl Turning<'_> {
+    /// Gives `command` to the axis and waits until it is done, for `limit` at most; `step` is its
+    /// name for a person.
     ///
     /// # Errors
-    /// When there is no such axis, the machine is not started, or the command fails.
-    pub fn turn_command(
+    /// When the machine is not started, or the command fails.
+    pub fn command(
         &mut self,
-        axis: &str,
         command: AxisCommand<Radians>,
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
-        let at = self.rotary_index(axis)?;
-        let drive = self.axes.len() + at;
-        self.require_supervised(drive)?;
-        let now = self.now();
-        self.rotaries[at].device.command(now, command);
-        self.await_outcome(drive, step, limit)
+        self.machine.require_supervised(self.drive())?;
+        let now = self.machine.now();
+        self.device_mut().command(now, command);
+        self.machine.await_outcome(self.drive(), step, limit)
     }
 
-    /// Arms or disarms the touch probe of the rotary axis `axis`.
+    /// Arms or disarms the touch probe.
     ///
     /// # Errors
-    /// When there is no such axis, or its drive refuses.
-    pub fn latch(&mut self, axis: &str, command: LatchCommand<Radians>) -> Result<(), Failure> {
-        let at = self.rotary_index(axis)?;
-        let now = self.now();
-        self.rotaries[at].device.latch(now, command);
-        self.await_outcome(self.axes.len() + at, "touch probe", LATCH_LIMIT)
+    /// When the drive refuses.
+    pub fn latch(&mut self, command: LatchCommand<Radians>) -> Result<(), Failure> {
+        let now = self.machine.now();
+        self.device_mut().latch(now, command);
+        let at = self.drive();
+        self.machine.await_outcome(at, "touch probe", LATCH_LIMIT)
     }
 
-    /// Refuses a turn of `axis` in which edges, no nearer than `spacing`, would be lost at `speed`.
+    /// Refuses a turn in which edges, no nearer than `spacing`, would be lost at `speed`.
     ///
     /// # Errors
-    /// When they would, or there is no such axis.
+    /// When they would.
     pub fn check_latch_speed(
         &self,
-        axis: &str,
         spacing: Radians,
         speed: RadiansPerSecond,
     ) -> Result<(), Failure> {
-        let device = &self.rotaries[self.rotary_index(axis)?].device;
-        device
-            .check_latch_speed(spacing, speed)
-            .map_err(|source| Failure::Device {
-                device: axis.to_owned(),
-                source,
-            })
-    }
-
-    /// What the touch probe of `axis` has latched and nobody took yet.
-    ///
-    /// # Errors
-    /// When there is no such axis.
-    pub fn take_latched(&mut self, axis: &str) -> Result<Vec<Latched<Radians>>, Failure> {
-        let at = self.rotary_index(axis)?;
-        let device = &mut self.rotaries[at].device;
-        Ok(core::iter::from_fn(|| device.poll_latched()).collect())
-    }
-
-    /// The number of a named rotary axis among those.
-    fn rotary_index(&self, axis: &str) -> Result<usize, Failure> {
-        let at = self.rotaries.iter().position(|unit| unit.name == axis);
-        at.ok_or_else(|| Failure::NoSuchAxis {
-            axis: axis.to_owned(),
-            known: self.rotary_names().join(", "),
+        let possible = self.device().check_latch_speed(spacing, speed);
+        possible.map_err(|source| Failure::Device {
+            device: self.machine.devices.name(self.drive()),
+            source,
         })
+    }
+
+    /// What the touch probe has latched and nobody took yet.
+    pub fn take_latched(&mut self) -> Vec<Latched<Radians>> {
+        let device = self.device_mut();
+        core::iter::from_fn(|| device.poll_latched()).collect()
+    }
+
+    fn device(&self) -> &dyn RotaryAxis {
+        &*self.machine.devices.rotaries[self.at].device
+    }
+
+    fn device_mut(&mut self) -> &mut dyn RotaryAxis {
+        &mut *self.machine.devices.rotaries[self.at].device
+    }
+
+    /// The number of its drive.
+    fn drive(&self) -> usize {
+        self.machine.devices.axes.len() + self.at
     }
 }

@@ -287,16 +287,16 @@ fn a_controller_that_is_not_there_is_a_time_out() {
 #[test]
 fn a_machine_looks_through_its_camera() {
     on_every_rig(&Setup::uvw(35), |stand| {
-        assert_eq!(stand.machine.camera_names(), ["eye"]);
+        assert_eq!(stand.machine.devices().camera_names(), ["eye"]);
         let seen = stand.machine.look("eye", 10)?;
         let is = stand.simulation(|it| it.truth().platform().expect("it is one").pose());
         assert!((seen.x - is.x).abs().um() < 0.2, "{seen:?} {is:?}");
         assert!((seen.y - is.y).abs().um() < 0.2, "{seen:?} {is:?}");
-        let names = stand.machine.device_names();
+        let names = stand.machine.devices().names();
         assert_eq!(names, ["u", "v", "w", "eye"]);
-        let identity = &stand.machine.identities()["eye"];
+        let identity = &stand.machine.devices().identities()["eye"];
         assert!(identity.name.contains("platform.job"), "{identity:?}");
-        let counted = stand.machine.counters();
+        let counted = stand.machine.devices().counters();
         assert!(counted.contains(&("eye".to_owned(), "pictures", 10)));
         let absent = FaultConfig::permanent(Fault::TargetAbsent);
         stand

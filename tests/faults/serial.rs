@@ -31,7 +31,7 @@ fn messages_that_are_split_or_joined_do_no_harm() {
 fn a_little_garbage_costs_a_sample_and_no_more() {
     let garbage = now_and_then(Fault::Garbage { port: laser() }, 0.05);
     let played = check_harmless(Scene::during(Phase::Calibrate).inject(garbage));
-    let counters = played.bench.machine.counters();
+    let counters = played.bench.machine.devices().counters();
     let lines = counters
         .iter()
         .find(|(_, what, _)| *what == "garbage_lines");

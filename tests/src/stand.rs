@@ -113,7 +113,7 @@ pub fn on_every_rig(setup: &Setup, procedure: impl Fn(&mut Stand) -> Result<(), 
             .and_then(|()| stand.machine.shut_down());
         if let Err(failure) = result {
             stand.machine.make_safe();
-            let counters = stand.machine.counters();
+            let counters = stand.machine.devices().counters();
             panic!("{rig:?}: {failure}\n{counters:?}");
         }
         let emulator = stand.gone();

@@ -6,6 +6,7 @@ mod hardware;
 mod imports;
 mod kinds;
 mod licences;
+mod methods;
 mod public_names;
 
 use std::collections::BTreeMap;

@@ -34,7 +34,11 @@ impl LinearStage<'_> {
         self.core.use_instrument(&plan.instrument)?;
         self.go_to_datum(&plan)?;
         let reading = self.read_displacement(&plan)?;
-        let environment = self.core.instrument(&plan.instrument)?.environment();
+        let environment = self
+            .core
+            .devices()
+            .instrument(&plan.instrument)?
+            .environment();
         self.core.leave_instrument();
         self.correct(&plan, &reading, &environment, &datum)
     }
@@ -58,7 +62,11 @@ impl LinearStage<'_> {
     }
 
     fn length_correction(&mut self, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
-        let environment = self.core.instrument(&plan.instrument)?.environment();
+        let environment = self
+            .core
+            .devices()
+            .instrument(&plan.instrument)?
+            .environment();
         let config = &self.core.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
         LengthCorrection::new(config.corrections(), &environment).map_err(|source| {

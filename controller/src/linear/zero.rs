@@ -364,7 +364,7 @@ impl LinearStage<'_> {
         config: &ZeroConfig,
         pairing: &mut Pairing,
     ) -> Result<Option<Sample>, Failure> {
-        let analog = self.core.analog(&config.analog)?;
+        let analog = self.core.devices().analog(&config.analog)?;
         let (Some(position), Some(voltages)) = (self.core.reading(self.axis)?, analog.reading())
         else {
             return Ok(None);

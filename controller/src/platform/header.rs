@@ -56,7 +56,7 @@ impl AlignmentPlatform<'_> {
 
     pub(crate) fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
         let name = self.config.camera.clone();
-        let identity = self.core.identities().remove(&name);
+        let identity = self.core.devices().identities().remove(&name);
         Ok(InstrumentRecord {
             identity: identity.unwrap_or_default().name,
             name,

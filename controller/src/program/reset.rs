@@ -12,8 +12,8 @@ use crate::program::session::{Session, choose_axis};
 /// Acknowledges a drive's fault; nothing moves.
 pub(crate) fn run(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "reset", Use::Motion, output)?;
-    let mut names = session.machine.axis_names();
-    names.extend(session.machine.rotary_names());
+    let mut names = session.machine.devices().axis_names();
+    names.extend(session.machine.devices().rotary_names());
     let axis = choose_axis(names, args)?;
     let (before, after, counters) = session.machine.guarded(|machine| {
         machine.start()?;
@@ -21,7 +21,11 @@ pub(crate) fn run(args: &AxisArgs, output: Output) -> Ended {
         machine.reset_fault(&axis)?;
         let after = machine.power_state(&axis)?;
         machine.shut_down()?;
-        Ok((before, after, to_json::counters(&machine.counters())))
+        Ok((
+            before,
+            after,
+            to_json::counters(&machine.devices().counters()),
+        ))
     })?;
     let word = |state: Option<PowerState>| state.map_or("unknown".into(), |it| it.to_string());
     let text = format!(

@@ -80,19 +80,22 @@ impl RotaryTable<'_> {
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
         let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
-        self.core.check_latch_speed(self.axis, spacing, speed)?;
+        self.core
+            .turning(self.axis)?
+            .check_latch_speed(spacing, speed)?;
         let start = self.turn_to(Radians(-sign * run_up), Way::Shortest)?;
         self.rest()?;
         let repeat = Repeat::Continuous;
         self.core
-            .latch(self.axis, LatchCommand::Arm { repeat, spacing })?;
+            .turning(self.axis)?
+            .latch(LatchCommand::Arm { repeat, spacing })?;
         let first = start + Radians(sign * run_up);
         let way = TAU + 2.0 * run_up;
         let limit = SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value());
         self.turn(start + Radians(sign * way), speed, limit)?;
         self.rest()?;
-        self.core.latch(self.axis, LatchCommand::Disarm)?;
-        let latched = self.core.take_latched(self.axis)?;
+        self.core.turning(self.axis)?.latch(LatchCommand::Disarm)?;
+        let latched = self.core.turning(self.axis)?.take_latched();
         if latched.is_empty() {
             return Err(Failure::NoLines {
                 axis: self.axis.to_owned(),
@@ -109,7 +112,7 @@ impl RotaryTable<'_> {
         let start = self.core.now();
         let mut first = None;
         loop {
-            let reading = self.core.rotary_reading(self.axis)?;
+            let reading = self.core.devices().rotary_reading(self.axis)?;
             match reading.filter(|it| it.standing && it.at > start) {
                 Some(reading) => {
                     let since = *first.get_or_insert(reading.at);

@@ -63,7 +63,9 @@ impl RotaryTable<'_> {
         };
         let limit = settings::index_limit(config).unwrap_or_default() + Duration::from_secs(5);
         self.core.enable(self.axis)?;
-        self.core.turn_command(self.axis, command, "zero", limit)?;
+        self.core
+            .turning(self.axis)?
+            .command(command, "zero", limit)?;
         self.core.set_zeroed(self.axis, true)?;
         Ok(())
     }
@@ -98,12 +100,15 @@ impl RotaryTable<'_> {
             speed,
             acceleration: RadiansPerSecondSquared(config.acceleration_deg_per_s2.to_radians()),
         };
-        Ok(self.core.turn_command(self.axis, command, "move", limit)?)
+        Ok(self
+            .core
+            .turning(self.axis)?
+            .command(command, "move", limit)?)
     }
 
     /// Where the drive says that the zeroed table is.
     pub(crate) fn reading(&self) -> Result<Radians, Failure> {
-        let reading = self.core.rotary_reading(self.axis)?;
+        let reading = self.core.devices().rotary_reading(self.axis)?;
         let reading = reading.expect("an axis that was zeroed has been read");
         Ok(reading.position)
     }

@@ -326,9 +326,9 @@ impl WorkVolume<'_> {
                 .into());
             }
             self.core.tick(deadline)?;
-            let newest = self.core.analogs().map(|it| it.last_sample());
-            let oldest = newest.map(|at| at.unwrap_or(Time::ZERO)).min();
-            if oldest.unwrap_or(Time::ZERO) <= last {
+            let devices = self.core.devices();
+            let newest = (devices.analogs()).map(|it| it.last_sample().unwrap_or(Time::ZERO));
+            if newest.min().unwrap_or(Time::ZERO) <= last {
                 continue;
             }
             (last, deadline) = (self.core.now(), self.core.now() + limit);
@@ -337,8 +337,8 @@ impl WorkVolume<'_> {
                 channels: [None; CHANNELS_MAX],
                 temperatures: [None; THERMOMETERS_MAX],
             };
-            self.core.hear_channels(&mut still.channels);
-            self.core.hear_temperatures(&mut still.temperatures);
+            devices.hear_channels(&mut still.channels);
+            devices.hear_temperatures(&mut still.temperatures);
             seen.push(still);
         }
         Ok(seen)

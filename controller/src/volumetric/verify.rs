@@ -235,7 +235,7 @@ impl WorkVolume<'_> {
     /// What the thermometers showed last, °C; a verification does not depend on them.
     fn thermometers_now(&self, config: &VolumetricConfig) -> Vec<Option<f64>> {
         let mut shown = [None; THERMOMETERS_MAX];
-        self.core.hear_temperatures(&mut shown);
+        self.core.devices().hear_temperatures(&mut shown);
         let each = config.temperature.iter().map(|it| {
             let place = place_of_temperature(self.core.config, &it.analog, it.channel);
             let sample = shown.get(place).copied().flatten()?;

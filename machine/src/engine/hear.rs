@@ -5,33 +5,38 @@ use drivers::device::AxisReading;
 use units::Time;
 
 use super::account::Heard;
-use super::run::Seats;
+use super::seats::Seats;
 use super::{AXES_MAX, Channel, ThermometerSample};
-use crate::machine::Machine;
+use crate::devices::Devices;
 
-impl Machine {
-    /// The newest sample of drive number `at`, if it came after the SYNC.
-    pub(super) fn answer(&self, at: usize, synced: Time) -> Option<AxisReading> {
-        let reading = self.axes[at].device.reading()?;
-        (reading.at >= synced).then_some(reading)
+/// The newest sample of drive number `at`, if it came after the SYNC.
+pub(super) fn answer(devices: &Devices, at: usize, synced: Time) -> Option<AxisReading> {
+    let reading = devices.axes[at].device.reading()?;
+    (reading.at >= synced).then_some(reading)
+}
+
+pub(super) fn heard<'a>(
+    devices: &Devices,
+    seats: &'a mut Seats,
+    now: Time,
+    synced: Time,
+) -> Heard<'a> {
+    let mut actual = [None; AXES_MAX];
+    for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
+        let reading = answer(devices, *at, synced);
+        *actual = reading.map(|it| it.position);
     }
-
-    pub(super) fn heard<'a>(&self, seats: &'a mut Seats, now: Time, synced: Time) -> Heard<'a> {
-        let mut actual = [None; AXES_MAX];
-        for (actual, at) in actual.iter_mut().zip(&seats.drive[..seats.count]) {
-            let reading = self.answer(*at, synced);
-            *actual = reading.map(|it| it.position);
-        }
-        self.hear_channels(&mut seats.channels);
-        self.hear_temperatures(&mut seats.temperatures);
-        Heard {
-            now,
-            actual,
-            channels: &seats.channels,
-            temperatures: &seats.temperatures,
-        }
+    devices.hear_channels(&mut seats.channels);
+    devices.hear_temperatures(&mut seats.temperatures);
+    Heard {
+        now,
+        actual,
+        channels: &seats.channels,
+        temperatures: &seats.temperatures,
     }
+}
 
+impl Devices {
     /// Puts the newest sample of each analog channel into its place, in the order of the
     /// modules' names.
     pub fn hear_channels(&self, channels: &mut [Option<Channel>]) {

@@ -3,7 +3,7 @@
 //!
 //! - `account` has what the loop is asked and what it says; `decide` decides one period: samples judged, path or motion, correction, set-points, and when
 //!   to stop. Sans-io, of fixed size.
-//! - `hear` collects what was heard of one SYNC. `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
+//! - `hear` collects what was heard of one SYNC. `seats` knows which devices these are, `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
 //!   send. It runs in the thread that calls it (docs/decisions/0014).
 //! - `path` and `csv` write paths, `motion` plans moves and stops, `correction` limits what is
 //!   added, `histogram` counts times.
@@ -35,6 +35,7 @@ mod pace;
 mod path;
 mod planner;
 mod run;
+mod seats;
 mod tables;
 
 use core::time::Duration;
@@ -130,7 +131,7 @@ impl Engine {
             let axis = names[twice].clone();
             return Err(EngineFailure::Twice { axis }.into());
         }
-        machine.require_one_sync(period)?;
+        run::require_one_sync(&machine.ports.buses, period)?;
         let (mut engine, desk) = Self::assemble(names, period, limits, &of_correction, correction);
         engine.core.be_patient(machine.patience);
         engine.real_time = machine.real_time;

@@ -17,19 +17,18 @@ use drivers::device::DriveCommand;
 use drivers::transport::SendError;
 use drivers::transport::real_time::RealTime;
 use units::{Metres, Time};
+use wire::Payload;
 use wire::canopen::sync::emit_sync;
 use wire::cia402::PowerState;
-use wire::{Payload, Port};
 
 use super::account::Trouble;
+use super::hear::{answer, heard};
 use super::pace::Pace;
-use super::{
-    AXES_MAX, CHANNELS_MAX, Cause, Channel, Engine, EngineFailure, PerAxis, THERMOMETERS_MAX,
-    ThermometerSample,
-};
+use super::seats::Seats;
+use super::{AXES_MAX, Cause, Engine, EngineFailure, PerAxis};
 use crate::failure::Failure;
 use crate::machine::{Machine, Supervision};
-use crate::parts::CyclicSettings;
+use crate::parts::{Bus, CyclicSettings};
 
 /// The share of a period in which answers are awaited.
 const LISTEN_SHARE: f64 = 0.5;
@@ -37,17 +36,6 @@ const LISTEN_SHARE: f64 = 0.5;
 const CHANGE_LIMIT: Duration = Duration::from_secs(10);
 /// How long the axes may take to come to rest before the mode is entered, and left.
 const REST_LIMIT: Duration = Duration::from_secs(5);
-
-/// Where the engine's axes are among the machine's devices.
-pub(super) struct Seats {
-    pub(super) count: usize,
-    /// By the engine's order of axes, the number of the drive.
-    pub(super) drive: PerAxis<usize>,
-    /// The buses that carry SYNC.
-    buses: Vec<Port>,
-    pub(super) channels: [Option<Channel>; CHANNELS_MAX],
-    pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
-}
 
 impl Machine {
     /// Moves the axes of `engine` along what its [`Desk`](super::Desk) says, until the path is
@@ -75,40 +63,11 @@ impl Machine {
         engine: &mut Engine,
         host: &mut dyn FnMut(),
     ) -> Result<Cause, Failure> {
-        let outcome = self.follow_to_rest(engine, host);
+        let outcome = follow_to_rest(self, engine, host);
         if outcome.is_err() {
             engine.core.forget_orders();
         }
         outcome
-    }
-
-    fn follow_to_rest(
-        &mut self,
-        engine: &mut Engine,
-        host: &mut dyn FnMut(),
-    ) -> Result<Cause, Failure> {
-        for axis in engine.axes.clone() {
-            self.require_zeroed(&axis)?;
-        }
-        let mut seats = self.seats(engine)?;
-        self.require_supervised(seats.drive[0])?;
-        self.await_rest(engine, &seats)?;
-        self.require_inside(engine, &seats)?;
-        // Locking memory takes its time, and so does letting it go: never between two SYNCs.
-        let granted = engine.real_time.then(RealTime::ask);
-        let text = granted.as_ref().map(ToString::to_string);
-        engine.timing.scheduling = text.unwrap_or_default();
-        let held = self.enter_cyclic(engine, &seats)?;
-        engine.core.begin(held);
-        let cause = self.holding_back(|machine| {
-            machine.with_own_sync(|it| it.run_periods(engine, &mut seats, host))
-        })?;
-        let leave = DriveCommand::LeaveCyclic;
-        self.change_at_rest(engine, &seats, leave, "leaving the cyclic mode")?;
-        for at in &seats.drive[..seats.count] {
-            self.approach[*at].forget();
-        }
-        Ok(cause)
     }
 
     /// Within which `axis` follows cyclic set-points.
@@ -122,77 +81,104 @@ impl Machine {
             EngineFailure::NotConfigured { axis }.into()
         })
     }
+}
 
-    /// The loop's SYNC goes out on every CAN bus, also those that carry none of its axes.
-    pub(super) fn require_one_sync(&self, expected: Duration) -> Result<(), Failure> {
-        let mut buses = self.buses.iter();
-        match buses.find(|it| it.sync_period != expected) {
-            None => Ok(()),
-            Some(other) => Err(EngineFailure::Periods {
-                bus: other.name.clone(),
-                expected,
-                seen: other.sync_period,
-            }
-            .into()),
+/// The loop's SYNC goes out on every CAN bus, also those that carry none of its axes.
+pub(super) fn require_one_sync(buses: &[Bus], expected: Duration) -> Result<(), Failure> {
+    match buses.iter().find(|it| it.sync_period != expected) {
+        None => Ok(()),
+        Some(other) => Err(EngineFailure::Periods {
+            bus: other.name.clone(),
+            expected,
+            seen: other.sync_period,
         }
+        .into()),
     }
+}
 
-    fn seats(&self, engine: &Engine) -> Result<Seats, Failure> {
-        let mut drive = [0; AXES_MAX];
-        for (at, axis) in engine.axes.iter().enumerate() {
-            drive[at] = self.axis_index(axis)?;
+fn follow_to_rest(
+    machine: &mut Machine,
+    engine: &mut Engine,
+    host: &mut dyn FnMut(),
+) -> Result<Cause, Failure> {
+    for axis in &engine.axes {
+        machine.require_zeroed(axis)?;
+    }
+    let seats = Seats::of(engine, machine)?;
+    machine.require_supervised(seats.drive[0])?;
+    let mut run = Run {
+        machine,
+        engine,
+        seats,
+    };
+    run.await_rest()?;
+    run.require_inside()?;
+    // Locking memory takes its time, and so does letting it go: never between two SYNCs.
+    let granted = run.engine.real_time.then(RealTime::ask);
+    let text = granted.as_ref().map(ToString::to_string);
+    run.engine.timing.scheduling = text.unwrap_or_default();
+    run.between_rests(host)
+}
+
+/// A motion that is under way.
+struct Run<'m> {
+    machine: &'m mut Machine,
+    engine: &'m mut Engine,
+    seats: Seats,
+}
+
+impl Run<'_> {
+    fn between_rests(&mut self, host: &mut dyn FnMut()) -> Result<Cause, Failure> {
+        let held = self.enter_cyclic()?;
+        self.engine.core.begin(held);
+        self.machine.notices.hold_back();
+        let cause = self.with_own_sync(host);
+        self.machine.notices.let_go();
+        let cause = cause?;
+        self.change_at_rest(DriveCommand::LeaveCyclic, "leaving the cyclic mode")?;
+        for at in self.seats.drives() {
+            self.machine.approach[*at].forget();
         }
-        Ok(Seats {
-            count: engine.axes.len(),
-            drive,
-            buses: self.buses.iter().map(|it| it.port).collect(),
-            channels: [None; CHANNELS_MAX],
-            temperatures: [None; THERMOMETERS_MAX],
-        })
+        Ok(cause)
     }
 
     /// Until every axis that its drive holds stands still; one that is not enabled goes where
     /// it likes.
-    fn await_rest(&mut self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
-        let begun = self.now();
-        let deadline = begun + self.patience.of(REST_LIMIT);
-        while let Some(axis) = (0..seats.count).find(|axis| self.moves(seats.drive[*axis])) {
-            if self.now() >= deadline {
-                let axis = engine.axes[axis].clone();
-                let waited = self.now().since(begun);
+    fn await_rest(&mut self) -> Result<(), Failure> {
+        let begun = self.machine.now();
+        let deadline = begun + self.machine.patience.of(REST_LIMIT);
+        while let Some(axis) = self.seats.drives().iter().position(|at| self.moves(*at)) {
+            if self.machine.now() >= deadline {
+                let axis = self.engine.axes[axis].clone();
+                let waited = self.machine.now().since(begun);
                 return Err(EngineFailure::NotAtRest { axis, waited }.into());
             }
-            self.tick(deadline)?;
+            self.machine.tick(deadline)?;
         }
         Ok(())
     }
 
     /// A drive that changes its mode while it moves may do anything. One change takes some periods,
     /// and another axis may creep meanwhile: before each of them all must stand.
-    fn change_at_rest(
-        &mut self,
-        engine: &Engine,
-        seats: &Seats,
-        change: DriveCommand,
-        step: &'static str,
-    ) -> Result<(), Failure> {
-        for at in &seats.drive[..seats.count] {
-            self.await_rest(engine, seats)?;
-            self.control(*at, change, step, CHANGE_LIMIT)?;
+    fn change_at_rest(&mut self, change: DriveCommand, step: &'static str) -> Result<(), Failure> {
+        for axis in 0..self.seats.count {
+            self.await_rest()?;
+            let at = self.seats.drive[axis];
+            self.machine.control(at, change, step, CHANGE_LIMIT)?;
         }
         Ok(())
     }
 
     fn moves(&self, at: usize) -> bool {
-        let device = &self.axes[at].device;
+        let device = &self.machine.devices.axes[at].device;
         device.power_state() == Some(PowerState::OperationEnabled)
             && device.reading().is_none_or(|it| !it.at_rest)
     }
 
     /// The first set-point of an axis beyond its soft limits would be the limit: a step.
-    fn require_inside(&self, engine: &Engine, seats: &Seats) -> Result<(), Failure> {
-        for (axis, at) in engine.axes.iter().zip(seats.drive) {
-            if let Some(reading) = self.axes[at].device.reading() {
+    fn require_inside(&self) -> Result<(), Failure> {
+        for (axis, at) in self.engine.axes.iter().zip(self.seats.drive) {
+            if let Some(reading) = self.machine.devices.axes[at].device.reading() {
                 self.require_place(axis, reading.position)?;
             }
         }
@@ -201,8 +187,8 @@ impl Machine {
 
     /// As near as a move ends counts as inside.
     fn require_place(&self, axis: &str, at: Metres) -> Result<(), Failure> {
-        let (min, max) = self.soft_limits(axis)?;
-        let window = self.axis_settings(axis)?.position_window;
+        let (min, max) = self.machine.soft_limits(axis)?;
+        let window = self.machine.axis_settings(axis)?.position_window;
         if min - window <= at && at <= max + window {
             return Ok(());
         }
@@ -211,62 +197,57 @@ impl Machine {
     }
 
     /// Every drive in the mode, enabled, and what each holds.
-    fn enter_cyclic(&mut self, engine: &Engine, seats: &Seats) -> Result<PerAxis<Metres>, Failure> {
-        let period = engine.period;
+    fn enter_cyclic(&mut self) -> Result<PerAxis<Metres>, Failure> {
+        let period = self.engine.period;
         let enter = DriveCommand::EnterCyclic { period };
         let mut held = [Metres::ZERO; AXES_MAX];
-        self.change_at_rest(engine, seats, enter, "entering the cyclic mode")?;
-        for at in &seats.drive[..seats.count] {
-            self.control(*at, DriveCommand::Enable, "enable", CHANGE_LIMIT)?;
+        self.change_at_rest(enter, "entering the cyclic mode")?;
+        for axis in 0..self.seats.count {
+            let at = self.seats.drive[axis];
+            self.machine
+                .control(at, DriveCommand::Enable, "enable", CHANGE_LIMIT)?;
         }
-        for (axis, at) in seats.drive[..seats.count].iter().enumerate() {
-            let position = self.axes[*at].device.held();
-            held[axis] = position.ok_or_else(|| EngineFailure::NotCyclic {
-                axis: engine.axes[axis].clone(),
-            })?;
-            self.require_place(&engine.axes[axis], held[axis])?;
+        for (axis, at) in self.seats.drives().iter().enumerate() {
+            let position = self.machine.devices.axes[*at].device.held();
+            let name = &self.engine.axes[axis];
+            held[axis] = position.ok_or_else(|| EngineFailure::NotCyclic { axis: name.clone() })?;
+            self.require_place(name, held[axis])?;
         }
         Ok(held)
     }
 
     /// SYNC is sent here instead of by the transport, and given back however the loop ends.
-    fn with_own_sync<R>(
-        &mut self,
-        run: impl FnOnce(&mut Self) -> Result<R, Failure>,
-    ) -> Result<R, Failure> {
-        self.set_sync(false)?;
-        let outcome = run(self);
-        let given_back = self.set_sync(true);
+    fn with_own_sync(&mut self, host: &mut dyn FnMut()) -> Result<Cause, Failure> {
+        let machine = &mut *self.machine;
+        machine.ports.set_sync(&mut *machine.transport, false)?;
+        let outcome = self.run_periods(host);
+        let machine = &mut *self.machine;
+        let given_back = machine.ports.set_sync(&mut *machine.transport, true);
         let result = outcome?;
         given_back.map(|()| result)
     }
 
-    fn run_periods(
-        &mut self,
-        engine: &mut Engine,
-        seats: &mut Seats,
-        host: &mut dyn FnMut(),
-    ) -> Result<Cause, Failure> {
+    fn run_periods(&mut self, host: &mut dyn FnMut()) -> Result<Cause, Failure> {
         let mut pace = Pace {
             // Between the transport's last SYNC and this one lies at most a period and a half.
-            deadline: self.now() + engine.period / 2,
+            deadline: self.machine.now() + self.engine.period / 2,
             synced: None,
             held_up: None,
         };
         loop {
-            let period = self.one_period(engine, seats, &mut pace);
+            let period = self.one_period(&mut pace);
             let period = period.and_then(|ended| match ended {
-                Some(_) => self.last_sync(seats, &pace).map(|()| ended),
+                Some(_) => self.last_sync(&pace).map(|()| ended),
                 None => Ok(None),
             });
             match period {
                 Ok(None) => host(),
                 Ok(Some(cause)) => return Ok(cause),
                 Err(failure) => {
-                    let now = self.now();
-                    let failure = self.bus_watch.explain(now, failure);
-                    let failure = pace.explain(now, engine.period, failure);
-                    self.quick_stop_together(seats);
+                    let now = self.machine.now();
+                    let failure = self.machine.bus_watch.explain(now, failure);
+                    let failure = pace.explain(now, self.engine.period, failure);
+                    self.quick_stop_together();
                     return Err(failure);
                 }
             }
@@ -276,119 +257,104 @@ impl Machine {
     /// The transport's first SYNC comes a period after it is asked for. Asked for in the middle of
     /// one, the drives would wait for up to two periods, and fault when this computer stands still
     /// just then: so the loop sends one more when it is due.
-    fn last_sync(&mut self, seats: &Seats, pace: &Pace) -> Result<(), Failure> {
-        self.transport.sleep_until(pace.deadline);
-        self.send_syncs(seats)
+    fn last_sync(&mut self, pace: &Pace) -> Result<(), Failure> {
+        self.machine.transport.sleep_until(pace.deadline);
+        self.send_syncs()
             .map_err(|source| self.not_sent(source, "SYNC"))
     }
 
-    fn one_period(
-        &mut self,
-        engine: &mut Engine,
-        seats: &mut Seats,
-        pace: &mut Pace,
-    ) -> Result<Option<Cause>, Failure> {
-        let late = self.begin_period(engine, seats, pace)?;
+    fn one_period(&mut self, pace: &mut Pace) -> Result<Option<Cause>, Failure> {
+        let late = self.begin_period(pace)?;
         let synced = pace.synced.unwrap_or(pace.deadline);
-        self.hear_answers(engine, seats, synced)?;
-        let answered = self.now();
-        self.fire_deadlines(answered);
-        self.judge_alarms()?;
+        self.hear_answers(synced)?;
+        let answered = self.machine.now();
+        self.machine.fire_deadlines(answered);
+        self.machine.judge_alarms()?;
+        let engine = &mut *self.engine;
         let late_answers = engine.timing.late_answers;
         let judged = |trouble| trouble_to_failure(engine_axes(&engine.axes), late_answers, trouble);
         if late > 0 {
             engine.core.overrun(late).map_err(judged)?;
         }
-        if self.stop.is_requested() {
+        if self.machine.stop.is_requested() {
             engine.core.stop(Cause::Asked).map_err(judged)?;
         }
-        let heard = self.heard(seats, answered, synced);
+        let heard = heard(&self.machine.devices, &mut self.seats, answered, synced);
         let set_points = engine.core.step(&heard).map_err(judged)?;
-        for (at, set_point) in seats.drive[..seats.count].iter().zip(set_points) {
-            self.send_set_point(*at, set_point)?;
+        for (axis, set_point) in (0..self.seats.count).zip(set_points) {
+            self.send_set_point(self.seats.drive[axis], set_point)?;
         }
-        self.send_pending()?;
-        engine.timing.work.note(self.now().since(answered));
+        self.machine.send_pending()?;
+        let work = self.machine.now().since(answered);
+        let engine = &mut *self.engine;
+        engine.timing.work.note(work);
         pace.deadline += engine.period;
         Ok(engine.core.ended())
     }
 
     /// Waits for the deadline and sends SYNC. Returns how many SYNCs were missed, beyond what
     /// is tolerated.
-    fn begin_period(
-        &mut self,
-        engine: &mut Engine,
-        seats: &Seats,
-        pace: &mut Pace,
-    ) -> Result<u32, Failure> {
-        let period = engine.period;
-        self.transport.sleep_until(pace.deadline);
-        let now = self.now();
+    fn begin_period(&mut self, pace: &mut Pace) -> Result<u32, Failure> {
+        let period = self.engine.period;
+        self.machine.transport.sleep_until(pace.deadline);
+        let now = self.machine.now();
         let late = now.since(pace.deadline);
-        engine.timing.lateness.note(late);
+        let timing = &mut self.engine.timing;
+        timing.lateness.note(late);
         let mut missed = 0;
         if late >= period {
             let periods = late.as_nanos() / period.as_nanos().max(1);
             missed = u32::try_from(periods).unwrap_or(u32::MAX);
-            engine.timing.overruns += 1;
-            engine.timing.skipped += u64::from(missed);
+            timing.overruns += 1;
+            timing.skipped += u64::from(missed);
             pace.deadline += period * missed;
         }
         if now.since(pace.deadline) > period / 2 {
             // The next SYNC on the old grid would come close behind this one.
             pace.deadline = now;
-            engine.timing.shifted += 1;
+            timing.shifted += 1;
         }
-        self.send_syncs(seats)
+        self.send_syncs()
             .map_err(|source| self.not_sent(source, "SYNC"))?;
         if let Some(before) = pace.synced {
-            engine
-                .timing
-                .jitter
-                .note(now.since(before).abs_diff(period));
+            let jitter = now.since(before).abs_diff(period);
+            self.engine.timing.jitter.note(jitter);
         }
         pace.synced = Some(now);
-        if missed < self.patience.periods(1, period) {
+        if missed < self.machine.patience.periods(1, period) {
             return Ok(0);
         }
         pace.held_up = Some((now, missed));
         Ok(missed)
     }
 
-    fn send_syncs(&mut self, seats: &Seats) -> Result<(), SendError> {
+    fn send_syncs(&mut self) -> Result<(), SendError> {
         let sync = Payload::Frame(emit_sync(None));
-        seats
-            .buses
-            .iter()
-            .try_for_each(|port| self.transport.send(*port, &sync))
+        let mut buses = self.seats.buses.iter();
+        buses.try_for_each(|port| self.machine.transport.send(*port, &sync))
     }
 
     /// Takes what arrives until every axis has answered, or the time for it is over.
-    fn hear_answers(
-        &mut self,
-        engine: &mut Engine,
-        seats: &Seats,
-        synced: Time,
-    ) -> Result<(), Failure> {
-        let listened = synced + engine.period.mul_f64(LISTEN_SHARE);
+    fn hear_answers(&mut self, synced: Time) -> Result<(), Failure> {
+        let listened = synced + self.engine.period.mul_f64(LISTEN_SHARE);
         loop {
-            let complete = seats.drive[..seats.count]
-                .iter()
-                .all(|at| self.answer(*at, synced).is_some());
+            let devices = &self.machine.devices;
+            let mut drives = self.seats.drives().iter();
+            let complete = drives.all(|at| answer(devices, *at, synced).is_some());
             // What else waits is taken too, so that nothing piles up.
             let until = if complete { Time::ZERO } else { listened };
-            let Some(arrival) = self.transport.receive(until) else {
+            let Some(arrival) = self.machine.transport.receive(until) else {
                 return Ok(());
             };
             let was_complete = complete;
-            self.take(&arrival)?;
+            self.machine.take(&arrival)?;
             if arrival.at < synced {
-                let is_late = seats.drive[..seats.count]
-                    .iter()
-                    .any(|at| self.answer(*at, arrival.at).is_some());
-                engine.timing.late_answers += u64::from(is_late);
+                let devices = &self.machine.devices;
+                let mut drives = self.seats.drives().iter();
+                let is_late = drives.any(|at| answer(devices, *at, arrival.at).is_some());
+                self.engine.timing.late_answers += u64::from(is_late);
             } else if !was_complete {
-                engine.timing.answers.note(arrival.at.since(synced));
+                self.engine.timing.answers.note(arrival.at.since(synced));
             }
             // On a flooded bus something always waits.
             if arrival.at > listened {
@@ -399,14 +365,14 @@ impl Machine {
 
     /// At once or not at all: a set-point that waits for room would be an old one.
     fn send_set_point(&mut self, at: usize, set_point: Metres) -> Result<(), Failure> {
-        let now = self.transport.now();
-        let unit = &mut self.axes[at];
+        let now = self.machine.transport.now();
+        let unit = &mut self.machine.devices.axes[at];
         if let Err(source) = unit.device.follow(now, set_point) {
             let device = unit.name.clone();
             return Err(Failure::Device { device, source });
         }
         while let Some(payload) = unit.device.poll_transmit() {
-            if let Err(source) = self.transport.send(unit.port, &payload) {
+            if let Err(source) = self.machine.transport.send(unit.port, &payload) {
                 let name = unit.name.clone();
                 return Err(self.not_sent(source, &name));
             }
@@ -417,9 +383,9 @@ impl Machine {
     fn not_sent(&mut self, source: SendError, what: &str) -> Failure {
         // What has arrived meanwhile may say why: bus-off, for one. On a flooded bus something always
         // waits.
-        let begun = self.now();
-        while let Some(arrival) = self.transport.receive(Time::ZERO) {
-            if let Err(failure) = self.take(&arrival) {
+        let begun = self.machine.now();
+        while let Some(arrival) = self.machine.transport.receive(Time::ZERO) {
+            if let Err(failure) = self.machine.take(&arrival) {
                 return failure;
             }
             if arrival.at > begun {
@@ -427,7 +393,7 @@ impl Machine {
             }
         }
         if let SendError::Unusable { port, state } = source {
-            let port = self.port_name(port);
+            let port = self.machine.ports.name(port);
             return Failure::Link { port, state };
         }
         let why = format!("{what}: {source}");
@@ -437,15 +403,18 @@ impl Machine {
     /// The quick stop command to every drive and the SYNC at which it counts, now. What a port
     /// does not take is left to the drives' watch on our heartbeat. Nothing moves any more until
     /// the machine is started again ([`Machine::require_supervised`]).
-    fn quick_stop_together(&mut self, seats: &Seats) {
-        self.supervision = Supervision::Stopping;
-        self.outbox.clear();
-        let now = self.now();
-        for at in 0..self.drive_count() {
-            self.drive_mut(at).control(now, DriveCommand::QuickStop);
+    fn quick_stop_together(&mut self) {
+        self.machine.supervision = Supervision::Stopping;
+        self.machine.outbox.clear();
+        let now = self.machine.now();
+        for at in 0..self.machine.devices.drive_count() {
+            self.machine
+                .devices
+                .drive_mut(at)
+                .control(now, DriveCommand::QuickStop);
         }
-        let _ = self.send_pending();
-        let _ = self.send_syncs(seats);
+        let _ = self.machine.send_pending();
+        let _ = self.send_syncs();
     }
 }
 

@@ -165,7 +165,11 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
             speed: Some(RadiansPerSecond(170.0_f64.to_radians())),
             ..options(Approach::Forward)
         };
-        let before = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
+        let before = bench
+            .machine
+            .devices()
+            .rotary_reading(AXIS)?
+            .expect("it was zeroed");
         let refused = bench.machine.rotary(AXIS)?.sweep(&fast);
         let Err(Failure::Machine(machine::Failure::Device {
             source: DeviceError::OutOfRange { limit, unit, .. },
@@ -178,7 +182,11 @@ fn a_sweep_too_fast_for_the_sync_is_refused_with_what_fits() {
             (limit - 75.0).abs() < 1e-9 && unit == "°/s",
             "{limit} {unit}"
         );
-        let after = bench.machine.rotary_reading(AXIS)?.expect("it was zeroed");
+        let after = bench
+            .machine
+            .devices()
+            .rotary_reading(AXIS)?
+            .expect("it was zeroed");
         assert!((after.position - before.position).abs().arcsec() < 1.0);
         Ok(())
     });
@@ -211,7 +219,12 @@ fn an_angle_is_reached_by_the_way_that_was_asked_for() {
                 "{}",
                 target.degrees()
             );
-            let reading = bench.machine.rotary_reading(AXIS)?.unwrap().position;
+            let reading = bench
+                .machine
+                .devices()
+                .rotary_reading(AXIS)?
+                .unwrap()
+                .position;
             assert!((reading - target).abs().arcsec() < 0.2);
         }
         Ok(())

@@ -35,7 +35,7 @@ fn with_zeroed_axis<R>(
     procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
     let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
-    let axis = choose_axis(session.machine.axis_names(), args)?;
+    let axis = choose_axis(session.machine.devices().axis_names(), args)?;
     let store = session.store.clone();
     let resume = journal_to_resume(resume, &store, verb, &axis)?;
     if load_calibration && store.active(&axis)?.current.is_none() {
@@ -61,19 +61,19 @@ fn with_zeroed_axis<R>(
             procedure(machine, &axis, &store, prepared)
         })?;
         machine.shut_down()?;
-        Ok((result, to_json::counters(&machine.counters())))
+        Ok((result, to_json::counters(&machine.devices().counters())))
     })
 }
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "zero", Use::Motion, output)?;
-    let axis = choose_axis(session.machine.axis_names(), args)?;
+    let axis = choose_axis(session.machine.devices().axis_names(), args)?;
     let store = session.store.clone();
     let (zeroed, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         let zeroed = machine.linear(&axis)?.zero(&store)?;
         machine.shut_down()?;
-        Ok((zeroed, to_json::counters(&machine.counters())))
+        Ok((zeroed, to_json::counters(&machine.devices().counters())))
     })?;
     let estimate = &zeroed.estimate;
     let lost_motion = estimate.passes.map_or(String::new(), |it| {

@@ -31,7 +31,7 @@ fn with_zeroed_platform<R>(
         machine.platform()?.zero(&store)?;
         let result = procedure(machine, &store)?;
         machine.shut_down()?;
-        Ok((result, to_json::counters(&machine.counters())))
+        Ok((result, to_json::counters(&machine.devices().counters())))
     })
 }
 

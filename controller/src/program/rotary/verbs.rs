@@ -36,14 +36,14 @@ fn with_zeroed_table<R>(
     procedure: impl FnOnce(&mut Machine, &str, &Store) -> Result<R, Failure>,
 ) -> Result<(String, R, Value), Failure> {
     let mut session = Session::open(&args.machine, verb, purpose, output)?;
-    let axis = choose_axis(session.machine.rotary_names(), args)?;
+    let axis = choose_axis(session.machine.devices().rotary_names(), args)?;
     let store = session.store.clone();
     let (result, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         machine.rotary(&axis)?.zero()?;
         let result = procedure(machine, &axis, &store)?;
         machine.shut_down()?;
-        Ok((result, to_json::counters(&machine.counters())))
+        Ok((result, to_json::counters(&machine.devices().counters())))
     })?;
     Ok((axis, result, counters))
 }

@@ -61,7 +61,7 @@ pub(crate) fn zeroed_volume<P, R>(
         machine.volumetric()?.zero()?;
         let result = procedure(machine, &store, prepared)?;
         machine.shut_down()?;
-        Ok((result, to_json::counters(&machine.counters())))
+        Ok((result, to_json::counters(&machine.devices().counters())))
     })
 }
 

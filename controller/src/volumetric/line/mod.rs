@@ -136,7 +136,11 @@ impl WorkVolume<'_> {
         let offset = self.read_path(readout)?.vacuum;
         let config = &self.core.config.instrument[&readout.instrument];
         let settings = settings::line_corrections(config, measure.has_two_beams());
-        let environment = self.core.instrument(&readout.instrument)?.environment();
+        let environment = self
+            .core
+            .devices()
+            .instrument(&readout.instrument)?
+            .environment();
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(settings, &environment);
         let length = length.map_err(|source| Failure::Correction {
@@ -173,7 +177,7 @@ impl WorkVolume<'_> {
     ) -> Result<LineReading, Failure> {
         let counted = self.read_path(&line.readout)?;
         let instrument = &line.readout.instrument;
-        let environment = self.core.instrument(instrument)?.environment();
+        let environment = self.core.devices().instrument(instrument)?.environment();
         let environment = assemble::correction_environment(&environment);
         let failed = |source| Failure::Correction {
             instrument: instrument.clone(),
@@ -271,7 +275,12 @@ impl WorkVolume<'_> {
             let now = self.core.now();
             self.core.set_instrument_datum(instrument)?;
             self.core.run_until(now + look)?;
-            let is_lit = self.core.instrument(instrument)?.latest().is_some();
+            let is_lit = self
+                .core
+                .devices()
+                .instrument(instrument)?
+                .latest()
+                .is_some();
             if is_lit {
                 return Ok(self.core.use_instrument(instrument)?);
             }

@@ -1,0 +1,57 @@
+//! What the observer is told, now or when there is time for it.
+
+use crate::failure::Failure;
+use crate::observer::{Observer, Silent};
+
+/// So many warnings are kept for later: as many as anybody reads.
+const WARNINGS_HELD: usize = 32;
+
+/// The observer, and the warnings for which there is no time now: whoever takes them may make their
+/// writer wait.
+pub(crate) struct Notices {
+    pub(crate) observer: Box<dyn Observer>,
+    held_back: Option<Vec<String>>,
+}
+
+impl Default for Notices {
+    fn default() -> Self {
+        Self {
+            observer: Box::new(Silent),
+            held_back: None,
+        }
+    }
+}
+
+impl Notices {
+    /// Tells the observer, or keeps it for later while a loop must not wait for him.
+    pub(crate) fn warn(&mut self, text: String) {
+        match &mut self.held_back {
+            None => self.observer.warning(&text),
+            Some(held) if held.len() < held.capacity() => held.push(text),
+            Some(_) => {}
+        }
+    }
+
+    /// Nothing is told from now on.
+    pub(crate) fn hold_back(&mut self) {
+        self.held_back = Some(Vec::with_capacity(WARNINGS_HELD));
+    }
+
+    /// What was held back is told, and all that follows.
+    pub(crate) fn let_go(&mut self) {
+        for text in self.held_back.take().unwrap_or_default() {
+            self.observer.warning(&text);
+        }
+    }
+
+    /// The operator must not read "stopped" of an axis that did not say so.
+    pub(crate) fn tell_unconfirmed(&mut self, axis: &str, outcome: Result<(), Failure>) {
+        let Err(failure) = outcome else {
+            return;
+        };
+        self.observer.warning(&format!(
+            "axis {axis} did not confirm that it stopped ({failure}); its drive monitors our \
+             heartbeat and stops by itself: make sure that it stands still before you reach in"
+        ));
+    }
+}
