@@ -62,6 +62,16 @@ pub enum FitError {
         /// Parameters wanted.
         parameters: usize,
     },
+    /// No stroke to spare.
+    #[error(
+        "screw: offset, slope and a periodic error of {strokes} different strokes leave none from \
+         which to judge the screw's own error; measure at five or more different strokes, better \
+         nine, or leave the lead out"
+    )]
+    TooFewStrokes {
+        /// Different strokes given.
+        strokes: usize,
+    },
     /// So many rows do not belong that nobody can say which do.
     #[error(
         "screw: {outliers} of {rows} rows do not fit the others, more than {:.0} %; look for loose \

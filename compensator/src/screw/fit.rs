@@ -6,10 +6,9 @@
 //! level divided by the number of those still in question (Holm's procedure), so that the chance
 //! of any false harmonic on a screw that has none is at most the level.
 //!
-//! Where the same stroke was made several times, the repetitions say how large the noise is
-//! without any model (pure error). When the means of the strokes then scatter more than that
-//! about the model, the strokes have an error of their own that repeating does not average out;
-//! tests and uncertainties are then made from the larger scatter, per stroke and not per row.
+//! What a screw has of errors beyond these terms is the same at a stroke whatever the side and however often it is
+//! repeated. Slope and harmonics are therefore judged by what the strokes scatter about the model, and not by
+//! their repetitions; the lost motion, a difference at the same stroke, by the latter (see `strata`).
 //!
 //! Rows that do not belong are left out and named (see `outliers`).
 //!
@@ -21,28 +20,75 @@ use super::error::FitError;
 use super::observe::observable;
 use super::options::FitOptions;
 use super::outliers::{self, StrokeOutlier};
-use super::problem::{HarmonicTest, LackOfFit, Problem};
+use super::problem::{FLOOR, HarmonicTest, Problem};
+use super::strata::Variances;
 use super::{BASE, Harmonic, ScrewModel};
 use crate::least_squares::LeastSquaresError;
 use crate::screw::Stroke;
 
+/// Fewer degrees of freedom between strokes are left to the noise only where the first harmonic needs them: from
+/// one or two no harmonic of a real screw stands out.
+const FREEDOM_WANTED: usize = 4;
+
+/// The level at which strokes count as scattering more than their repetitions.
+const LACK_OF_FIT_LEVEL: f64 = 0.01;
+
 /// A model and how it came about.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
-    /// The model, with its covariance.
+    /// The model, with its covariance, which is unknown where no stroke is left to judge it by.
     pub model: ScrewModel,
     /// Rows that were left out, in the order given.
     pub outliers: Vec<StrokeOutlier>,
-    /// Standard deviation of the rows about the model.
+    /// Standard deviation of a single row about the model.
     pub residual: Metres,
-    /// Degrees of freedom behind the covariance.
+    /// Where it comes from.
+    pub scatter: Scatter,
+    /// Degrees of freedom between strokes: behind the uncertainties of offset, slope and harmonics,
+    /// which have been widened for it.
     pub degrees_of_freedom: usize,
+    /// Degrees of freedom within strokes: likewise behind that of the lost motion.
+    pub degrees_of_freedom_within: usize,
     /// `None` where no stroke was repeated or none is left to judge the model by.
     pub lack_of_fit: Option<LackOfFit>,
     /// Every harmonic looked for.
     pub tests: Vec<HarmonicTest>,
     /// Harmonics that these strokes cannot show; they were not looked for.
     pub unobservable: Vec<u32>,
+    /// What each harmonic does to the slope where the model lacks it.
+    pub leaks: Vec<Leak>,
+}
+
+/// Standard deviations of the parts of a row's scatter about the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// The screw's own error at a stroke, the same from both sides and in every repetition; zero
+    /// where the strokes scatter no more than the rest explains.
+    pub stroke: Metres,
+    /// The error of one side of a stroke.
+    pub side: Metres,
+    /// One repetition.
+    pub repeatability: Metres,
+}
+
+/// Whether the means of the strokes scatter about the model more than their repetitions explain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LackOfFit {
+    /// The probability of this by chance.
+    pub p_value: f64,
+    /// Whether it counts, at 1 %.
+    pub significant: bool,
+    /// Standard deviation of one measurement from its repetitions alone.
+    pub repeatability: Metres,
+}
+
+/// What a harmonic does to the slope when it is there and the model lacks it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leak {
+    /// Which harmonic.
+    pub number: u32,
+    /// By how much the slope is off, in the worst phase, for an amplitude of 1; 1/m.
+    pub slope_per_amplitude: f64,
 }
 
 /// Fits the model to the strokes of one axis.
@@ -93,48 +139,112 @@ pub fn fit(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
 
 /// The same with every row.
 fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError> {
+    let problem = Problem::new(strokes, options.lead);
+    problem.check_rows()?;
+    let (candidates, unobservable) = looked_for(strokes, options, &problem)?;
+    let (kept, tests) = problem.significant(&candidates, options.significance)?;
+    let strata = problem.strata(&kept)?;
+    let variances = strata.variances();
+    let solved = problem.solve(&kept, &variances)?;
+    let covariance = strata
+        .widened()
+        .map(|real| problem.covariance(&kept, (&variances, &real), &solved.cofactor));
+    let root = |variance: f64| Metres(variance.sqrt());
+    let residual = root(variances.of_one());
+    let repeatability = root(variances.repeat);
+    let lack_of_fit = strata.lack_of_fit(FLOOR).map(|p_value| LackOfFit {
+        p_value,
+        significant: p_value < LACK_OF_FIT_LEVEL,
+        repeatability,
+    });
+    Ok(Fitted {
+        model: model_of(
+            &problem,
+            options,
+            &kept,
+            &solved.coefficients,
+            covariance,
+            residual,
+        ),
+        outliers: Vec::new(),
+        residual,
+        scatter: Scatter {
+            stroke: root(variances.stroke.max(0.0)),
+            side: root(variances.side.max(0.0)),
+            repeatability,
+        },
+        degrees_of_freedom: strata.strokes.freedom,
+        degrees_of_freedom_within: strata.freedom_of_sides(),
+        lack_of_fit,
+        tests,
+        unobservable,
+        leaks: leaks(&problem, options, &kept, &variances)?,
+    })
+}
+
+/// The harmonics to look for, and those up to the highest asked for that these strokes cannot show: each needs
+/// strokes to judge it by.
+fn looked_for(
+    strokes: &[Stroke],
+    options: &FitOptions,
+    problem: &Problem,
+) -> Result<(Vec<u32>, Vec<u32>), FitError> {
     let (mut candidates, mut unobservable) =
         observable(strokes, options.lead, options.harmonics_max)?;
-    let problem = Problem::new(strokes, options.lead);
-    // Without a row to spare for it a harmonic cannot be judged either; the first must be.
-    while candidates.len() > 1 && problem.check_rows(&candidates).is_err() {
+    let freedom = |harmonics: usize| problem.places().saturating_sub(BASE - 1 + 2 * harmonics);
+    while candidates.len() > 1 && freedom(candidates.len()) < FREEDOM_WANTED {
         unobservable.extend(candidates.pop());
     }
+    if !candidates.is_empty() && freedom(candidates.len()) == 0 {
+        return Err(FitError::TooFewStrokes {
+            strokes: problem.places(),
+        });
+    }
     unobservable.sort_unstable();
-    problem.check_rows(&candidates)?;
-    let noise = problem.noise(&candidates)?;
-    let (kept, tests) = problem.significant(&candidates, &noise, options.significance)?;
-    let final_noise = problem.noise(&kept)?;
-    let solved = problem.solve(&kept)?;
-    let variance = final_noise.variance;
-    let covariance = solved.cofactor.iter().map(|c| c * variance).collect();
-    let values = &solved.coefficients;
+    Ok((candidates, unobservable))
+}
+
+fn model_of(
+    problem: &Problem,
+    options: &FitOptions,
+    kept: &[u32],
+    values: &[f64],
+    covariance: Option<Vec<f64>>,
+    scatter: Metres,
+) -> ScrewModel {
     let harmonic = |(i, &number): (usize, &u32)| Harmonic {
         number,
         sine: Metres(values[BASE + 2 * i]),
         cosine: Metres(values[BASE + 2 * i + 1]),
     };
-    let ends = problem.ends();
-    let model = ScrewModel {
+    let (first, last) = problem.ends();
+    ScrewModel {
         offset: Metres(values[0]),
         slope: values[1],
         lost_motion: Metres(values[2]),
         lead: options.lead,
         harmonics: kept.iter().enumerate().map(harmonic).collect(),
-        first: ends.0,
-        last: ends.1,
-        covariance: Some(covariance),
-        scatter: Some(Metres(final_noise.per_row.sqrt())),
+        first,
+        last,
+        covariance,
+        scatter: Some(scatter),
+    }
+}
+
+fn leaks(
+    problem: &Problem,
+    options: &FitOptions,
+    kept: &[u32],
+    variances: &Variances,
+) -> Result<Vec<Leak>, LeastSquaresError> {
+    let asked = options.lead.map_or(0, |_| options.harmonics_max);
+    let leak = |number: u32| {
+        Ok(Leak {
+            number,
+            slope_per_amplitude: problem.leak(number, kept, variances)?,
+        })
     };
-    Ok(Fitted {
-        model,
-        outliers: Vec::new(),
-        residual: Metres(final_noise.per_row.sqrt()),
-        degrees_of_freedom: final_noise.degrees_of_freedom,
-        lack_of_fit: final_noise.lack_of_fit,
-        tests,
-        unobservable,
-    })
+    (1..=asked).map(leak).collect()
 }
 
 fn check(strokes: &[Stroke], options: &FitOptions) -> Result<(), FitError> {
@@ -158,3 +268,7 @@ fn check(strokes: &[Stroke], options: &FitOptions) -> Result<(), FitError> {
 #[cfg(test)]
 #[path = "fit_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "coverage_tests.rs"]
+mod coverage_tests;

@@ -171,7 +171,9 @@ pub(super) fn check_model(model: &ScrewModel) -> Result<(), ScrewError> {
 /// The play that belongs to an estimated lost motion, which noise may have made negative.
 pub(super) fn play_of(model: &ScrewModel) -> Result<f64, ScrewError> {
     let seen = model.lost_motion;
-    let u = model.u_lost_motion().unwrap_or(Metres::ZERO);
+    // A single row scatters by more than the mean of all.
+    let u = model.u_lost_motion().or(model.scatter);
+    let u = u.unwrap_or(Metres::ZERO);
     if seen < u * -NEGATIVE_MAX {
         return Err(ScrewError::NegativeLostMotion { seen });
     }

@@ -32,6 +32,7 @@
 //!
 //! Absent: temperature, wear, speed-dependent friction, random error (it is the `scatter`).
 
+mod cells;
 mod compensation;
 mod engagement;
 mod error;
@@ -43,6 +44,7 @@ mod outliers;
 pub mod patent;
 mod problem;
 mod series;
+mod strata;
 
 use core::f64::consts::TAU;
 
@@ -54,11 +56,11 @@ use crate::uncertainty::propagate;
 pub use compensation::{Correction, OutOfRange, Rule, ScrewCompensation};
 pub use engagement::{Engagement, ScrewMemory};
 pub use error::FitError;
-pub use fit::{Fitted, fit};
+pub use fit::{Fitted, LackOfFit, Leak, Scatter, fit};
 pub use limits::{LimitName, Limits, ScrewError};
 pub use options::FitOptions;
 pub use outliers::StrokeOutlier;
-pub use problem::{HarmonicTest, LackOfFit};
+pub use problem::HarmonicTest;
 pub use series::{AxisStrokes, ScrewFault, Stroke, StrokeError, StrokeSeries};
 
 /// Offset, slope and lost motion come before the harmonics' sines and cosines.
@@ -117,9 +119,11 @@ pub struct ScrewModel {
     /// The highest stroke measured.
     pub last: Metres,
     /// Covariance of offset, slope, lost motion, and sine and cosine of each harmonic, in this
-    /// order, square row by row, SI units; `None` when nothing was repeated.
+    /// order, square row by row, SI units; widened for their degrees of freedom where these are few.
+    /// `None` where nothing was left to judge by.
     pub covariance: Option<Vec<f64>>,
-    /// Standard deviation of a single move around the model; `None` when nothing was repeated.
+    /// Standard deviation of a single move around the model, the screw's own errors at a stroke
+    /// included; `None` when nothing was repeated.
     pub scatter: Option<Metres>,
 }
 

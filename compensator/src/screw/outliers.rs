@@ -17,6 +17,7 @@ use units::{Approach, Metres};
 use super::error::FitError;
 use super::options::FitOptions;
 use super::problem::{Problem, SCATTER_FLOOR_M};
+use super::strata::Variances;
 use super::{BASE, design_row};
 use crate::screw::Stroke;
 use crate::uncertainty::{median, propagate, robust_sigma};
@@ -162,7 +163,14 @@ impl<'a> Judge<'a> {
             .len()
             .checked_sub(BASE + 2 * self.harmonics.len())
             .filter(|it| *it >= JUDGED_MIN)?;
-        let fit = Problem::new(&kept, lead).solve(self.harmonics).ok()?;
+        let alike = Variances {
+            stroke: 0.0,
+            side: 0.0,
+            repeat: 1.0,
+        };
+        let fit = Problem::new(&kept, lead)
+            .solve(self.harmonics, &alike)
+            .ok()?;
         let scaled = |(index, it): (usize, &Stroke)| {
             let lead = lead.map_or(1.0, Metres::value);
             let row = design_row(it.stroke.value(), it.approach, lead, self.harmonics);

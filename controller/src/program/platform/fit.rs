@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use compensator::screw::{
-    self, FitError, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
+    self, FitError, FitOptions, Fitted, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
 use compensator::screw::{AxisStrokes, StrokeSeries};
 use machine::records::{CalibrationRecord, short};
@@ -112,7 +112,8 @@ fn patent(strokes: &AxisStrokes) -> Result<Estimated<'_>, FitError> {
     let slope = with_u(estimate.slope * 1e3, u.map(|it| it.slope * 1e3), "µm/mm");
     let lost_motion = with_u(estimate.mean_all.um(), u.map(|it| it.mean_all.um()), "µm");
     let text = format!(
-        "{} strokes from {} to {} um, residual {:.3} µm\n  {:<24} {slope}\n  {:<24} {lost_motion}",
+        "{} strokes from {} to {} um, residual {:.3} µm\n  {:<24} {slope}\n  {:<24} {lost_motion}\n  \
+         u: of the repetitions alone; errors that the screw always has at a stroke come on top",
         estimate.rows,
         Short(estimate.at_m.um()),
         Short(estimate.at_n.um()),
@@ -138,13 +139,13 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
     let fitted = screw::fit(&strokes.strokes, &options)?;
     let rows = strokes.strokes.len();
     let mut text = format!(
-        "{rows} strokes from {} to {} um, residual {:.3} µm, {} degrees of freedom{}",
+        "{rows} strokes from {} to {} um, residual {:.3} µm{}",
         Short(fitted.model.first.um()),
         Short(fitted.model.last.um()),
         fitted.residual.um(),
-        fitted.degrees_of_freedom,
         model_text(&fitted.model)
     );
+    text += &scatter_text(&fitted);
     if options.lead.is_none() {
         text += "\n  periodic errors were not looked for: give --lead-mm";
     }
@@ -154,10 +155,7 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
             fitted.unobservable
         );
     }
-    if fitted.lack_of_fit.is_some_and(|it| it.significant) {
-        text += "\n  the strokes scatter more than their repetitions: the screw has errors that \
-                 this model does not describe; the uncertainties include them";
-    }
+    text += &leaks_text(&fitted);
     text += &outlier_lines(&fitted.outliers, &strokes.lines);
     Ok(Estimated {
         axis: &strokes.axis,
@@ -167,6 +165,49 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
         outliers: fitted.outliers,
         text,
     })
+}
+
+/// What the scatter is made of, and what the uncertainties were judged by.
+fn scatter_text(fitted: &Fitted) -> String {
+    let scatter = &fitted.scatter;
+    let mut text = format!(
+        "\n  repetitions scatter by {:.3} µm; the screw's own error at a stroke, which they do not \
+         average out, is {:.3} µm",
+        scatter.repeatability.um(),
+        scatter.stroke.um()
+    );
+    text += &match fitted.degrees_of_freedom {
+        0 => "\n  so few different strokes leave none to judge slope and offset by: their \
+              uncertainties are unknown; measure more different strokes"
+            .to_owned(),
+        freedom => format!(
+            "\n  u: twice it holds in 95 % of cases, by {freedom} degree(s) of freedom between \
+             strokes (slope, offset, amplitudes) and {} within them (lost motion)",
+            fitted.degrees_of_freedom_within
+        ),
+    };
+    if matches!(fitted.degrees_of_freedom, 1..FEW_BETWEEN) {
+        text += "\n  more different strokes, not more repetitions, would make the slope surer";
+    }
+    text
+}
+
+/// With fewer degrees of freedom u is widened by a tenth and more.
+const FEW_BETWEEN: usize = 14;
+
+/// What harmonics that are not in the model would do to the slope.
+fn leaks_text(fitted: &Fitted) -> String {
+    let modelled = |number| fitted.model.harmonics.iter().any(|it| it.number == number);
+    let left_out = fitted.leaks.iter().filter(|it| !modelled(it.number));
+    let lines = left_out.map(|it| {
+        format!(
+            "\n  1 µm of harmonic {}, which is not in the model, would shift the slope by up to \
+             {:.4} µm/mm",
+            it.number,
+            it.slope_per_amplitude * 1e-3
+        )
+    });
+    lines.collect()
 }
 
 /// Each row that was left out, by its line in the file where there is one.

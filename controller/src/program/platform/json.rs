@@ -76,6 +76,12 @@ pub(crate) fn fitted(fitted: &Fitted, rows: usize, lines: &[usize]) -> Value {
             "repeatability_um": um(it.repeatability),
         })
     });
+    let leaks = fitted.leaks.iter().map(|it| {
+        json!({
+            "harmonic": it.number,
+            "slope_um_per_mm_per_um": rounded(it.slope_per_amplitude * 1e-3),
+        })
+    });
     json!({
         "rows": rows,
         "first_stroke_um": um(model.first),
@@ -90,8 +96,13 @@ pub(crate) fn fitted(fitted: &Fitted, rows: usize, lines: &[usize]) -> Value {
         "harmonics": harmonics(model),
         "harmonics_tested": tests.collect::<Vec<_>>(),
         "harmonics_not_observable": fitted.unobservable,
+        "harmonics_left_out_shift_slope": leaks.collect::<Vec<_>>(),
         "residual_um": um(fitted.residual),
+        "stroke_error_um": um(fitted.scatter.stroke),
+        "side_error_um": um(fitted.scatter.side),
+        "repeatability_um": um(fitted.scatter.repeatability),
         "degrees_of_freedom": fitted.degrees_of_freedom,
+        "degrees_of_freedom_within": fitted.degrees_of_freedom_within,
         "lack_of_fit": lack_of_fit,
         "outliers": outliers(&fitted.outliers, lines),
     })
