@@ -12,7 +12,8 @@ use units::{Metres, Radians};
 
 use crate::Edit;
 use crate::hand::Hand;
-use crate::rig::{Bench, LINEAR, ROTARY, Shipped, UVW, UVW_COPLEY, VOLUMETRIC};
+use crate::rig::Bench;
+use crate::shipped::{LINEAR, ROTARY, Shipped, UVW, UVW_COPLEY, VOLUMETRIC};
 use crate::volume::{Volume, calm, spread};
 
 /// How long three axes warm up between cold and warm lines.

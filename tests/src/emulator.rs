@@ -9,9 +9,8 @@ use truestage::emulated::{Emulated, EmulatedError, EmulatedOnPtys};
 use truestage::ports;
 
 use crate::four_screws::{four_cyclic_axes, with_fourth_drive};
-use crate::rig::{
-    LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC, shipped_config,
-};
+use crate::rig::{Rig, shipped_config};
+use crate::shipped::{LINEAR, MACHINE, ROTARY, Shipped, UVW, UVW_COPLEY, VOLUMETRIC};
 use crate::stream::Watch;
 use truestage::for_tests::Edit;
 
@@ -57,7 +56,8 @@ impl Setup {
         Self::of(UVW_COPLEY, seed)
     }
 
-    const fn of(shipped: Shipped, seed: u64) -> Self {
+    /// A machine that ships, with the noise and errors of `seed`.
+    pub const fn of(shipped: Shipped, seed: u64) -> Self {
         Self {
             shipped,
             seed,

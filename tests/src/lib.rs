@@ -16,6 +16,7 @@ mod not_run;
 mod pose_judge;
 mod random;
 mod rig;
+mod shipped;
 mod slcan_hub;
 mod stand;
 pub mod stream;
@@ -30,10 +31,8 @@ pub use interface::{Interface, run};
 pub use not_run::{left_out, not_run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use random::{random, seeds};
-pub use rig::{
-    Bench, EMULATED, LINEAR, MACHINE, ROTARY, Rig, Shipped, UVW, UVW_COPLEY, VOLUMETRIC,
-    machine_config, rigs, shipped_config, vcan_is_native,
-};
+pub use rig::{Bench, Rig, machine_config, rigs, shipped_config, vcan_is_native};
+pub use shipped::*;
 pub use slcan_hub::SlcanHub;
 pub use stand::{Stand, on_every_rig};
 pub use truestage::for_tests::Edit;

@@ -7,12 +7,13 @@ use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
 use crate::linear::{CalibrateConfig, CompensationConfig, EndPolicyName, VerifyConfig, ZeroConfig};
 
-pub(crate) fn check_cycle(
-    findings: &mut Vec<Finding>,
-    config: &MachineConfig,
-    name: &str,
-    axis: &AxisConfig,
-) {
+pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
+    for (name, axis) in &config.axis {
+        check_cycle(findings, config, name, axis);
+    }
+}
+
+fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, axis: &AxisConfig) {
     if let Some(zero) = &axis.zero {
         check_zero(
             &mut Judge::at(format!("axis.{name}.zero"), findings),

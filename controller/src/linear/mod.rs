@@ -8,6 +8,9 @@ mod cross_check;
 mod datum;
 mod datum_in_use;
 pub(crate) mod entries;
+#[cfg(test)]
+mod golden;
+mod kind;
 mod log;
 pub(crate) mod measure;
 pub(crate) mod moved;
@@ -36,6 +39,7 @@ pub(crate) use config::{
 };
 pub(crate) use datum_in_use::Datum;
 pub(crate) use entries::{PointEntry, ZeroEntry};
+pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
 pub(crate) use stage::AxisMemory;

@@ -11,8 +11,11 @@ pub(crate) mod check;
 pub(crate) mod config;
 mod entries;
 mod failure;
+#[cfg(test)]
+mod golden;
 mod handle;
 mod header;
+mod kind;
 mod log;
 mod look;
 mod moves;
@@ -36,6 +39,7 @@ pub(crate) use config::{
     AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
 };
 pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
 pub(crate) use record::ScrewMethodName;
 pub(crate) use state::{PlatformState, kinematics};

@@ -7,7 +7,7 @@ use machine::records::{Glance, Lease, RecordHead, Store, short};
 use serde_json::{Value, json};
 
 use crate::config::Loaded;
-use crate::program::kind::Kind;
+use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
 use crate::volumetric::MemoryName;
@@ -135,7 +135,7 @@ pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure>
 
 /// How a kind of content is shown that the store knows.
 fn of_kind(kind: &str) -> Shown {
-    let all = Kind::ALL.into_iter().flat_map(|it| it.verbs().shown);
+    let all = KINDS.into_iter().flat_map(|it| it.shown);
     let own = all.into_iter().find(|it| it.kind == kind);
     *own.expect("a test looks for each kind that is stored")
 }
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_calibration_that_is_stored_is_shown() {
-        for kind in crate::stores::CONTENTS {
+        for kind in crate::stores::contents() {
             assert_eq!(of_kind(kind.name()).kind, kind.name());
         }
     }

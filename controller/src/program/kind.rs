@@ -1,54 +1,35 @@
 //! What a verb acts upon: a platform, a work volume, linear or rotary axes, as the configuration says.
 
 use super::verbs::Verbs;
+use super::{linear, platform, rotary, volumetric};
 use crate::Failure;
 use crate::config::{self, MachineConfig};
 use crate::program::MachineArgs;
 use crate::program::output::Ended;
 
-/// The kinds of things that have a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// An alignment platform on screws.
-    Platform,
-    /// Linear axes by themselves.
-    Linear,
-    /// Rotary axes.
-    Rotary,
-    /// Three axes corrected throughout their volume.
-    Volumetric,
-}
-
-impl Kind {
-    pub(crate) const ALL: [Self; 4] =
-        [Self::Linear, Self::Rotary, Self::Platform, Self::Volumetric];
-
-    /// What this kind does for the verbs of the cycle.
-    pub(crate) const fn verbs(self) -> &'static Verbs {
-        match self {
-            Self::Linear => &super::linear::VERBS,
-            Self::Rotary => &super::rotary::VERBS,
-            Self::Platform => &super::platform::VERBS,
-            Self::Volumetric => &super::volumetric::VERBS,
-        }
-    }
-}
+/// Each kind.
+pub(crate) const KINDS: [&Verbs; 4] = [
+    &linear::VERBS,
+    &platform::VERBS,
+    &rotary::VERBS,
+    &volumetric::VERBS,
+];
 
 /// Runs a verb on what it is for: the axes it names, or the only kind that there is.
 pub(crate) fn by_kind<'a>(
     machine: &MachineArgs,
     named: impl Iterator<Item = &'a str>,
-    verb: impl FnOnce(Kind) -> Ended,
+    verb: impl FnOnce(&Verbs) -> Ended,
 ) -> Ended {
     let named: Vec<&str> = named.collect();
     verb(kind_of(&config::load(&machine.config)?.config, &named)?)
 }
 
-fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
-    let rotary = |name: &&&str| config.rotary.contains_key(**name);
-    let (turning, all) = (named.iter().filter(rotary).count(), named.len());
+fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<&'static Verbs, Failure> {
+    let turns = |name: &&&str| config.rotary.contains_key(**name);
+    let (turning, all) = (named.iter().filter(turns).count(), named.len());
     if all > 0 && turning == all {
-        return Ok(Kind::Rotary);
+        return Ok(&rotary::VERBS);
     }
     if turning > 0 {
         return Err(Failure::Usage {
@@ -56,14 +37,13 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
             help: "use one command for the linear axes and another for the rotary axes".into(),
         });
     }
-    if config.volumetric.is_some() {
-        return Ok(Kind::Volumetric);
-    }
-    if config.platform.is_some() {
-        return Ok(Kind::Platform);
+    // Three axes that move a platform are first of all three axes.
+    let mut kinds = KINDS.into_iter().rev();
+    if let Some(kind) = kinds.find(|it| (it.has_the_axes)(config)) {
+        return Ok(kind);
     }
     match (config.axis.is_empty(), config.rotary.is_empty()) {
-        (true, _) => Ok(Kind::Rotary),
+        (true, _) => Ok(&rotary::VERBS),
         (false, false) if all == 0 => {
             let names: Vec<_> = config.axis.keys().chain(config.rotary.keys()).collect();
             Err(Failure::Usage {
@@ -71,7 +51,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<Kind, Failure> {
                 help: format!("say which with --axis: {names:?}"),
             })
         }
-        _ => Ok(Kind::Linear),
+        _ => Ok(&linear::VERBS),
     }
 }
 
@@ -85,21 +65,23 @@ mod tests {
     const VOLUME: &str = include_str!("../../../configs/machines/volumetric.toml");
     const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
 
+    /// A kind is known by the first machine that it shows.
     #[track_caller]
-    fn check(text: &str, named: &[&str], expected: Option<Kind>) {
+    fn check(text: &str, named: &[&str], expected: Option<&str>) {
         let config = config::parse(text, "m.toml").unwrap().config;
-        assert_eq!(kind_of(&config, named).ok(), expected, "{named:?}");
+        let kind = kind_of(&config, named).ok().map(|it| it.demos[0].name);
+        assert_eq!(kind, expected, "{named:?}");
     }
 
     #[test]
     fn a_verb_acts_on_what_it_names_or_on_the_only_kind_there_is() {
-        check(LINEAR, &[], Some(Kind::Linear));
-        check(LINEAR, &["x"], Some(Kind::Linear));
-        check(ROTARY, &[], Some(Kind::Rotary));
-        check(ROTARY, &["c"], Some(Kind::Rotary));
-        check(UVW, &[], Some(Kind::Platform));
-        check(UVW, &["x", "theta"], Some(Kind::Platform));
-        check(VOLUME, &["x", "z"], Some(Kind::Volumetric));
+        check(LINEAR, &[], Some("linear"));
+        check(LINEAR, &["x"], Some("linear"));
+        check(ROTARY, &[], Some("rotary"));
+        check(ROTARY, &["c"], Some("rotary"));
+        check(UVW, &[], Some("uvw"));
+        check(UVW, &["x", "theta"], Some("uvw"));
+        check(VOLUME, &["x", "z"], Some("volumetric"));
     }
 
     #[test]
@@ -108,8 +90,8 @@ mod tests {
         let mixed = format!("{LINEAR}\n{}", &ROTARY[rotary..])
             .edit("node_id = 1\ncounts", "node_id = 9\ncounts");
         check(&mixed, &[], None);
-        check(&mixed, &["x"], Some(Kind::Linear));
-        check(&mixed, &["c"], Some(Kind::Rotary));
+        check(&mixed, &["x"], Some("linear"));
+        check(&mixed, &["c"], Some("rotary"));
         check(&mixed, &["x", "c"], None);
     }
 }

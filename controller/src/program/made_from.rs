@@ -5,7 +5,7 @@ use std::path::Path;
 use machine::records::{CalibrationRecord, Content, Store};
 
 use crate::Failure;
-use crate::stores::CONTENTS;
+use crate::stores::contents;
 
 /// The calibrations of a kind that were made from the journal at `path`.
 pub(crate) fn made_from<C: Content>(
@@ -21,5 +21,5 @@ pub(crate) fn made_from<C: Content>(
 /// lies elsewhere.
 pub(crate) fn source(path: &Path) -> Option<(Store, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
-    Some((Store::of_journal(path, CONTENTS)?, name))
+    Some((Store::of_journal(path, contents())?, name))
 }

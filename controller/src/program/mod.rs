@@ -36,8 +36,9 @@ use wire::lockstep::path_of;
 
 use crate::Failure;
 use crate::ports::Pace;
-use kind::{Kind, by_kind};
+use kind::by_kind;
 use output::Output;
+use verbs::Verbs;
 
 /// What a shell script learns of an end: [`crate::Failure::exit_code`].
 const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
@@ -58,7 +59,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// The whole cycle on an emulated machine: start here.
-    Demo(demo::DemoArgs),
+    Demo(demo::DemoCommand),
     /// Check a configuration; no bus is touched.
     Check {
         /// The machine's configuration.
@@ -159,7 +160,7 @@ struct AxisArgs {
 }
 
 impl AxisArgs {
-    fn by_kind(&self, verb: impl FnOnce(Kind) -> output::Ended) -> output::Ended {
+    fn by_kind(&self, verb: impl FnOnce(&Verbs) -> output::Ended) -> output::Ended {
         by_kind(&self.machine, self.axis.as_deref().into_iter(), verb)
     }
 }
@@ -328,17 +329,13 @@ pub fn main() -> ExitCode {
         Command::Check { config } => check::run(&config, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => reset::run(&args, output),
-        Command::Zero(args) => args.by_kind(|kind| (kind.verbs().zero)(&args, output)),
-        Command::Calibrate(args) => args
-            .axis
-            .by_kind(|kind| (kind.verbs().calibrate)(&args, output)),
-        Command::Verify(args) => args
-            .axis
-            .by_kind(|kind| (kind.verbs().verify)(&args, output)),
+        Command::Zero(args) => args.by_kind(|kind| (kind.zero)(&args, output)),
+        Command::Calibrate(args) => args.axis.by_kind(|kind| (kind.calibrate)(&args, output)),
+        Command::Verify(args) => args.axis.by_kind(|kind| (kind.verify)(&args, output)),
         Command::Move(args) => {
             let args = args.settle();
             by_kind(&args.machine, args.named(), |kind| {
-                (kind.verbs().move_to)(&args, output)
+                (kind.move_to)(&args, output)
             })
         }
         Command::Reference(args) => volumetric::verbs::reference(&args, output),

@@ -7,7 +7,8 @@ use machine::records::{AnyLog, read_journal};
 use serde_json::json;
 
 use crate::Failure;
-use crate::program::kind::Kind;
+use crate::program::kind::KINDS;
+use crate::program::linear;
 use crate::program::output::{Ended, Output};
 
 #[derive(Debug, Args)]
@@ -22,11 +23,12 @@ pub(crate) struct ReportArgs {
 /// The page of the journal at `run`, of the kind that its first line tells.
 pub(crate) fn html(run: &Path) -> Result<String, Failure> {
     let opened_by = read_journal::<AnyLog>(run)?.log.opened_by;
-    let verbs = Kind::ALL.into_iter().map(Kind::verbs);
-    let own =
-        opened_by.and_then(|name| verbs.into_iter().find(|it| it.opened_by.contains(&&*name)));
+    let own = opened_by.and_then(|name| {
+        let mut kinds = KINDS.into_iter();
+        kinds.find(|it| it.opened_by.contains(&&*name))
+    });
     // A run of which only the header was written shows that.
-    (own.unwrap_or_else(|| Kind::Linear.verbs()).page)(run)
+    (own.unwrap_or(&linear::VERBS).page)(run)
 }
 
 pub(crate) fn run(args: &ReportArgs, output: Output) -> Ended {

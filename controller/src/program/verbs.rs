@@ -2,13 +2,19 @@
 
 use std::path::Path;
 
+use super::demo::stand::Demo;
 use super::output::{Ended, Output};
 use super::show::Shown;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::Failure;
+use crate::config::MachineConfig;
 
 /// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {
+    /// Whether it moves the linear axes of a machine, so that nobody moves them by themselves.
+    pub(crate) has_the_axes: fn(&MachineConfig) -> bool,
+    /// Its demonstrations.
+    pub(crate) demos: &'static [Demo],
     pub(crate) zero: fn(&AxisArgs, Output) -> Ended,
     pub(crate) calibrate: fn(&CalibrateArgs, Output) -> Ended,
     pub(crate) verify: fn(&VerifyArgs, Output) -> Ended,

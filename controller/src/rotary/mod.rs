@@ -17,7 +17,10 @@ mod config;
 mod entries;
 pub(crate) mod estimate;
 mod failure;
+#[cfg(test)]
+mod golden;
 mod in_use;
+mod kind;
 mod line_speed;
 mod log;
 pub(crate) mod moves;
@@ -50,5 +53,6 @@ pub(crate) use config::{
 };
 pub(crate) use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
 pub(crate) use in_use::TableInUse;
+pub(crate) use kind::KIND;
 pub(crate) use log::PlateEntry;
 pub(crate) use table::RotaryMemory;

@@ -1,6 +1,8 @@
 //! What is kept: [`machine::records`], and where the records of a machine lie.
 
 #[cfg(test)]
+pub(crate) mod golden;
+#[cfg(test)]
 mod golden_tests;
 #[cfg(test)]
 pub(crate) mod record_tests;

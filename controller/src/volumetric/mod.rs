@@ -23,8 +23,11 @@ mod correction;
 pub(crate) mod entries;
 mod failure;
 pub(crate) mod first_part;
+#[cfg(test)]
+mod golden;
 mod handle;
 mod inputs;
+mod kind;
 mod limits;
 pub(crate) mod line;
 mod log;
@@ -64,6 +67,7 @@ pub(crate) use entries::{
     VolumeCheckEntry, VolumePlanEntry, VolumeReferencesEntry,
 };
 pub(crate) use entries::{metres, point};
+pub(crate) use kind::KIND;
 pub(crate) use log::VolumeEntry;
 pub(crate) use memory::Remembered;
 pub(crate) use path_refusal::PathRefusal;

@@ -137,3 +137,8 @@ fn a_compensated_move_brings_the_point_itself_to_its_target() {
         );
     }
 }
+
+#[test]
+fn the_pinned_log_of_a_linear_stage_is_that_of_every_computer() {
+    super::pinned::check("linear");
+}

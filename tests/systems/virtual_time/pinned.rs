@@ -21,8 +21,9 @@ struct Log {
     lines: Vec<String>,
 }
 
+/// The log of the machine that ships as `name` is the one that is pinned.
 #[track_caller]
-fn check(name: &str) {
+pub(super) fn check(name: &str) {
     let log = log_of(name);
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("systems/pinned");
     let path = path.join(format!("{name}.txt"));
@@ -99,31 +100,6 @@ fn difference(pinned: &str, now: &str) -> String {
 /// The line of the log in a line of the excerpt.
 fn text_of(line: &str) -> &str {
     line.trim_start().splitn(3, ' ').nth(2).unwrap_or_default()
-}
-
-#[test]
-fn the_pinned_log_of_a_linear_stage_is_that_of_every_computer() {
-    check("linear");
-}
-
-#[test]
-fn the_pinned_log_of_a_platform_is_that_of_every_computer() {
-    check("uvw");
-}
-
-#[test]
-fn the_pinned_log_of_amplifiers_on_a_serial_line_is_that_of_every_computer() {
-    check("uvw-copley");
-}
-
-#[test]
-fn the_pinned_log_of_a_rotary_table_is_that_of_every_computer() {
-    check("rotary");
-}
-
-#[test]
-fn the_pinned_log_of_three_axes_is_that_of_every_computer() {
-    check("volumetric");
 }
 
 #[test]

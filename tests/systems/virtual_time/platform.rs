@@ -306,3 +306,13 @@ fn what_cannot_be_reached_is_refused_before_anything_moves() {
     let after = true_pose(&bench.emulated.simulation());
     assert!((after.x - before.x).abs() < Metres::from_um(0.2));
 }
+
+#[test]
+fn the_pinned_log_of_a_platform_is_that_of_every_computer() {
+    super::pinned::check("uvw");
+}
+
+#[test]
+fn the_pinned_log_of_amplifiers_on_a_serial_line_is_that_of_every_computer() {
+    super::pinned::check("uvw-copley");
+}

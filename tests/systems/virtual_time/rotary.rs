@@ -636,3 +636,8 @@ fn one_seed_is_one_run_bit_by_bit() {
     assert_eq!(once, run(32));
     assert_ne!(once.0, run(33).0);
 }
+
+#[test]
+fn the_pinned_log_of_a_rotary_table_is_that_of_every_computer() {
+    super::pinned::check("rotary");
+}

@@ -79,3 +79,8 @@ fn references_and_memories_of_other_errors_are_refused() {
     assert_eq!(good(cleared), (records.first_memory, None));
     assert!(good(volume.work().state(&store)).is_some());
 }
+
+#[test]
+fn the_pinned_log_of_three_axes_is_that_of_every_computer() {
+    super::pinned::check("volumetric");
+}

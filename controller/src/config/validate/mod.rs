@@ -9,8 +9,7 @@ use self::axis::{check_axis, check_lines};
 use self::drive::check_axis_name;
 pub(super) use crate::config::judge::Finding;
 use crate::config::judge::Judge;
-use crate::linear::check::check_cycle;
-use crate::rotary::check::check_rotaries;
+use crate::kinds::KINDS;
 use drivers::device::cia402::period_from;
 use drivers::protocol::bus_load::BusLoadError;
 
@@ -42,9 +41,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
             config,
             axis,
         );
-        check_cycle(&mut findings, config, name, axis);
     }
-    check_rotaries(config, &mut findings);
     for (name, analog) in &config.analog {
         let mut judge = Judge::at(format!("analog.{name}"), &mut findings);
         analog.check(&mut judge, config.wiring());
@@ -64,8 +61,9 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
         }
         camera.check(&mut judge, config.wiring());
     }
-    crate::platform::check::check(config, &mut findings);
-    crate::volumetric::check::check(config, &mut findings);
+    for kind in KINDS {
+        (kind.check)(config, &mut findings);
+    }
     check_node_ids(config, &mut findings);
     check_lines(config, &mut findings);
     // Only of a configuration that is otherwise sound: its numbers would mean nothing.

@@ -7,15 +7,17 @@
 
 pub(crate) mod emulation;
 pub(crate) mod stand;
+mod which;
 
 use std::io::IsTerminal;
 use std::time::Instant;
 
+use clap::Args;
 use machine::records::Lease;
 
 use self::emulation::Emulation;
-pub(crate) use self::stand::DemoArgs;
-use self::stand::{Stand, Which};
+use self::stand::{Demo, DemoArgs, Show, Shown, Stand};
+use self::which::Which;
 use crate::config::{self, Loaded};
 use crate::emulated::{Emulated, EmulatedOnPtys};
 use crate::program::output::{Ended, Output};
@@ -23,15 +25,34 @@ use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
 use crate::{Failure, Machine, store_of};
 
-pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
-    if args.machine == Which::Volumetric {
-        return super::volumetric::demo::run(args, output);
+#[derive(Debug, Args)]
+pub(crate) struct DemoCommand {
+    /// Which machine.
+    #[arg(long, value_enum, default_value_t = Which::first())]
+    machine: Which,
+    #[command(flatten)]
+    args: DemoArgs,
+}
+
+pub(crate) fn run(command: &DemoCommand, output: Output) -> Ended {
+    let (Which(demo), args) = (command.machine, &command.args);
+    match demo.show {
+        Show::Alone(run) => run(demo, args, output),
+        Show::OnStand(show) => on_stand(demo, args, output, show),
     }
+}
+
+fn on_stand(
+    demo: &Demo,
+    args: &DemoArgs,
+    output: Output,
+    show: impl FnOnce(&mut Stand, &DemoArgs, Output) -> Result<Shown, Failure>,
+) -> Ended {
     let started = Instant::now();
-    let mut loaded = load(args)?;
+    let mut loaded = load(demo, args)?;
     let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "demo")?;
-    let [_, _, description] = args.machine.files();
+    let [_, _, description] = demo.files;
     let emulated = emulation(args, description, &loaded)?;
     let (transport, patience) = emulated.connect(&loaded.config)?;
     loaded.patience = patience;
@@ -47,12 +68,7 @@ pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
         emulated,
         started,
     };
-    let shown = match args.machine {
-        Which::Linear => super::linear::demo::show(&mut stand, args, output),
-        Which::Uvw | Which::UvwCopley => super::platform::demo::show(&mut stand, args, output),
-        Which::Rotary => super::rotary::demo::show(&mut stand, output),
-        Which::Volumetric => unreachable!("the demonstration ran in virtual time"),
-    }?;
+    let shown = show(&mut stand, args, output)?;
     match shown.bad {
         None => output.result(&shown.text, &shown.value),
         Some(failure) => output.bad_result(&shown.text, shown.value, failure),
@@ -71,7 +87,7 @@ fn emulation(args: &DemoArgs, description: &str, loaded: &Loaded) -> Result<Emul
     Ok(Emulation::OnPtys(Box::new(emulated)))
 }
 
-fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
+fn load(demo: &Demo, args: &DemoArgs) -> Result<Loaded, Failure> {
     if let Some(speed) = args.speed
         && !(speed.is_finite() && speed > 0.0)
     {
@@ -80,7 +96,7 @@ fn load(args: &DemoArgs) -> Result<Loaded, Failure> {
             help: "give a positive number; 1 is real time".into(),
         });
     }
-    let [path, text, _] = args.machine.files();
+    let [path, text, _] = demo.files;
     let mut loaded = config::parse(text, path)?;
     if let Some(folder) = &args.data_dir {
         loaded.config.machine.data_dir.clone_from(folder);

@@ -3,23 +3,22 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use machine::records::JournalHeader;
 use serde_json::Value;
 use units::Time;
 
 use super::emulation::Emulation;
 use crate::emulated::HallDrift;
+use crate::program::output::{Ended, Output};
 use crate::{Failure, Machine, Store};
 
 /// How long the mains stays off, and what the drives take to boot, in machine time.
 const POWER_OFF: Duration = Duration::from_millis(800);
 
+/// How it is shown.
 #[derive(Debug, Args)]
 pub(crate) struct DemoArgs {
-    /// Which machine.
-    #[arg(long, value_enum, default_value_t = Which::Linear)]
-    pub(crate) machine: Which,
     /// The emulated stage's errors, noise and drift; the same seed is the same stage.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -39,53 +38,36 @@ pub(crate) struct DemoArgs {
     pub(crate) data_dir: Option<PathBuf>,
 }
 
-/// The machines there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Which {
-    /// A linear-motor stage with Hall sensors and a laser interferometer.
-    Linear,
-    /// An alignment platform on three screws, seen by an image controller.
-    Uvw,
-    /// The same with amplifiers on a serial line in place of drives on CAN.
-    UvwCopley,
-    /// A rotary table and a plate of lines, turned from placement to placement.
-    Rotary,
-    /// Three axes corrected throughout their volume, for eight hours in virtual time.
-    Volumetric,
+/// A machine that can be shown.
+pub(crate) struct Demo {
+    /// What it is called on the command line.
+    pub(crate) name: &'static str,
+    /// What it is, for whoever asks for help.
+    pub(crate) help: &'static str,
+    /// Where its configuration ships, that configuration, and what it is emulated from.
+    pub(crate) files: [&'static str; 3],
+    pub(crate) show: Show,
 }
 
-impl Which {
-    /// Where its configuration ships, that configuration, and what it is emulated from.
-    pub(crate) const fn files(self) -> [&'static str; 3] {
-        match self {
-            Self::Linear => [
-                "configs/machines/linear.toml",
-                include_str!("../../../../configs/machines/linear.toml"),
-                include_str!("../../../../configs/emulated/linear.toml"),
-            ],
-            Self::Uvw => [
-                "configs/machines/uvw.toml",
-                include_str!("../../../../configs/machines/uvw.toml"),
-                include_str!("../../../../configs/emulated/uvw.toml"),
-            ],
-            Self::Rotary => [
-                "configs/machines/rotary.toml",
-                include_str!("../../../../configs/machines/rotary.toml"),
-                include_str!("../../../../configs/emulated/rotary.toml"),
-            ],
-            Self::Volumetric => [
-                "configs/machines/volumetric.toml",
-                include_str!("../../../../configs/machines/volumetric.toml"),
-                include_str!("../../../../configs/emulated/volumetric.toml"),
-            ],
-            Self::UvwCopley => [
-                "configs/machines/uvw-copley.toml",
-                include_str!("../../../../configs/machines/uvw-copley.toml"),
-                include_str!("../../../../configs/emulated/uvw-copley.toml"),
-            ],
-        }
-    }
+/// Who shows it.
+pub(crate) enum Show {
+    /// On a stand, behind terminals or in this process.
+    OnStand(fn(&mut Stand, &DemoArgs, Output) -> Result<Shown, Failure>),
+    /// From beginning to end in virtual time.
+    Alone(fn(&Demo, &DemoArgs, Output) -> Ended),
 }
+
+/// The files of the machine that ships as this name.
+macro_rules! shipped {
+    ($name:literal) => {
+        [
+            concat!("configs/machines/", $name, ".toml"),
+            include_str!(concat!("../../../../configs/machines/", $name, ".toml")),
+            include_str!(concat!("../../../../configs/emulated/", $name, ".toml")),
+        ]
+    };
+}
+pub(crate) use shipped;
 
 /// A machine to show, and its emulation.
 pub(crate) struct Stand {

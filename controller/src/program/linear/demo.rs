@@ -12,7 +12,9 @@ use crate::emulated::{DriftLimits, HallDrift};
 use crate::linear::ZeroEntry;
 use crate::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
 use crate::program::demo::emulation::Emulation;
-use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::demo::stand::{
+    Demo, DemoArgs, Show, Shown, Stand, power_cycle, shipped, took, write_page,
+};
 use crate::program::linear::report::{self, Page, Section};
 use crate::program::output::Output;
 use crate::program::page::facts_of;
@@ -47,7 +49,15 @@ struct Story {
     after: Verified,
 }
 
-pub(crate) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+/// What can be shown.
+pub(crate) const DEMOS: &[Demo] = &[Demo {
+    name: "linear",
+    help: "A linear-motor stage with Hall sensors and a laser interferometer",
+    files: shipped!("linear"),
+    show: Show::OnStand(show),
+}];
+
+fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
     let Stand {
         machine,
         store,

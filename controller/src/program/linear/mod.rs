@@ -5,6 +5,8 @@ mod moved;
 mod page;
 mod report;
 mod shown;
+#[cfg(test)]
+mod stored_tests;
 pub(crate) mod verbs;
 
 use machine::records::Log;
@@ -15,6 +17,8 @@ use crate::linear::{LinearContent, LinearLog};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
+    has_the_axes: |_| false,
+    demos: demo::DEMOS,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

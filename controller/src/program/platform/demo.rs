@@ -11,7 +11,9 @@ use crate::platform::Pose;
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::{Aligned, PlatformVerified};
 use crate::platform::zero::PlatformZeroed;
-use crate::program::demo::stand::{DemoArgs, Shown, Stand, power_cycle, took, write_page};
+use crate::program::demo::stand::{
+    Demo, DemoArgs, Show, Shown, Stand, power_cycle, shipped, took, write_page,
+};
 use crate::program::json as to_json;
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
@@ -32,7 +34,23 @@ struct Story {
     aligned: Aligned,
 }
 
-pub(crate) fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
+/// What can be shown.
+pub(crate) const DEMOS: &[Demo] = &[
+    Demo {
+        name: "uvw",
+        help: "An alignment platform on three screws, seen by an image controller",
+        files: shipped!("uvw"),
+        show: Show::OnStand(show),
+    },
+    Demo {
+        name: "uvw-copley",
+        help: "The same with amplifiers on a serial line in place of drives on CAN",
+        files: shipped!("uvw-copley"),
+        show: Show::OnStand(show),
+    },
+];
+
+fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Failure> {
     let story = tell(stand, args, output)?;
     let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();

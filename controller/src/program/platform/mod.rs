@@ -4,6 +4,8 @@ pub(crate) mod demo;
 pub(crate) mod fit;
 mod json;
 mod report;
+#[cfg(test)]
+mod stored_tests;
 pub(crate) mod verbs;
 
 use std::path::Path;
@@ -19,6 +21,8 @@ use crate::platform::{PlatformLog, ScrewContent};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
+    has_the_axes: |config| config.platform.is_some(),
+    demos: demo::DEMOS,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

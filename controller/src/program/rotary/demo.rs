@@ -9,7 +9,9 @@ use units::Radians;
 
 use crate::emulated::HallDrift;
 use crate::program::demo::emulation::Emulation;
-use crate::program::demo::stand::{Shown, Stand, power_cycle, took, write_page};
+use crate::program::demo::stand::{
+    Demo, DemoArgs, Show, Shown, Stand, power_cycle, shipped, took, write_page,
+};
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
 use crate::program::rotary::report as page;
@@ -56,7 +58,15 @@ impl Operator for Hand<'_> {
     }
 }
 
-pub(crate) fn show(stand: &mut Stand, output: Output) -> Result<Shown, Failure> {
+/// What can be shown.
+pub(crate) const DEMOS: &[Demo] = &[Demo {
+    name: "rotary",
+    help: "A rotary table and a plate of lines, turned from placement to placement",
+    files: shipped!("rotary"),
+    show: Show::OnStand(show),
+}];
+
+fn show(stand: &mut Stand, _: &DemoArgs, output: Output) -> Result<Shown, Failure> {
     let story = tell(stand, output)?;
     let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();

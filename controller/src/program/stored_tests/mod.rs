@@ -19,10 +19,11 @@ use serde_json::Value;
 
 use crate::program::output::Output;
 use crate::program::{cal, report};
-use crate::{Failure, Store};
+use crate::store::golden::Golden;
+use crate::{Failure, Store, platform, rotary};
 
 /// So many of each kind in every run.
-const QUICK: usize = 400;
+pub(super) const QUICK: usize = 400;
 /// A case may take so many times the processor time of the file as it was written, on the same
 /// computer; several files become several times as long by being edited.
 const WORK_MAX: u32 = 200;
@@ -30,54 +31,6 @@ const WORK_MAX: u32 = 200;
 const WORK_LEAST: Duration = Duration::from_millis(20);
 /// A page or text is no longer than so many times that of the file as it was written.
 const LENGTH_MAX: usize = 60;
-
-/// The files of one kind of machine: calibrations and journals by name; the first journal is the one
-/// that the calibrations were made from.
-struct Machine {
-    calibrations: &'static [&'static str],
-    journals: &'static [(&'static str, &'static str)],
-}
-
-macro_rules! file {
-    ($name:literal) => {
-        include_str!(concat!("../../../golden/", $name))
-    };
-}
-
-const LINEAR: Machine = Machine {
-    calibrations: &[file!("linear.json")],
-    journals: &[
-        ("linear_calibrate.jsonl", file!("linear_calibrate.jsonl")),
-        ("linear_zero.jsonl", file!("linear_zero.jsonl")),
-    ],
-};
-const PLATFORM: Machine = Machine {
-    calibrations: &[file!("platform.json")],
-    journals: &[
-        (
-            "platform_calibrate.jsonl",
-            file!("platform_calibrate.jsonl"),
-        ),
-        ("platform_verify.jsonl", file!("platform_verify.jsonl")),
-    ],
-};
-const ROTARY: Machine = Machine {
-    calibrations: &[file!("rotary.json")],
-    journals: &[
-        ("rotary_calibrate.jsonl", file!("rotary_calibrate.jsonl")),
-        ("rotary_verify.jsonl", file!("rotary_verify.jsonl")),
-    ],
-};
-const VOLUMETRIC: Machine = Machine {
-    calibrations: &[file!("volumetric.json"), file!("references.json")],
-    journals: &[
-        (
-            "volumetric_calibrate.jsonl",
-            file!("volumetric_calibrate.jsonl"),
-        ),
-        ("volumetric_verify.jsonl", file!("volumetric_verify.jsonl")),
-    ],
-};
 
 /// A store on disk with the files of a machine.
 struct Desk {
@@ -236,17 +189,17 @@ fn show_calibration(desk: &Desk, base: &str, id: &str, run: &Path) -> Result<Str
     Ok([list, text, diff, report::html(run)?].concat())
 }
 
-fn edit_calibrations(machine: &Machine, count: usize) -> Tally {
+fn edit_calibrations(golden: &Golden, count: usize) -> Tally {
     let mut tally = Tally::default();
     let desk = Desk::new();
-    let (name, journal) = machine.journals[0];
+    let (name, journal) = golden.journals[0];
     let run = desk.put_journal(name, &thinned(lines_of(journal)));
-    for text in machine.calibrations {
+    for (text, _) in golden.calibrations {
         let base = desk.put_calibration(text);
         let whole = look(|| show_calibration(&desk, &base, &base, &run));
         assert_eq!(whole.fate, Fate::Shown, "as it was written");
         let value: Value = serde_json::from_str(text).expect("it is JSON");
-        for seed in 0..(count / machine.calibrations.len()) as u64 {
+        for seed in 0..(count / golden.calibrations.len()) as u64 {
             let mut chance = Chance(seed);
             let mut edited = value.clone();
             (0..=chance.below(3)).for_each(|_| edit(&mut edited, &mut chance));
@@ -260,13 +213,13 @@ fn edit_calibrations(machine: &Machine, count: usize) -> Tally {
     tally
 }
 
-fn edit_journals(machine: &Machine, count: usize) -> Tally {
+fn edit_journals(golden: &Golden, count: usize) -> Tally {
     let mut tally = Tally::default();
     let desk = Desk::new();
-    for text in machine.calibrations {
+    for (text, _) in golden.calibrations {
         desk.put_calibration(text);
     }
-    for (at, (name, text)) in machine.journals.iter().enumerate() {
+    for (at, (name, text)) in golden.journals.iter().enumerate() {
         let lines = thinned(lines_of(text));
         let run = desk.put_journal(name, &lines);
         let whole = look(|| report::html(&run));
@@ -286,9 +239,9 @@ fn edit_journals(machine: &Machine, count: usize) -> Tally {
     tally
 }
 
-fn check(machine: &Machine, count: usize) {
-    let calibrations = edit_calibrations(machine, count);
-    let journals = edit_journals(machine, count);
+pub(super) fn check(golden: &Golden, count: usize) {
+    let calibrations = edit_calibrations(golden, count);
+    let journals = edit_journals(golden, count);
     // What is never shown was never tried.
     assert!(calibrations.counts.contains_key(&Fate::Shown));
     assert!(journals.counts.contains_key(&Fate::Shown));
@@ -296,60 +249,17 @@ fn check(machine: &Machine, count: usize) {
     journals.assert_good("journals");
 }
 
-fn wanted() -> usize {
+pub(super) fn wanted() -> usize {
     let given = std::env::var("MUTATIONS").ok();
     given.and_then(|it| it.parse().ok()).unwrap_or(20_000)
-}
-
-#[test]
-fn mutated_files_of_a_linear_axis_are_shown_or_refused() {
-    check(&LINEAR, QUICK);
-}
-
-#[test]
-fn mutated_files_of_a_platform_are_shown_or_refused() {
-    check(&PLATFORM, QUICK);
-}
-
-#[test]
-fn mutated_files_of_a_rotary_table_are_shown_or_refused() {
-    check(&ROTARY, QUICK);
-}
-
-#[test]
-fn mutated_files_of_three_axes_are_shown_or_refused() {
-    check(&VOLUMETRIC, QUICK);
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn many_mutated_files_of_a_linear_axis() {
-    check(&LINEAR, wanted());
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn many_mutated_files_of_a_platform() {
-    check(&PLATFORM, wanted());
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn many_mutated_files_of_a_rotary_table() {
-    check(&ROTARY, wanted());
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn many_mutated_files_of_three_axes() {
-    check(&VOLUMETRIC, wanted());
 }
 
 /// What was found by hand first.
 #[test]
 fn what_is_refused_is_named_with_file_place_expectation_and_what_stands_there() {
     let desk = Desk::new();
-    let mut screw: Value = serde_json::from_str(PLATFORM.calibrations[0]).expect("JSON");
+    let mut screw: Value =
+        serde_json::from_str(platform::KIND.golden.calibrations[0].0).expect("JSON");
     let covariance = screw["covariance_si"].as_array_mut().expect("a list");
     let before = covariance.len();
     covariance.pop();
@@ -364,7 +274,7 @@ fn what_is_refused_is_named_with_file_place_expectation_and_what_stands_there() 
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    let (name, journal) = ROTARY.journals[0];
+    let (name, journal) = rotary::KIND.golden.journals[0];
     let mut lines = lines_of(journal);
     lines[1]["lines"] = 4_000_000.into();
     let refused = report::html(&desk.put_journal(name, &lines)).expect_err("no such plate");

@@ -11,7 +11,7 @@ use units::{Metres, Time};
 
 use crate::edit::with_rare_heartbeats;
 use crate::emulated::Emulated;
-use crate::program::demo::stand::{DemoArgs, write_page};
+use crate::program::demo::stand::{Demo, DemoArgs, Show, shipped, write_page};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::report::{HourOfDay, render_day};
 use crate::program::volumetric::verbs::{calibrated_text, calibrated_value};
@@ -34,9 +34,17 @@ struct Hour {
     journals: [PathBuf; 3],
 }
 
-pub(crate) fn run(args: &DemoArgs, output: Output) -> Ended {
+/// What can be shown.
+pub(crate) const DEMOS: &[Demo] = &[Demo {
+    name: "volumetric",
+    help: "Three axes corrected throughout their volume, for eight hours in virtual time",
+    files: shipped!("volumetric"),
+    show: Show::Alone(run),
+}];
+
+fn run(demo: &Demo, args: &DemoArgs, output: Output) -> Ended {
     let started = Instant::now();
-    let [path, text, description] = args.machine.files();
+    let [path, text, description] = demo.files;
     let mut loaded = config::parse(&with_rare_heartbeats(text), path)?;
     if let Some(folder) = &args.data_dir {
         loaded.config.machine.data_dir.clone_from(folder);

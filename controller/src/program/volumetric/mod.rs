@@ -5,6 +5,8 @@ pub(crate) mod fit;
 pub(crate) mod part;
 mod report;
 pub(crate) mod shown;
+#[cfg(test)]
+mod stored_tests;
 pub(crate) mod verbs;
 
 use std::path::Path;
@@ -20,6 +22,8 @@ use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryConte
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
+    has_the_axes: |config| config.volumetric.is_some(),
+    demos: demo::DEMOS,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

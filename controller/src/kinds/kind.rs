@@ -1,0 +1,19 @@
+//! What is asked of each kind of machine.
+
+use machine::records::ContentKind;
+
+use crate::config::MachineConfig;
+use crate::config::judge::Finding;
+#[cfg(test)]
+use crate::store::golden::Golden;
+
+/// A kind of machine.
+pub(crate) struct Kind {
+    /// Which values of its part of a configuration are impossible.
+    pub(crate) check: fn(&MachineConfig, &mut Vec<Finding>),
+    /// What its calibrations say.
+    pub(crate) contents: &'static [ContentKind],
+    /// What its machines have written.
+    #[cfg(test)]
+    pub(crate) golden: Golden,
+}

@@ -1,0 +1,16 @@
+//! What the list of kinds says of linear axes.
+
+use machine::records::ContentKind;
+
+use crate::kinds::kind::Kind;
+use crate::linear::check::check;
+#[cfg(test)]
+use crate::linear::golden::GOLDEN;
+use crate::linear::record::LinearContent;
+
+pub(crate) const KIND: Kind = Kind {
+    check,
+    contents: &[ContentKind::of::<LinearContent>()],
+    #[cfg(test)]
+    golden: GOLDEN,
+};

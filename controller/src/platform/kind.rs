@@ -1,0 +1,16 @@
+//! What the list of kinds says of alignment platforms.
+
+use machine::records::ContentKind;
+
+use crate::kinds::kind::Kind;
+use crate::platform::check::check;
+#[cfg(test)]
+use crate::platform::golden::GOLDEN;
+use crate::platform::record::ScrewContent;
+
+pub(crate) const KIND: Kind = Kind {
+    check,
+    contents: &[ContentKind::of::<ScrewContent>()],
+    #[cfg(test)]
+    golden: GOLDEN,
+};

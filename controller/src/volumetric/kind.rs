@@ -1,0 +1,20 @@
+//! What the list of kinds says of three axes.
+
+use machine::records::ContentKind;
+
+use crate::kinds::kind::Kind;
+use crate::volumetric::check::check;
+#[cfg(test)]
+use crate::volumetric::golden::GOLDEN;
+use crate::volumetric::record::{BeamReferencesContent, GeometryContent, StateMemoryContent};
+
+pub(crate) const KIND: Kind = Kind {
+    check,
+    contents: &[
+        ContentKind::of::<GeometryContent>(),
+        ContentKind::of::<BeamReferencesContent>(),
+        ContentKind::of::<StateMemoryContent>(),
+    ],
+    #[cfg(test)]
+    golden: GOLDEN,
+};
