@@ -5,6 +5,7 @@ mod exit_code;
 
 use std::path::PathBuf;
 
+use compensator::budget::BudgetError;
 use compensator::data::DataError;
 use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
@@ -208,6 +209,14 @@ pub enum Failure {
         axis: String,
         /// Why.
         source: FitError,
+    },
+    /// How uncertain the error table is cannot be said.
+    #[error("axis {axis}: {source}")]
+    Budget {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: BudgetError,
     },
     /// The error table cannot be applied.
     #[error("axis {axis}: {source}{}", advice::of_limit(axis, source))]

@@ -53,6 +53,7 @@ impl Failure {
             | Self::Refine { .. }
             | Self::Closure { .. }
             | Self::Fit { .. }
+            | Self::Budget { .. }
             | Self::MadeWorse { .. }
             | Self::OutOfTolerance { .. } => 5,
         }

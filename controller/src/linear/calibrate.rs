@@ -3,7 +3,8 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use compensator::error_table::{self, Compensation, FitOptions, Fitted};
+use compensator::budget::AxisBudget;
+use compensator::error_table::{self, Compensation, FitOptions, Fitted, uncertainty};
 use units::Metres;
 
 use crate::config::ConfigHash;
@@ -30,12 +31,14 @@ pub struct Calibrated {
     pub journal: PathBuf,
     /// What it says.
     pub record: CalibrationRecord<LinearContent>,
-    /// How the fit went.
+    /// How the fit went; the uncertainties of its table are those of the budget.
     pub fitted: Fitted,
     /// What was measured.
     pub measured: Measured,
     /// The smallest error of one position that would have been noticed by its neighbours.
     pub noticed: Option<Metres>,
+    /// What makes the table uncertain.
+    pub budget: AxisBudget,
 }
 
 impl LinearStage<'_> {
@@ -73,14 +76,16 @@ impl LinearStage<'_> {
         };
         let measured = self.measure_runs(&plan, measuring, &mut journal, earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let fitted = self.fit_table(&plan, &measured)?;
+        let mut fitted = self.fit_table(&plan, &measured)?;
+        let budget = self.budget_of(&plan, &measured, &fitted)?;
+        let record = self.calibration_record(&plan, &journal, &measured, &fitted, &budget);
+        fitted.table = uncertainty::stated(&fitted.table, &budget);
         let compensation = self.prepare(fitted.table.clone())?;
         let harmless = settings::harmless(self.core.config, self.axis);
         let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
-        let record = self.calibration_record(&plan, &journal, &measured, &fitted);
         let id = store.save(&record)?;
         store.activate(self.axis, &id)?;
-        self.set_compensation(Some(compensation));
+        self.use_calibration(compensation, Some(budget.clone()));
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -89,6 +94,7 @@ impl LinearStage<'_> {
             fitted,
             measured,
             noticed,
+            budget,
         })
     }
 
@@ -108,7 +114,7 @@ impl LinearStage<'_> {
             self.core.config_hash,
         )?;
         let compensation = self.prepare(record.content.table(&id)?)?;
-        self.set_compensation(Some(compensation));
+        self.use_calibration(compensation, record.content.axis_budget(&id)?);
         Ok(Some(id))
     }
 
@@ -135,6 +141,7 @@ impl LinearStage<'_> {
         journal: &Journal<LinearLog>,
         measured: &Measured,
         fitted: &Fitted,
+        budget: &AxisBudget,
     ) -> CalibrationRecord<LinearContent> {
         let head = RecordHead {
             created: utc_now(),
@@ -148,7 +155,8 @@ impl LinearStage<'_> {
             environment: measured.environment,
             ..self.core.this_machine(self.axis)
         };
-        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure));
+        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure))
+            .with_budget(budget);
         CalibrationRecord { head, content }
     }
 

@@ -95,6 +95,11 @@ pub struct CalibrateConfig {
     /// How far instrument and encoder may differ over a run; in `verify` too.
     #[schemars(range(min = 1.0, max = 100000.0))]
     pub scale_limit_ppm: f64,
+    /// Standard uncertainty of errors that repeat within less than `step_mm`, so that no position shows them,
+    /// such as the interpolation of a scale's signal: its maker's limit divided by √2. By default 0: none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000000.0))]
+    pub short_period_standard_uncertainty_nm: f64,
 }
 
 /// The verification run of an axis (ISO 230-2).

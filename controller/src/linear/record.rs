@@ -1,10 +1,16 @@
 //! The deviations of a linear axis (`linear_error_table`).
 
+mod budget;
+
+use compensator::budget::AxisBudget;
 use compensator::error_table::{ErrorTable, Node};
 use serde::{Deserialize, Serialize};
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::store::StoreError;
+pub(crate) use budget::{
+    BudgetRecord, CombinedRecord, ContributionRecord, CorrelationRecord, PlaceRecord,
+};
 
 /// An error table as it is stored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -20,6 +26,10 @@ pub struct LinearContent {
     pub lost_motion_u_m: Option<f64>,
     /// Deviation (actual − target) at each calibrated position.
     pub nodes: Vec<NodeRecord>,
+    /// What makes these uncertain; without it the nodes' uncertainties are those of their scatter and
+    /// of the instrument alone, as programs stated them before there was a budget.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<BudgetRecord>,
 }
 
 /// One calibrated position, metres.
@@ -54,7 +64,49 @@ impl LinearContent {
             lost_motion_m: lost_motion.map(|it| it.mean.value()),
             lost_motion_u_m: metres(lost_motion.and_then(|it| it.standard_uncertainty)),
             nodes: nodes.collect(),
+            budget: None,
         }
+    }
+
+    /// The same with `budget`, whose combined uncertainties become those of the nodes.
+    #[must_use]
+    pub fn with_budget(mut self, budget: &AxisBudget) -> Self {
+        let combined = |node: &NodeRecord, approach, value: Option<f64>| {
+            let at = budget.at(Metres(node.position_m), approach);
+            at.filter(|_| value.is_some())
+                .map(|it| it.standard_uncertainty.value())
+        };
+        for node in &mut self.nodes {
+            node.forward_u_m = combined(node, Approach::Forward, node.forward_m);
+            node.reverse_u_m = combined(node, Approach::Reverse, node.reverse_m);
+        }
+        self.budget = Some(BudgetRecord::new(budget, &self.approaches()));
+        self
+    }
+
+    /// From which sides it was measured.
+    pub fn approaches(&self) -> Vec<Approach> {
+        let has = |of: fn(&NodeRecord) -> Option<f64>| self.nodes.iter().any(|it| of(it).is_some());
+        let sides = [
+            (Approach::Forward, has(|it| it.forward_m)),
+            (Approach::Reverse, has(|it| it.reverse_m)),
+        ];
+        sides
+            .into_iter()
+            .filter_map(|(approach, is_known)| is_known.then_some(approach))
+            .collect()
+    }
+
+    /// The uncertainty budget of calibration `id`, where it has one.
+    ///
+    /// # Errors
+    /// When its numbers can be no uncertainties.
+    pub fn axis_budget(&self, id: &str) -> Result<Option<AxisBudget>, StoreError> {
+        let positions = self.nodes.iter().map(|it| Metres(it.position_m)).collect();
+        let budget = self.budget.as_ref().map(|it| it.budget(positions));
+        budget
+            .transpose()
+            .map_err(|source| StoreError::model(id, source))
     }
 
     /// The error table that calibration `id` holds.
@@ -76,3 +128,6 @@ impl LinearContent {
         ErrorTable::new(nodes).map_err(|source| StoreError::model(id, source))
     }
 }
+
+#[cfg(test)]
+mod tests;

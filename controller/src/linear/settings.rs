@@ -3,7 +3,7 @@
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits};
 use units::{Metres, MetresPerSecond};
 
-use crate::config::MachineConfig;
+use crate::config::{AxisConfig, MachineConfig};
 use crate::failure::Failure;
 use crate::hardware::CHECKED;
 use crate::hardware::instrument::umd2::half_wavelength;
@@ -54,6 +54,12 @@ pub fn compensation(
     };
     Compensation::new(table, interpolation(own), limits, ends(own))
         .map_err(|source| Failure::Compensation { axis, source })
+}
+
+/// The curve that is drawn between the positions of an axis.
+pub(crate) fn interpolation_of(axis: &AxisConfig) -> Interpolation {
+    let own = axis.compensation.as_ref();
+    own.map_or(Interpolation::Linear, interpolation)
 }
 
 fn interpolation(config: &CompensationConfig) -> Interpolation {

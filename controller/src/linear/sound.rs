@@ -1,12 +1,19 @@
 //! Whether a calibration of a linear axis can be so.
 
+use compensator::budget::COVERAGE_FACTOR;
 use machine::records::Content;
 use machine::records::sound::{
-    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PLACE_M, counted, increasing, is, model, number,
-    optional,
+    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, Limits, PLACE_M, RATIO, approach, as_many, counted,
+    increasing, is, letter, limits, model, number, optional,
 };
 
 use crate::linear::LinearContent;
+use crate::linear::record::{BudgetRecord, CombinedRecord};
+
+/// What one unit of an input does.
+const SENSITIVITY: Limits = limits(-1e12, 1e12, "m or m/m per unit");
+/// How well an uncertainty is known.
+const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
 
 /// A figure that follows from others may differ by rounding.
 const ROUNDING: f64 = 1e-9;
@@ -41,6 +48,9 @@ fn linear(it: &LinearContent) -> Judged {
     let table = it.table("");
     let follows = table.as_ref().ok().and_then(|it| it.lost_motion());
     model("nodes", table)?;
+    if let Some(budget) = &it.budget {
+        judge_budget(it, budget)?;
+    }
     let Some(stated) = it.lost_motion_m else {
         return Ok(());
     };
@@ -53,4 +63,111 @@ fn linear(it: &LinearContent) -> Judged {
     is("lost_motion_m", agrees, expected, || {
         format!("{stated:e} m")
     })
+}
+
+/// Contributions of a budget at most.
+const CONTRIBUTIONS_MAX: usize = 1000;
+/// Letters of a name at most.
+const NAME_MAX: usize = 200;
+
+/// A budget whose sums are not those of its lines says nothing.
+fn judge_budget(it: &LinearContent, stated: &BudgetRecord) -> Judged {
+    let lines = &stated.contributions;
+    counted("budget.contributions", lines.len(), 1..=CONTRIBUTIONS_MAX)?;
+    for (at, line) in lines.iter().enumerate() {
+        let place = |key: &str| format!("budget.contributions[{at}].{key}");
+        counted(&place("name"), line.name.len(), 1..=NAME_MAX)?;
+        counted(&place("unit"), line.unit.len(), 1..=NAME_MAX)?;
+        letter(&place("evaluation"), line.evaluation, &['A', 'B'])?;
+        line.approach
+            .map_or(Ok(()), |it| approach(&place("approach"), it))?;
+        number(place("value"), line.value, &RATIO)?;
+        number(place("sensitivity"), line.sensitivity, &SENSITIVITY)?;
+        optional(
+            &place("degrees_of_freedom"),
+            line.degrees_of_freedom,
+            &FREEDOM,
+        )?;
+    }
+    let factor = stated.coverage_factor;
+    let is_two = factor == COVERAGE_FACTOR;
+    is(
+        "budget.coverage_factor",
+        is_two,
+        || COVERAGE_FACTOR.to_string(),
+        || factor.to_string(),
+    )?;
+    let budget = it.axis_budget("");
+    let follows = budget.as_ref().ok().and_then(Option::as_ref);
+    let follows = follows.map(|budget| BudgetRecord::new(budget, &it.approaches()));
+    model("budget", budget)?;
+    let Some(follows) = follows else {
+        return Ok(());
+    };
+    judge_places(it, stated, &follows)
+}
+
+fn judge_places(it: &LinearContent, stated: &BudgetRecord, follows: &BudgetRecord) -> Judged {
+    as_many(
+        "budget.places",
+        stated.places.len(),
+        follows.places.len(),
+        "the positions and the places between them",
+    )?;
+    for (at, (seen, expected)) in stated.places.iter().zip(&follows.places).enumerate() {
+        let place = |key: &str| format!("budget.places[{at}].{key}");
+        same(&place("position_m"), seen.position_m, expected.position_m)?;
+        same_combined(&place("forward"), seen.forward, expected.forward)?;
+        same_combined(&place("reverse"), seen.reverse, expected.reverse)?;
+    }
+    for (at, node) in it.nodes.iter().enumerate() {
+        let [forward, reverse] = [
+            follows.places[2 * at].forward,
+            follows.places[2 * at].reverse,
+        ];
+        let u = |it: Option<CombinedRecord>| it.map_or(0.0, |it| it.u_m);
+        let stated = |it: Option<f64>| it.unwrap_or(0.0);
+        let place = |key: &str| format!("nodes[{at}].{key}");
+        same(&place("forward_u_m"), stated(node.forward_u_m), u(forward))?;
+        same(&place("reverse_u_m"), stated(node.reverse_u_m), u(reverse))?;
+    }
+    Ok(())
+}
+
+fn same_combined(
+    place: &str,
+    seen: Option<CombinedRecord>,
+    expected: Option<CombinedRecord>,
+) -> Judged {
+    let (Some(seen), Some(expected)) = (seen, expected) else {
+        let said = |it: bool| if it { "a value" } else { "null" }.to_owned();
+        let (is_there, is_known) = (seen.is_some(), expected.is_some());
+        return is(
+            place,
+            is_there == is_known,
+            || said(is_known),
+            || said(is_there),
+        );
+    };
+    let at = |key: &str| format!("{place}.{key}");
+    same(&at("u_m"), seen.u_m, expected.u_m)?;
+    same(
+        &at("expanded_u_m"),
+        seen.expanded_u_m,
+        expected.expanded_u_m,
+    )?;
+    let infinite = |it: Option<f64>| it.unwrap_or(f64::MAX);
+    same(
+        &at("degrees_of_freedom"),
+        infinite(seen.degrees_of_freedom),
+        infinite(expected.degrees_of_freedom),
+    )
+}
+
+/// What follows from the contributions, but for rounding.
+fn same(place: &str, seen: f64, expected: f64) -> Judged {
+    // A comparison with NaN is false.
+    let agrees = (seen - expected).abs() <= ROUNDING * expected.abs();
+    let follows = || format!("{expected:e}, which follows from the budget's contributions");
+    is(place, agrees, follows, || format!("{seen:e}"))
 }

@@ -1,6 +1,8 @@
 //! The handle of one linear axis.
 
+use compensator::budget::AxisBudget;
 use compensator::error_table::Compensation;
+use units::Metres;
 
 use crate::config::AxisConfig;
 use crate::handle::Core;
@@ -13,6 +15,10 @@ pub(crate) struct AxisMemory {
     pub(crate) compensation: Option<Compensation>,
     /// What was measured last, and how lengths were corrected since its datum.
     pub(crate) datum: Option<(RunPlan, Datum)>,
+    /// How uncertain the calibration in use is, where it says so.
+    pub(crate) budget: Option<AxisBudget>,
+    /// Standard uncertainty of the zero that was found last.
+    pub(crate) zero: Option<Metres>,
 }
 
 /// One linear axis of a machine: its zero, its moves, its calibration and what they need to
@@ -37,8 +43,19 @@ impl LinearStage<'_> {
         self.memory.compensation.as_ref()
     }
 
-    /// Uses `compensation` (or none) for every move from now on.
+    /// Uses `compensation` (or none) for every move from now on; how uncertain it is, is then not known.
     pub fn set_compensation(&mut self, compensation: Option<Compensation>) {
         self.memory.compensation = compensation;
+        self.memory.budget = None;
+    }
+
+    /// Uses a calibration for every move from now on.
+    pub(crate) fn use_calibration(
+        &mut self,
+        compensation: Compensation,
+        budget: Option<AxisBudget>,
+    ) {
+        self.memory.compensation = Some(compensation);
+        self.memory.budget = budget;
     }
 }

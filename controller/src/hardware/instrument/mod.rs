@@ -18,7 +18,9 @@ pub(crate) use nd287::Nd287Config;
 pub(crate) use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
-const ANGLE_U: Radians = Radians(0.2e-3);
+const fn by_card() -> f64 {
+    0.2
+}
 
 /// A displacement instrument, by what `device` calls it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -54,6 +56,11 @@ pub(crate) trait Family {
 
     /// Which corrections its readings get, but for the angle of the line that it measures along.
     fn corrections(&self) -> length_correction::Settings;
+
+    /// Which corrections they would get if none was switched off.
+    fn every_correction(&self) -> length_correction::Settings {
+        self.corrections()
+    }
 
     /// A sensor of its surroundings that shows the very same digits for longer is broken; `None` for an
     /// instrument without such sensors.
@@ -108,7 +115,13 @@ pub struct InstrumentConfig {
     /// Angle between measuring line (a beam, a scale) and travel.
     #[schemars(extend("x-magnitude" = [0.0, 100]))]
     pub misalignment_mrad: f64,
-    /// Of one reading; enters the uncertainty of the table.
+    /// Standard uncertainty of `misalignment_mrad`, known or not; by default what a beam finder and a card
+    /// leave.
+    #[serde(default = "by_card")]
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub misalignment_standard_uncertainty_mrad: f64,
+    /// Of one reading, as far as averaging does not take it away (polarisation mixing, electronics); enters
+    /// the uncertainty of the table.
     #[schemars(range(min = 0.0, max = 1000000.0))]
     pub instrument_standard_uncertainty_nm: f64,
 }
@@ -150,13 +163,24 @@ impl InstrumentConfig {
 
     /// Which corrections its readings get.
     pub(crate) fn corrections(&self) -> length_correction::Settings {
-        let cosine = Cosine {
-            angle: Radians(self.misalignment_mrad * 1e-3),
-            u_angle: ANGLE_U,
-        };
         length_correction::Settings {
-            cosine: self.correct_cosine.then_some(cosine),
+            cosine: self.correct_cosine.then(|| self.cosine()),
             ..self.device.family().corrections()
+        }
+    }
+
+    /// Which corrections they would get if none was switched off.
+    pub(crate) fn every_correction(&self) -> length_correction::Settings {
+        length_correction::Settings {
+            cosine: Some(self.cosine()),
+            ..self.device.family().every_correction()
+        }
+    }
+
+    fn cosine(&self) -> Cosine {
+        Cosine {
+            angle: Radians(self.misalignment_mrad * 1e-3),
+            u_angle: Radians(self.misalignment_standard_uncertainty_mrad * 1e-3),
         }
     }
 }

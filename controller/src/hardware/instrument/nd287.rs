@@ -31,8 +31,7 @@ pub struct Nd287Config {
     /// The fastest that the stage moves under the encoder: a value farther away is not believed.
     #[schemars(range(min = 0.01, max = 100000.0))]
     pub speed_max_mm_per_s: f64,
-    /// Standard uncertainty of the scale's length, relative to it. It enters the lines of three axes; the
-    /// table of one axis knows `instrument_standard_uncertainty_nm` alone.
+    /// Standard uncertainty of the scale's length, relative to it.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub scale_standard_uncertainty_ppm: f64,
 }

@@ -14,11 +14,6 @@ use super::{Count, Family, InstrumentConfig, OpticsConfig};
 
 /// Carbon dioxide in the air of a hall; its share in the index of air is below 1e-8.
 const CO2_UMOL_PER_MOL: f64 = 450.0;
-/// Relative standard uncertainty of a stabilised HeNe laser's wavelength.
-const WAVELENGTH_U: f64 = 2e-8;
-/// Standard uncertainty of a dead path that was measured with a rule.
-const DEAD_PATH_U: Metres = Metres(1e-3);
-
 /// What only an interferometer has.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 pub struct Umd2Config {
@@ -34,7 +29,7 @@ pub struct Umd2Config {
     pub correct_air: bool,
     /// Whether for the expansion to 20 °C.
     pub correct_material: bool,
-    /// Of the machine's material; its standard uncertainty is taken as 10 %.
+    /// Of the machine's material.
     #[schemars(range(min = -0.0001, max = 0.0001))]
     pub expansion_per_kelvin: f64,
     /// Whether for the dead path; needs `correct_air`.
@@ -50,6 +45,76 @@ pub struct Umd2Config {
     /// What else it can be set up with.
     #[serde(default)]
     pub optics: OpticsConfig,
+    /// How uncertain that is which its readings are corrected with.
+    #[serde(default)]
+    pub uncertainty: UncertaintyConfig,
+}
+
+/// Standard uncertainties (k = 1) of what an interferometer's readings are corrected with; they enter the
+/// budget of each calibration.
+///
+/// The defaults are those of good sensors beside the beam and on the machine, without certificates:
+/// where a certificate states U with k = 2, write half of it, and add in squares what the place of the
+/// sensor makes uncertain (a gradient of 0.2 K across the stage is more than its thermometer's own).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct UncertaintyConfig {
+    /// Of the air temperature along the beam; by default that of a class A thermometer (IEC 60751: within
+    /// 0.15 K + 0.2 %, a rectangle) beside it.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub air_temperature_k: f64,
+    /// Of the air pressure; by default that of a silicon barometer a year after its adjustment.
+    #[schemars(range(min = 0.0, max = 100000.0))]
+    pub pressure_pa: f64,
+    /// Of the relative humidity; by default that of a capacitive sensor.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub humidity_percent: f64,
+    /// Of the carbon dioxide in the air, taken as 450 µmol/mol; by default what people in a room change.
+    #[schemars(range(min = 0.0, max = 10000.0))]
+    pub co2_umol_per_mol: f64,
+    /// Of the mean temperature of what expands: its sensor, and where that sits; by default as for air.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub material_temperature_k: f64,
+    /// Of `expansion_per_kelvin`; where it is missing a tenth of that, which is what handbooks differ by for
+    /// one kind of steel, glass or granite.
+    #[schemars(range(min = 0.0, max = 0.0001))]
+    pub expansion_per_kelvin: Option<f64>,
+    /// Of the wavelength in vacuum, relative to it; by default that of a stabilised helium-neon laser.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub wavelength_ppm: f64,
+    /// Of `dead_path_mm`; by default that of a rule.
+    #[schemars(range(min = 0.0, max = 100000.0))]
+    pub dead_path_mm: f64,
+}
+
+impl Default for UncertaintyConfig {
+    fn default() -> Self {
+        Self {
+            air_temperature_k: 0.1,
+            pressure_pa: 20.0,
+            humidity_percent: 3.0,
+            co2_umol_per_mol: 100.0,
+            material_temperature_k: 0.1,
+            expansion_per_kelvin: None,
+            wavelength_ppm: 0.02,
+            dead_path_mm: 1.0,
+        }
+    }
+}
+
+/// What handbooks differ by for one kind of material.
+const EXPANSION_U: f64 = 0.1;
+
+impl UncertaintyConfig {
+    fn environment(&self) -> EnvironmentUncertainty {
+        EnvironmentUncertainty {
+            air_temperature: Celsius(self.air_temperature_k),
+            pressure: Pascals(self.pressure_pa),
+            humidity: RelativeHumidity(self.humidity_percent * 1e-2),
+            material_temperature: Celsius(self.material_temperature_k),
+            co2_umol_per_mol: self.co2_umol_per_mol,
+        }
+    }
 }
 
 /// The last digit of a good sensor moves with the air of a good hall.
@@ -104,30 +169,34 @@ impl Family for Umd2Config {
     }
 
     fn corrections(&self) -> length_correction::Settings {
-        let material = MaterialExpansion {
-            per_kelvin: self.expansion_per_kelvin,
-            u_per_kelvin: self.expansion_per_kelvin.abs() * 0.1,
-        };
-        let dead_path = DeadPath {
-            length: Metres::from_mm(self.dead_path_mm),
-            u_length: DEAD_PATH_U,
-        };
+        let every = self.every_correction();
         let has_dead_path = self.correct_dead_path && self.correct_air;
         length_correction::Settings {
             air: self.correct_air,
+            material_expansion: every.material_expansion.filter(|_| self.correct_material),
+            dead_path: every.dead_path.filter(|_| has_dead_path),
+            ..every
+        }
+    }
+
+    fn every_correction(&self) -> length_correction::Settings {
+        let u = &self.uncertainty;
+        let of_coefficient = self.expansion_per_kelvin.abs() * EXPANSION_U;
+        length_correction::Settings {
+            air: true,
             vacuum_wavelength: Umd2Settings::default().vacuum_wavelength,
-            u_relative_wavelength: WAVELENGTH_U,
+            u_relative_wavelength: u.wavelength_ppm * 1e-6,
             co2_umol_per_mol: CO2_UMOL_PER_MOL,
-            material_expansion: self.correct_material.then_some(material),
-            dead_path: has_dead_path.then_some(dead_path),
+            material_expansion: Some(MaterialExpansion {
+                per_kelvin: self.expansion_per_kelvin,
+                u_per_kelvin: u.expansion_per_kelvin.unwrap_or(of_coefficient),
+            }),
+            dead_path: Some(DeadPath {
+                length: Metres::from_mm(self.dead_path_mm),
+                u_length: Metres::from_mm(u.dead_path_mm),
+            }),
             cosine: None,
-            u_environment: EnvironmentUncertainty {
-                air_temperature: Celsius(0.1),
-                pressure: Pascals(20.0),
-                humidity: RelativeHumidity(0.03),
-                material_temperature: Celsius(0.1),
-                co2_umol_per_mol: 100.0,
-            },
+            u_environment: u.environment(),
         }
     }
 

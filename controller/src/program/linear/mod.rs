@@ -7,6 +7,7 @@ mod report;
 mod shown;
 #[cfg(test)]
 mod stored_tests;
+mod uncertainty;
 pub(crate) mod verbs;
 
 use machine::records::Log;

@@ -14,9 +14,14 @@ impl Show for LinearContent {
             self.runs,
             micrometres(self.closure_m),
         );
-        self.nodes
+        let table = self
+            .nodes
             .iter()
-            .fold(head, |text, node| text + &node_line(node))
+            .fold(head, |text, node| text + &node_line(node));
+        match &self.budget {
+            Some(budget) => table + &super::uncertainty::lines(self, budget),
+            None => table + "\n" + super::uncertainty::NOT_STATED,
+        }
     }
 
     fn changes(&self, after: &Self) -> Option<Changes> {

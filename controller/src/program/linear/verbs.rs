@@ -8,7 +8,7 @@ use units::{Metres, Short};
 
 use crate::linear::VerifyOptions;
 use crate::ports::Use;
-use crate::program::linear::moved;
+use crate::program::linear::{moved, uncertainty};
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
@@ -137,6 +137,10 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         calibrated.journal.display()
     );
     text += &format!("\n  {}", text::noticed(calibrated.noticed));
+    let budget = calibrated.record.content.budget.as_ref();
+    text += &budget.map_or(String::new(), |it| {
+        format!("\n  {}", uncertainty::sentence(it))
+    });
     for point in &fitted.robust.outliers {
         text += &format!(
             "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
@@ -153,6 +157,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         "closure_um": to_json::um(calibrated.measured.closure),
         "fit": to_json::fitted(fitted),
         "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
+        "uncertainty": budget.map(uncertainty::value),
         "counters": counters,
     });
     output.result(&text, &value)
