@@ -33,6 +33,8 @@ const SECTORS: usize = 8;
 const SECTOR_LINES: usize = 8;
 /// From how many standard deviations on a difference of two passes is no noise.
 const WILD: f64 = 5.0;
+/// So many neighbours on each side say whether a line that differs is dirty or the plate has moved.
+const NEIGHBOURS: usize = 2;
 /// So many lines are named in a warning.
 const NAMED: usize = 6;
 
@@ -164,13 +166,15 @@ fn mean_of<'a>(sweeps: impl Iterator<Item = &'a SweepEntry>) -> Vec<Option<f64>>
 }
 
 /// By how much the second of two equal passes differs from the first: the mean over a part of the
-/// turn, of that part where it is largest. A plate that slips in the middle of a pass shows, too.
+/// turn, of that part where it is largest. A plate that slips in the middle of a pass shows, too:
+/// all lines after that differ, whereas a dirty line leaves its neighbours what they are.
 fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
     let apart: Vec<Option<f64>> = first
         .iter()
         .zip(again)
         .map(|(first, again)| Some((*again)? - (*first)?))
         .collect();
+    let apart = without_dirt(&apart);
     let sectors = (apart.len() / SECTOR_LINES).clamp(1, SECTORS);
     let of_sector = |lines: &[Option<f64>]| {
         let seen: Vec<f64> = lines.iter().flatten().copied().collect();
@@ -181,6 +185,18 @@ fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
     means
         .map(of_sector)
         .fold(0.0, |a, b| if b.abs() > f64::abs(a) { b } else { a })
+}
+
+/// The median of each line and its neighbours, as many at the ends as elsewhere.
+fn without_dirt(apart: &[Option<f64>]) -> Vec<Option<f64>> {
+    let width = apart.len().min(2 * NEIGHBOURS + 1);
+    let middle = |at: usize| {
+        let start = at.saturating_sub(NEIGHBOURS).min(apart.len() - width);
+        let around = apart[start..start + width].iter().flatten();
+        median(&around.copied().collect::<Vec<_>>())
+    };
+    let each = apart.iter().enumerate();
+    each.map(|(at, own)| own.and(middle(at))).collect()
 }
 
 impl RotaryTable<'_> {
@@ -486,5 +502,21 @@ mod tests {
         let closed = closure(&vec![Some(1.0); 360], &late);
         assert!((closed - 5.0 * 10.0 / 45.0).abs() < 1e-12, "{closed}");
         assert_eq!(closure(&first, &first), 0.0);
+    }
+
+    #[test]
+    fn one_dirty_line_is_no_plate_that_moved() {
+        let clean = vec![Some(1.0); 36];
+        for dirty in 0..36 {
+            let mut again = clean.clone();
+            again[dirty] = Some(1001.0);
+            assert_eq!(closure(&clean, &again), 0.0, "line {dirty}");
+            again[(dirty + 1) % 36] = None;
+            assert_eq!(closure(&clean, &again), 0.0, "line {dirty}");
+        }
+        let slipped: Vec<Option<f64>> = (0..36)
+            .map(|at| Some(if at < 33 { 1.0 } else { 9.0 }))
+            .collect();
+        assert!(closure(&clean, &slipped) > 2.0);
     }
 }
