@@ -194,6 +194,23 @@ impl Design {
     }
 }
 
+/// Up to which harmonic (periods in a turn) readings at `lines` equally spaced places tell a table
+/// error between these places, too: ⌊(N − 1)/2⌋, Nyquist's limit. Of an even number of lines
+/// harmonic N/2 shows only its cosine. A harmonic m above the limit looks at the lines like harmonic
+/// |m − jN| below it, with the whole number j that makes it so; no placement of the plate parts the
+/// two.
+///
+/// # Example
+///
+/// ```
+/// use compensator::rotary::harmonic_max;
+///
+/// assert_eq!((harmonic_max(360), harmonic_max(37)), (179, 18));
+/// ```
+pub const fn harmonic_max(lines: usize) -> usize {
+    lines.saturating_sub(1) / 2
+}
+
 /// rms amplification of two placements that differ by one line: √((N² − 1)/(6N)).
 ///
 /// # Example

@@ -103,3 +103,21 @@ fn what_are_no_offsets_is_refused() {
     check_refused(8, &[0, 8], "offset 8 is repeated or is not one of 0 to 7");
     check_refused(8, &[0, 3, 3], "offset 3 is repeated");
 }
+
+/// What is at the lines above the limit is there below it, too: the limit is where telling ends.
+#[test]
+fn a_harmonic_above_the_limit_looks_like_one_below_it() {
+    for lines in [5_usize, 12, 36, 37] {
+        let at = |harmonic: usize, line: usize| {
+            let turns = (harmonic * line % lines) as f64 / lines as f64;
+            units::portable::cos(core::f64::consts::TAU * turns)
+        };
+        let alike = |a: usize, b: usize| (0..lines).all(|it| (at(a, it) - at(b, it)).abs() < 1e-12);
+        let limit = harmonic_max(lines);
+        for harmonic in 1..=limit {
+            assert!((1..harmonic).all(|lower| !alike(harmonic, lower)));
+            assert!(alike(lines - harmonic, harmonic), "{lines}: {harmonic}");
+        }
+        assert!(2 * limit < lines && 2 * (limit + 1) >= lines);
+    }
+}

@@ -58,7 +58,9 @@ mod series;
 mod solve;
 
 pub(crate) use design::gcd;
-pub use design::{Design, DesignError, rms_amplification_of_a_pair, rms_amplification_of_all};
+pub use design::{
+    Design, DesignError, harmonic_max, rms_amplification_of_a_pair, rms_amplification_of_all,
+};
 pub use misplaced::{Misplaced, misplaced, shift_between};
 pub use periodic::{
     NotAnAngle, PeriodicCompensation, PeriodicError, PeriodicInterpolation, PeriodicLimits,

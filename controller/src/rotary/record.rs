@@ -1,6 +1,6 @@
 //! The errors of a rotary table at the lines of a plate (`rotary_error_table`).
 
-use compensator::rotary::{PeriodicTable, Reading, Solution};
+use compensator::rotary::{PeriodicTable, Reading, Solution, harmonic_max};
 use serde::{Deserialize, Serialize};
 use units::Radians;
 
@@ -96,6 +96,21 @@ impl RotaryContent {
         self.standard_uncertainty_rad
             .as_ref()
             .map(|it| largest(it.iter()))
+    }
+
+    /// Up to which harmonic the table error and its uncertainty hold between the lines, too.
+    pub fn harmonic_max(&self) -> usize {
+        harmonic_max(self.lines as usize)
+    }
+
+    /// That in words.
+    pub(crate) fn harmonics_told(&self) -> String {
+        format!(
+            "holds between the lines, as its uncertainty does, for harmonics up to {} of a turn; \
+             faster errors look like slower ones at {} lines, and are not in the uncertainty",
+            self.harmonic_max(),
+            self.lines
+        )
     }
 
     /// One line about it, for lists.

@@ -224,6 +224,7 @@ fn solution_text(solution: &Solution) -> String {
         text += "\n  standard uncertainty unknown: two placements leave no residuals; give \
                  --reading-noise-arcsec";
     }
+    text += &format!("\n  {}", content.harmonics_told());
     for it in &solution.outliers {
         let (name, residual) = (name(&it.reading), it.residual.arcsec());
         text += &format!("\n  left out: {name}, {residual:+.3} ″ from what the others predict");
@@ -286,11 +287,12 @@ fn shown(content: &RotaryContent) -> String {
     let arcsec = |value: f64| format!("{:.4}", Radians(value).arcsec());
     let cell = |value: Option<f64>| value.map_or("–".to_owned(), arcsec);
     let mut text = format!(
-        "{} lines, plate offsets {:?}, residual rms {} ″\n  line   table error (″)     u (″)   \
+        "{} lines, plate offsets {:?}, residual rms {} ″\n  {}\n  line   table error (″)     u (″)   \
          plate (″)",
         content.lines,
         content.offsets,
         arcsec(content.residual_rms_rad),
+        content.harmonics_told(),
     );
     for (line, error) in content.table_error_rad.iter().enumerate() {
         let u = content.standard_uncertainty_rad.as_ref();

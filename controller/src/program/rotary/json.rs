@@ -1,7 +1,8 @@
 //! A rotary table's self-calibration and its plan, angles in arcseconds.
 
 use compensator::rotary::{
-    Criterion, Design, Reading, Solution, rms_amplification_of_a_pair, rms_amplification_of_all,
+    Criterion, Design, Reading, Solution, harmonic_max, rms_amplification_of_a_pair,
+    rms_amplification_of_all,
 };
 use serde_json::{Value, json};
 use units::Radians;
@@ -79,6 +80,7 @@ pub(crate) fn solution(solution: &Solution) -> Value {
         "noise_amplification": solution.noise_amplification(),
         "worst_amplification": worst_amplification,
         "worst_harmonic": worst_harmonic,
+        "harmonic_max": harmonic_max(solution.design.lines()),
         "outliers": outliers,
         "missing": solution.missing.iter().map(reading).collect::<Vec<_>>(),
     })

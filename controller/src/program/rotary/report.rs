@@ -167,12 +167,13 @@ fn calibration(content: &RotaryContent) -> String {
     });
     let mut html = format!(
         "<h2>Table error</h2><p>Up to {:.3} ″ at the lines; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
-         degrees of freedom; noise of a reading amplified {:.3} times.</p><figure>{}</figure>{shaded}\
+         degrees of freedom; noise of a reading amplified {:.3} times. The table error {}.</p><figure>{}</figure>{shaded}\
          <h2>Plate error</h2><figure>{}</figure>",
         content.largest_error().arcsec(),
         arcsec(content.residual_rms_rad),
         content.degrees_of_freedom,
         content.noise_amplification,
+        content.harmonics_told(),
         chart(
             "Table error and its standard uncertainty",
             ("table angle (°)", "reading − true angle (″)"),
@@ -325,5 +326,6 @@ mod tests {
         );
         let html = calibration(&content());
         assert!(html.contains(&format!("Up to {largest} ″ at the lines")));
+        assert!(html.contains("for harmonics up to 19 of a turn"), "{html}");
     }
 }

@@ -212,12 +212,13 @@ pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
     let mut text = format!(
         "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″ at \
          the lines, plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
-         the plate moved by {:.3}″ at most while it was read\n  {}\n  passes in {}",
+         {}\n  the plate moved by {:.3}″ at most while it was read\n  {}\n  passes in {}",
         short(&calibrated.id),
         solution.design.lines(),
         solution.design.offsets(),
         content.largest_error().arcsec(),
         content.largest_plate_error().arcsec(),
+        content.harmonics_told(),
         calibrated.closure.arcsec(),
         calibrated.path.display(),
         calibrated.journal.display(),
