@@ -115,7 +115,7 @@ impl Design {
                 harmonic: lines / step,
             });
         }
-        let design = Self::of_any(lines, offsets)?;
+        let design = Self::of_any(lines, offsets);
         let (harmonic, seen) = design.worst();
         // Written so that a NaN limit refuses.
         if seen <= amplification_max {
@@ -130,14 +130,14 @@ impl Design {
         }
     }
 
-    /// The same for offsets that may leave harmonics unobservable, whose information is zero.
-    pub(super) fn of_any(lines: usize, offsets: &[usize]) -> Result<Self, DesignError> {
-        check_offsets(lines, offsets)?;
-        Ok(Self {
+    /// The same for offsets below `lines` that may repeat and may leave harmonics unobservable,
+    /// whose information is zero.
+    pub(super) fn of_any(lines: usize, offsets: &[usize]) -> Self {
+        Self {
             lines,
             offsets: offsets.to_vec(),
             information: information(lines, offsets),
-        })
+        }
     }
 
     /// The lines of the plate.
@@ -291,7 +291,7 @@ fn information(lines: usize, offsets: &[usize]) -> Vec<f64> {
 }
 
 /// cos and sin of 2πm/N; the second half of the circle mirrors the first.
-fn turn(lines: usize) -> Vec<(f64, f64)> {
+pub(super) fn turn(lines: usize) -> Vec<(f64, f64)> {
     let mut turn = vec![(1.0, 0.0); lines];
     for m in 1..=lines / 2 {
         let (sin, cos) = sin_cos(2.0 * PI * m as f64 / lines as f64);

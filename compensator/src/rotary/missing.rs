@@ -20,6 +20,9 @@ pub(super) const UNKNOWNS_MAX: usize = 3000;
 /// A pivot (1 for a reading that others determine fully) taken for zero.
 const PIVOT_MIN: f64 = 1e-9;
 
+/// Residuals that share less than this part of their variance are hardly mistaken for each other.
+const AKIN_MIN: f64 = 0.1;
+
 /// Why gaps cannot be bridged.
 pub(super) enum Unbridged {
     /// Too many.
@@ -172,6 +175,34 @@ impl<'a> Gaps<'a> {
         column[place] = 1.0;
         self.factor.solve_forward(&mut column);
         Some(column.iter().map(|it| it * it).sum())
+    }
+}
+
+impl Gaps<'_> {
+    /// Readings on whose residuals a bad reading `at` throws much of its shadow: those of its line,
+    /// of its position, and others that the offsets put beside it.
+    pub(super) fn akin(&self, at: usize) -> Vec<usize> {
+        let (response, lines) = (&self.response, self.response.lines);
+        let own = response.on_residual(at, at);
+        let total = lines * response.offsets.len();
+        let shadow = |to: &usize| {
+            let shadow = response.on_residual(*to, at);
+            shadow * shadow > AKIN_MIN * own * response.on_residual(*to, *to)
+        };
+        (0..total).filter(|to| *to != at).filter(shadow).collect()
+    }
+
+    /// What of its own variance is left in the residual of the reading `at`, which is not missing,
+    /// and for each unknown reading how much of `at` the prediction for it contains.
+    pub(super) fn shadow(&self, at: usize) -> (f64, Vec<(usize, f64)>) {
+        let response = &self.response;
+        let on = self.unknown.iter().map(|it| response.on_residual(*it, at));
+        let on: Vec<f64> = on.collect();
+        let mut contained = on.clone();
+        self.factor.solve(&mut contained);
+        let left = response.on_residual(at, at) - dot(&on, &contained);
+        let unknown = self.unknown.iter().copied();
+        (left.max(0.0), unknown.zip(contained).collect())
     }
 }
 

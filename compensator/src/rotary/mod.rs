@@ -34,8 +34,12 @@
 //! | `closed_form` | the least squares of complete readings, with two Fourier transforms |
 //! | `missing` | the same with readings missing |
 //! | `outliers` | readings that belong to no model |
+//! | `search` | the search for them, and which may be bad just as well |
+//! | `majority` | whether the readings left out are those that were bad |
+//! | `turns` | which turn of one placement makes all readings fit best |
 //! | `misplaced` | a plate turned otherwise than was entered |
-//! | `solve` | all of it, with uncertainties |
+//! | `solver` | one evaluation after the other, until no outlier is left |
+//! | `solution`, `solve` | all of it, with uncertainties |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
 //!
 //! Limits: G is read at the nominal position of a line; the plate's error and the placement's
@@ -47,15 +51,22 @@
 mod closed_form;
 mod design;
 mod lanes;
+mod majority;
 mod misplaced;
 mod missing;
 mod outliers;
 mod periodic;
 mod plan;
 #[cfg(test)]
+mod rates;
+#[cfg(test)]
 mod rig;
+mod search;
 mod series;
+mod solution;
 mod solve;
+mod solver;
+mod turns;
 
 pub(crate) use design::gcd;
 pub use design::{
@@ -68,4 +79,5 @@ pub use periodic::{
 };
 pub use plan::{Criterion, PlanError, plan};
 pub use series::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
-pub use solve::{Outlier, Reading, Solution, SolveError, SolveOptions, solve};
+pub use solution::{Outlier, Reading, Solution, SolveError, SolveOptions};
+pub use solve::solve;

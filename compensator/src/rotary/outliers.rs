@@ -22,7 +22,7 @@ const SAMPLE: usize = 4096;
 const ROUND_SHARE: f64 = 0.5;
 
 /// A scatter below it is rounding of the data: 0.2 µas.
-const SIGMA_MIN: f64 = 1e-12;
+pub(super) const SIGMA_MIN: f64 = 1e-12;
 
 /// What is needed of residuals to see whether there are outliers.
 #[derive(Default)]
@@ -92,6 +92,14 @@ impl<'a> Judge<'a> {
             return Vec::new();
         }
         self.beyond(limit, &residuals())
+    }
+
+    /// The reading with the largest residual in units of √R_jj.
+    pub(super) fn worst(&self, residuals: &[f64]) -> Option<usize> {
+        let lines = self.design.lines();
+        let scaled = |(at, it): (usize, &f64)| (at, it.abs() / self.scales[at / lines]);
+        let each = residuals.iter().enumerate().map(scaled);
+        each.max_by(|a, b| a.1.total_cmp(&b.1)).map(|it| it.0)
     }
 
     fn beyond(&self, limit: f64, residuals: &[f64]) -> Vec<usize> {

@@ -1,11 +1,14 @@
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
+use units::Radians;
+
+use super::super::design::DesignError;
 use super::super::plan::{Criterion, plan};
 use super::super::rig::{Noise, Truth, centred};
 use super::*;
-use crate::rotary::Placement;
-use crate::uncertainty::reduced_chi_square_limit;
+use crate::rotary::{Placement, Reading};
+use crate::uncertainty::{reduced_chi_square_limit, rms};
 
 fn whole(_: usize, _: usize, reading: f64) -> Option<f64> {
     Some(reading)
