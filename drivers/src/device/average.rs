@@ -14,6 +14,16 @@ pub(super) enum Averaging {
     Done(DisplacementReading),
 }
 
+impl Averaging {
+    /// The reading, when all samples have come.
+    pub(super) const fn reading(&self) -> Option<DisplacementReading> {
+        match self {
+            Self::Done(reading) => Some(*reading),
+            Self::Never | Self::Running(_) => None,
+        }
+    }
+}
+
 /// Welford's recurrence: no sum of squares that cancels (B. P. Welford, Technometrics 4,
 /// 1962).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@
 //! controller owns the loop (`truestage::tick`) that feeds them.
 
 mod alarm;
+mod analog_node;
 mod average;
 pub mod canopen_node;
 pub mod cia401;
@@ -19,6 +20,7 @@ pub mod in_sight;
 mod latch;
 mod name;
 pub mod nd287;
+mod plausible;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;

@@ -444,10 +444,7 @@ impl DisplacementInstrument for Umd2 {
     }
 
     fn average(&self) -> Option<DisplacementReading> {
-        match self.averaging {
-            Averaging::Done(reading) => Some(reading),
-            Averaging::Never | Averaging::Running(_) => None,
-        }
+        self.averaging.reading()
     }
 
     fn latest(&self) -> Option<DisplacementReading> {

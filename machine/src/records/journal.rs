@@ -22,7 +22,7 @@ use super::sound::{
 use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
 
 /// What a run is: written first.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JournalHeader {
     /// Of this file.

@@ -7,12 +7,12 @@
 
 use core::time::Duration;
 use serde::Deserialize;
-use std::collections::VecDeque;
 use wire::Payload;
 use wire::dcon::{CR, Command, format_volts, frame, unframe};
 
 use units::Time;
 
+use super::replies::Replies;
 use super::{Node, Section};
 use crate::config::error::{ConfigError, positive};
 use crate::plant::Plant;
@@ -66,12 +66,10 @@ const LINE_MAX: usize = 32;
 #[derive(Clone, Debug)]
 pub struct DconModuleNode {
     config: DconModuleConfig,
-    listens_from: Time,
     line: Vec<u8>,
     sampled: Vec<f64>,
     fresh: bool,
-    replies: VecDeque<(Time, Vec<u8>)>,
-    outbox: VecDeque<Payload>,
+    replies: Replies,
     jitter: Stream,
 }
 
@@ -80,12 +78,10 @@ impl DconModuleNode {
     pub fn new(config: &DconModuleConfig, seed: u64, name: &str) -> Self {
         Self {
             config: config.clone(),
-            listens_from: Time::NEVER,
             line: Vec::new(),
             sampled: Vec::new(),
             fresh: false,
-            replies: VecDeque::new(),
-            outbox: VecDeque::new(),
+            replies: Replies::new(),
             jitter: Stream::new(seed, &format!("{name} reply")),
         }
     }
@@ -108,8 +104,8 @@ impl DconModuleNode {
         };
         let wait_ms = self.config.reply_ms + self.config.reply_jitter_ms * self.jitter.uniform();
         let at = now + Duration::from_secs_f64(wait_ms * 1e-3);
-        self.replies
-            .push_back((at, frame(&answer, self.config.checksum)));
+        let reply = frame(&answer, self.config.checksum);
+        self.replies.push(at, reply);
     }
 
     /// `None` where the module stays silent.
@@ -172,8 +168,6 @@ impl DconModuleNode {
     fn reset(&mut self) {
         self.line.clear();
         self.sampled.clear();
-        self.replies.clear();
-        self.outbox.clear();
     }
 }
 
@@ -189,40 +183,31 @@ impl Section for DconModuleConfig {
 
 impl Node for DconModuleNode {
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
-        let Payload::Bytes(bytes) = payload else {
-            return;
-        };
-        if now < self.listens_from {
-            return;
-        }
-        for byte in bytes {
+        for byte in self.replies.heard(now, payload) {
             self.take_byte(now, *byte, plant);
         }
     }
 
     fn advance(&mut self, now: Time, _plant: &mut Plant) {
-        while self.next_event() <= now {
-            let reply = self.replies.pop_front().map(|(_, reply)| reply);
-            self.outbox.extend(reply.map(Payload::Bytes));
-        }
+        self.replies.advance(now);
     }
 
     fn next_event(&self) -> Time {
-        self.replies.front().map_or(Time::NEVER, |(at, _)| *at)
+        self.replies.next_event()
     }
 
     fn poll_transmit(&mut self) -> Option<Payload> {
-        self.outbox.pop_front()
+        self.replies.poll_transmit()
     }
 
     fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
         self.reset();
-        self.listens_from = Time::NEVER;
+        self.replies.power_off();
     }
 
     fn power_on(&mut self, now: Time, _plant: &mut Plant) {
         self.reset();
-        self.listens_from = now + Duration::from_secs_f64(self.config.boot_ms * 1e-3);
+        self.replies.power_on(now, self.config.boot_ms);
     }
 }
 

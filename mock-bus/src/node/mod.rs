@@ -12,6 +12,7 @@ pub mod dcon_module;
 pub mod in_sight_controller;
 pub mod nd287_display;
 pub mod profile;
+mod replies;
 pub mod umd2_interferometer;
 
 use core::any::Any;

@@ -9,13 +9,13 @@
 //! Absent: keys, functions, status, lists of parameters, the second input.
 
 use core::time::Duration;
-use std::collections::VecDeque;
 
 use serde::Deserialize;
 use units::Time;
 use wire::Payload;
 use wire::nd287::{Command, Identification, MeasuredValue, NAK, STX, Unit};
 
+use super::replies::Replies;
 use super::{Node, Section};
 use crate::config::error::{ConfigError, positive};
 use crate::plant::Plant;
@@ -94,14 +94,12 @@ const COMMAND_MAX: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Nd287DisplayNode {
     config: Nd287DisplayConfig,
-    listens_from: Time,
     /// What has come of a command, behind its ESC.
     command: Option<Vec<u8>>,
     /// Where the head stood when the display was switched on.
     datum_m: Option<f64>,
     is_faulty: bool,
-    replies: VecDeque<(Time, Vec<u8>)>,
-    outbox: VecDeque<Payload>,
+    replies: Replies,
     noise: Stream,
     jitter: Stream,
 }
@@ -111,12 +109,10 @@ impl Nd287DisplayNode {
     pub fn new(config: &Nd287DisplayConfig, seed: u64, name: &str) -> Self {
         Self {
             config: config.clone(),
-            listens_from: Time::NEVER,
             command: None,
             datum_m: None,
             is_faulty: false,
-            replies: VecDeque::new(),
-            outbox: VecDeque::new(),
+            replies: Replies::new(),
             noise: Stream::new(seed, &format!("{name} noise")),
             jitter: Stream::new(seed, &format!("{name} reply")),
         }
@@ -161,9 +157,7 @@ impl Nd287DisplayNode {
     fn reply(&mut self, now: Time, answer: Vec<u8>) {
         let wait_ms = self.config.reply_ms + self.config.reply_jitter_ms * self.jitter.uniform();
         let at = now + Duration::from_secs_f64(wait_ms * 1e-3);
-        // Answers keep the order of their requests.
-        let at = self.replies.back().map_or(at, |(last, _)| at.max(*last));
-        self.replies.push_back((at, answer));
+        self.replies.push_in_order(at, answer);
     }
 
     fn value(&mut self, plant: &Plant) -> MeasuredValue {
@@ -196,8 +190,6 @@ impl Nd287DisplayNode {
 
     fn reset(&mut self) {
         self.command = None;
-        self.replies.clear();
-        self.outbox.clear();
         self.is_faulty = false;
     }
 }
@@ -222,41 +214,32 @@ impl Section for Nd287DisplayConfig {
 
 impl Node for Nd287DisplayNode {
     fn handle(&mut self, now: Time, payload: &Payload, plant: &mut Plant) {
-        let Payload::Bytes(bytes) = payload else {
-            return;
-        };
-        if now < self.listens_from {
-            return;
-        }
-        for byte in bytes {
+        for byte in self.replies.heard(now, payload) {
             self.take_byte(now, *byte, plant);
         }
     }
 
     fn advance(&mut self, now: Time, _plant: &mut Plant) {
-        while self.next_event() <= now {
-            let reply = self.replies.pop_front().map(|(_, reply)| reply);
-            self.outbox.extend(reply.map(Payload::Bytes));
-        }
+        self.replies.advance(now);
     }
 
     fn next_event(&self) -> Time {
-        self.replies.front().map_or(Time::NEVER, |(at, _)| *at)
+        self.replies.next_event()
     }
 
     fn poll_transmit(&mut self) -> Option<Payload> {
-        self.outbox.pop_front()
+        self.replies.poll_transmit()
     }
 
     fn power_off(&mut self, _now: Time, _plant: &mut Plant) {
         self.reset();
-        self.listens_from = Time::NEVER;
+        self.replies.power_off();
     }
 
     fn power_on(&mut self, now: Time, plant: &mut Plant) {
         self.reset();
         self.datum_m = plant.scanned().map(|seen| seen.position.value());
-        self.listens_from = now + Duration::from_secs_f64(self.config.boot_ms * 1e-3);
+        self.replies.power_on(now, self.config.boot_ms);
     }
 }
 

@@ -9,15 +9,14 @@
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
-
 use units::{Time, Volts};
 use wire::Input;
 use wire::Payload;
 use wire::canopen::Object;
 use wire::canopen::pdo::{MappedObject, Transmission, extract};
 
-use super::canopen_node::{CanopenNode, NodeEvent, NodeSettings};
+use super::analog_node::{AnalogNode, Heard};
+use super::canopen_node::{CanopenNode, NodeSettings};
 use super::{Alarm, AnalogInput, AnalogReading, Device, DeviceError, Identity};
 use crate::protocol::pdo_setup::{Pdo, PdoDirection};
 use crate::protocol::script::Step;
@@ -59,6 +58,39 @@ impl Cia401Settings {
             channels: channels.to_vec(),
             converter_bits: 16,
         })
+    }
+
+    fn configuration(&self) -> Vec<Step> {
+        const SCALING: &str = "making the module's own scaling neutral";
+        let node = self.common.node;
+        let pdo = |direction, number| Pdo::new(direction, number).expect("1 to 4");
+        let transmit = |number| pdo(PdoDirection::Transmit, number);
+        let mapped: Vec<MappedObject> = self
+            .channels
+            .iter()
+            .map(|channel| MappedObject::new(0x6401, channel.input, 16))
+            .collect();
+        let mut steps = transmit(1)
+            .configure(node, &mapped, Transmission::Synchronous(1))
+            .expect("four channels of 16 bits fit");
+        for unused in 2..=4 {
+            steps.extend(transmit(unused).disable(node));
+        }
+        for channel in &self.channels {
+            let input = channel.input;
+            let object = |index| Object::new(index, input);
+            steps.push(Step::check(object(0x6431), 0_i32, SCALING).optional());
+            steps.push(Step::check(object(0x6432), 1_i32, SCALING).optional());
+            let trigger = "choosing what makes the module send";
+            steps.push(Step::check(object(0x6421), TRIGGER_DELTA, trigger).optional());
+            steps.push(Step::check(object(0x6426), 0_u32, trigger).optional());
+        }
+        steps.push(Step::check(
+            Object::new(0x6423, 0),
+            1_u8,
+            "enabling the analog inputs",
+        ));
+        steps
     }
 
     const fn upper_rail(&self) -> i16 {
@@ -110,114 +142,41 @@ impl Cia401Settings {
 #[derive(Debug)]
 pub struct Cia401Analog {
     settings: Cia401Settings,
-    node: CanopenNode,
-    starting: bool,
+    module: AnalogNode,
     reading: Option<AnalogReading>,
-    told_short: bool,
-    short_pdos: u64,
-    outcome: Option<Result<(), DeviceError>>,
-    alarms: VecDeque<Alarm>,
 }
 
 impl Cia401Analog {
     /// A module that is not started.
     pub fn new(settings: Cia401Settings) -> Self {
         Self {
-            node: CanopenNode::new(settings.common, PROFILE),
+            module: AnalogNode::new(CanopenNode::new(settings.common, PROFILE)),
             settings,
-            starting: false,
             reading: None,
-            told_short: false,
-            short_pdos: 0,
-            outcome: None,
-            alarms: VecDeque::new(),
         }
-    }
-
-    fn configuration(&self) -> Vec<Step> {
-        const SCALING: &str = "making the module's own scaling neutral";
-        let node = self.settings.common.node;
-        let pdo = |direction, number| Pdo::new(direction, number).expect("1 to 4");
-        let transmit = |number| pdo(PdoDirection::Transmit, number);
-        let mapped: Vec<MappedObject> = self
-            .settings
-            .channels
-            .iter()
-            .map(|channel| MappedObject::new(0x6401, channel.input, 16))
-            .collect();
-        let mut steps = transmit(1)
-            .configure(node, &mapped, Transmission::Synchronous(1))
-            .expect("four channels of 16 bits fit");
-        for unused in 2..=4 {
-            steps.extend(transmit(unused).disable(node));
-        }
-        for channel in &self.settings.channels {
-            let input = channel.input;
-            let object = |index| Object::new(index, input);
-            steps.push(Step::check(object(0x6431), 0_i32, SCALING).optional());
-            steps.push(Step::check(object(0x6432), 1_i32, SCALING).optional());
-            let trigger = "choosing what makes the module send";
-            steps.push(Step::check(object(0x6421), TRIGGER_DELTA, trigger).optional());
-            steps.push(Step::check(object(0x6426), 0_u32, trigger).optional());
-        }
-        steps.push(Step::check(
-            Object::new(0x6423, 0),
-            1_u8,
-            "enabling the analog inputs",
-        ));
-        steps
-    }
-
-    fn finish(&mut self, result: Result<(), DeviceError>) {
-        self.starting = false;
-        self.outcome = Some(result);
     }
 
     fn pump(&mut self, now: Time) {
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Described(_) => {
-                    let steps = self.configuration();
-                    self.node.configure(now, steps);
-                }
-                NodeEvent::Operational | NodeEvent::ScriptDone(_) => {}
-                NodeEvent::Failed(error) => self.finish(Err(error)),
-                NodeEvent::Alarm(alarm) => {
-                    if let Alarm::UnexpectedBootUp { .. } = alarm {
-                        self.reading = None;
-                    }
-                    self.alarms.push_back(alarm);
-                }
-                NodeEvent::Pdo { number: 1, frame } => self.take_sample(now, frame.data()),
-                NodeEvent::Pdo { .. } => {}
-                NodeEvent::PdoSilent { waited } => {
-                    self.alarms.push_back(Alarm::StaleSample { waited });
-                }
+        while let Some(heard) = self.module.hear(now, || self.settings.configuration()) {
+            match heard {
+                Heard::Pdo { number: 1, frame } => self.take_sample(now, frame.data()),
+                Heard::Pdo { .. } => {}
+                Heard::Reset => self.reading = None,
             }
         }
     }
 
     fn take_sample(&mut self, now: Time, payload: &[u8]) {
         let expected = self.settings.channels.len() * 2;
-        if !self.node.is_up() {
-            if !self.starting || !self.node.is_operational() || payload.len() < expected {
+        if !self.module.node.is_up() {
+            if !self.module.awaits_its_first() || payload.len() < expected {
                 return;
             }
-            self.node.up(now);
-            self.finish(Ok(()));
+            self.module.up(now);
         }
-        if payload.len() < expected {
-            self.short_pdos += 1;
-            if !core::mem::replace(&mut self.told_short, true) {
-                self.alarms.push_back(Alarm::PdoTooShort {
-                    node: self.node.id(),
-                    expected,
-                    seen: payload.len(),
-                });
-            }
+        if !self.module.is_whole(expected, payload.len()) {
             return;
         }
-        self.told_short = false;
         let rail = self.settings.upper_rail();
         let channels = &self.settings.channels;
         // The last sample's memory serves again: a cyclic loop asks for none.
@@ -244,48 +203,42 @@ impl Cia401Analog {
 
 impl Device for Cia401Analog {
     fn handle(&mut self, now: Time, input: &Input) {
-        self.node.handle(now, input);
+        self.module.node.handle(now, input);
         self.pump(now);
     }
 
     fn handle_timeout(&mut self, now: Time) {
-        self.node.handle_timeout(now);
+        self.module.node.handle_timeout(now);
         self.pump(now);
     }
 
     fn poll_timeout(&self) -> Time {
-        self.node.poll_timeout()
+        self.module.node.poll_timeout()
     }
 
     fn poll_transmit(&mut self) -> Option<Payload> {
-        self.node.poll_transmit().map(Payload::Frame)
+        self.module.node.poll_transmit().map(Payload::Frame)
     }
 
     fn poll_alarm(&mut self) -> Option<Alarm> {
-        self.alarms.pop_front()
+        self.module.alarms.pop_front()
     }
 
     fn start(&mut self, now: Time) {
-        self.outcome = None;
         self.reading = None;
-        self.told_short = false;
-        self.alarms.clear();
-        self.starting = true;
-        self.node.start(now, Vec::new());
+        self.module.start(now);
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
-        self.outcome.take()
+        self.module.outcome.take()
     }
 
     fn identity(&self) -> Option<Identity> {
-        self.node.identity().cloned()
+        self.module.node.identity().cloned()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {
-        let mut counters = self.node.counters();
-        counters.push(("pdos too short", self.short_pdos));
-        counters
+        self.module.counters()
     }
 }
 

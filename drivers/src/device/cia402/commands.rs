@@ -106,7 +106,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
         let scale = self.settings.scale;
         // In the cyclic mode bit 10 says nothing: the axis stands when it stands.
         let reached = match sample.mode {
-            OperationMode::CyclicSynchronousPosition => self.image.stands(),
+            OperationMode::CyclicSynchronousPosition => self.image.plausible.stands(),
             _ => sample.status.contains(Statusword::TARGET_REACHED),
         };
         let pending = sample.mode == OperationMode::ProfilePosition
@@ -122,7 +122,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             standing: reached
                 && !pending
                 && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
-            at_rest: self.image.stands(),
+            at_rest: self.image.plausible.stands(),
         })
     }
 }

@@ -46,7 +46,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Some(target) => target - begun.demand,
             None => demand - begun.demand,
         };
-        let margin = self.image.margin();
+        let margin = self.image.plausible.margin();
         let apart = wanted.0.signum() == -moved.0.signum();
         if apart && wanted.0.abs() > margin && moved.0.abs() > margin {
             self.course = None;

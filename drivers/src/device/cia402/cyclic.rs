@@ -151,7 +151,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return self.refuse(ENTERING, needs);
         };
         let enabled = self.state() == Some(PowerState::OperationEnabled);
-        if enabled && !self.image.stands() {
+        if enabled && !self.image.plausible.stands() {
             return self.refuse(ENTERING, "an axis that stands still");
         }
         const TEXT: &str = "setting the interpolation period";

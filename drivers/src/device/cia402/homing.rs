@@ -92,7 +92,7 @@ impl<S: Copy> HomingPlace<S> {
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
         let search = place.speed();
-        if search.is_none() && !self.image.stands() {
+        if search.is_none() && !self.image.plausible.stands() {
             self.refuse("homing here", "an axis that stands still");
             return;
         }
@@ -110,7 +110,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Ok((position, steps)) => {
                 self.reached = None;
                 self.homed = false;
-                self.image.allow_jumps(true);
+                self.image.plausible.allow_jumps(true);
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,
                     position,

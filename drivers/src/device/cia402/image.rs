@@ -7,12 +7,10 @@ use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::modulo::Modulo;
 use super::start::{MODE_DISPLAY, POSITION_ACTUAL, STATUSWORD};
+use crate::device::plausible::{Judgement, Plausible};
 
 /// Bytes of TPDO 1: statusword, position, mode.
 pub(super) const SAMPLE_BYTES: usize = 7;
-
-/// An axis stands when so many samples in a row lie within the tolerance.
-const STANDING_SAMPLES: u8 = 3;
 
 /// One sample, decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,46 +47,21 @@ impl Sample {
     }
 }
 
-/// What a sample is worth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Judgement {
-    Believed,
-    /// Too far from where the axis can be: not taken.
-    Doubted,
-    /// Doubted twice running: the position did jump. Taken, but to be told.
-    Jumped {
-        by: Counts,
-        limit: Counts,
-    },
-}
-
 #[derive(Debug)]
 pub(super) struct Image {
     sample: Option<Sample>,
     following_error: Option<Counts>,
     modulo: Option<Modulo>,
-    speed_max: f64,
-    margin: i64,
-    tolerance: i64,
     sync_period: Duration,
     stall_max: Duration,
-    /// Where the axis was when it last seemed to come to rest.
-    rest: Counts,
-    standing: u8,
-    doubted: bool,
-    /// While homing the coordinates may change.
-    jumps_allowed: bool,
-    rejected: u64,
+    pub(super) plausible: Plausible,
 }
 
 impl Image {
-    /// `speed_max` in counts per second, `margin` and `tolerance` in counts; samples may lie
-    /// `stall_max` further apart than their arrivals say.
+    /// Samples may lie `stall_max` further apart than their arrivals say.
     pub(super) const fn new(
         modulo: Option<Modulo>,
-        speed_max: f64,
-        margin: i64,
-        tolerance: i64,
+        plausible: Plausible,
         sync_period: Duration,
         stall_max: Duration,
     ) -> Self {
@@ -96,16 +69,9 @@ impl Image {
             sample: None,
             following_error: None,
             modulo,
-            speed_max,
-            margin,
-            tolerance,
             sync_period,
             stall_max,
-            rest: Counts(0),
-            standing: 0,
-            doubted: false,
-            jumps_allowed: false,
-            rejected: 0,
+            plausible,
         }
     }
 
@@ -117,36 +83,11 @@ impl Image {
         self.following_error
     }
 
-    /// How far two honest positions of one moment may be apart.
-    pub(super) const fn margin(&self) -> i64 {
-        self.margin
-    }
-
-    pub(super) const fn rejected(&self) -> u64 {
-        self.rejected
-    }
-
-    /// Whether the last samples lie together.
-    pub(super) const fn stands(&self) -> bool {
-        self.standing >= STANDING_SAMPLES
-    }
-
-    /// From now on samples begin a new count of standing still.
-    pub(super) const fn watch_rest(&mut self) {
-        self.standing = 0;
-    }
-
-    pub(super) const fn allow_jumps(&mut self, allowed: bool) {
-        self.jumps_allowed = allowed;
-        self.doubted = false;
-    }
-
     pub(super) const fn clear(&mut self) {
         self.sample = None;
         self.following_error = None;
-        self.standing = 0;
-        self.doubted = false;
-        self.jumps_allowed = false;
+        self.plausible.forget();
+        self.plausible.allow_jumps(false);
     }
 
     pub(super) fn take_following_error(&mut self, payload: &[u8]) {
@@ -175,54 +116,27 @@ impl Image {
     pub(super) fn count_from(&mut self, position: i64) {
         if let (Some(modulo), Some(sample)) = (self.modulo, &mut self.sample) {
             sample.position = Counts(modulo.nearest(i64::from(sample.shown), position));
-            self.standing = 0;
+            self.plausible.watch_rest();
         }
     }
 
     pub(super) fn take(&mut self, mut sample: Sample) -> Judgement {
         sample.position = self.counting_on(sample.shown);
-        let judgement = self.judge(&sample);
-        match judgement {
-            Judgement::Doubted => {
-                self.rejected += 1;
-                self.doubted = true;
-                // The statusword has its own checks; only the position is not believed.
-                let Some(old) = &mut self.sample else {
-                    return judgement;
-                };
+        // Frames that queued up in a stall arrive together: at least a period lies between.
+        let old = self.sample.map(|old| {
+            let apart = sample.at.since(old.at).max(self.sync_period) + self.stall_max;
+            (old.position, apart)
+        });
+        let judgement = self.plausible.take(sample.position, old);
+        match (&mut self.sample, judgement) {
+            // The statusword has its own checks; only the position is not believed.
+            (Some(old), Judgement::Doubted) => {
                 old.status = sample.status;
                 old.mode = sample.mode;
-                return judgement;
             }
-            Judgement::Believed | Judgement::Jumped { .. } => self.doubted = false,
+            (None, Judgement::Doubted) => {}
+            (newest, Judgement::Believed | Judgement::Jumped { .. }) => *newest = Some(sample),
         }
-        if (sample.position - self.rest).0.abs() <= self.tolerance {
-            self.standing = self.standing.saturating_add(1);
-        } else {
-            self.rest = sample.position;
-            self.standing = 0;
-        }
-        self.sample = Some(sample);
         judgement
-    }
-
-    fn judge(&self, sample: &Sample) -> Judgement {
-        let Some(old) = self.sample.filter(|_| !self.jumps_allowed) else {
-            return Judgement::Believed;
-        };
-        // Frames that queued up in a stall arrive together: at least a period lies between.
-        let apart = sample.at.since(old.at).max(self.sync_period) + self.stall_max;
-        let limit = (self.speed_max * 1.2 * apart.as_secs_f64()) as i64 + self.margin;
-        let by = sample.position - old.position;
-        if by.0.abs() <= limit {
-            Judgement::Believed
-        } else if self.doubted {
-            Judgement::Jumped {
-                by,
-                limit: Counts(limit),
-            }
-        } else {
-            Judgement::Doubted
-        }
     }
 }

@@ -377,7 +377,7 @@ impl<Q: Coordinate> PositionLatch<Q> for Cia402Drive<Q> {
             }
             _ if !self.node.is_in_service() => self.refuse_out_of_service(),
             LatchCommand::Disarm => self.begin_latch(now, None),
-            LatchCommand::Arm { .. } if !self.image.stands() => {
+            LatchCommand::Arm { .. } if !self.image.plausible.stands() => {
                 self.refuse(STEP, "an axis that stands still");
             }
             LatchCommand::Arm { repeat, spacing } => {

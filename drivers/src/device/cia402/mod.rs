@@ -53,6 +53,7 @@ pub use settings::{
 };
 
 use super::canopen_node::{CanopenNode, NodeEvent};
+use super::plausible::Plausible;
 use super::{Alarm, Device, DeviceError, Identity, Seen};
 use crate::protocol::script::Script;
 use cyclic::ModeChange;
@@ -165,14 +166,13 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     /// A drive that is not started.
     pub fn new(settings: Cia402Settings<Q>) -> Self {
         let counts = |si: f64| si / settings.scale.resolution().abs().value();
-        let image = Image::new(
-            settings.modulo(),
+        let plausible = Plausible::new(
             counts(settings.speed_max.value()),
             counts(settings.jump_margin.value()) as i64,
             settings.tolerance_counts(),
-            settings.common.sync_period,
-            settings.stall_max,
         );
+        let (modulo, period) = (settings.modulo(), settings.common.sync_period);
+        let image = Image::new(modulo, plausible, period, settings.stall_max);
         Self {
             node: CanopenNode::new(settings.common, PROFILE),
             image,
@@ -240,7 +240,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     fn finish(&mut self, result: Result<(), DeviceError>) {
         self.activity = Activity::Idle;
         self.repeat_at = Time::NEVER;
-        self.image.allow_jumps(false);
+        self.image.plausible.allow_jumps(false);
         self.course = None;
         self.outcome = Some(result);
     }
@@ -355,7 +355,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         self.outcome = None;
         self.prepared = None;
         self.repeat_at = Time::NEVER;
-        self.image.allow_jumps(false);
+        self.image.plausible.allow_jumps(false);
         self.course = None;
         if matches!(self.activity, Activity::Starting) {
             self.node.give_up(now);
@@ -440,7 +440,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
     fn counters(&self) -> Vec<(&'static str, u64)> {
         let mut counters = self.node.counters();
         counters.push(("pdos too short", self.short_pdos));
-        counters.push(("positions not believed", self.image.rejected()));
+        counters.push(("positions not believed", self.image.plausible.rejected()));
         counters.push(("commands repeated", self.repeated_commands));
         if self.settings.latch.is_some() {
             counters.push(("edges latched", self.probe.latched));

@@ -404,7 +404,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     pub(super) fn begin_halt(&mut self, now: Time) {
         self.reached = None;
-        self.image.watch_rest();
+        self.image.plausible.watch_rest();
         self.activity = Activity::Halt(Halt {
             since: now,
             deadline: now + self.settings.timeouts.standing,
@@ -422,7 +422,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let reached = self
             .statusword()
             .is_some_and(|word| word.contains(Statusword::TARGET_REACHED));
-        if fresh && reached && self.image.stands() {
+        if fresh && reached && self.image.plausible.stands() {
             self.finish(Ok(()));
         }
     }

@@ -58,7 +58,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     /// Goes out at once, whatever runs and whatever state the drive is in.
     pub(super) fn begin_quick_stop(&mut self, now: Time) {
-        self.image.watch_rest();
+        self.image.plausible.watch_rest();
         self.begin_power(now, Goal::QuickStop);
         if !self.node.is_in_service() {
             // A node that left operational hears no RPDO, but perhaps SDO.
@@ -84,7 +84,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     pub(super) fn advance_power(&mut self, now: Time) {
-        let standing = self.image.stands();
+        let standing = self.image.plausible.stands();
         self.keep_target_at_axis();
         let (Activity::Power(power), Some(sample)) = (&mut self.activity, self.image.sample())
         else {

@@ -4,10 +4,11 @@ use units::{Coordinate, Time};
 use wire::can::CanFrame;
 use wire::cia402::{OperationMode, PowerState, Statusword};
 
-use super::image::{Judgement, SAMPLE_BYTES, Sample};
+use super::image::{SAMPLE_BYTES, Sample};
 use super::modulo::apart;
 use super::start::POSITION_ACTUAL;
 use super::{Activity, Cia402Drive};
+use crate::device::plausible::Judgement;
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::script::{Script, Step};
 
@@ -106,7 +107,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         };
         let position = i64::from(raw.cast_signed());
         let away = apart(self.settings.modulo(), sample.position.0, position);
-        if away.abs() > self.image.margin() {
+        if away.abs() > self.image.plausible.margin() {
             self.node.give_up(now);
             self.finish(Err(DeviceError::ReadBack {
                 node: self.node.id(),

@@ -16,7 +16,6 @@
 mod tests;
 
 use core::time::Duration;
-use std::collections::VecDeque;
 
 use units::{Celsius, Time, Volts};
 use wire::Input;
@@ -25,7 +24,8 @@ use wire::canopen::Object;
 use wire::canopen::pdo::{MappedObject, Transmission, extract};
 use wire::cia404::{self, PhysicalUnit, SensorType};
 
-use super::canopen_node::{CanopenNode, NodeEvent, NodeSettings};
+use super::analog_node::{AnalogNode, Heard};
+use super::canopen_node::{CanopenNode, NodeSettings};
 use super::{
     Alarm, AnalogInput, AnalogReading, Device, DeviceError, Identity, TemperatureInput,
     TemperatureReading,
@@ -143,6 +143,27 @@ impl Cia404Settings {
         })
     }
 
+    fn configuration(&self) -> Vec<Step> {
+        let node = self.common.node;
+        let transmit = |number| Pdo::new(PdoDirection::Transmit, number).expect("1 to 4");
+        let mut steps: Vec<Step> = (1..=4)
+            .flat_map(|number| transmit(number).disable(node))
+            .collect();
+        for input in &self.inputs {
+            steps.extend(input_steps(*input));
+        }
+        let transmission = Transmission::Synchronous(self.every_syncs);
+        for (number, inputs) in (FIRST_PDO..).zip(self.inputs.chunks(PER_PDO)) {
+            let mapped: Vec<MappedObject> = inputs
+                .iter()
+                .map(|it| MappedObject::new(cia404::PROCESS_VALUE, it.input, 16))
+                .collect();
+            let pdo = transmit(number).configure(node, &mapped, transmission);
+            steps.extend(pdo.expect("four inputs of 16 bits fit"));
+        }
+        steps
+    }
+
     /// Bytes of each PDO that the module sends, and at every how many SYNCs: for the bus load.
     pub fn pdo_bytes(&self) -> Vec<u8> {
         let pdos = self.inputs.chunks(PER_PDO);
@@ -154,18 +175,13 @@ impl Cia404Settings {
 #[derive(Debug)]
 pub struct Cia404Analog {
     settings: Cia404Settings,
-    node: CanopenNode,
-    starting: bool,
+    module: AnalogNode,
     /// The PDOs of the sample under way, as far as they have come.
     parts: Vec<Option<[u8; 8]>>,
     began: Time,
     volts: Option<AnalogReading>,
     temperatures: Option<TemperatureReading>,
-    told_short: bool,
-    short_pdos: u64,
     incomplete_samples: u64,
-    outcome: Option<Result<(), DeviceError>>,
-    alarms: VecDeque<Alarm>,
 }
 
 impl Cia404Analog {
@@ -174,51 +190,21 @@ impl Cia404Analog {
         let mut common = settings.common;
         // Its process data comes so much more seldom than SYNC.
         common.sync_period *= u32::from(settings.every_syncs);
+        let node = CanopenNode::new(common, cia404::PROFILE).living_by(FIRST_PDO);
         Self {
-            node: CanopenNode::new(common, cia404::PROFILE).living_by(FIRST_PDO),
-            starting: false,
+            module: AnalogNode::new(node),
             parts: vec![None; settings.inputs.len().div_ceil(PER_PDO)],
             settings,
             began: Time::ZERO,
             volts: None,
             temperatures: None,
-            told_short: false,
-            short_pdos: 0,
             incomplete_samples: 0,
-            outcome: None,
-            alarms: VecDeque::new(),
         }
     }
 
     /// The settings it was made with.
     pub const fn settings(&self) -> &Cia404Settings {
         &self.settings
-    }
-
-    fn configuration(&self) -> Vec<Step> {
-        let node = self.settings.common.node;
-        let transmit = |number| Pdo::new(PdoDirection::Transmit, number).expect("1 to 4");
-        let mut steps: Vec<Step> = (1..=4)
-            .flat_map(|number| transmit(number).disable(node))
-            .collect();
-        for input in &self.settings.inputs {
-            steps.extend(input_steps(*input));
-        }
-        let transmission = Transmission::Synchronous(self.settings.every_syncs);
-        for (number, inputs) in (FIRST_PDO..).zip(self.settings.inputs.chunks(PER_PDO)) {
-            let mapped: Vec<MappedObject> = inputs
-                .iter()
-                .map(|it| MappedObject::new(cia404::PROCESS_VALUE, it.input, 16))
-                .collect();
-            let pdo = transmit(number).configure(node, &mapped, transmission);
-            steps.extend(pdo.expect("four inputs of 16 bits fit"));
-        }
-        steps
-    }
-
-    fn finish(&mut self, result: Result<(), DeviceError>) {
-        self.starting = false;
-        self.outcome = Some(result);
     }
 
     fn forget(&mut self) {
@@ -228,45 +214,31 @@ impl Cia404Analog {
     }
 
     fn pump(&mut self, now: Time) {
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Described(_) => {
-                    let steps = self.configuration();
-                    self.node.configure(now, steps);
-                }
-                NodeEvent::Operational | NodeEvent::ScriptDone(_) => {}
-                NodeEvent::Failed(error) => self.finish(Err(error)),
-                NodeEvent::Alarm(alarm) => {
-                    if let Alarm::UnexpectedBootUp { .. } = alarm {
-                        self.forget();
-                    }
-                    self.alarms.push_back(alarm);
-                }
-                NodeEvent::Pdo { number, frame } => {
+        while let Some(heard) = self.module.hear(now, || self.settings.configuration()) {
+            match heard {
+                Heard::Pdo { number, frame } => {
                     let part = number.checked_sub(FIRST_PDO).map(usize::from);
                     if let Some(part) = part.filter(|part| *part < self.parts.len()) {
                         self.take_part(now, part, frame.data());
                     }
                 }
-                NodeEvent::PdoSilent { waited } => {
-                    self.alarms.push_back(Alarm::StaleSample { waited });
-                }
+                Heard::Reset => self.forget(),
             }
         }
     }
 
     fn take_part(&mut self, now: Time, part: usize, payload: &[u8]) {
-        let begins = self.starting && self.node.is_operational();
-        if !(begins || self.node.is_up()) {
+        let (begins, is_up) = (self.module.awaits_its_first(), self.module.node.is_up());
+        if !(begins || is_up) {
             return;
         }
         let left = self.settings.inputs.len() - part * PER_PDO;
         let expected = left.min(PER_PDO) * 2;
-        if payload.len() < expected {
-            self.note_short(expected, payload.len());
+        // Before the start is over nobody is told of a short one.
+        let is_silent = !is_up && payload.len() < expected;
+        if is_silent || !self.module.is_whole(expected, payload.len()) {
             return;
         }
-        self.told_short = false;
         // The parts of one sample follow each other; an older one that stayed alone is lost.
         let old = now.since(self.began) >= self.patience();
         if self.parts.iter().any(Option::is_some) && (old || self.parts[part].is_some()) {
@@ -287,20 +259,6 @@ impl Cia404Analog {
     /// Parts of one sample come within half the time to the next one.
     fn patience(&self) -> Duration {
         self.settings.common.sync_period * u32::from(self.settings.every_syncs) / 2
-    }
-
-    fn note_short(&mut self, expected: usize, seen: usize) {
-        if !self.node.is_up() {
-            return;
-        }
-        self.short_pdos += 1;
-        if !core::mem::replace(&mut self.told_short, true) {
-            self.alarms.push_back(Alarm::PdoTooShort {
-                node: self.node.id(),
-                expected,
-                seen,
-            });
-        }
     }
 
     /// Into the memory of the sample before: in a cyclic loop nothing is asked for.
@@ -341,9 +299,8 @@ impl Cia404Analog {
         self.parts.fill(None);
         self.volts = (!volts.volts.is_empty()).then_some(volts);
         self.temperatures = (!temperatures.celsius.is_empty()).then_some(temperatures);
-        if !self.node.is_up() {
-            self.node.up(now);
-            self.finish(Ok(()));
+        if !self.module.node.is_up() {
+            self.module.up(now);
         }
     }
 
@@ -381,47 +338,42 @@ fn input_steps(settings: InputSettings) -> Vec<Step> {
 
 impl Device for Cia404Analog {
     fn handle(&mut self, now: Time, input: &Input) {
-        self.node.handle(now, input);
+        self.module.node.handle(now, input);
         self.pump(now);
     }
 
     fn handle_timeout(&mut self, now: Time) {
-        self.node.handle_timeout(now);
+        self.module.node.handle_timeout(now);
         self.pump(now);
     }
 
     fn poll_timeout(&self) -> Time {
-        self.node.poll_timeout()
+        self.module.node.poll_timeout()
     }
 
     fn poll_transmit(&mut self) -> Option<Payload> {
-        self.node.poll_transmit().map(Payload::Frame)
+        self.module.node.poll_transmit().map(Payload::Frame)
     }
 
     fn poll_alarm(&mut self) -> Option<Alarm> {
-        self.alarms.pop_front()
+        self.module.alarms.pop_front()
     }
 
     fn start(&mut self, now: Time) {
-        self.outcome = None;
         self.forget();
-        self.told_short = false;
-        self.alarms.clear();
-        self.starting = true;
-        self.node.start(now, Vec::new());
+        self.module.start(now);
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
-        self.outcome.take()
+        self.module.outcome.take()
     }
 
     fn identity(&self) -> Option<Identity> {
-        self.node.identity().cloned()
+        self.module.node.identity().cloned()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {
-        let mut counters = self.node.counters();
-        counters.push(("pdos too short", self.short_pdos));
+        let mut counters = self.module.counters();
         counters.push(("samples incomplete", self.incomplete_samples));
         counters
     }

@@ -173,8 +173,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         self.started_at = Some(now);
         let patience = Some(self.settings.timeouts.homing);
         self.enter_homing(Phase::Running, patience, now);
-        self.image.allow_jumps(true);
-        self.image.watch_rest();
+        self.image.plausible.allow_jumps(true);
+        self.image.plausible.watch_rest();
         self.look_anew(now);
     }
 
@@ -223,7 +223,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             return;
         };
         // Beside a switch it comes to rest at its zero, too; in between it may still settle.
-        if at.0.abs() > self.settings.tolerance_counts() && (here || !self.image.stands()) {
+        if at.0.abs() > self.settings.tolerance_counts() && (here || !self.image.plausible.stands())
+        {
             return;
         }
         self.origin = position;

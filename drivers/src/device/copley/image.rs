@@ -6,21 +6,10 @@ use std::collections::VecDeque;
 use units::{Counts, Time};
 use wire::copley::{EventStatus, Parameter, TrajectoryStatus};
 
-/// An axis stands when so many looks in a row lie within the tolerance.
-const STANDING_LOOKS: u8 = 3;
+use crate::device::plausible::{Judgement, Plausible};
 
-/// What a position is worth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Judgement {
-    Believed,
-    /// Too far from where the axis can be: not taken.
-    Doubted,
-    /// Doubted twice running: the position did jump. Taken, but to be told.
-    Jumped {
-        by: Counts,
-        limit: Counts,
-    },
-}
+/// An amplifier samples when it is asked, not when its answer arrives.
+const SAMPLED_EARLIER: Duration = Duration::from_millis(20);
 
 /// Positions in counts of the amplifier.
 #[derive(Debug)]
@@ -29,33 +18,17 @@ pub(super) struct Image {
     pub(super) trajectory: TrajectoryStatus,
     position: Option<(Time, Counts)>,
     pub(super) following_error: Option<Counts>,
-    speed_max: f64,
-    margin: i64,
-    tolerance: i64,
-    rest: Counts,
-    standing: u8,
-    doubted: bool,
-    /// While homing the coordinates may change.
-    jumps_allowed: bool,
-    rejected: u64,
+    pub(super) plausible: Plausible,
 }
 
 impl Image {
-    /// `speed_max` in counts per second, `margin` and `tolerance` in counts.
-    pub(super) const fn new(speed_max: f64, margin: i64, tolerance: i64) -> Self {
+    pub(super) const fn new(plausible: Plausible) -> Self {
         Self {
             events: EventStatus::empty(),
             trajectory: TrajectoryStatus::empty(),
             position: None,
             following_error: None,
-            speed_max,
-            margin,
-            tolerance,
-            rest: Counts(0),
-            standing: 0,
-            doubted: false,
-            jumps_allowed: false,
-            rejected: 0,
+            plausible,
         }
     }
 
@@ -63,67 +36,21 @@ impl Image {
         self.position
     }
 
-    pub(super) const fn rejected(&self) -> u64 {
-        self.rejected
-    }
-
-    /// Whether the last looks lie together.
-    pub(super) const fn stands(&self) -> bool {
-        self.standing >= STANDING_LOOKS
-    }
-
-    pub(super) const fn watch_rest(&mut self) {
-        self.standing = 0;
-    }
-
-    pub(super) const fn allow_jumps(&mut self, allowed: bool) {
-        self.jumps_allowed = allowed;
-        self.doubted = false;
-    }
-
     /// Nothing before compares with what comes.
     pub(super) const fn forget_position(&mut self) {
         self.position = None;
         self.following_error = None;
-        self.doubted = false;
-        self.standing = 0;
+        self.plausible.forget();
     }
 
     pub(super) fn take_position(&mut self, at: Time, position: Counts) -> Judgement {
-        let judgement = self.judge(at, position);
-        if judgement == Judgement::Doubted {
-            self.rejected += 1;
-            self.doubted = true;
-            return judgement;
+        let old = self.position;
+        let old = old.map(|(before, old)| (old, at.since(before) + SAMPLED_EARLIER));
+        let judgement = self.plausible.take(position, old);
+        if judgement != Judgement::Doubted {
+            self.position = Some((at, position));
         }
-        self.doubted = false;
-        if (position - self.rest).0.abs() <= self.tolerance {
-            self.standing = self.standing.saturating_add(1);
-        } else {
-            self.rest = position;
-            self.standing = 0;
-        }
-        self.position = Some((at, position));
         judgement
-    }
-
-    fn judge(&self, at: Time, position: Counts) -> Judgement {
-        let Some((before, old)) = self.position.filter(|_| !self.jumps_allowed) else {
-            return Judgement::Believed;
-        };
-        // An amplifier samples when it is asked, not when its answer arrives.
-        const SAMPLED_EARLIER: Duration = Duration::from_millis(20);
-        let apart = at.since(before) + SAMPLED_EARLIER;
-        let limit = (self.speed_max * 1.2 * apart.as_secs_f64()) as i64 + self.margin;
-        let by = position - old;
-        if by.0.abs() <= limit {
-            Judgement::Believed
-        } else if self.doubted {
-            let limit = Counts(limit);
-            Judgement::Jumped { by, limit }
-        } else {
-            Judgement::Doubted
-        }
     }
 }
 

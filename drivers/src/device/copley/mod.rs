@@ -46,6 +46,7 @@ use wire::{Input, LinkState};
 
 pub use settings::{CopleySettings, CopleyTimeouts};
 
+use super::plausible::Plausible;
 use super::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DeviceName, DriveCommand, Identity,
     LineUse, Seen, ServoDrive,
@@ -127,11 +128,11 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     /// An amplifier that is not started.
     pub fn new(settings: CopleySettings<Q>) -> Self {
         let count = settings.scale.resolution().abs().value();
-        let image = Image::new(
+        let image = Image::new(Plausible::new(
             settings.speed_max.value() / count,
             (settings.jump_margin.value() / count) as i64,
             settings.tolerance_counts(),
-        );
+        ));
         Self {
             link: Link::new(settings.address, settings.baud, settings.timeouts),
             purpose: Purpose::Nothing,
@@ -171,7 +172,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
 
     fn finish(&mut self, result: Result<(), DeviceError>) {
         self.activity = Activity::Idle;
-        self.image.allow_jumps(false);
+        self.image.plausible.allow_jumps(false);
         self.script = Script::nothing();
         if self.purpose == Purpose::Step {
             self.purpose = Purpose::Nothing;
@@ -237,7 +238,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             self.link.close();
             self.look.active = false;
         }
-        self.image.allow_jumps(false);
+        self.image.plausible.allow_jumps(false);
         self.activity = Activity::Idle;
     }
 
@@ -376,7 +377,7 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
             ("damaged lines", counts.damaged),
             ("commands sent again", counts.resent),
             ("searches for the amplifier", counts.searches),
-            ("positions not believed", self.image.rejected()),
+            ("positions not believed", self.image.plausible.rejected()),
         ]
     }
 }
@@ -485,7 +486,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 .following_error
                 .map(|counts| scale.to_coordinate(counts)),
             standing: !moving,
-            at_rest: self.image.stands(),
+            at_rest: self.image.plausible.stands(),
         })
     }
 }

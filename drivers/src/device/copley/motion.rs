@@ -285,7 +285,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     }
 
     pub(super) fn begin_halt(&mut self, now: Time) {
-        self.image.watch_rest();
+        self.image.plausible.watch_rest();
         self.activity = Activity::Halt(Halt {
             since: now,
             deadline: now + self.settings.timeouts.standing,
@@ -301,7 +301,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     pub(super) fn advance_halt(&mut self) {
         let sent = self.script.steps.is_empty();
         let in_motion = self.image.events.contains(EventStatus::IN_MOTION);
-        if sent && (!in_motion || self.image.stands()) {
+        if sent && (!in_motion || self.image.plausible.stands()) {
             self.finish(Ok(()));
         }
     }

@@ -101,7 +101,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     /// As soon as the exchange under way has ended, whoever's it is.
     pub(super) fn begin_quick_stop(&mut self, now: Time) {
         self.kept = false;
-        self.image.watch_rest();
+        self.image.plausible.watch_rest();
         let deadline = now + self.settings.timeouts.standing;
         self.enter_power(Phase::Stopping, now, deadline);
         let steps = vec![Step::abort("the quick stop")];
@@ -223,7 +223,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             }
             Phase::AwaitingRest => {
                 let off = events.contains(EventStatus::OUTPUTS_OFF);
-                let rests = !events.contains(EventStatus::IN_MOTION) || self.image.stands();
+                let rests =
+                    !events.contains(EventStatus::IN_MOTION) || self.image.plausible.stands();
                 if off || rests {
                     self.disable(now, deadline, Urgency::Stop);
                 }

@@ -4,9 +4,9 @@ use core::time::Duration;
 use units::{Coordinate, Counts, Time};
 use wire::copley::{Bank, Command, EventStatus, Faults, Parameter, Reply, TrajectoryStatus};
 
-use super::image::Judgement;
 use super::start::Starting;
 use super::{Activity, CopleyAxis, Purpose};
+use crate::device::plausible::Judgement;
 use crate::device::{Alarm, AmplifierTrouble, Urgency};
 
 /// How often the amplifier is asked how long it has been on.

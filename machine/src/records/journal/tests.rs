@@ -54,16 +54,11 @@ fn header() -> JournalHeader {
     JournalHeader {
         schema_version: SCHEMA_VERSION,
         verb: "calibrate".into(),
-        machine: "m".into(),
-        stage_serial: "A".into(),
         config_hash: "h".into(),
         axis: "x".into(),
-        drive: IdentityRecord::default(),
-        instrument: InstrumentRecord::default(),
         started: "2026-01-01T00:00:00Z".into(),
-        calibration: None,
-        targets_m: vec![0.0, 0.003],
         runs: 3,
+        ..JournalHeader::default()
     }
 }
 
