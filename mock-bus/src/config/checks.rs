@@ -2,9 +2,6 @@
 
 use super::error::positive;
 use super::{ConfigError, MachineConfig, PortConfig};
-use crate::plant::config::PlantConfig;
-use crate::plant::platform::config::PlatformConfig;
-use crate::plant::volumetric::config::VolumetricConfig;
 
 impl MachineConfig {
     pub(super) fn check_numbers(&self) -> Result<(), ConfigError> {
@@ -50,87 +47,9 @@ impl MachineConfig {
                 positive("bitrate_kbit_per_s", f64::from(can.bitrate_kbit_per_s))?;
             }
         }
-        if let Some(platform) = &self.plant.platform {
-            check_platform(platform)?;
-            positive("field_mm", self.plant.camera.field_mm)?;
-        }
-        let plant = &self.plant;
-        if let Some(table) = &plant.table {
-            for (key, seen) in table.positive_numbers() {
-                positive(key, seen)?;
-            }
-        }
-        if let Some(volumetric) = &plant.volumetric {
-            check_volumetric(volumetric)?;
-        }
-        one_machine(plant)?;
+        self.plant.check()?;
         self.nodes
             .iter()
-            .try_for_each(|node| node.device.check(plant))
+            .try_for_each(|node| node.device.check(&self.plant))
     }
-}
-
-/// A machine is one thing or the other.
-fn one_machine(plant: &PlantConfig) -> Result<(), ConfigError> {
-    let others = [
-        plant.platform.is_some(),
-        plant.table.is_some(),
-        plant.volumetric.is_some(),
-    ];
-    let others = others.into_iter().filter(|there| *there).count();
-    if others <= 1 {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key: "platform and table and volumetric",
-        seen: others as f64,
-        expected: "at most one of them",
-    })
-}
-
-fn check_platform(platform: &PlatformConfig) -> Result<(), ConfigError> {
-    let screw = &platform.screw;
-    for (key, seen) in [
-        ("lead_mm", screw.lead_mm),
-        ("resolution_nm", screw.resolution_nm),
-        ("work_range_mm", screw.work_range_mm),
-        ("servo_bandwidth_hz", screw.servo_bandwidth_hz),
-        ("acceleration_max_m_per_s2", screw.acceleration_max_m_per_s2),
-        (
-            "friction_deceleration_m_per_s2",
-            screw.friction_deceleration_m_per_s2,
-        ),
-        (
-            "hard_stop_mm - work_range_mm",
-            screw.hard_stop_mm - screw.work_range_mm,
-        ),
-        (
-            "hard_stop_mm - start_mm",
-            screw.hard_stop_mm - screw.start_mm,
-        ),
-    ] {
-        positive(key, seen)?;
-    }
-    if platform.holds_the_platform() {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key: "actuators",
-        seen: platform.actuators.len() as f64,
-        expected: "three or four screws that hold x, y and angle",
-    })
-}
-
-fn check_volumetric(volumetric: &VolumetricConfig) -> Result<(), ConfigError> {
-    for (key, seen) in volumetric.positive_numbers() {
-        positive(key, seen)?;
-    }
-    if volumetric.is_a_chain() {
-        return Ok(());
-    }
-    Err(ConfigError::Value {
-        key: "chain and roll.axis",
-        seen: volumetric.roll.axis as f64,
-        expected: "F, X, Y and Z once each, and an axis from 0 to 2",
-    })
 }

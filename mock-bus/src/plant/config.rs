@@ -13,6 +13,7 @@ use super::camera::CameraConfig;
 use super::platform::config::PlatformConfig;
 use super::table::config::TableConfig;
 use super::volumetric::config::VolumetricConfig;
+use crate::config::error::{ConfigError, positive};
 
 /// The physics of one machine.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -44,5 +45,35 @@ impl PlantConfig {
             (None, Some(volumetric)) => volumetric.resolution_nm,
             (None, None) => self.stage.encoder.resolution_nm,
         }
+    }
+
+    /// What makes no machine: numbers that no kind has, and more than one kind.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        if let Some(platform) = &self.platform {
+            platform.check()?;
+            positive("field_mm", self.camera.field_mm)?;
+        }
+        self.table.as_ref().map_or(Ok(()), TableConfig::check)?;
+        let volumetric = self.volumetric.as_ref();
+        volumetric.map_or(Ok(()), VolumetricConfig::check)?;
+        self.is_one_machine()
+    }
+
+    /// A machine is one thing or the other.
+    fn is_one_machine(&self) -> Result<(), ConfigError> {
+        let others = [
+            self.platform.is_some(),
+            self.table.is_some(),
+            self.volumetric.is_some(),
+        ];
+        let others = others.into_iter().filter(|there| *there).count();
+        if others <= 1 {
+            return Ok(());
+        }
+        Err(ConfigError::Value {
+            key: "platform and table and volumetric",
+            seen: others as f64,
+            expected: "at most one of them",
+        })
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use crate::config::error::{ConfigError, positive};
 use crate::plant::config::{LimitConfig, MotionConfig};
 
 /// A platform on three or four screws.
@@ -12,6 +13,42 @@ pub struct PlatformConfig {
     pub actuators: Vec<ActuatorConfig>,
     /// How the screws are made.
     pub screw: ScrewConfig,
+}
+
+impl PlatformConfig {
+    /// What makes no platform.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let screw = &self.screw;
+        for (key, seen) in [
+            ("lead_mm", screw.lead_mm),
+            ("resolution_nm", screw.resolution_nm),
+            ("work_range_mm", screw.work_range_mm),
+            ("servo_bandwidth_hz", screw.servo_bandwidth_hz),
+            ("acceleration_max_m_per_s2", screw.acceleration_max_m_per_s2),
+            (
+                "friction_deceleration_m_per_s2",
+                screw.friction_deceleration_m_per_s2,
+            ),
+            (
+                "hard_stop_mm - work_range_mm",
+                screw.hard_stop_mm - screw.work_range_mm,
+            ),
+            (
+                "hard_stop_mm - start_mm",
+                screw.hard_stop_mm - screw.start_mm,
+            ),
+        ] {
+            positive(key, seen)?;
+        }
+        if self.holds_the_platform() {
+            return Ok(());
+        }
+        Err(ConfigError::Value {
+            key: "actuators",
+            seen: self.actuators.len() as f64,
+            expected: "three or four screws that hold x, y and angle",
+        })
+    }
 }
 
 /// Where one screw acts on the platform.

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use crate::config::error::{ConfigError, positive};
 use crate::plant::parts::servo::Dynamics;
 
 const ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
@@ -198,8 +199,14 @@ impl Default for DetectorConfig {
 }
 
 impl TableConfig {
+    /// What makes no table.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let mut numbers = self.positive_numbers().into_iter();
+        numbers.try_for_each(|(key, seen)| positive(key, seen))
+    }
+
     /// What must be more than 0 for the rest to make sense.
-    pub(crate) fn positive_numbers(&self) -> [(&'static str, f64); 6] {
+    fn positive_numbers(&self) -> [(&'static str, f64); 6] {
         let (motion, plate) = (&self.motion, &self.plate);
         let spacing_arcsec = 1_296_000.0 / f64::from(plate.lines);
         [

@@ -3,6 +3,7 @@
 
 use serde::Deserialize;
 
+use crate::config::error::{ConfigError, positive};
 use crate::plant::config::{LimitConfig, MotionConfig};
 
 /// Three linear axes, their errors, what warms them, and what watches them.
@@ -378,6 +379,21 @@ impl Default for LaserConfig {
 }
 
 impl VolumetricConfig {
+    /// What makes no three axes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        for (key, seen) in self.positive_numbers() {
+            positive(key, seen)?;
+        }
+        if self.is_a_chain() {
+            return Ok(());
+        }
+        Err(ConfigError::Value {
+            key: "chain and roll.axis",
+            seen: self.roll.axis as f64,
+            expected: "F, X, Y and Z once each, and an axis from 0 to 2",
+        })
+    }
+
     /// Whether the chain names the foot and each axis once.
     pub(crate) fn is_a_chain(&self) -> bool {
         let mut letters: Vec<char> = self.chain.chars().collect();
@@ -386,7 +402,7 @@ impl VolumetricConfig {
     }
 
     /// What must be more than 0 for the rest to make sense.
-    pub(crate) fn positive_numbers(&self) -> Vec<(&'static str, f64)> {
+    fn positive_numbers(&self) -> Vec<(&'static str, f64)> {
         let (slide, heat, beams) = (&self.slide, &self.heat, &self.beams);
         let mut numbers = vec![
             ("resolution_nm", self.resolution_nm),
