@@ -158,6 +158,23 @@ pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, Le
     })
 }
 
+/// By row, orthonormal columns that span those of `design` (rows of `columns` entries each, which are
+/// independent): what the coefficients can explain of observations.
+pub(crate) fn orthonormal_columns(design: &[f64], columns: usize) -> Vec<Vec<f64>> {
+    let rows = design.len() / columns.max(1);
+    let mut matrix = DMatrix::from_row_slice(rows, columns, design);
+    for mut column in matrix.column_iter_mut() {
+        let length = column.norm();
+        if length > 0.0 {
+            column.unscale_mut(length);
+        }
+    }
+    let q = matrix.qr().q();
+    q.row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect()
+}
+
 fn check(design: &[f64], columns: usize, observed: &[f64]) -> Result<(), LeastSquaresError> {
     let rows = observed.len();
     if columns == 0 || rows < columns {

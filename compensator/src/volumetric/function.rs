@@ -156,6 +156,8 @@ pub struct Function<Q> {
     shape: Shape,
     /// Standard uncertainties over the nodes, as straight lines.
     uncertainty: Option<Pieces>,
+    /// By piece: how far it may be from its curve in the middle, as a standard uncertainty.
+    between: Vec<f64>,
     quantity: PhantomData<Q>,
 }
 
@@ -171,6 +173,7 @@ impl<Q: Quantity> Function<Q> {
             pieces: Pieces::new(&nodes, &values, shape)?,
             shape,
             uncertainty: None,
+            between: Vec::new(),
             quantity: PhantomData,
         })
     }
@@ -197,6 +200,31 @@ impl<Q: Quantity> Function<Q> {
         Ok(self)
     }
 
+    /// With how far the true function may be from this one in the middle between two nodes, one standard
+    /// uncertainty for each interval: 4t(1 − t) of it at the share t of the interval.
+    ///
+    /// # Errors
+    /// When there is another number of them than of intervals, or one is negative or not finite.
+    pub fn with_between(mut self, uncertainties: &[Q]) -> Result<Self, FunctionError> {
+        let values: Vec<f64> = uncertainties.iter().map(|it| it.value()).collect();
+        let (seen, nodes) = (values.len(), self.pieces.segments.len());
+        if seen != nodes {
+            return Err(FunctionError::Lengths { seen, nodes });
+        }
+        let sound = |u: &f64| u.is_finite() && *u >= 0.0;
+        if let Some(index) = values.iter().position(|u| !sound(u)) {
+            return Err(FunctionError::NotFinite { index });
+        }
+        self.between = values;
+        Ok(self)
+    }
+
+    /// What [`with_between`](Self::with_between) said; `None` when it said nothing.
+    pub fn between(&self) -> Option<Vec<Q>> {
+        let known = !self.between.is_empty();
+        known.then(|| self.between.iter().copied().map(Q::from_value).collect())
+    }
+
     /// Its value at `position`; the end nodes' values beyond them. NaN for NaN.
     #[inline]
     pub fn at(&self, position: Metres) -> Q {
@@ -206,10 +234,19 @@ impl<Q: Quantity> Function<Q> {
         Q::from_value(self.pieces.at(position.value()))
     }
 
-    /// Its standard uncertainty there; `None` when the nodes have none.
+    /// Its standard uncertainty there, that between the nodes included; `None` when the nodes have none.
     pub fn standard_uncertainty(&self, position: Metres) -> Option<Q> {
         let pieces = self.uncertainty.as_ref()?;
-        Some(Q::from_value(pieces.at(position.value())))
+        let at_nodes = pieces.at(position.value());
+        let (inside, at) = self.pieces.finder.find(position.value());
+        let between = self.between.get(at).map_or(0.0, |middle| {
+            let piece = &self.pieces.segments[at];
+            let t = ((inside - piece.start) / piece.width).clamp(0.0, 1.0);
+            middle * 4.0 * t * (1.0 - t)
+        });
+        Some(Q::from_value(
+            (at_nodes * at_nodes + between * between).sqrt(),
+        ))
     }
 
     /// Where its nodes are.

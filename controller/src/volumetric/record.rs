@@ -69,6 +69,10 @@ pub struct FunctionRecord {
     pub values_si: Vec<f64>,
     /// Their standard uncertainties, where known.
     pub standard_uncertainties_si: Option<Vec<f64>>,
+    /// For the middle of each interval, the standard uncertainty of how far the error is from the curve
+    /// there; `None` in files of earlier programs, and where that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub between_standard_uncertainties_si: Option<Vec<f64>>,
 }
 
 impl FunctionRecord {
@@ -85,6 +89,9 @@ impl FunctionRecord {
             values_si: nodes.iter().map(|it| function.at(*it).value()).collect(),
             positions_m: nodes.iter().map(|it| it.value()).collect(),
             standard_uncertainties_si: u,
+            between_standard_uncertainties_si: function
+                .between()
+                .map(|all| all.into_iter().map(Quantity::value).collect()),
         }
     }
 
@@ -100,6 +107,11 @@ impl FunctionRecord {
         let function = Function::new(&nodes, &quantities(&self.values_si), shape);
         let function = function.and_then(|it| match &self.standard_uncertainties_si {
             Some(u) => it.with_uncertainties(&quantities(u)),
+            None => Ok(it),
+        });
+        let between = self.between_standard_uncertainties_si.as_ref();
+        let function = function.and_then(|it| match between {
+            Some(u) => it.with_between(&quantities(u)),
             None => Ok(it),
         });
         function.map_err(|source| StoreError::Part {

@@ -1,58 +1,19 @@
 //! From readings to the rows of a linear problem.
 
-use nalgebra::{DMatrix, SymmetricEigen};
 use units::Metres;
 
+use super::between::Between;
+use super::block::{Block, axis_of, block};
 use super::effect::{Effect, lever, seen, u_of};
 use super::thermal::ThermalPlan;
-use super::{Axis, FunctionPlan, IdentifyError, Observation, Plan, Reading, Unknown};
+use super::{Axis, IdentifyError, Observation, Plan, Reading, Unknown};
+use crate::least_squares;
 use crate::volumetric::Point;
-use crate::volumetric::function::{Pieces, Shape};
 use crate::volumetric::model::{ErrorName, Squareness};
 use crate::volumetric::point::cross;
 
 /// A target that rounding puts this far beyond the last node is at it.
 const AT_THE_END_M: f64 = 1e-9;
-
-/// One function's nodes and how its parameters make their values.
-#[derive(Clone, Debug)]
-pub(super) struct Block {
-    pub(super) name: ErrorName,
-    pub(super) nodes: Vec<f64>,
-    /// What a value of 1 at one node alone makes of all places, by node.
-    influences: Vec<Pieces>,
-    /// nodes × parameters; its columns keep the conventions.
-    pub(super) basis: DMatrix<f64>,
-    /// The first of its parameters.
-    pub(super) first: usize,
-}
-
-impl Block {
-    /// The value at `position` per parameter.
-    pub(super) fn row(&self, position: f64) -> Vec<f64> {
-        let values: Vec<f64> = self.influences.iter().map(|it| it.at(position)).collect();
-        let column = |column: usize| {
-            let shares = self.basis.column(column).into_iter().zip(&values);
-            shares.map(|(share, value)| share * value).sum()
-        };
-        (0..self.basis.ncols()).map(column).collect()
-    }
-}
-
-/// What a value of 1 at each node alone makes of all places. Monotone cubics are not the sum of
-/// what their nodes make: straight lines stand for them.
-fn influences(nodes: &[f64], shape: Shape) -> Vec<Pieces> {
-    let shape = match shape {
-        Shape::Linear | Shape::MonotoneCubic => Shape::Linear,
-        Shape::Spline => Shape::Spline,
-    };
-    let of = |node: usize| {
-        let mut values = vec![0.0; nodes.len()];
-        values[node] = 1.0;
-        Pieces::new(nodes, &values, shape).expect("the nodes were checked")
-    };
-    (0..nodes.len()).map(of).collect()
-}
 
 /// The weighted problem.
 #[derive(Clone, Debug)]
@@ -63,6 +24,11 @@ pub(super) struct Design {
     /// Rows divided by their reading's standard uncertainty.
     pub(super) rows: Vec<f64>,
     pub(super) values: Vec<f64>,
+    /// By reading: its standard uncertainty, in its SI unit, with how far the functions may be from their
+    /// curves where it was read.
+    pub(super) u: Vec<f64>,
+    /// How far that is.
+    pub(super) between: Between,
 }
 
 impl Design {
@@ -77,6 +43,8 @@ impl Design {
             unknowns,
             rows: Vec::new(),
             values: Vec::new(),
+            u: Vec::new(),
+            between: Between::default(),
         };
         let mut starts: Vec<Option<Point>> = vec![None; plan.runs.len()];
         for (index, observation) in observations.iter().enumerate() {
@@ -162,6 +130,77 @@ impl Design {
         self.rows
             .extend(errors.iter().copied().chain(open).map(|it| it / u));
         self.values.push(value / u);
+        self.u.push(u);
+    }
+
+    /// Weighted with what the functions do between their nodes, which is told by a first fit; `wrong`:
+    /// columns of what is grossly wrong in the readings, which is no part of that.
+    pub(super) fn with_between(
+        mut self,
+        plan: &Plan,
+        observations: &[Observation],
+        wrong: &[Vec<f64>],
+    ) -> Result<Self, IdentifyError> {
+        let columns = self.columns();
+        let rows = self.rows.chunks_exact(columns).enumerate();
+        let rows: Vec<f64> = rows
+            .flat_map(|(at, row)| {
+                row.iter()
+                    .copied()
+                    .chain(wrong.iter().map(move |it| it[at]))
+            })
+            .collect();
+        let fit = least_squares::solve(&rows, columns + wrong.len(), &self.values)?;
+        self.between = Between::of(&self.blocks, &fit, plan.shape);
+        for (at, it) in observations.iter().enumerate() {
+            let square = between_square(
+                plan,
+                &self.blocks,
+                &self.between,
+                it.at,
+                it.tool,
+                |effect| seen(it.reading, effect),
+            );
+            let u = u_of(it.reading);
+            let whole = (u * u + square).sqrt();
+            let share = self.u[at] / whole;
+            self.u[at] = whole;
+            self.values[at] *= share;
+            let row = &mut self.rows[at * columns..(at + 1) * columns];
+            row.iter_mut().for_each(|it| *it *= share);
+        }
+        Ok(self)
+    }
+}
+
+/// The square of what functions may be from their curves at a place, as `seen` sees it.
+pub(super) fn between_square(
+    plan: &Plan,
+    blocks: &[Block],
+    between: &Between,
+    at: Point,
+    tool: Point,
+    seen: impl Fn(&Effect) -> f64,
+) -> f64 {
+    let each = blocks.iter().enumerate().map(|(number, block)| {
+        let position = at.along(axis_of(block.name)).value();
+        let effect = effect_of(plan, block.name, at, tool);
+        let u = seen(&effect) * between.at(number, block, position);
+        u * u
+    });
+    each.sum()
+}
+
+/// What one unit of an error function does to the tool.
+fn effect_of(plan: &Plan, name: ErrorName, at: Point, tool: Point) -> Effect {
+    let unit = |axis: Axis| core::array::from_fn(|k| f64::from(u8::from(k == axis.index())));
+    match name {
+        ErrorName::Along(_, direction) => Effect::displaced(unit(direction)),
+        ErrorName::About(axis, direction) => {
+            let turn = unit(direction);
+            let moved = cross(turn, lever(plan, axis, at, tool));
+            Effect { turn, moved }
+        }
     }
 }
 
@@ -175,17 +214,9 @@ pub(super) fn error_row(
     above: &[f64],
     seen: impl Fn(&Effect) -> f64,
 ) -> Vec<f64> {
-    let unit = |axis: Axis| core::array::from_fn(|k| f64::from(u8::from(k == axis.index())));
     let mut row = Vec::new();
     for block in blocks {
-        let effect = match block.name {
-            ErrorName::Along(_, direction) => Effect::displaced(unit(direction)),
-            ErrorName::About(axis, direction) => {
-                let turn = unit(direction);
-                let moved = cross(turn, lever(plan, axis, at, tool));
-                Effect { turn, moved }
-            }
-        };
+        let effect = effect_of(plan, block.name, at, tool);
         let factor = seen(&effect);
         let position = at.along(axis_of(block.name)).value();
         row.extend(block.row(position).into_iter().map(|it| it * factor));
@@ -202,12 +233,6 @@ pub(super) fn error_row(
     let warmth = ThermalPlan::effects(plan, at, above, |axis| lever(plan, axis, at, tool));
     row.extend(warmth.iter().map(&seen));
     row
-}
-
-fn axis_of(name: ErrorName) -> Axis {
-    match name {
-        ErrorName::Along(axis, _) | ErrorName::About(axis, _) => axis,
-    }
 }
 
 fn columns(plan: &Plan) -> Result<(Vec<Block>, Vec<Unknown>), IdentifyError> {
@@ -239,56 +264,4 @@ fn columns(plan: &Plan) -> Result<(Vec<Block>, Vec<Unknown>), IdentifyError> {
     angles.dedup();
     unknowns.extend(angles.into_iter().map(Unknown::Angle));
     Ok((blocks, unknowns))
-}
-
-fn block(plan: &Plan, function: &FunctionPlan, first: usize) -> Result<Block, IdentifyError> {
-    let name = function.name;
-    let nodes: Vec<f64> = function.nodes.iter().map(|it| it.value()).collect();
-    let is_straightness = matches!(name, ErrorName::Along(axis, along) if axis != along);
-    let least = if is_straightness { 3 } else { 2 };
-    let ordered = nodes.windows(2).all(|it| it[0] < it[1]);
-    let finite = nodes.iter().all(|it| it.is_finite());
-    if nodes.len() < least || !ordered || !finite {
-        return Err(IdentifyError::Nodes { name, least });
-    }
-    let count = nodes.len();
-    let influences = influences(&nodes, plan.shape);
-    let conditions = if is_straightness {
-        let middle = (nodes[0] + nodes[count - 1]) / 2.0;
-        let span = nodes[count - 1] - nodes[0];
-        DMatrix::from_fn(2, count, |row, at| {
-            if row == 0 {
-                1.0
-            } else {
-                (nodes[at] - middle) / span
-            }
-        })
-    } else {
-        let zero = plan.zero.along(axis_of(name));
-        if zero.value() < nodes[0] || zero.value() > nodes[count - 1] {
-            return Err(IdentifyError::Zero { name, zero });
-        }
-        DMatrix::from_fn(1, count, |_, at| influences[at].at(zero.value()))
-    };
-    Ok(Block {
-        name,
-        basis: kernel(&conditions),
-        influences,
-        nodes,
-        first,
-    })
-}
-
-/// Orthonormal columns that span all values for which the conditions (independent rows) hold.
-fn kernel(conditions: &DMatrix<f64>) -> DMatrix<f64> {
-    let (rows, count) = conditions.shape();
-    let gram = conditions * conditions.transpose();
-    let inverse = gram.try_inverse().expect("the conditions are independent");
-    let onto = DMatrix::identity(count, count) - conditions.transpose() * inverse * conditions;
-    let eigen = SymmetricEigen::new(onto);
-    let mut order: Vec<usize> = (0..count).collect();
-    // Eigenvalues are 0 for the conditions and 1 for the rest.
-    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    order.truncate(count - rows);
-    eigen.eigenvectors.select_columns(&order)
 }

@@ -1,7 +1,7 @@
 //! How errors of the thermometers change the errors found.
 
 use super::design::{Design, error_row};
-use super::effect::{seen, u_of};
+use super::effect::seen;
 use super::{Observation, Plan};
 use crate::least_squares::Fit;
 
@@ -34,7 +34,7 @@ pub(super) fn add_heat(
                 let off: f64 = terms.map(|(a, b)| a * b).sum();
                 let row = &design.rows[index * all..(index + 1) * all];
                 for (sum, part) in pull.iter_mut().zip(row) {
-                    *sum += part * off / u_of(it.reading);
+                    *sum += part * off / design.u[index];
                 }
             }
             let moved: Vec<f64> = (0..count)

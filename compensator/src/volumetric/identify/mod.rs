@@ -32,16 +32,21 @@
 //! Readings that scatter more than their stated uncertainties are reported
 //! ([`Identified::scattered`]), with those that fit least.
 //!
-//! Absent: leaving out outliers, hysteresis, laser tracker lengths from unknown stations, the instrument's own
+//! Gross errors are looked for by [`Plan::snoop`], and named by reading and run; none is left out.
+//!
+//! Absent: hysteresis, laser tracker lengths from unknown stations, the instrument's own
 //! temperature and air (correct the readings first: [`crate::length_correction`]), temperatures
 //! that change within a run.
 
+mod between;
+mod block;
 mod design;
 mod diagonals;
 mod effect;
 mod heat;
 mod observe;
 mod scatter;
+mod snoop;
 mod solve;
 mod standard;
 mod straightness;
@@ -54,6 +59,7 @@ use units::{Metres, Quantity, Radians};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
 pub use scatter::{Conspicuous, SCATTER_RATIO_MAX, Scattered, scatter_limit};
+pub use snoop::{GROSS_FALSE_ALARMS, Gross, GrossKind, Rival, Snooped};
 pub use solve::{Identified, IdentifiedFunction};
 pub use standard::{Optics, Purpose, StandardDesign, StandardLine, standard_design};
 pub use straightness::{ReferenceLine, Straightness, straightness};
@@ -367,12 +373,41 @@ impl Plan {
         if !unseen.is_complete() {
             return Err(IdentifyError::Unobservable { unseen });
         }
+        let design = design.with_between(self, observations, &[])?;
         solve::solve(self, &design, observations)
+    }
+
+    /// Looks for gross errors in `observations`, from which all that is planned can be identified.
+    ///
+    /// # Errors
+    /// When plan and observations do not fit each other.
+    pub fn snoop(&self, observations: &[Observation]) -> Result<Snooped, IdentifyError> {
+        let design = design::Design::new(self, observations)?;
+        let first = snoop::snoop(&design, observations, GROSS_FALSE_ALARMS);
+        if first.found.is_empty() {
+            return Ok(first);
+        }
+        // Judged as if no function left its curve, which what is wrong would make it seem to do: then
+        // with what remains of that without it.
+        let wrong: Vec<Vec<f64>> = first
+            .found
+            .iter()
+            .map(|it| design.column_of(it, observations))
+            .collect();
+        let design = design.with_between(self, observations, &wrong)?;
+        Ok(snoop::snoop(&design, observations, GROSS_FALSE_ALARMS))
     }
 }
 
 #[cfg(test)]
+mod between_tests;
+#[cfg(test)]
+mod rig;
+
+#[cfg(test)]
 mod scatter_tests;
+#[cfg(test)]
+mod snoop_tests;
 #[cfg(test)]
 mod standard_tests;
 #[cfg(test)]

@@ -13,11 +13,10 @@
 //! | w = v / √r | [`Conspicuous::times`] |
 //! | ∇ = v / r | [`Conspicuous::off`] |
 //!
-//! Absent: leaving readings out, and tests for more than one gross error: a reading that is named
-//! is where to look first.
+//! Absent: gross errors one by one, and slips, which [`Plan::snoop`](super::Plan::snoop) tells: a reading
+//! that is named here is where to look first.
 
 use super::Observation;
-use super::effect::u_of;
 use super::solve::Identified;
 use crate::uncertainty::reduced_chi_square_limit;
 
@@ -33,7 +32,7 @@ const CONSPICUOUS: f64 = 3.3;
 /// With less of itself left in its residual a reading is not judged by it.
 const REDUNDANCY_MIN: f64 = 1e-6;
 
-/// Readings that scatter beyond the limit.
+/// How much readings scatter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scattered {
     /// Their scatter in units of what was stated.
@@ -71,13 +70,17 @@ impl Identified {
     /// What is wrong with `observations`, which this was found from, where they scatter too much;
     /// `None` when they do not, or when none is spare.
     pub fn scattered(&self, observations: &[Observation]) -> Option<Scattered> {
-        let ratio = self.birge_ratio?;
-        let limit = scatter_limit(self.degrees_of_freedom);
+        let seen = self.scatter(observations)?;
         // A comparison with NaN is false, so that it is refused too.
-        let is_sound = ratio <= limit;
-        (!is_sound).then(|| Scattered {
-            ratio,
-            limit,
+        let is_sound = seen.ratio <= seen.limit;
+        (!is_sound).then_some(seen)
+    }
+
+    /// How much `observations`, which this was found from, scatter; `None` when none is spare.
+    pub fn scatter(&self, observations: &[Observation]) -> Option<Scattered> {
+        Some(Scattered {
+            ratio: self.birge_ratio?,
+            limit: scatter_limit(self.degrees_of_freedom),
             degrees_of_freedom: self.degrees_of_freedom,
             worst: self.worst(observations),
         })
@@ -85,16 +88,16 @@ impl Identified {
 
     /// By run, what fits least.
     fn worst(&self, observations: &[Observation]) -> Vec<Conspicuous> {
-        let each = observations.iter().zip(&self.residuals);
+        let each = observations.iter().zip(&self.u).zip(&self.residuals);
         let each = each.zip(&self.redundancies).enumerate();
         let judged = each.filter(|(_, (_, redundancy))| **redundancy > REDUNDANCY_MIN);
         let mut worst: Vec<Conspicuous> = Vec::new();
-        for (index, ((observation, residual), redundancy)) in judged {
+        for (index, (((observation, u), residual), redundancy)) in judged {
             let seen = Conspicuous {
                 index,
                 run: observation.run,
                 times: residual / redundancy.sqrt(),
-                off: residual / redundancy * u_of(observation.reading),
+                off: residual / redundancy * u,
             };
             match worst.iter_mut().find(|it| it.run == seen.run) {
                 Some(it) if it.times.abs() < seen.times.abs() => *it = seen,

@@ -2,7 +2,9 @@
 
 use units::{Celsius, Metres, Radians};
 
-use super::design::{Block, Design, error_row};
+use super::between::Between;
+use super::block::Block;
+use super::design::{Design, between_square, error_row};
 use super::heat::add_heat;
 use super::thermal::{IdentifiedBend, IdentifiedExpansion};
 use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
@@ -21,16 +23,23 @@ pub struct IdentifiedFunction {
     pub values: Vec<f64>,
     /// Their standard uncertainties.
     pub u: Vec<f64>,
+    /// For the middle of each interval between nodes, the standard uncertainty of how far the error is
+    /// from its curve there.
+    pub u_between: Vec<f64>,
 }
 
 /// Errors found, with what is known of their uncertainty.
 ///
-/// Standard uncertainties are propagated from those of the readings, enlarged by the scatter of
+/// Standard uncertainties are propagated from those of the readings, with what the functions do between
+/// their nodes where they were read there ([`IdentifiedFunction::u_between`]), enlarged by the scatter of
 /// the readings about the model where that is larger than stated (Birge's ratio).
 #[derive(Clone, Debug)]
 pub struct Identified {
     plan: Plan,
     blocks: Vec<Block>,
+    between: Between,
+    /// By reading: its standard uncertainty with how far the functions may be from their curves there.
+    pub(super) u: Vec<f64>,
     /// The functions, in the order of the plan.
     pub functions: Vec<IdentifiedFunction>,
     /// The squarenesses; zero where not planned.
@@ -97,7 +106,11 @@ impl Identified {
                 effect.moved[axis.index()]
             });
             let variance = crate::uncertainty::propagate(&row, &self.covariance);
-            Metres(variance.max(0.0).sqrt())
+            let (blocks, between) = (&self.blocks, &self.between);
+            let square = between_square(&self.plan, blocks, between, at, tool, |effect| {
+                effect.moved[axis.index()]
+            });
+            Metres((variance.max(0.0) + square).sqrt())
         });
         Some(Point::new(u[0], u[1], u[2]))
     }
@@ -109,7 +122,10 @@ fn function<Q: Quantity>(
     unit: fn(f64) -> Q,
 ) -> Result<Function<Q>, FunctionError> {
     let of = |values: &[f64]| -> Vec<Q> { values.iter().copied().map(unit).collect() };
-    Function::new(&it.nodes, &of(&it.values), shape)?.with_uncertainties(&of(&it.u))
+    let function = Function::new(&it.nodes, &of(&it.values), shape)?;
+    function
+        .with_uncertainties(&of(&it.u))?
+        .with_between(&of(&it.u_between))
 }
 
 pub(super) fn solve(
@@ -127,7 +143,7 @@ pub(super) fn solve(
         .map(|at| fit.cofactor[at / count * all + at % count] * enlarged * enlarged)
         .collect();
     add_heat(plan, design, observations, &fit, &mut covariance);
-    let found = design.blocks.iter().map(|block| {
+    let found = design.blocks.iter().enumerate().map(|(number, block)| {
         let mut gradient = vec![0.0; count];
         let (mut values, mut u) = (Vec::new(), Vec::new());
         for node in 0..block.nodes.len() {
@@ -147,6 +163,7 @@ pub(super) fn solve(
             nodes: block.nodes.iter().copied().map(Metres).collect(),
             values,
             u,
+            u_between: design.between.of_block(number, block),
         }
     });
     let known = |column: usize| {
@@ -159,6 +176,8 @@ pub(super) fn solve(
         plan: plan.clone(),
         functions: found.collect(),
         blocks: design.blocks.clone(),
+        between: design.between.clone(),
+        u: design.u.clone(),
         squareness: squareness(plan, &|at| known(functions + at)),
         expansions,
         bends,

@@ -1,5 +1,6 @@
 use units::MetresPerSecond;
 
+use super::rig::as_drawn;
 use super::*;
 use crate::error_table::Limits;
 use crate::volumetric::Volume;
@@ -253,9 +254,7 @@ fn uncertainties_say_how_far_off_the_errors_found_are() {
         let mut chance = Chance(100 + seed);
         let truth = model(machine("XFYZ", &mut chance));
         let (runs, observations) = everywhere(&truth, &mut chance, 0.1);
-        let found = plan("XFYZ", &all_names(), 4, runs)
-            .identify(&observations)
-            .unwrap();
+        let found = as_drawn(&plan("XFYZ", &all_names(), 4, runs), &observations);
         let birge = found.birge_ratio.unwrap();
         assert!((0.85..1.15).contains(&birge), "{birge}");
         let mut own = truth.machine().clone();

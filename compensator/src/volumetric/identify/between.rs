@@ -1,0 +1,247 @@
+//! How far an error function may be from the curve through its nodes, between them.
+//!
+//! Source: the mean-square error of a linear predictor of a random function (C. E. Rasmussen, C. K. I.
+//! Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and 5). What nobody read is judged
+//! by how the values at the nodes differ from polynomials that the curve reproduces. These contrasts are
+//! compared with random functions of covariance a²·exp(−d²/2ℓ²): for each length ℓ on a grid, from the
+//! distance of the nodes to more than the travel, and each size a. All functions of one axis share their
+//! length, each has a size of its own; both are weighted by their likelihood, the noise of the nodes
+//! included, and averaged in logarithms.
+//!
+//! | symbol | name here |
+//! |---|---|
+//! | a²·(1 − 2wᵀk + wᵀKw): the mean-square error in the middle of an interval, w the node's weights | [`Between::at_middles`] |
+//! | 4t(1 − t) of it elsewhere | [`share`] |
+//!
+//! Absent: functions of two nodes, of which nothing can be said; what repeats within a step, such as the
+//! pitch of a screw or of a scale that is as long as a whole number of steps.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use units::portable::{exp, ln};
+
+use super::Axis;
+use super::block::{Block, axis_of, kernel};
+use crate::least_squares::Fit;
+use crate::volumetric::function::Shape;
+
+/// Lengths that are tried, the longest in units of the travel.
+const LENGTHS: usize = 9;
+const LONGEST: f64 = 1.5;
+/// Sizes that are tried, in units of the contrasts' rms.
+const SIZES: usize = 36;
+const SMALLEST: f64 = 1e-2;
+const LARGEST: f64 = 1e5;
+/// What rounding leaves of a mean-square error.
+const ROUNDING: f64 = 1e-16;
+
+/// By block, for the middle of each interval between its nodes, the standard deviation of the function
+/// from its curve, in its SI unit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Between {
+    pub(super) at_middles: Vec<Vec<f64>>,
+}
+
+/// The share of what there is in the middle of an interval, at `t` of it from 0 to 1.
+fn share(t: f64) -> f64 {
+    4.0 * t * (1.0 - t)
+}
+
+impl Between {
+    /// By the values of the functions in `fit`; `shape`: how they are drawn.
+    pub(super) fn of(blocks: &[Block], fit: &Fit, shape: Shape) -> Self {
+        let mut at_middles: Vec<Vec<f64>> = blocks
+            .iter()
+            .map(|it| vec![0.0; it.nodes.len().saturating_sub(1)])
+            .collect();
+        for axis in Axis::ALL {
+            let own: Vec<usize> = (0..blocks.len())
+                .filter(|at| axis_of(blocks[*at].name) == axis)
+                .collect();
+            let judged: Vec<(usize, Judged)> = own
+                .into_iter()
+                .filter_map(|at| Some((at, Judged::new(&blocks[at], fit, shape)?)))
+                .collect();
+            for (at, middles) in of_axis(&judged) {
+                at_middles[at] = middles;
+            }
+        }
+        Self { at_middles }
+    }
+
+    /// For the middles of the intervals of the block of this number.
+    pub(super) fn of_block(&self, number: usize, block: &Block) -> Vec<f64> {
+        let none = || vec![0.0; block.nodes.len().saturating_sub(1)];
+        self.at_middles.get(number).cloned().unwrap_or_else(none)
+    }
+
+    /// At a position, of the block of this number.
+    pub(super) fn at(&self, number: usize, block: &Block, position: f64) -> f64 {
+        let nodes = &block.nodes;
+        let after = nodes.partition_point(|it| *it <= position);
+        let at = after.clamp(1, nodes.len() - 1) - 1;
+        let t = (position - nodes[at]) / (nodes[at + 1] - nodes[at]);
+        let middles = self.at_middles.get(number);
+        middles.map_or(0.0, |it| it[at] * share(t.clamp(0.0, 1.0)))
+    }
+}
+
+/// All lengths, weighted by what all functions of the axis say of them.
+fn of_axis(judged: &[(usize, Judged)]) -> Vec<(usize, Vec<f64>)> {
+    let step = judged
+        .iter()
+        .map(|it| it.1.step)
+        .fold(f64::INFINITY, f64::min);
+    let span = judged.iter().map(|it| it.1.span).fold(0.0, f64::max);
+    let longest = (LONGEST * span).max(2.0 * step);
+    let lengths = logarithmic(step, longest, LENGTHS);
+    let each: Vec<Vec<(f64, Vec<f64>)>> = lengths
+        .iter()
+        .map(|length| judged.iter().map(|it| it.1.by_length(*length)).collect())
+        .collect();
+    let likelihoods: Vec<f64> = each
+        .iter()
+        .map(|all| all.iter().map(|it| it.0).sum())
+        .collect();
+    let weights = normalised(&likelihoods);
+    let mean = |number: usize| {
+        let intervals = each[0][number].1.len();
+        let log = |at: usize| {
+            let terms = each.iter().zip(&weights);
+            terms
+                .map(|(all, weight)| weight * all[number].1[at])
+                .sum::<f64>()
+        };
+        (0..intervals).map(|at| exp(0.5 * log(at))).collect()
+    };
+    let numbered = judged.iter().enumerate();
+    numbered
+        .map(|(number, (at, _))| (*at, mean(number)))
+        .collect()
+}
+
+/// One function, made ready to be compared with random ones.
+struct Judged {
+    nodes: Vec<f64>,
+    /// Contrasts × nodes.
+    contrasts: DMatrix<f64>,
+    /// What they are of the function.
+    values: DVector<f64>,
+    /// L⁻¹ of their noise's covariance LLᵀ.
+    whitening: DMatrix<f64>,
+    /// The middles of the intervals, with each node's weight there.
+    middles: Vec<(f64, DVector<f64>)>,
+    step: f64,
+    span: f64,
+}
+
+impl Judged {
+    fn new(block: &Block, fit: &Fit, shape: Shape) -> Option<Self> {
+        let nodes = block.nodes.clone();
+        let count = nodes.len();
+        let reproduced = if shape == Shape::Spline { 3 } else { 1 };
+        let degree = reproduced.min(count.checked_sub(3)?);
+        let contrasts = contrasts(&nodes, degree);
+        let (width, all) = (block.basis.ncols(), fit.coefficients.len());
+        let own = DVector::from_fn(width, |at, _| fit.coefficients[block.first + at]);
+        let cofactor = DMatrix::from_fn(width, width, |i, j| {
+            fit.cofactor[(block.first + i) * all + block.first + j]
+        });
+        let of_contrasts = &contrasts * &block.basis;
+        let values = &of_contrasts * own;
+        let noise = &of_contrasts * cofactor * of_contrasts.transpose();
+        let jitter = noise.trace() * 1e-12;
+        let size = noise.nrows();
+        let noise = noise + DMatrix::identity(size, size) * jitter;
+        let whitening = noise.cholesky()?.l().try_inverse()?;
+        let middles = nodes.windows(2).map(|it| {
+            let middle = f64::midpoint(it[0], it[1]);
+            (middle, DVector::from_vec(block.weights(middle)))
+        });
+        Some(Self {
+            middles: middles.collect(),
+            step: nodes
+                .windows(2)
+                .map(|it| it[1] - it[0])
+                .fold(f64::INFINITY, f64::min),
+            span: nodes[count - 1] - nodes[0],
+            nodes,
+            contrasts,
+            values,
+            whitening,
+        })
+    }
+
+    /// The logarithm of the likelihood of this length, and for each interval that of the mean-square
+    /// error.
+    fn by_length(&self, length: f64) -> (f64, Vec<f64>) {
+        let count = self.nodes.len();
+        let alike = |a: f64, b: f64| {
+            let d = (a - b) / length;
+            exp(-0.5 * d * d)
+        };
+        let between = DMatrix::from_fn(count, count, |i, j| alike(self.nodes[i], self.nodes[j]));
+        let turned = &self.whitening * &self.contrasts;
+        let eigen = SymmetricEigen::new(&turned * &between * turned.transpose());
+        let seen = eigen.eigenvectors.transpose() * (&self.whitening * &self.values);
+        let (likelihood, size) = self.sizes(&eigen.eigenvalues, &seen);
+        let of_middle = |(at, weights): &(f64, DVector<f64>)| {
+            let near = DVector::from_fn(count, |i, _| alike(*at, self.nodes[i]));
+            let square = 1.0 - 2.0 * weights.dot(&near) + weights.dot(&(&between * weights));
+            size + ln(square.max(ROUNDING))
+        };
+        (likelihood, self.middles.iter().map(of_middle).collect())
+    }
+
+    /// The logarithms of the likelihood over all sizes, and of the size squared.
+    fn sizes(&self, powers: &DVector<f64>, seen: &DVector<f64>) -> (f64, f64) {
+        let rms = (self.values.norm_squared() / self.values.len() as f64).sqrt();
+        let sizes = logarithmic(SMALLEST, LARGEST, SIZES);
+        let sizes: Vec<f64> = sizes
+            .iter()
+            .map(|it| it * rms.max(f64::MIN_POSITIVE))
+            .collect();
+        let likelihood = |size: &f64| {
+            let each = powers.iter().zip(seen.iter());
+            let terms = each.map(|(power, seen)| {
+                let variance = 1.0 + size * size * power.max(0.0);
+                ln(variance) + seen * seen / variance
+            });
+            -0.5 * terms.sum::<f64>()
+        };
+        let likelihoods: Vec<f64> = sizes.iter().map(likelihood).collect();
+        let most = likelihoods
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mean = likelihoods.iter().map(|it| exp(it - most)).sum::<f64>() / SIZES as f64;
+        let weights = normalised(&likelihoods);
+        let logs = sizes.iter().zip(&weights);
+        let log = logs.map(|(size, weight)| weight * 2.0 * ln(*size)).sum();
+        (most + ln(mean), log)
+    }
+}
+
+/// Orthonormal rows that are zero for polynomials up to this degree.
+fn contrasts(nodes: &[f64], degree: usize) -> DMatrix<f64> {
+    let count = nodes.len();
+    let middle = f64::midpoint(nodes[0], nodes[count - 1]);
+    let half = (nodes[count - 1] - nodes[0]) / 2.0;
+    let powers = DMatrix::from_fn(count, degree + 1, |at, power| {
+        units::portable::powi((nodes[at] - middle) / half, power as i32)
+    });
+    kernel(&powers.transpose()).transpose()
+}
+
+fn logarithmic(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let (from, to) = (ln(low), ln(high));
+    let at = |n: usize| exp(from + (to - from) * n as f64 / (count - 1) as f64);
+    (0..count).map(at).collect()
+}
+
+/// Shares of a whole, by their logarithms.
+fn normalised(logs: &[f64]) -> Vec<f64> {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let each: Vec<f64> = logs.iter().map(|it| exp(it - most)).collect();
+    let sum: f64 = each.iter().sum();
+    each.into_iter().map(|it| it / sum).collect()
+}
