@@ -174,6 +174,14 @@ pub struct LineReadEntry {
     pub at_s: f64,
 }
 
+/// A line contradicts the others: what was read of it does not count, and it is to be read again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineVoidEntry {
+    /// Which line of the plan, from 0.
+    pub line: usize,
+}
+
 /// Which line a verification reads, and by what the machine is corrected meanwhile.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -13,8 +13,8 @@ use compensator::volumetric::model::Chain;
 use crate::volumetric::sound::references as beams;
 use crate::volumetric::{AXES, error_name};
 use crate::volumetric::{
-    LineEntry, LineReadEntry, LineReadingEntry, OpticsName, VolumeCheckEntry, VolumePlanEntry,
-    VolumeReferencesEntry,
+    LineEntry, LineReadEntry, LineReadingEntry, LineVoidEntry, OpticsName, VolumeCheckEntry,
+    VolumePlanEntry, VolumeReferencesEntry,
 };
 
 /// A line of such a journal.
@@ -29,6 +29,8 @@ pub enum VolumeEntry {
     LineReading(LineReadingEntry),
     /// A line was read to its end.
     LineRead(LineReadEntry),
+    /// What was read of a line does not count.
+    LineVoid(LineVoidEntry),
     /// Which line a verification of three axes reads: the second line of such a run.
     VolumeCheck(VolumeCheckEntry),
 }
@@ -59,6 +61,7 @@ impl Log for VolumeLog {
             VolumeEntry::VolumeReferences(it) => references(self, it),
             VolumeEntry::LineReading(it) => reading(self, it),
             VolumeEntry::LineRead(it) => whole(self, it),
+            VolumeEntry::LineVoid(it) => line(self, it.line),
             VolumeEntry::VolumeCheck(it) => check(self, it),
         }
     }
@@ -69,6 +72,10 @@ impl Log for VolumeLog {
             VolumeEntry::VolumeReferences(it) => self.references = Some(it),
             VolumeEntry::LineReading(it) => self.readings.push(it),
             VolumeEntry::LineRead(it) => self.whole.push(it),
+            VolumeEntry::LineVoid(it) => {
+                self.whole.retain(|read| read.line != it.line);
+                self.readings.retain(|reading| reading.line != it.line);
+            }
             VolumeEntry::VolumeCheck(it) => self.check = Some(it),
         }
     }

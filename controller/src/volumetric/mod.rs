@@ -63,8 +63,8 @@ pub(crate) use config::{
     VolumetricConfig, VolumetricVerifyConfig,
 };
 pub(crate) use entries::{
-    BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, OpticsName,
-    VolumeCheckEntry, VolumePlanEntry, VolumeReferencesEntry,
+    BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, LineVoidEntry,
+    OpticsName, VolumeCheckEntry, VolumePlanEntry, VolumeReferencesEntry,
 };
 pub(crate) use entries::{metres, point};
 pub(crate) use kind::KIND;

@@ -19,12 +19,15 @@ struct Careless {
     /// Which one, counted from 1.
     slips_on: usize,
     asked: usize,
+    /// All lines that were asked for.
+    all: Vec<usize>,
     slip: Option<FaultId>,
 }
 
 impl LineOperator for Careless {
     fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
         self.asked = task.step.0;
+        self.all.push(task.step.0);
         self.emulated.ask_line(task)
     }
 
@@ -48,7 +51,7 @@ impl LineOperator for Careless {
 
 /// Lines along an axis, across it, and a diagonal of the body.
 #[test]
-fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_named() {
+fn a_count_that_slips_is_stored_nowhere_and_its_line_is_named_and_read_again_alone() {
     for slips_on in [2, 17, 20] {
         let mut volume = Volume::zeroed(1, quick, |text| text);
         let store = volume.bench.store.clone();
@@ -56,6 +59,7 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
             emulated: volume.bench.emulated.clone(),
             slips_on,
             asked: 0,
+            all: Vec::new(),
             slip: None,
         };
         let machine = &mut volume.bench.machine;
@@ -76,7 +80,12 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
         assert!(scattered, "line {slips_on}: {text}");
         assert_eq!(failure.exit_code(), 5);
         assert!(
-            text.contains(&format!("line {slips_on} ")),
+            text.contains(&format!("line {slips_on} ("))
+                && text.contains(") slipped: from reading"),
+            "{slips_on}: {text}"
+        );
+        assert!(
+            text.contains(&format!("measure line {slips_on} again")),
             "{slips_on}: {text}"
         );
         assert!(store.list().expect("it can be read").is_empty());
@@ -85,7 +94,13 @@ fn a_count_that_slips_while_a_line_is_read_is_stored_nowhere_and_the_line_is_nam
         assert!(known.is_none(), "it is in use");
         let journal = store.newest_run("calibrate", "volume");
         let journal = journal.expect("it can be read").expect("there is one");
-        let journal = read_journal::<VolumeLog>(&journal).unwrap_or_else(|error| panic!("{error}"));
-        assert!(journal.failure.is_some() && !journal.complete);
+        let read = read_journal::<VolumeLog>(&journal).unwrap_or_else(|error| panic!("{error}"));
+        assert!(read.failure.is_some() && !read.complete);
+        let asked = hand.all.len();
+        let mut volumetric = machine.volumetric().unwrap();
+        let made = volumetric.calibrate(&store, WarmUp::None, Some(&journal), &mut hand);
+        let made = made.unwrap_or_else(|failure| panic!("line {slips_on}: {failure}"));
+        assert_eq!(hand.all[asked..], [slips_on]);
+        assert_eq!(made.lines, read.log.plan.expect("it has one").lines.len());
     }
 }

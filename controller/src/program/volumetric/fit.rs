@@ -387,12 +387,17 @@ mod tests {
                 add(line, 1e-3);
             }
         });
-        for path in [jumped, wild] {
+        let named = [
+            (jumped, "slipped: from reading 7 at"),
+            (wild, "reading 4 at"),
+        ];
+        for (path, what) in named {
             let refused = desk.save(path).expect_err("they scatter");
             assert_eq!(refused.exit_code(), 5, "{refused}");
             let text = refused.to_string();
             assert!(text.contains("times as much as their stated"), "{text}");
-            assert!(text.contains(&format!("line {}", DIAGONAL + 1)), "{text}");
+            assert!(text.contains(&format!("line {} (", DIAGONAL + 1)), "{text}");
+            assert!(text.contains(what) && text.contains("expected"), "{text}");
             assert!(desk.store.list().unwrap().is_empty());
         }
         let sound = desk.journal("sound.jsonl", |_, _| ());

@@ -3,8 +3,8 @@
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::Shape;
 use compensator::volumetric::identify::{
-    Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, Observation, Plan, RunSetup,
-    Scattered, SquarenessName, ThermalPlan,
+    Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, IdentifyError, Observation, Plan,
+    RunSetup, Scattered, Snooped, SquarenessName, ThermalPlan,
 };
 use compensator::volumetric::model::{AxisErrors, ErrorName};
 use units::{Celsius, Metres};
@@ -39,7 +39,7 @@ pub struct VolumetricEvaluated {
     pub readings: usize,
     /// The largest standard uncertainty of the tool in use, in the volume.
     pub u_max: Metres,
-    /// By how much the readings scatter, where that is more than they may.
+    /// Readings that are grossly wrong, or scatter more than they may.
     pub scatter: Option<Scatter>,
     drives: Vec<IdentityRecord>,
     /// Errors that move nothing with the tools given: taken as zero.
@@ -60,8 +60,9 @@ impl VolumetricEvaluated {
         let axes = found.axis_errors(shape);
         let axes = axes.map_err(VolumetricFailure::from)?;
         let temperatures = references(read);
-        let scattered = scattered(&plan, &found, &observations);
-        let scatter = scattered.map(|it| Scatter::of(&it, entry, read, &observations));
+        let wrong = contradiction(&plan, &found, &observations).map_err(VolumetricFailure::from)?;
+        let scatter = wrong
+            .map(|(scattered, gross)| Scatter::of(&scattered, &gross, entry, read, &observations));
         Ok(Self {
             scatter,
             u_max: largest_u(entry, &found, &temperatures),
@@ -141,22 +142,29 @@ impl VolumetricEvaluated {
     }
 }
 
-/// What is wrong with readings that scatter too much. Errors that straight lines or monotone cubics
-/// between the nodes cannot draw are no fault of the readings: these are judged by the curve that
-/// bends most, and the errors found are as uncertain as the curve in use leaves them.
-fn scattered(plan: &Plan, found: &Identified, observations: &[Observation]) -> Option<Scattered> {
-    let seen = found.scattered(observations)?;
-    if plan.shape == Shape::Spline {
-        return Some(seen);
+/// What is wrong with readings that contradict each other; `None` where they do not. Errors that straight
+/// lines or monotone cubics between the nodes cannot draw are no fault of the readings: these are judged by
+/// the curve that bends most, and the errors found are as uncertain as the curve in use leaves them.
+fn contradiction(
+    plan: &Plan,
+    found: &Identified,
+    observations: &[Observation],
+) -> Result<Option<(Scattered, Snooped)>, IdentifyError> {
+    if plan.shape != Shape::Spline {
+        let smooth = Plan {
+            shape: Shape::Spline,
+            ..plan.clone()
+        };
+        if let Ok(found) = smooth.identify(observations) {
+            return contradiction(&smooth, &found, observations);
+        }
     }
-    let smooth = Plan {
-        shape: Shape::Spline,
-        ..plan.clone()
+    let Some(scatter) = found.scatter(observations) else {
+        return Ok(None);
     };
-    match smooth.identify(observations) {
-        Ok(smooth) => smooth.scattered(observations),
-        Err(_) => Some(seen),
-    }
+    let snooped = plan.snoop(observations)?;
+    let is_sound = snooped.found.is_empty() && found.scattered(observations).is_none();
+    Ok((!is_sound).then_some((scatter, snooped)))
 }
 
 /// The errors that are not looked for.

@@ -13,11 +13,14 @@
 //! first line that is not whole, as long as its references still hold (`resume`). What is evaluated
 //! is what was written down: the journal alone gives the same errors again.
 //!
-//! A result that cannot be applied, or whose readings scatter much more than was stated of them, is
-//! refused before it is stored (`scatter`).
+//! A result that cannot be applied, whose readings scatter much more than was stated of them (`scatter`),
+//! or of which some are grossly wrong (`gross`) is refused before it is stored. Lines that are named then
+//! count as not read, so that a run that is continued reads them again.
 
 mod evaluate;
+mod gross;
 mod known;
+mod off;
 mod own;
 mod plan;
 mod readings;
@@ -42,7 +45,6 @@ use crate::run::{note_failure, utc_now};
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
-use crate::volumetric::VolumeEntry;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
 use crate::volumetric::reference::References;
@@ -50,6 +52,7 @@ use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
 use crate::volumetric::{GEOMETRY, VolumetricFailure};
+use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
 
@@ -136,7 +139,7 @@ impl WorkVolume<'_> {
             .calibration_session(config, lines, read, &mut journal, operator)
             .and_then(|mut session| {
                 self.read_lines(&mut session, warm_up, &mut journal)?;
-                self.conclude(store, session, &journal)
+                self.conclude(store, session, &mut journal)
             });
         let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
@@ -291,10 +294,13 @@ impl WorkVolume<'_> {
         &mut self,
         store: &Store,
         session: Session<'_>,
-        journal: &Journal<VolumeLog>,
+        journal: &mut Journal<VolumeLog>,
     ) -> Result<VolumetricCalibrated, Failure> {
         let shape = function_shape(session.config.compensation.interpolation);
         let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
+        if let Some(scatter) = &evaluated.scatter {
+            void_lines(&scatter.void(), journal)?;
+        }
         // What cannot be applied must not be stored as what is in use.
         evaluated.check(self.core.config, Some(&session.references.content))?;
         let source = journal.path().file_name().unwrap_or_default();
@@ -321,6 +327,14 @@ impl WorkVolume<'_> {
             journal: journal.path().to_owned(),
         })
     }
+}
+
+/// Has these lines read again when the run is continued.
+fn void_lines(lines: &[usize], journal: &mut Journal<VolumeLog>) -> Result<(), Failure> {
+    for line in lines.iter().copied() {
+        journal.write(&VolumeEntry::LineVoid(LineVoidEntry { line }))?;
+    }
+    Ok(journal.flush_to_disk()?)
 }
 
 impl Session<'_> {

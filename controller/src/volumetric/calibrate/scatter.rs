@@ -1,17 +1,20 @@
-//! Readings that scatter too much, named by the lines that the operator set up.
+//! Readings that contradict each other, named by the lines that the operator set up: by a few that are
+//! grossly wrong, or all together by their scatter.
 
 use core::fmt;
 
 use compensator::volumetric::Point;
-use compensator::volumetric::identify::{Conspicuous, Observation, Reading, Scattered};
-use units::{Metres, Radians};
+use compensator::volumetric::identify::{Observation, Scattered, Snooped, scatter_limit};
+use units::Metres;
 
+use super::gross::GrossReading;
+use super::off::Off;
 use crate::volumetric::{VolumeLog, VolumePlanEntry};
 
-/// Readings that scatter more than they may.
+/// Readings that are grossly wrong, or scatter more than they may.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scatter {
-    /// In units of what was stated of them.
+    /// How much they scatter, in units of what was stated of them.
     pub seen: f64,
     /// What it may be.
     pub limit: f64,
@@ -19,6 +22,12 @@ pub struct Scatter {
     pub spare: usize,
     /// Where to look first, the worst first.
     pub worst: Vec<WorstReading>,
+    /// Those that are grossly wrong.
+    pub gross: Vec<GrossReading>,
+    /// How much the others scatter without them.
+    pub left: f64,
+    /// Whether the run can be continued, with these lines measured again.
+    pub is_run: bool,
 }
 
 /// The reading of a line that fits the others least.
@@ -36,34 +45,20 @@ pub struct WorstReading {
     pub times: f64,
 }
 
-/// What a reading is off by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Off {
-    /// A displacement.
-    Length(Metres),
-    /// A tilt.
-    Angle(Radians),
-}
-
-impl fmt::Display for Off {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Length(it) => write!(f, "{:+.2} um", it.um()),
-            Self::Angle(it) => write!(f, "{:+.2} arcsec", it.arcsec()),
-        }
-    }
-}
-
 impl Scatter {
-    /// What `scattered` says of the lines of `plan`, of which those that are whole were evaluated.
+    /// What `scattered` and `snooped` say of the lines of `plan`, of which those that are whole were
+    /// evaluated; `None` where nothing contradicts.
     pub(super) fn of(
         scattered: &Scattered,
+        snooped: &Snooped,
         plan: &VolumePlanEntry,
         read: &VolumeLog,
         observations: &[Observation],
     ) -> Self {
         let whole = read.whole.iter().map(|it| it.line);
         let whole: Vec<usize> = whole.filter(|it| *it < plan.lines.len()).collect();
+        let gross = snooped.found.iter();
+        let gross = gross.filter_map(|it| GrossReading::of(it, plan, read, observations));
         let worst = scattered.worst.iter().filter_map(|it| {
             let line = *whole.get(it.run)?;
             let purpose = plan.lines.get(line)?.purpose.clone();
@@ -72,7 +67,7 @@ impl Scatter {
                 line: line + 1,
                 purpose,
                 at: observation.at,
-                off: off(observation.reading, it),
+                off: Off::of(observation.reading, it.off),
                 times: it.times.abs(),
             })
         });
@@ -81,19 +76,74 @@ impl Scatter {
             limit: scattered.limit,
             spare: scattered.degrees_of_freedom,
             worst: worst.collect(),
+            gross: gross.collect(),
+            left: snooped.ratio_left.unwrap_or(0.0),
+            is_run: !plan.drives.is_empty(),
         }
     }
-}
 
-fn off(reading: Reading, seen: &Conspicuous) -> Off {
-    match reading {
-        Reading::Length { .. } => Off::Length(Metres(seen.off)),
-        Reading::Angle { .. } => Off::Angle(Radians(seen.off)),
+    /// The lines, from 0, that have to be measured again; none where it is no matter of single lines.
+    pub(super) fn lines(&self) -> Vec<usize> {
+        if !self.is_explained() {
+            return Vec::new();
+        }
+        let mut lines: Vec<usize> = self.gross.iter().flat_map(GrossReading::lines).collect();
+        lines.sort_unstable();
+        lines.dedup();
+        lines.into_iter().map(|it| it - 1).collect()
+    }
+
+    /// Those of them that are read again when the run is continued: what the machine's own detectors read
+    /// counts from the references of the run, and would be the same.
+    pub(super) fn void(&self) -> Vec<usize> {
+        if self.gross.iter().any(|it| it.by_detectors) {
+            return Vec::new();
+        }
+        self.lines()
+    }
+
+    /// Whether what is grossly wrong is all that is.
+    fn is_explained(&self) -> bool {
+        let spare = self.spare.saturating_sub(self.gross.len());
+        !self.gross.is_empty() && self.left <= scatter_limit(spare)
+    }
+
+    fn write_gross(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "readings contradict the others: all together scatter {:.2} times as much as their stated \
+             uncertainties, without these {:.2} times; nothing was stored, what was in use stays in use",
+            self.seen, self.left
+        )?;
+        for it in &self.gross {
+            write!(f, "; {it}")?;
+        }
+        let lines = self.lines().into_iter().map(|it| (it + 1).to_string());
+        let lines = lines.collect::<Vec<_>>().join(" and ");
+        let by_detectors = self.gross.iter().any(|it| it.by_detectors);
+        match (self.is_run, by_detectors) {
+            (true, false) => write!(
+                f,
+                "; remove the cause and measure line {lines} again: `truestage calibrate --resume` with this \
+                 run's journal reads what is named here once more, and keeps all other lines"
+            ),
+            (true, true) => f.write_str(
+                "; the machine's own detectors read one of these lines with their references: look for what has \
+                 shifted or covers the beam, and start a new calibration without --resume",
+            ),
+            (false, _) => write!(
+                f,
+                "; measure line {lines} again and put its readings in place of these"
+            ),
+        }
     }
 }
 
 impl fmt::Display for Scatter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_explained() {
+            return self.write_gross(f);
+        }
         write!(
             f,
             "the readings scatter {:.2} times as much as their stated uncertainties, the limit is \
@@ -122,6 +172,9 @@ impl fmt::Display for Scatter {
 
 #[cfg(test)]
 mod tests {
+    use compensator::volumetric::identify::GrossKind;
+    use units::Radians;
+
     use super::*;
 
     #[test]
@@ -143,6 +196,9 @@ mod tests {
             limit: 2.0,
             spare: 210,
             worst: vec![worst, tilt],
+            gross: Vec::new(),
+            left: 546.0,
+            is_run: true,
         }
         .to_string();
         for part in [
@@ -157,5 +213,65 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
+    }
+
+    fn slipped(line: usize, by_detectors: bool) -> Scatter {
+        let gross = GrossReading {
+            line,
+            purpose: "squarenesses".into(),
+            by_detectors,
+            number: 7,
+            at: Point::from_mm(500.0, 400.0, 300.0),
+            kind: GrossKind::Slip,
+            seen: Off::Length(Metres::from_um(10.0)),
+            off: Off::Length(Metres::from_um(9.5)),
+            times: 61.2,
+            limit: 5.4,
+            rivals: vec![4],
+        };
+        Scatter {
+            seen: 30.0,
+            limit: 2.0,
+            spare: 210,
+            worst: Vec::new(),
+            gross: vec![gross],
+            left: 0.9,
+            is_run: true,
+        }
+    }
+
+    #[test]
+    fn a_line_that_slipped_is_named_with_what_was_expected_and_what_to_do() {
+        let scatter = slipped(17, false);
+        assert_eq!(
+            (scatter.lines(), scatter.void()),
+            (vec![3, 16], vec![3, 16])
+        );
+        let text = scatter.to_string();
+        for part in [
+            "line 17 (squarenesses) slipped: from reading 7 at (500.000, 400.000, 300.000) mm on",
+            "seen +10.00 um, expected +0.50 um, +9.50 um off, 61.2 times",
+            "stay below 5.4",
+            "or line 4 is wrong instead",
+            "measure line 4 and 17 again",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let own = slipped(17, true);
+        assert!(own.void().is_empty());
+        assert!(own.to_string().contains("without --resume"), "{own}");
+    }
+
+    #[test]
+    fn what_single_lines_do_not_explain_voids_none() {
+        let scatter = Scatter {
+            left: 7.0,
+            ..slipped(17, false)
+        };
+        assert!(scatter.void().is_empty());
+        assert!(
+            scatter.to_string().contains("the limit is 2.00 times"),
+            "{scatter}"
+        );
     }
 }
