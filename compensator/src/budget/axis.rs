@@ -127,16 +127,23 @@ impl AxisBudget {
     ///
     /// Between two positions the scatter of both counts by their distance, as for a straight line.
     pub fn at(&self, position: Metres, approach: Approach) -> Option<Combined> {
+        let shares = self.shares(position, approach)?.into_iter();
+        Some(combine_shares(
+            shares.map(|(it, share)| (share, it.degrees_of_freedom)),
+        ))
+    }
+
+    /// What each contribution that concerns `approach` comes to at `position`; `None` beyond the
+    /// calibrated positions.
+    pub fn shares(
+        &self,
+        position: Metres,
+        approach: Approach,
+    ) -> Option<Vec<(&Contribution, Metres)>> {
         let place = self.place(position)?;
-        let own = self
-            .contributions
-            .iter()
-            .filter(|it| it.concerns(approach))
-            .map(|it| {
-                let variance = self.product(it, &place, &place, true);
-                (Metres(variance.sqrt()), it.degrees_of_freedom)
-            });
-        Some(combine_shares(own))
+        let own = self.contributions.iter().filter(|it| it.concerns(approach));
+        let share = |it| (it, Metres(self.product(it, &place, &place, true).sqrt()));
+        Some(own.map(share).collect())
     }
 
     /// The covariance of two places in m², each with its approach; `None` beyond the calibrated

@@ -45,3 +45,4 @@ pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
 pub(crate) use stage::AxisMemory;
 pub(crate) use table_correction::table_correction;
+pub(crate) use verify::UncertaintyAtTarget;

@@ -1,7 +1,8 @@
 //! A move and what became of it: where the drive's encoder stands, and what corrected the move.
 
+use compensator::budget::Combined;
 use compensator::error_table::{Compensation, EndPolicy};
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::failure::Failure;
 use crate::linear::stage::LinearStage;
@@ -43,6 +44,11 @@ pub struct Moved {
     pub encoder: Metres,
     /// What corrected the move.
     pub corrected: Corrected,
+    /// Where the point itself stands by encoder and calibration; `None` without a calibration.
+    pub place: Option<Metres>,
+    /// How uncertain that is; `None` where the calibration says nothing of it: beyond its range, or when
+    /// it has no uncertainty budget.
+    pub uncertainty: Option<Combined>,
 }
 
 impl LinearStage<'_> {
@@ -58,11 +64,18 @@ impl LinearStage<'_> {
         self.core.stand_still(self.axis, STAND)?;
         let reading = self.core.reading(self.axis)?;
         let encoder = reading.expect("an axis that moved has been read").position;
+        let approach = self.core.approach(self.axis)?.approach();
+        let approach = approach.unwrap_or(Approach::Forward);
+        let deviation = self
+            .compensation()
+            .and_then(|table| table.deviation(encoder, approach).ok());
         Ok(Moved {
             target,
             set_point,
             encoder,
             corrected,
+            place: deviation.map(|it| encoder + it),
+            uncertainty: self.uncertainty_at(target, approach),
         })
     }
 }

@@ -3,9 +3,10 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use compensator::budget::Combined;
 use compensator::error_table::ErrorTable;
 use compensator::iso230::{self, Figures};
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::failure::Failure;
 use crate::linear::VerifyConfig;
@@ -42,6 +43,19 @@ pub struct Verified {
     pub measured: Measured,
     /// The tolerance of the configuration.
     pub tolerance: Metres,
+    /// How uncertain the corrected position is at each target; empty for a measurement as found.
+    pub uncertainty: Vec<UncertaintyAtTarget>,
+}
+
+/// How uncertain the corrected position is at a target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncertaintyAtTarget {
+    /// The target.
+    pub target: Metres,
+    /// Approached forward; `None` where the calibration says nothing of it.
+    pub forward: Option<Combined>,
+    /// Likewise in reverse.
+    pub reverse: Option<Combined>,
 }
 
 impl Verified {
@@ -97,12 +111,24 @@ impl LinearStage<'_> {
             journal: journal.path().to_owned(),
             measured,
             tolerance: Metres::from_um(config.accuracy_tolerance_um),
+            uncertainty: match options.compensated {
+                true => plan.targets.iter().map(|it| self.at_target(*it)).collect(),
+                false => Vec::new(),
+            },
         };
         if options.compensated {
             self.judge_benefit(store, &verified, options.calibration.as_deref())
                 .inspect_err(|failure| note_failure(&mut journal, failure))?;
         }
         Ok(verified)
+    }
+
+    fn at_target(&self, target: Metres) -> UncertaintyAtTarget {
+        UncertaintyAtTarget {
+            target,
+            forward: self.uncertainty_at(target, Approach::Forward),
+            reverse: self.uncertainty_at(target, Approach::Reverse),
+        }
     }
 
     /// A calibration that is out of tolerance and makes the axis worse than it was found is

@@ -88,6 +88,7 @@ fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
     let moved = go(&mut bench.machine, 12.345_678_9);
     assert_eq!(moved.corrected, Corrected::No);
     assert_eq!(moved.set_point, moved.target);
+    assert_eq!((moved.place, moved.uncertainty), (None, None));
     let options = CalibrateOptions::default();
     bench
         .machine
@@ -95,10 +96,19 @@ fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
         .unwrap()
         .calibrate(&store, &options)
         .unwrap();
-    assert_eq!(go(&mut bench.machine, 20.0).corrected, Corrected::Within);
+    let moved = go(&mut bench.machine, 20.0);
+    assert_eq!(moved.corrected, Corrected::Within);
+    let off = moved.place.unwrap() - moved.target;
+    assert!(off.abs() < Metres::from_um(0.1), "{} µm", off.um());
+    // Datum, zero, scatter, instrument and one stop are some 60 nm; a seventh of a micrometre would be
+    // more than all of it.
+    let u_nm = moved.uncertainty.unwrap().standard_uncertainty.nm();
+    assert!((30.0..150.0).contains(&u_nm), "{u_nm}");
     let (first, last) = (Metres::ZERO, Metres::from_mm(30.0));
     let moved = go(&mut bench.machine, 45.0);
     assert_eq!(moved.corrected, Corrected::Held { first, last });
+    assert_eq!(moved.uncertainty, None, "nobody measured there");
+    assert!(moved.place.is_some());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use units::{Metres, Short};
 
 use crate::linear::Corrected;
 use crate::linear::moved::Moved;
+use crate::program::linear::uncertainty;
 
 /// For people: where the encoder stands, then what to know about the correction.
 pub(crate) fn text(axis: &str, moved: &Moved, calibration: Option<&str>) -> String {
@@ -16,6 +17,13 @@ pub(crate) fn text(axis: &str, moved: &Moved, calibration: Option<&str>) -> Stri
         moved.target.mm(),
         moved.set_point.mm()
     );
+    if let Some(place) = moved.place {
+        text += &format!(
+            "\naxis {axis}: the point stands at {:.6} mm, {}",
+            place.mm(),
+            uncertainty_of(moved)
+        );
+    }
     if let Some(warning) = warning(moved) {
         text += &format!("\naxis {axis}: {warning}");
     }
@@ -35,11 +43,26 @@ pub(crate) fn value(axis: &str, moved: &Moved, calibration: Option<&str>) -> Val
         "target_mm": moved.target.mm(),
         "set_point_mm": moved.set_point.mm(),
         "encoder_mm": moved.encoder.mm(),
+        "place_mm": moved.place.map(Metres::mm),
+        "uncertainty": uncertainty::combined(moved.uncertainty),
         "calibration": calibration,
         "corrected": corrected,
         "beyond_calibrated_mm": range.map(|(first, last)| [first.mm(), last.mm()]),
         "warning": warning(moved),
     })
+}
+
+/// How uncertain the place of the point is, or why nobody says it.
+fn uncertainty_of(moved: &Moved) -> String {
+    match (&moved.uncertainty, moved.corrected) {
+        (Some(combined), _) => uncertainty::said(combined),
+        (None, Corrected::Held { .. } | Corrected::Fading { .. }) => {
+            "its uncertainty NOT STATED here: beyond the calibrated range".into()
+        }
+        (None, Corrected::Within | Corrected::No) => {
+            format!("its uncertainty {}", uncertainty::NOT_KNOWN)
+        }
+    }
 }
 
 /// What of the move nobody measured.
@@ -61,8 +84,8 @@ fn warning(moved: &Moved) -> Option<String> {
                 .into(),
         ),
         Corrected::Held { first, last } => Some(format!(
-            "{}; the correction at its end was held, and the deviation of the stage here was never \
-             measured; calibrate a wider range, or set end_policy = \"refuse\"",
+            "{}; the correction at its end was held, the deviation of the stage here was never \
+             measured, and no uncertainty is stated; calibrate a wider range, or set end_policy = \"refuse\"",
             beyond(first, last)
         )),
         Corrected::Fading {
@@ -70,8 +93,8 @@ fn warning(moved: &Moved) -> Option<String> {
             last,
             distance,
         } => Some(format!(
-            "{}; the correction at its end fades to zero over {} mm, and the deviation of the \
-             stage here was never measured; calibrate a wider range, or set end_policy = \
+            "{}; the correction at its end fades to zero over {} mm, the deviation of the stage here \
+             was never measured, and no uncertainty is stated; calibrate a wider range, or set end_policy = \
              \"refuse\"",
             beyond(first, last),
             Short(distance.mm())
@@ -81,14 +104,23 @@ fn warning(moved: &Moved) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use compensator::budget::Combined;
+
     use super::*;
 
     fn moved(corrected: Corrected) -> Moved {
+        let is_known = corrected == Corrected::Within;
+        let combined = Combined {
+            standard_uncertainty: Metres::from_um(0.123),
+            degrees_of_freedom: None,
+        };
         Moved {
             target: Metres::from_mm(61.0),
             set_point: Metres::from_mm(60.997_123),
             encoder: Metres::from_mm(60.997_111),
             corrected,
+            place: (corrected != Corrected::No).then_some(Metres::from_mm(60.999_988)),
+            uncertainty: is_known.then_some(combined),
         }
     }
 
@@ -103,16 +135,27 @@ mod tests {
         assert!(text.starts_with(head), "{text}");
         assert_eq!(value["encoder_mm"], moved.encoder.mm());
         assert_eq!(value["corrected"], word);
+        let has_place = corrected != Corrected::No;
+        assert_eq!(
+            text.contains("the point stands at 60.999988 mm"),
+            has_place,
+            "{text}"
+        );
+        assert_eq!(value["place_mm"].is_number(), has_place);
         match said {
             None => {
-                assert_eq!(text.lines().count(), 1, "{text}");
+                assert!(text.ends_with("U = 0.246 µm (k = 2)"), "{text}");
+                assert_eq!(value["uncertainty"]["expanded_um"], 0.246);
                 assert_eq!(value["warning"], Value::Null);
             }
             Some(said) => {
                 assert!(
-                    text.lines().nth(1).is_some_and(|it| it.contains(said)),
+                    text.lines().last().is_some_and(|it| it.contains(said)),
                     "{text}"
                 );
+                assert!(!text.contains("U = "), "{text}");
+                assert_eq!(text.contains("its uncertainty NOT STATED here"), has_place);
+                assert_eq!(value["uncertainty"], Value::Null);
                 assert!(
                     value["warning"]
                         .as_str()
@@ -120,6 +163,19 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_calibration_without_a_budget_states_no_uncertainty_and_says_why() {
+        let moved = Moved {
+            uncertainty: None,
+            ..moved(Corrected::Within)
+        };
+        let text = text("x", &moved, Some(ID));
+        assert!(
+            text.ends_with("has no uncertainty budget; calibrate again"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The page of a linear axis: facts, deviations, figures of ISO 230-2, its table and its zeros.
 
 mod deviations;
+mod uncertainty;
 
 use core::fmt::Write as _;
 
@@ -51,6 +52,8 @@ pub(crate) fn render(page: &Page<'_>) -> String {
     if let Some(calibration) = page.calibration {
         html += "<h2>Calibration</h2>";
         html += &table(calibration);
+        html += "<h3>Uncertainty</h3>";
+        html += &uncertainty::html(calibration);
     }
     if !page.zeros.is_empty() {
         html += "<h2>Zeros</h2>";

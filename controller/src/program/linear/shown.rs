@@ -18,10 +18,7 @@ impl Show for LinearContent {
             .nodes
             .iter()
             .fold(head, |text, node| text + &node_line(node));
-        match &self.budget {
-            Some(budget) => table + &super::uncertainty::lines(self, budget),
-            None => table + "\n" + super::uncertainty::NOT_STATED,
-        }
+        table + &super::uncertainty::lines(self)
     }
 
     fn changes(&self, after: &Self) -> Option<Changes> {

@@ -1,11 +1,11 @@
 //! What is said of an uncertainty budget: the same figures in text, JSON and on the page.
 
-use compensator::budget::{COVERAGE_FACTOR, Contribution};
+use compensator::budget::{COVERAGE_FACTOR, Combined};
 use serde_json::{Value, json};
-use units::{Metres, Short};
+use units::{Approach, Metres, Short};
 
-use crate::linear::LinearContent;
-use crate::linear::record::{BudgetRecord, CombinedRecord, ContributionRecord, PlaceRecord};
+use crate::linear::record::{BudgetRecord, CombinedRecord, ContributionRecord};
+use crate::linear::{LinearContent, UncertaintyAtTarget};
 
 /// Of a calibration that has no budget.
 pub(crate) const NOT_STATED: &str = "u: scatter and instrument alone; the calibration has no uncertainty budget \
@@ -13,75 +13,86 @@ pub(crate) const NOT_STATED: &str = "u: scatter and instrument alone; the calibr
 /// Contributions that are named in one line.
 const NAMED: usize = 4;
 
-/// The place of the largest uncertainty, and what it is there.
-pub(crate) fn largest(budget: &BudgetRecord) -> Option<(Metres, CombinedRecord)> {
-    let each = budget.places.iter().filter_map(|it| Some((it, worst(it)?)));
-    let largest = each.max_by(|a, b| a.1.u_m.total_cmp(&b.1.u_m));
-    largest.map(|(place, combined)| (Metres(place.position_m), combined))
+/// The largest uncertainty of a calibration: where, from which side, and how large.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Largest {
+    pub(crate) position: Metres,
+    pub(crate) approach: Approach,
+    pub(crate) combined: CombinedRecord,
 }
 
-/// Of both approaches the less certain.
-fn worst(place: &PlaceRecord) -> Option<CombinedRecord> {
-    let both = [place.forward, place.reverse].into_iter().flatten();
-    both.max_by(|a, b| a.u_m.total_cmp(&b.u_m))
+/// The least certain of the places that a budget names.
+pub(crate) fn largest(budget: &BudgetRecord) -> Option<Largest> {
+    let sides = budget.places.iter().flat_map(|it| {
+        let position = Metres(it.position_m);
+        [
+            (position, Approach::Forward, it.forward),
+            (position, Approach::Reverse, it.reverse),
+        ]
+    });
+    let known = sides.filter_map(|(position, approach, combined)| {
+        Some(Largest {
+            position,
+            approach,
+            combined: combined?,
+        })
+    });
+    known.max_by(|a, b| a.combined.u_m.total_cmp(&b.combined.u_m))
 }
 
-/// What each contribution comes to so far from the datum, the largest first.
-fn shares(budget: &BudgetRecord, position: Metres) -> Vec<(&ContributionRecord, Metres)> {
-    let lines = budget.contributions.iter();
-    let mut shares: Vec<_> = lines
-        .map(|it| (it, Contribution::from(it).share(position)))
-        .collect();
+/// What each contribution comes to there, the largest first.
+pub(crate) fn shares(content: &LinearContent, at: &Largest) -> Vec<(ContributionRecord, Metres)> {
+    let budget = content.axis_budget("").ok().flatten();
+    let shares = budget.and_then(|it| {
+        let shares = it.shares(at.position, at.approach)?.into_iter();
+        Some(shares.map(|(line, share)| (line.into(), share)).collect())
+    });
+    let mut shares: Vec<(ContributionRecord, Metres)> = shares.unwrap_or_default();
     shares.sort_by(|a, b| b.1.value().total_cmp(&a.1.value()));
     shares
 }
 
 /// In one line: the largest uncertainty, and what makes it.
-pub(crate) fn sentence(budget: &BudgetRecord) -> String {
-    let Some((position, combined)) = largest(budget) else {
-        return String::new();
+pub(crate) fn sentence(content: &LinearContent) -> String {
+    let Some(at) = content.budget.as_ref().and_then(largest) else {
+        return NOT_STATED.to_owned();
     };
-    let named = shares(budget, position)
+    let named = shares(content, &at)
         .into_iter()
         .take(NAMED)
         .map(|(it, share)| format!("{} {:.0} nm", it.name, share.nm()));
     format!(
         "uncertainty U (k = {}) up to {:.3} µm, at {} mm; largest contributions there: {}",
         Short(COVERAGE_FACTOR),
-        Metres(combined.expanded_u_m).um(),
-        Short(position.mm()),
+        Metres(at.combined.expanded_u_m).um(),
+        Short(at.position.mm()),
         named.collect::<Vec<_>>().join(", ")
     )
 }
 
 /// The whole budget, after a table.
-pub(crate) fn lines(content: &LinearContent, budget: &BudgetRecord) -> String {
-    let Some((position, combined)) = largest(budget) else {
-        return String::new();
+pub(crate) fn lines(content: &LinearContent) -> String {
+    let Some(at) = content.budget.as_ref().and_then(largest) else {
+        return format!("\n{NOT_STATED}");
     };
-    let sides = content.approaches().len();
-    let at_mm = Short(position.mm()).to_string();
+    let combined = at.combined;
+    let at_mm = format!("{} mm, {}", Short(at.position.mm()), at.approach.symbol());
     let head = format!(
-        "\nuncertainty budget (GUM), shares at {at_mm} mm\n  {:<38} {:>4} {:>12} {:<9} {:>10} {:>9}  {}",
+        "\nuncertainty budget (GUM), shares at {at_mm}\n  {:<38} {:>4} {:>12} {:<9} {:>10} {:>9}  {}",
         "contribution", "type", "u of input", "", "share (nm)", "freedom", "at two places"
     );
-    let each = shares(budget, position).into_iter().map(|(it, share)| {
+    let each = shares(content, &at).into_iter().map(|(it, share)| {
         let freedom = it
             .degrees_of_freedom
             .map_or("∞".into(), |it| format!("{it:.1}"));
-        let side = match it.approach {
-            Some('-') if sides > 1 => ", reverse",
-            Some(_) if sides > 1 => ", forward",
-            _ => "",
-        };
         format!(
             "\n  {:<38} {:>4} {:>12} {:<9} {:>10.1} {freedom:>9}  {}",
-            format!("{}{side}", it.name),
+            it.name,
             it.evaluation,
             Short(it.value).to_string(),
             it.unit,
             share.nm(),
-            correlation(it)
+            correlation(&it)
         )
     });
     let foot = format!(
@@ -109,11 +120,94 @@ pub(crate) fn correlation(it: &ContributionRecord) -> &'static str {
 
 /// For programs: the budget as it is stored, with its largest uncertainty.
 pub(crate) fn value(budget: &BudgetRecord) -> Value {
-    let largest = largest(budget).map(|(position, combined)| {
+    let largest = largest(budget).map(|it| {
         json!({
-            "position_mm": position.mm(),
-            "expanded_um": Metres(combined.expanded_u_m).um(),
+            "position_mm": it.position.mm(),
+            "approach": it.approach.symbol().to_string(),
+            "expanded_um": Metres(it.combined.expanded_u_m).um(),
         })
     });
     json!({"coverage_factor": budget.coverage_factor, "largest": largest, "contributions": budget.contributions})
+}
+
+/// An uncertainty in words.
+pub(crate) fn said(combined: &Combined) -> String {
+    format!(
+        "U = {:.3} µm (k = {})",
+        combined.expanded().um(),
+        Short(COVERAGE_FACTOR)
+    )
+}
+
+/// The same for programs; `null` where none is stated.
+pub(crate) fn combined(combined: Option<Combined>) -> Value {
+    combined.map_or(Value::Null, |it| {
+        json!({
+            "standard_um": it.standard_uncertainty.um(),
+            "expanded_um": it.expanded().um(),
+            "coverage_factor": COVERAGE_FACTOR,
+            "degrees_of_freedom": it.degrees_of_freedom,
+        })
+    })
+}
+
+/// How uncertain the corrected position is over the targets of a verification; `None` for one as found.
+pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
+    let worst = |it: &UncertaintyAtTarget| {
+        let both = [it.forward, it.reverse].into_iter().flatten();
+        both.max_by(|a, b| {
+            let (a, b) = (a.standard_uncertainty, b.standard_uncertainty);
+            a.value().total_cmp(&b.value())
+        })
+    };
+    let mut known: Vec<(Metres, Combined)> = targets
+        .iter()
+        .filter_map(|it| Some((it.target, worst(it)?)))
+        .collect();
+    known.sort_by(|a, b| {
+        let (a, b) = (a.1.standard_uncertainty, b.1.standard_uncertainty);
+        a.value().total_cmp(&b.value())
+    });
+    let at = |(target, it): &(Metres, Combined)| {
+        format!("{:.3} µm at {} mm", it.expanded().um(), Short(target.mm()))
+    };
+    if targets.is_empty() {
+        return None;
+    }
+    let (Some(least), Some(most)) = (known.first(), known.last()) else {
+        return Some(format!(
+            "uncertainty of the corrected position: {NOT_KNOWN}"
+        ));
+    };
+    let mut text = format!(
+        "uncertainty U (k = {}) of the corrected position: {} to {}",
+        Short(COVERAGE_FACTOR),
+        at(least),
+        at(most)
+    );
+    let beyond = targets.iter().filter(|it| worst(it).is_none());
+    let beyond: Vec<String> = beyond.map(|it| Short(it.target.mm()).to_string()).collect();
+    if !beyond.is_empty() {
+        text += &format!(
+            "; NOT STATED at {} mm, beyond the calibrated range",
+            beyond.join(", ")
+        );
+    }
+    Some(text)
+}
+
+/// Of a place that a calibration without a budget corrects.
+pub(crate) const NOT_KNOWN: &str =
+    "NOT STATED: the calibration in use has no uncertainty budget; calibrate again";
+
+/// For programs: at each target.
+pub(crate) fn targets(targets: &[UncertaintyAtTarget]) -> Value {
+    let each = targets.iter().map(|it| {
+        json!({
+            "target_mm": it.target.mm(),
+            "forward": combined(it.forward),
+            "reverse": combined(it.reverse),
+        })
+    });
+    each.collect()
 }

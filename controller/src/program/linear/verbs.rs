@@ -137,10 +137,8 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         calibrated.journal.display()
     );
     text += &format!("\n  {}", text::noticed(calibrated.noticed));
-    let budget = calibrated.record.content.budget.as_ref();
-    text += &budget.map_or(String::new(), |it| {
-        format!("\n  {}", uncertainty::sentence(it))
-    });
+    let content = &calibrated.record.content;
+    text += &format!("\n  {}", uncertainty::sentence(content));
     for point in &fitted.robust.outliers {
         text += &format!(
             "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
@@ -157,7 +155,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         "closure_um": to_json::um(calibrated.measured.closure),
         "fit": to_json::fitted(fitted),
         "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
-        "uncertainty": budget.map(uncertainty::value),
+        "uncertainty": content.budget.as_ref().map(uncertainty::value),
         "counters": counters,
     });
     output.result(&text, &value)
@@ -187,6 +185,8 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     )?;
     let title = name.replace('_', " ");
     let mut text = text::figures_table(&[(&title, &verified.figures)]);
+    let uncertain = uncertainty::of_targets(&verified.uncertainty);
+    text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
     text += &format!("\npoints in {}", verified.journal.display());
     let within = verified.is_within_tolerance();
     let value = json!({
@@ -194,6 +194,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         name: to_json::figures(&verified.figures),
         "tolerance_um": to_json::um(verified.tolerance),
         "within_tolerance": within,
+        "uncertainty": uncertainty::targets(&verified.uncertainty),
         "counters": counters,
         "journal": verified.journal,
     });

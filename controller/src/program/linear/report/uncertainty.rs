@@ -1,0 +1,148 @@
+//! The uncertainty budget of a linear axis on its page: U over the position, and what makes it.
+
+use core::fmt::Write as _;
+
+use units::{Metres, Short};
+
+use crate::linear::LinearContent;
+use crate::linear::record::{BudgetRecord, CombinedRecord, PlaceRecord};
+use crate::program::linear::uncertainty;
+use crate::program::page::escape;
+use crate::program::page::svg::{Axes, FORWARD, HEIGHT, REVERSE, WIDTH, grid, padded};
+
+/// Less than this share of itself is no variation that a curve could show.
+const VARIES: f64 = 0.01;
+
+/// U over the position where it varies, then each contribution.
+pub(super) fn html(content: &LinearContent) -> String {
+    let Some(budget) = &content.budget else {
+        return format!("<p>{}</p>", escape(uncertainty::NOT_STATED));
+    };
+    let mut html = format!("<p>{}</p>", escape(&uncertainty::sentence(content)));
+    if varies(budget) {
+        html += &format!("<figure>{}</figure>", curve(budget));
+    }
+    html + &table(content)
+}
+
+fn expanded(budget: &BudgetRecord) -> impl Iterator<Item = f64> {
+    let each = budget.places.iter();
+    each.flat_map(|it| [it.forward, it.reverse])
+        .flatten()
+        .map(|it| Metres(it.expanded_u_m).um())
+}
+
+fn varies(budget: &BudgetRecord) -> bool {
+    let least = expanded(budget).fold(f64::INFINITY, f64::min);
+    let most = expanded(budget).fold(0.0, f64::max);
+    most - least > VARIES * most
+}
+
+fn curve(budget: &BudgetRecord) -> String {
+    let axes = Axes {
+        x: padded(
+            budget.places.iter().map(|it| Metres(it.position_m).mm()),
+            0.02,
+        ),
+        y: padded(expanded(budget).chain([0.0]), 0.06),
+    };
+    let mut svg = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">");
+    svg += "<title>Expanded uncertainty of the deviation</title>";
+    svg += &grid(&axes, ("position (mm)", "U, k = 2 (µm)"));
+    svg += &line(&axes, budget, FORWARD, |it| it.forward);
+    svg += &line(&axes, budget, REVERSE, |it| it.reverse);
+    svg + "</svg>"
+}
+
+fn line(
+    axes: &Axes,
+    budget: &BudgetRecord,
+    colour: &str,
+    side: fn(&PlaceRecord) -> Option<CombinedRecord>,
+) -> String {
+    let places = budget.places.iter();
+    let points = places.filter_map(|it| Some((it.position_m, side(it)?.expanded_u_m)));
+    let points = points.fold(String::new(), |mut line, (position_m, u_m)| {
+        let (x, y) = (Metres(position_m).mm(), Metres(u_m).um());
+        let _ = write!(line, "{:.1},{:.1} ", axes.px(x), axes.py(y));
+        line
+    });
+    format!(
+        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>"
+    )
+}
+
+fn table(content: &LinearContent) -> String {
+    let Some(at) = content.budget.as_ref().and_then(uncertainty::largest) else {
+        return String::new();
+    };
+    let mut html = format!(
+        "<table><tr><th>contribution</th><th>type</th><th>u of input</th><th></th>\
+         <th>share at {} mm (nm)</th><th>degrees of freedom</th><th>at two places</th></tr>",
+        Short(at.position.mm())
+    );
+    let freedom = |it: Option<f64>| it.map_or("∞".to_owned(), |it| format!("{it:.1}"));
+    for (it, share) in uncertainty::shares(content, &at) {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td></tr>",
+            escape(&it.name),
+            escape(&it.evaluation.to_string()),
+            Short(it.value),
+            escape(&it.unit),
+            share.nm(),
+            freedom(it.degrees_of_freedom),
+            uncertainty::correlation(&it)
+        );
+    }
+    let _ = write!(
+        html,
+        "<tr><td>combined u</td><td></td><td></td><td></td><td>{:.1}</td><td>{}</td><td></td></tr>",
+        Metres(at.combined.u_m).nm(),
+        freedom(at.combined.degrees_of_freedom)
+    );
+    html + "</table>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOLDEN: &str = include_str!("../../../../golden/linear_budget.json");
+
+    fn golden() -> LinearContent {
+        let record: machine::records::CalibrationRecord<LinearContent> =
+            serde_json::from_str(GOLDEN).expect("a golden file is read");
+        record.content
+    }
+
+    #[test]
+    fn page_and_text_state_the_same_largest_uncertainty_and_contributions() {
+        let content = golden();
+        let (html, text) = (html(&content), uncertainty::lines(&content));
+        assert_eq!(html.matches("<polyline").count(), 2);
+        // 11.5e-6/K · 0.1 K · 58.5 mm, half-way to the last position.
+        for said in ["material temperature", "67.3", "103.3", "common scale"] {
+            assert!(html.contains(said) && text.contains(said), "{said}: {text}");
+        }
+        assert!(html.contains(&uncertainty::sentence(&content)));
+        // What is listed is all: the shares come to the whole.
+        let at = uncertainty::largest(content.budget.as_ref().unwrap()).unwrap();
+        let shares = uncertainty::shares(&content, &at).into_iter();
+        let sum: f64 = shares.map(|(_, it)| it.value() * it.value()).sum();
+        assert!((sum.sqrt() / at.combined.u_m - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_curve_is_drawn_where_the_uncertainty_varies_only() {
+        let mut content = golden();
+        let budget = content.budget.as_mut().unwrap();
+        let first = budget.places[0];
+        for place in &mut budget.places {
+            (place.forward, place.reverse) = (first.forward, first.reverse);
+        }
+        assert!(!html(&content).contains("<svg"));
+        content.budget = None;
+        assert!(html(&content).contains("no uncertainty budget"));
+    }
+}
