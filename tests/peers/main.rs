@@ -1,7 +1,8 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
-//! as our driver's server, python-can as the reader of our recordings.
+//! as our driver's server, python-can as the reader of our recordings; and GTC, which computes uncertainties.
 
 mod analog;
+mod budget;
 mod csp;
 mod drive;
 mod emulated;
