@@ -9,7 +9,7 @@ use core::fmt;
 
 use units::{Metres, Volts};
 
-use super::profile::{profile, slopes};
+use super::profile::{Bin, profile, slopes};
 use super::{Sensor, Settings};
 use crate::hall_zero::HallPoint;
 
@@ -163,13 +163,22 @@ fn constant(points: &[HallPoint], sensor: Sensor, settings: &Settings) -> Option
     })
 }
 
+/// By how much curve 1 rises from one bin to the next as one goes away from the nominal zero, squared so
+/// that the flanks count and the noise does not.
+fn rise_outwards(pair: &[Bin], nominal: Metres) -> f64 {
+    let middle = (pair[0].x + pair[1].x) / 2.0 - nominal.value();
+    let rise = pair[1].peak - pair[0].peak;
+    middle.signum() * rise * rise.abs()
+}
+
 /// Reads swapped and inverted sensors off the curves' shapes.
 fn misshapen(points: &[HallPoint], nominal: Metres, settings: &Settings) -> Option<SensorFault> {
     let travel = travel(points);
     if travel < TRAVEL_MIN {
         return None;
     }
-    let curves: Vec<(f64, f64, f64)> = slopes(&profile(points, BINS))
+    let bins = profile(points, BINS);
+    let curves: Vec<(f64, f64, f64)> = slopes(&bins)
         .map(|(x, peak, slope)| (x - nominal.value(), peak, slope))
         .collect();
     let nearest = extent(curves.iter().map(|c| c.0.abs())).0;
@@ -180,19 +189,19 @@ fn misshapen(points: &[HallPoint], nominal: Metres, settings: &Settings) -> Opti
     let mean =
         |f: fn(&(f64, f64, f64)) -> f64| near.iter().map(|c| f(c)).sum::<f64>() / near.len() as f64;
     let (peak_here, slope_here) = (mean(|c| c.1), mean(|c| c.2));
-    let steepest = curves
-        .iter()
-        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let steepest = extent(curves.iter().map(|c| c.1.abs())).1;
     let slope_steepest = extent(curves.iter().map(|c| c.2.abs())).1;
-    let peak_share = peak_here.abs() / steepest.1.abs();
+    let peak_share = peak_here.abs() / steepest;
     let slope_share = slope_here.abs() / slope_steepest;
     if peak_share > 0.6 && peak_share > 1.4 * slope_share {
         return Some(SensorFault::Swapped);
     }
-    // The steepest part of curve 1 is the flank between the middle magnet and its neighbour;
-    // a rise of less than the noise there is no flank.
-    let rise = steepest.1.abs() * travel / BINS as f64;
-    if slope_share > 0.5 && rise > 5.0 * settings.noise.value() && steepest.0 * steepest.1 > 0.0 {
+    // Curve 1 falls away from its maximum on both flanks, unless it is inverted; a rise of less than the
+    // noise there is no flank. All bins are asked by how much they rise, as a voltage that was taken
+    // elsewhere than its position can make a single slope the steepest.
+    let rise = steepest * travel / BINS as f64;
+    let outwards: f64 = bins.windows(2).map(|w| rise_outwards(w, nominal)).sum();
+    if slope_share > 0.5 && rise > 5.0 * settings.noise.value() && outwards > 0.0 {
         return Some(SensorFault::Inverted {
             sensor: Sensor::Peak,
         });
@@ -201,4 +210,43 @@ fn misshapen(points: &[HallPoint], nominal: Metres, settings: &Settings) -> Opti
     (slope_share > 0.5 && wrong).then_some(SensorFault::Inverted {
         sensor: Sensor::Slope,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hall_zero::rig::Magnets;
+
+    fn point(um: f64, off_mv: f64) -> HallPoint {
+        let [peak, slope] = Magnets::IDEAL.volts(um * 1e-3);
+        HallPoint {
+            position: Metres::from_um(um),
+            peak: Volts(peak + off_mv * 1e-3),
+            slope: Volts(slope),
+        }
+    }
+
+    /// Two voltages at almost the same place, the outer one of which was taken elsewhere: nowhere is the
+    /// curve as steep.
+    #[test]
+    fn a_voltage_from_elsewhere_does_not_make_a_sensor_inverted() {
+        let usual = Settings::default();
+        for border in 2..BINS - 1 {
+            for off_mv in [-30.0, 30.0] {
+                let place = |bin: usize| match bin {
+                    _ if bin + 1 == border => border as f64 * 100.0 - 0.1,
+                    _ if bin == border => border as f64 * 100.0 + 0.1,
+                    _ => bin as f64 * 100.0 + 50.0,
+                };
+                let width = BINS as f64 * 100.0;
+                let um = |at: f64| (at / width - 0.5) * 1200.0;
+                let shift = |bin: usize| if bin == border { off_mv } else { 0.0 };
+                let ends = [point(-600.0, 0.0), point(600.0, 0.0)];
+                let inner = (0..BINS).map(|bin| point(um(place(bin)), shift(bin)));
+                let points: Vec<HallPoint> = inner.chain(ends).collect();
+                let blamed = diagnose(&points, Metres::ZERO, &usual);
+                assert_eq!(blamed, None, "bin {border}, {off_mv} mV");
+            }
+        }
+    }
 }
