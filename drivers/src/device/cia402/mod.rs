@@ -146,6 +146,8 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     homed: bool,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
+    /// What the object was that is compared with them.
+    compared: Option<u32>,
     /// The state the drive was brought to and must keep.
     kept: Option<PowerState>,
     /// Where the motion under way began.
@@ -190,6 +192,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             started_at: None,
             homed: false,
             first: None,
+            compared: None,
             kept: None,
             course: None,
             probe: Probe::default(),
@@ -423,7 +426,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.commanded_mode = None;
         self.reached = None;
         self.kept = None;
-        self.first = None;
+        (self.first, self.compared) = (None, None);
         self.probe.disarm();
         self.activity = Activity::Starting;
         self.node.start(now, start::description(&self.settings));

@@ -93,31 +93,56 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         if !matches!(self.activity, Activity::Starting) || !self.node.is_operational() {
             return;
         }
-        if self.first.replace(sample).is_none() {
+        if let Some(raw) = self.compared {
+            self.end_comparison(now, raw, sample);
+        } else if self.first.replace(sample).is_none() {
             let object = POSITION_ACTUAL.object;
             self.node.run(now, vec![Step::read(object, COMPARING)]);
         }
     }
 
-    /// The start is done when both agree.
+    /// The start is done when both agree. Where they do not, the axis may be moving (a controller that was
+    /// killed has left it so): the next process data tell.
     pub(super) fn end_start(&mut self, now: Time, script: &Script) {
-        let object = POSITION_ACTUAL.object;
-        let (Some(sample), Some(raw)) = (self.first.take(), script.value(object)) else {
+        let (Some(sample), Some(raw)) = (self.first, script.value(POSITION_ACTUAL.object)) else {
             return;
         };
-        let position = i64::from(raw.cast_signed());
-        let away = apart(self.settings.modulo(), sample.position.0, position);
-        if away.abs() > self.image.plausible.margin() {
-            self.node.give_up(now);
-            self.finish(Err(DeviceError::ReadBack {
-                node: self.node.id(),
-                object,
-                expected: u64::from(raw),
-                seen: u64::from(sample.shown.cast_unsigned()),
-                step: COMPARING,
-            }));
+        if self.agrees(raw, &sample, &sample) {
+            self.is_started(now, sample);
+        } else {
+            self.compared = Some(raw);
+        }
+    }
+
+    /// The object was read between the newest process data before it and `after`.
+    fn end_comparison(&mut self, now: Time, raw: u32, after: Sample) {
+        let Some(before) = self.first else {
+            return;
+        };
+        if self.agrees(raw, &before, &after) {
+            self.is_started(now, after);
             return;
         }
+        self.node.give_up(now);
+        self.finish(Err(DeviceError::ReadBack {
+            node: self.node.id(),
+            object: POSITION_ACTUAL.object,
+            expected: u64::from(raw),
+            seen: u64::from(before.shown.cast_unsigned()),
+            step: COMPARING,
+        }));
+    }
+
+    /// Whether an axis that was at `before` and then at `after` can have been at `raw` meanwhile.
+    fn agrees(&self, raw: u32, before: &Sample, after: &Sample) -> bool {
+        let away = |position| apart(self.settings.modulo(), position, before.position.0);
+        let (seen, moved) = (away(i64::from(raw.cast_signed())), away(after.position.0));
+        let margin = self.image.plausible.margin();
+        (moved.min(0) - margin..=moved.max(0) + margin).contains(&seen)
+    }
+
+    fn is_started(&mut self, now: Time, sample: Sample) {
+        (self.first, self.compared) = (None, None);
         self.node.up(now);
         self.commanded_mode = Some(OperationMode::ProfilePosition);
         self.finish(Ok(()));

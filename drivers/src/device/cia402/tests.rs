@@ -44,6 +44,8 @@ pub(super) struct FakeDrive {
     pub(super) following_error: bool,
     /// Further bits of the statusword.
     pub(super) also_says: u16,
+    /// So many counts it goes on by itself from each frame to the next: nobody has stopped it.
+    coasts: i64,
 }
 
 impl FakeDrive {
@@ -101,6 +103,13 @@ impl FakeDrive {
             fault_edges: 0,
             following_error: false,
             also_says: 0,
+            coasts: 0,
+        }
+    }
+
+    fn coast(&mut self) {
+        if self.coasts != 0 {
+            self.set_position(self.position() + self.coasts);
         }
     }
 
@@ -113,6 +122,7 @@ impl FakeDrive {
     }
 
     fn hear(&mut self, frame: &CanFrame) {
+        self.coast();
         if self.node.hear(frame) {
             let control = self.node.get(0x6040, 0) as u16;
             self.obey(control);
@@ -176,6 +186,7 @@ impl FakeDrive {
     }
 
     fn sync(&mut self) {
+        self.coast();
         let mode = self.node.get(0x6060, 0);
         if mode != self.node.get(0x6061, 0) {
             self.mode_countdown += 1;
@@ -536,6 +547,16 @@ fn a_mapping_that_is_carried_out_wrong_is_found_by_comparing() {
             .contains("comparing process data with the object it carries"),
         "{error}"
     );
+}
+
+/// A controller that was killed leaves an axis in motion until the drive misses its heartbeat.
+#[test]
+fn an_axis_that_still_moves_is_compared_between_two_process_data() {
+    for coasts in [-40_000, -300, 0, 300, 40_000] {
+        let mut rig = Rig::new();
+        rig.fake.coasts = coasts;
+        assert_eq!(rig.start(), Ok(()), "{coasts} counts");
+    }
 }
 
 #[test]
