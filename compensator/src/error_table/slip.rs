@@ -18,6 +18,8 @@
 //! - Its size must be a whole number of counts, as well as it is known.
 //! - On either side of it are at least two readings: of a single one nobody can tell whether it is
 //!   itself off.
+//! - What was read between the runs belongs to both, as the end of one and the start of the other. A count
+//!   that slips among these readings changes all of them but the first ones and the last ones.
 //!
 //! Absent: two slips in one comparison; a step that is no whole number of counts.
 
@@ -37,9 +39,13 @@ const READINGS: usize = 2;
 /// So many standard uncertainties a step may be from a whole number of counts.
 const COVERAGE: f64 = 4.0;
 
-/// The share of slips that are passed over because some readings scatter more by chance, and the chance that
-/// a step is believed to be still there.
+/// The share of slips that are passed over because some readings scatter more by chance.
 const UNLIKE: f64 = 1e-4;
+
+/// How often a lost motion that changed between the runs is taken for a slip, when it changed by a whole number
+/// of counts, which is seldom enough. In a run of 11 targets both ways, less would hide one in six counts that
+/// slip at the turn and show against the lost motion in two readings of the datum only.
+const LOST_MOTION: f64 = 1e-2;
 
 /// How well the length of a count is known: it changes with the air by 3e-4.
 const COUNT_LENGTH: f64 = 1e-3;
@@ -65,48 +71,46 @@ pub struct Change {
 /// A count that slipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slip {
-    /// The first change after it.
+    /// The first change that shows it.
     pub at: usize,
     /// By how many counts the instrument reads more from there on, in the run in which it slipped.
     pub counts: i64,
-    /// Whether the earlier run is the one in which it slipped.
+    /// Whether the earlier run is the one in which it slipped, or at the end of which.
     pub is_in_the_earlier_run: bool,
 }
 
 /// The slip in `readings` (one for each reading, in the order of time), if there is one; `count` is the length
-/// of one count.
+/// of one count. The last `shared` readings of the earlier run are also the first ones of the later run.
 ///
 /// Of fewer than eight readings nothing can be said.
-pub fn find_slip(readings: &[Change], count: Metres) -> Option<Slip> {
+pub fn find_slip(readings: &[Change], shared: usize, count: Metres) -> Option<Slip> {
     let changes: Vec<f64> = readings.iter().map(|it| it.size.value()).collect();
     let size = changes.len();
     if size < READINGS_MIN {
         return None;
     }
     let drift = Sound::drifting(size, LINE);
-    let steps = READINGS..=size - READINGS;
-    let step = strongest(steps.map(|at| Stepped::new(&drift, &changes, at)))?;
+    let shifted = places(size, shared).map(|shifted| Stepped::new(&drift, &changes, shifted));
+    let step = strongest(shifted)?;
     // NaN, too, is no slip.
     let is_real = step.chance() * (size as f64) < SLIP_FALSE_ALARMS;
     if !is_real || !beats_its_rivals(&step, &drift, &changes) {
         return None;
     }
-    let step = Stepped::new(&drift.with_lost_motion(readings), &changes, step.at);
-    if step.chance() > UNLIKE || !step.sides_agree() || !step.turns_agree(readings) {
+    let step = Stepped::new(&drift.with_lost_motion(readings), &changes, step.shifted);
+    if step.chance() > LOST_MOTION || !step.sides_agree() || !step.turns_agree(readings) {
         return None;
     }
     let counts = step.whole_counts(count).filter(|it| *it != 0)?;
-    let (before, after) = changes.split_at(step.at);
-    let is_in_the_earlier_run = mean(after).abs() < mean(before).abs();
-    Some(Slip {
-        at: step.at,
-        counts: if is_in_the_earlier_run {
-            -counts
-        } else {
-            counts
-        },
-        is_in_the_earlier_run,
-    })
+    Some(step.as_slip(counts, &changes))
+}
+
+/// Which readings of `size` a slip may shift: all from one on, or, when it came among the shared ones, all but
+/// the first and the last of these.
+fn places(size: usize, shared: usize) -> impl Iterator<Item = Range<usize>> {
+    let within = (READINGS..=size - READINGS).map(move |at| at..size);
+    let among = (1..shared).map(move |at| at..size - (shared - at));
+    within.chain(among)
 }
 
 /// Whether the step explains more than any single reading that is off, and than a drift that bends.
@@ -120,9 +124,9 @@ fn beats_its_rivals(step: &Stepped, drift: &Sound, changes: &[f64]) -> bool {
         && step.variance < bent
 }
 
-/// What a sound stage does and a step in one place, fitted to the changes.
+/// What a sound stage does and a shift of some readings, fitted to the changes.
 struct Stepped {
-    at: usize,
+    shifted: Range<usize>,
     column: Explained,
     left: Vec<f64>,
     variance: f64,
@@ -130,17 +134,31 @@ struct Stepped {
 }
 
 impl Stepped {
-    fn new(sound: &Sound, changes: &[f64], at: usize) -> Self {
+    fn new(sound: &Sound, changes: &[f64], shifted: Range<usize>) -> Self {
         let rest = sound.without(changes.to_vec());
-        let column = Explained::new(sound, &rest, step(changes.len(), at));
+        let column = Explained::new(sound, &rest, step(changes.len(), &shifted));
         let left = column.without(&rest);
         let freedom = changes.len() - sound.0.len() - 1;
         Self {
-            at,
+            shifted,
             variance: (squares(&left) / freedom as f64).max(f64::MIN_POSITIVE),
             column,
             left,
             freedom,
+        }
+    }
+
+    /// In which run it slipped: in the one whose readings are not what they are in the other. What slipped
+    /// between the runs is told with the earlier one.
+    fn as_slip(&self, counts: i64, changes: &[f64]) -> Slip {
+        let at = self.shifted.start;
+        let (before, after) = changes.split_at(at);
+        let is_between = self.shifted.end < changes.len();
+        let is_undone = !is_between && mean(after).abs() < mean(before).abs();
+        Slip {
+            at,
+            counts: if is_undone { -counts } else { counts },
+            is_in_the_earlier_run: is_between || is_undone,
         }
     }
 
@@ -162,24 +180,21 @@ impl Stepped {
     /// Whether what is left of the shorter side is like that of the longer one: a count that slips shifts
     /// every reading by the same. Where readings scatter more by themselves, they are no evidence of it.
     fn sides_agree(&self) -> bool {
-        let (before, after) = self.left.split_at(self.at);
-        if before.len() < after.len() {
-            scatter_alike(before, after)
-        } else {
-            scatter_alike(after, before)
-        }
+        let (short, long) = self.sides();
+        let left =
+            |places: &[usize]| -> Vec<f64> { places.iter().map(|it| self.left[*it]).collect() };
+        scatter_alike(&left(&short), &left(&long))
     }
 
     /// Whether the readings after a turn are evidence of a step that nothing but such readings shows: not
     /// when the other ones are off what the readings between the turns let expect.
     fn turns_agree(&self, readings: &[Change]) -> bool {
-        let short = self.shorter_side();
-        if !short.clone().all(|it| readings[it].is_after_turn) {
+        let (short, long) = self.sides();
+        if !short.iter().all(|it| readings[*it].is_after_turn) {
             return true;
         }
         let is_between = |it: &usize| !readings[*it].is_after_turn;
-        let places = (0..readings.len()).filter(|it| !short.contains(it));
-        let (between, turns): (Vec<usize>, Vec<usize>) = places.partition(is_between);
+        let (between, turns): (Vec<usize>, Vec<usize>) = long.into_iter().partition(is_between);
         let Ok(expected) = Expected::new(readings, &between) else {
             return true;
         };
@@ -192,13 +207,15 @@ impl Stepped {
         scatter_alike(&off(&turns), &off(&between))
     }
 
-    /// The places on the side with fewer readings.
-    fn shorter_side(&self) -> Range<usize> {
-        let size = self.left.len();
-        if self.at < size - self.at {
-            0..self.at
+    /// The places of the readings that it shifts and of the others, the fewer ones first.
+    fn sides(&self) -> (Vec<usize>, Vec<usize>) {
+        let places = 0..self.left.len();
+        let (shifted, others): (Vec<usize>, Vec<usize>) =
+            places.partition(|it| self.shifted.contains(it));
+        if others.len() <= shifted.len() {
+            (others, shifted)
         } else {
-            self.at..size
+            (shifted, others)
         }
     }
 }
@@ -331,8 +348,9 @@ impl Explained {
     }
 }
 
-fn step(size: usize, at: usize) -> Vec<f64> {
-    (0..size).map(|it| f64::from(u8::from(it >= at))).collect()
+fn step(size: usize, shifted: &Range<usize>) -> Vec<f64> {
+    let is_shifted = |it: usize| f64::from(u8::from(shifted.contains(&it)));
+    (0..size).map(is_shifted).collect()
 }
 
 fn spike(size: usize, at: usize) -> Vec<f64> {

@@ -37,8 +37,8 @@ pub(super) fn is_shaken(scatter: Metres) -> bool {
     scatter > SHAKEN
 }
 
-/// What the datum's place read, approached from either side, in metres.
-#[derive(Clone, Copy, Debug)]
+/// What the datum's place read, in reverse and then forward, in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DatumReadings {
     pub(super) forward_m: f64,
     pub(super) reverse_m: Option<f64>,
@@ -61,9 +61,8 @@ impl DatumReadings {
         };
         let reverse = self.reverse_m.zip(before.reverse_m);
         let reverse = reverse.map(|(now, before)| change(Approach::Reverse, now, before));
-        core::iter::once(change(Approach::Forward, self.forward_m, before.forward_m))
-            .chain(reverse)
-            .collect()
+        let forward = change(Approach::Forward, self.forward_m, before.forward_m);
+        reverse.into_iter().chain([forward]).collect()
     }
 }
 
@@ -169,6 +168,8 @@ impl CrossCheck {
         };
         let start = run.start.changes(&before.start);
         let started = start.len();
+        // Between a run and one that was continued later the datum was set anew.
+        let shared = if run.start == before.end { started } else { 0 };
         let changes = pairs.iter().map(|(place, size_m)| Change {
             size: Metres(*size_m),
             approach: run.points[*place].side(),
@@ -179,7 +180,7 @@ impl CrossCheck {
             .chain(changes)
             .chain(run.end.changes(&before.end))
             .collect();
-        let Some(slip) = find_slip(&all, self.plausible.count.length) else {
+        let Some(slip) = find_slip(&all, shared, self.plausible.count.length) else {
             return Ok(());
         };
         let point = |at: usize| {

@@ -9,7 +9,7 @@ use units::Metres;
 use crate::assemble;
 use crate::correction::Correction;
 use crate::failure::Failure;
-use crate::linear::cross_check::is_shaken;
+use crate::linear::cross_check::{DatumReadings, is_shaken};
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::stage::LinearStage;
@@ -51,14 +51,35 @@ impl LinearStage<'_> {
         Ok(())
     }
 
-    /// Goes to the axis's zero, forward, and makes the instrument read zero there.
-    pub(super) fn set_datum(&mut self, plan: &RunPlan) -> Result<Datum, Failure> {
+    /// Goes to the axis's zero, forward, and makes the instrument read zero there. What it reads there is
+    /// read in reverse first, then forward: nothing counts from a reading that is older than another one of
+    /// the datum's place, so that a count that slips between them shifts nothing.
+    pub(super) fn set_datum(&mut self, plan: &RunPlan) -> Result<(Datum, DatumReadings), Failure> {
         self.go_to_datum(plan)?;
         self.core.stand_still(self.axis, plan.settle)?;
         self.core.set_instrument_datum(&plan.instrument)?;
+        let reverse = if self.go_to_datum_in_reverse(plan)? {
+            let reading = self.read_calm(plan)?;
+            self.go_to_datum(plan)?;
+            Some((
+                reading,
+                self.core.instrument(&plan.instrument)?.environment(),
+            ))
+        } else {
+            None
+        };
         let offset = self.read_calm(plan)?.vacuum;
         let length = self.length_correction(plan)?;
-        Ok(Datum { length, offset })
+        let datum = Datum { length, offset };
+        let reverse = reverse.map(|(reading, environment)| {
+            let corrected = self.correct(plan, &reading, &environment, &datum)?;
+            Ok::<f64, Failure>(corrected.value())
+        });
+        let readings = DatumReadings {
+            reverse_m: reverse.transpose()?,
+            ..DatumReadings::forward(0.0)
+        };
+        Ok((datum, readings))
     }
 
     fn length_correction(&mut self, plan: &RunPlan) -> Result<LengthCorrection, Failure> {

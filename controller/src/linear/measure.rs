@@ -166,7 +166,7 @@ impl LinearStage<'_> {
         self.core.use_instrument(&plan.instrument)?;
         let plausible = self.plausible(plan)?;
         self.exercise(plan)?;
-        let datum = self.set_datum(plan)?;
+        let (datum, mut start) = self.set_datum(plan)?;
         self.memory.datum = Some((plan.clone(), datum));
         let counter = Counter {
             stage: options.stage,
@@ -189,10 +189,6 @@ impl LinearStage<'_> {
             watch: self.environment_watch(plan),
         };
         let first = runs.points.last().map_or(1, |point| point.run + 1);
-        let mut start = DatumReadings {
-            forward_m: 0.0,
-            reverse_m: self.read_datum_in_reverse(&mut session)?,
-        };
         let mut before = runs.last();
         for run in first..=plan.runs {
             let points = self.measure_run(&mut session, run)?;
@@ -273,10 +269,12 @@ impl LinearStage<'_> {
 
     /// What the datum's place reads at the end of a run.
     fn read_datum(&mut self, session: &mut Session<'_>) -> Result<DatumReadings, Failure> {
+        let reverse_m = self.read_datum_in_reverse(session)?;
         self.go_to_datum(session.plan)?;
+        let forward_m = self.read_at_datum(session)?;
         Ok(DatumReadings {
-            forward_m: self.read_at_datum(session)?,
-            reverse_m: self.read_datum_in_reverse(session)?,
+            forward_m,
+            reverse_m,
         })
     }
 
