@@ -92,6 +92,10 @@ pub struct CanConfig {
     /// How late the host's adapter hands over a frame.
     #[serde(default)]
     pub latency_us: f64,
+    /// It hands over at whole multiples of this only, all that it has by then: 1000 for an adapter
+    /// on full-speed USB, whose host asks once in each frame of 1 ms. With 0 at any time.
+    #[serde(default)]
+    pub hands_over_every_us: f64,
     /// How many frames the host's interface takes before it says "full".
     #[serde(default = "default_transmit_queue")]
     pub transmit_queue_frames: usize,
@@ -113,6 +117,9 @@ pub struct SerialConfig {
     /// How late the host's adapter hands over bytes.
     #[serde(default)]
     pub latency_us: f64,
+    /// As for [`CanConfig::hands_over_every_us`].
+    #[serde(default)]
+    pub hands_over_every_us: f64,
 }
 
 /// A device on a port.

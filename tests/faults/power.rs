@@ -108,7 +108,7 @@ fn a_target_that_is_never_reached_ends_the_move_in_bounded_time() {
                 })
             )
         },
-        words: &["x:", "target to be reached", "60.0"],
+        words: &["x:", "target to be reached", "last saw position", " mm"],
         within: Duration::from_secs(10),
         rest: Duration::from_secs(10),
     };

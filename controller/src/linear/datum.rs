@@ -63,7 +63,10 @@ impl LinearStage<'_> {
             self.go_to_datum(plan)?;
             Some((
                 reading,
-                self.core.instrument(&plan.instrument)?.environment(),
+                self.core
+                    .devices()
+                    .instrument(&plan.instrument)?
+                    .environment(),
             ))
         } else {
             None

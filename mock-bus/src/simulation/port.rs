@@ -17,7 +17,9 @@ const BITS_PER_BYTE: u64 = 10;
 pub(super) struct PortState {
     pub(super) name: String,
     pub(super) link: Link,
-    pub(super) latency: Duration,
+    latency: Duration,
+    /// Zero when it hands over at any time.
+    every: Duration,
     pub(super) medium: Medium,
 }
 
@@ -43,22 +45,37 @@ pub(super) struct SerialPort {
 
 impl PortState {
     pub(super) fn new(config: &PortConfig) -> Self {
-        let (latency_us, medium) = match config {
+        let (latency_us, every_us, medium) = match config {
             PortConfig::Can(can) => (
                 can.latency_us,
+                can.hands_over_every_us,
                 Medium::Can(CanPort {
                     bus: CanBus::new(can.bitrate_kbit_per_s),
                     queue_max: can.transmit_queue_frames,
                     held_back: None,
                 }),
             ),
-            PortConfig::Serial(line) => (line.latency_us, Medium::Serial(SerialPort::new(line))),
+            PortConfig::Serial(line) => (
+                line.latency_us,
+                line.hands_over_every_us,
+                Medium::Serial(SerialPort::new(line)),
+            ),
         };
         Self {
             name: config.name().to_owned(),
             link: Link::Up,
-            latency: Duration::try_from_secs_f64(latency_us * 1e-6).unwrap_or(Duration::ZERO),
+            latency: span_of(latency_us),
+            every: span_of(every_us),
             medium,
+        }
+    }
+
+    /// When the host gets what is through at `through`.
+    pub(super) fn handed_over(&self, through: Time) -> Time {
+        let ready = through + self.latency;
+        match self.every.as_nanos() as u64 {
+            0 => ready,
+            every => Time(ready.0.next_multiple_of(every)),
         }
     }
 
@@ -204,6 +221,10 @@ impl SerialPort {
     const fn span(&self, bytes: usize) -> Duration {
         Duration::from_nanos(self.byte_ns * bytes as u64)
     }
+}
+
+fn span_of(us: f64) -> Duration {
+    Duration::try_from_secs_f64(us * 1e-6).unwrap_or(Duration::ZERO)
 }
 
 fn byte_ns(baud: u32) -> u64 {

@@ -39,7 +39,7 @@ impl Simulation {
         let payload = Payload::Frame(frame);
         self.tell_nodes(place, sender, &payload);
         if sender != Sender::Host && self.ports[place].link == Link::Up {
-            let at = self.now + delay + self.ports[place].latency;
+            let at = self.ports[place].handed_over(self.now + delay);
             self.tell_host(at, place, Event::Payload(payload));
         }
     }
@@ -90,7 +90,8 @@ impl Simulation {
         if port.link != Link::Up || bytes.is_empty() {
             return;
         }
-        let at = port.line_time(self.now + delay, bytes.len()) + port.latency;
+        let through = port.line_time(self.now + delay, bytes.len());
+        let at = port.handed_over(through);
         self.tell_host(at, place, Event::Payload(Payload::Bytes(bytes)));
     }
 
