@@ -42,6 +42,7 @@ mod observe;
 mod options;
 mod outliers;
 pub mod patent;
+pub mod plan;
 mod problem;
 mod series;
 mod strata;

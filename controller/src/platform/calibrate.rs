@@ -308,7 +308,8 @@ impl AlignmentPlatform<'_> {
     }
 }
 
-fn targets(plan: &PlatformCalibrateConfig) -> Vec<Metres> {
+/// The strokes of a run, increasing.
+pub(crate) fn targets(plan: &PlatformCalibrateConfig) -> Vec<Metres> {
     let steps = ((plan.last_mm - plan.first_mm) / plan.step_mm + 1e-9).floor() as u32;
     (0..=steps)
         .map(|step| Metres::from_mm(plan.first_mm + f64::from(step) * plan.step_mm))

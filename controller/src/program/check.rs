@@ -7,6 +7,7 @@ use units::Several;
 
 use crate::config;
 use crate::program::output::{Ended, Output};
+use crate::program::platform::plan;
 use crate::program::text;
 
 pub(crate) fn run(path: &Path, output: Output) -> Ended {
@@ -24,7 +25,8 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
         Several(loaded.config.camera.len(), "camera"),
         &loaded.hash.as_str()[..12],
     );
-    let notes = text::table_notes(&loaded.config);
+    let mut notes = text::table_notes(&loaded.config);
+    notes.extend(plan::notes(&loaded.config));
     let text = notes.iter().fold(text, |text, note| text + "\n" + note);
     output.result(
         &text,

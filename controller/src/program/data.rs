@@ -46,6 +46,22 @@ pub(crate) enum FitCommand {
     Volumetric(super::volumetric::fit::VolumetricArgs),
 }
 
+#[derive(Debug, Subcommand)]
+pub(crate) enum PlanCommand {
+    /// Offsets of a plate on a rotary table that amplify noise least, or the amplification of given
+    /// ones.
+    Rotary(super::rotary::fit::PlanArgs),
+    /// Strokes that tell slope, lost motion and periodic error of a ball screw apart.
+    Screw(super::platform::plan::PlanArgs),
+}
+
+pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
+    match command {
+        PlanCommand::Rotary(args) => super::rotary::fit::plan(args, output),
+        PlanCommand::Screw(args) => super::platform::plan::run(args, output),
+    }
+}
+
 pub(crate) fn iso230(path: &Path, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
     let figures = iso230::evaluate(&series)?;

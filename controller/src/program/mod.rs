@@ -98,7 +98,7 @@ enum Command {
     Fit(data::FitCommand),
     /// Plan a measurement: what to measure, and what it will be able to tell.
     #[command(subcommand)]
-    Plan(rotary::fit::PlanCommand),
+    Plan(data::PlanCommand),
     /// ISO 230-2 figures of measured data (columns run,approach,target_mm,measured_mm).
     Iso230 {
         /// The data file.
@@ -352,7 +352,7 @@ pub fn main() -> ExitCode {
         }
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
-        Command::Plan(command) => rotary::fit::plan(&command, output),
+        Command::Plan(command) => data::plan(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
         Command::Report(args) => report::run(&args, output),
     };

@@ -3,6 +3,7 @@
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod json;
+pub(crate) mod plan;
 mod report;
 #[cfg(test)]
 mod stored_tests;

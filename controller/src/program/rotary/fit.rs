@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, ValueEnum};
 use compensator::rotary::RotarySeries;
 use compensator::rotary::{
     self, Criterion, Design, PlanError, Reading, Solution, SolveOptions,
@@ -22,13 +22,6 @@ use crate::{Failure, config, store_of};
 
 /// Harmonics that a plan prints; `--json` has them all.
 const SHOWN: usize = 8;
-
-#[derive(Debug, Subcommand)]
-pub(crate) enum PlanCommand {
-    /// Offsets of a plate on a rotary table that amplify noise least, or the amplification of given
-    /// ones.
-    Rotary(PlanArgs),
-}
 
 /// What `truestage plan rotary` is told.
 #[derive(Debug, Args)]
@@ -87,8 +80,7 @@ fn amplification_max() -> f64 {
     SolveOptions::default().amplification_max
 }
 
-pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
-    let PlanCommand::Rotary(args) = command;
+pub(crate) fn plan(args: &PlanArgs, output: Output) -> Ended {
     let wanted = match args.criterion {
         CriterionName::Worst => Criterion::Worst,
         CriterionName::Rms => Criterion::Rms,
