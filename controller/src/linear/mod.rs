@@ -45,4 +45,5 @@ pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
 pub(crate) use stage::AxisMemory;
 pub(crate) use table_correction::table_correction;
+#[cfg(feature = "program")]
 pub(crate) use verify::UncertaintyAtTarget;

@@ -104,7 +104,7 @@ impl RotaryContent {
     }
 
     /// That in words.
-    pub(crate) fn harmonics_told(&self) -> String {
+    pub fn harmonics_told(&self) -> String {
         format!(
             "holds between the lines, as its uncertainty does, for harmonics up to {} of a turn; \
              faster errors look like slower ones at {} lines, and are not in the uncertainty",

@@ -12,6 +12,7 @@ mod rotary;
 mod rotary_table;
 mod serial_zero;
 mod survey;
+mod table_uncertainty;
 mod volumetric;
 mod volumetric_cold;
 mod volumetric_day;
