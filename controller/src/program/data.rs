@@ -64,6 +64,13 @@ pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
 
 pub(crate) fn iso230(path: &Path, output: Output) -> Ended {
     let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    if let Some(approach) = iso230::only_approach(&series) {
+        let figures = iso230::evaluate_one_way(&series, approach)?;
+        return output.result(
+            &text::one_way_figures(&figures),
+            &to_json::one_way(&figures),
+        );
+    }
     let figures = iso230::evaluate(&series)?;
     let text = text::figures_table(&[("measured", &figures)]);
     output.result(&text, &to_json::figures(&figures))

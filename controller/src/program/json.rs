@@ -2,9 +2,9 @@
 
 use compensator::error_table::{ErrorTable, Fitted};
 use compensator::hall_zero::ZeroEstimate;
-use compensator::iso230::{Directional, Figures};
+use compensator::iso230::{Conformity, Directional, Figures, OneWayFigures};
 use serde_json::{Value, json};
-use units::Metres;
+use units::{Approach, Metres};
 
 /// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
 pub(crate) fn um(length: Metres) -> f64 {
@@ -50,11 +50,41 @@ pub(crate) fn figures(figures: &Figures) -> Value {
         "accuracy": directional(&figures.accuracy),
         "runs": figures.runs,
         "conforms_to_iso_230_2": figures.conforms(),
-        "iso_230_2_asks_for": {
-            "runs": figures.conformity.runs_wanted,
-            "targets": figures.conformity.targets_wanted,
-        },
+        "iso_230_2_asks_for": asked_for(&figures.conformity),
         "targets": targets,
+    })
+}
+
+fn asked_for(conformity: &Conformity) -> Value {
+    json!({"runs": conformity.runs_wanted, "targets": conformity.targets_wanted})
+}
+
+/// Unidirectional ISO 230-2 figures in micrometres, with the names that they have among those of both
+/// directions; what needs both is not there.
+pub(crate) fn one_way(figures: &OneWayFigures) -> Value {
+    let side = match figures.approach {
+        Approach::Forward => "forward",
+        Approach::Reverse => "reverse",
+    };
+    let of = |figure| json!({ side: um(figure) });
+    let targets = figures.targets.iter().map(|it| {
+        json!({
+            "target_mm": it.target.mm(),
+            "mean_deviation": of(it.mean),
+            "standard_deviation": of(it.s),
+            "repeatability": of(it.repeatability),
+        })
+    });
+    json!({
+        "unit": "um",
+        "approach": side,
+        "systematic_deviation": of(figures.systematic_deviation),
+        "repeatability": of(figures.repeatability),
+        "accuracy": of(figures.accuracy),
+        "runs": figures.conformity.runs,
+        "conforms_to_iso_230_2": figures.conformity.conforms(),
+        "iso_230_2_asks_for": asked_for(&figures.conformity),
+        "targets": targets.collect::<Vec<_>>(),
     })
 }
 

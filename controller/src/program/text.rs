@@ -1,9 +1,9 @@
 //! What a person reads on a terminal.
 
 use compensator::error_table::FALSE_ALARMS;
-use compensator::iso230::{Conformity, Figures};
+use compensator::iso230::{Conformity, Figures, OneWayFigures};
 use compensator::screw::ScrewModel;
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::config::MachineConfig;
 use crate::linear::settings;
@@ -54,6 +54,27 @@ pub(crate) fn figures_table(columns: &[(&str, &Figures)]) -> String {
         .iter()
         .filter_map(|(title, figures)| Some(format!("\n{title}: {}", lack(&figures.conformity)?)));
     text + &lacks.collect::<String>()
+}
+
+/// Unidirectional ISO 230-2 figures, micrometres.
+pub(crate) fn one_way_figures(figures: &OneWayFigures) -> String {
+    let (side, arrow) = match figures.approach {
+        Approach::Forward => ("forward", '↑'),
+        Approach::Reverse => ("reverse", '↓'),
+    };
+    let rows = [
+        ("accuracy", 'A', figures.accuracy),
+        ("repeatability", 'R', figures.repeatability),
+        ("systematic deviation", 'E', figures.systematic_deviation),
+    ];
+    let mut text = format!("{:<30} {:>3} {:>22}", "ISO 230-2 (µm)", "", "measured");
+    for (name, symbol, figure) in rows {
+        let name = format!("{name}, {side}");
+        text += &format!("\n  {name:<28}  {symbol}{arrow} {:>22.3}", figure.um());
+    }
+    text += "\nall targets were approached from one side: figures of both sides (A, R, E, M, B) are not stated";
+    let lack = lack(&figures.conformity).map(|it| format!("\nmeasured: {it}"));
+    text + &lack.unwrap_or_default()
 }
 
 /// What a measurement lacks of the standard's: the figures are computed all the same.
@@ -173,5 +194,29 @@ mod tests {
                     requires 5; 4 targets, the standard requires 5 over this range";
         assert!(text.ends_with(told), "{text}");
         assert!(!figures_table(&[("as left", &good)]).contains("DOES NOT CONFORM"));
+    }
+
+    #[test]
+    fn of_one_side_no_figure_of_both_is_stated() {
+        let mut rows = String::from("run,approach,target_mm,measured_mm\n");
+        for run in 1..=5 {
+            rows.extend(
+                (0..5)
+                    .rev()
+                    .map(|it| format!("{run},-,{it}0,{it}0.00{run}\n")),
+            );
+        }
+        let series = compensator::error_table::LinearSeries::from_csv(&rows, "rows").unwrap();
+        let side = compensator::iso230::only_approach(&series).unwrap();
+        let figures = compensator::iso230::evaluate_one_way(&series, side).unwrap();
+        let text = one_way_figures(&figures);
+        for (symbol, um) in [("A↓", "6.325"), ("R↓", "6.325"), ("E↓", "0.000")] {
+            let is_stated = |line: &str| line.contains(symbol) && line.ends_with(um);
+            assert!(text.lines().any(is_stated), "{text}");
+        }
+        assert!(!text.contains("DOES NOT CONFORM"), "{text}");
+        let value = crate::program::json::one_way(&figures);
+        assert_eq!(value["accuracy"], serde_json::json!({"reverse": 6.3246}));
+        assert_eq!(value.get("reversal_value"), None);
     }
 }

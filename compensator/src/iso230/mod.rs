@@ -20,8 +20,13 @@
 //! Absent: axes beyond 2000 mm (5.3.3, fewer runs), rotary axes, the uncertainty budget of
 //! ISO/TR 230-9.
 
+mod one_way;
+
 use units::{Approach, Metres};
 
+pub use self::one_way::{OneWayFigures, OneWayTarget, evaluate_one_way, only_approach};
+
+use self::one_way::{Direction, repeatability};
 use crate::error_table::LinearSeries;
 use crate::uncertainty::{mean, standard_deviation};
 
@@ -37,7 +42,7 @@ pub enum EvaluationError {
     /// Only one approach in the whole series.
     #[error(
         "ISO 230-2: only approach `{}` was measured; the bidirectional figures need every \
-         target from both sides", measured.symbol()
+         target from both sides; `truestage iso230` gives the unidirectional ones", measured.symbol()
     )]
     OneApproach {
         /// The approach that is there.
@@ -113,6 +118,18 @@ pub struct Conformity {
 }
 
 impl Conformity {
+    /// Of so many runs over these targets.
+    fn of(runs: usize, targets: impl Iterator<Item = Metres> + Clone) -> Self {
+        let span = Extent::of(targets.clone()).range();
+        let per_metre = (span.value() * TARGETS_WANTED as f64).ceil() as usize;
+        Self {
+            runs,
+            runs_wanted: RUNS_WANTED,
+            targets: targets.count(),
+            targets_wanted: per_metre.max(TARGETS_WANTED),
+        }
+    }
+
     /// Five runs from each side, and five targets per metre, at least five.
     pub fn conforms(&self) -> bool {
         self.runs >= self.runs_wanted && self.targets >= self.targets_wanted
@@ -186,10 +203,7 @@ impl Figures {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn evaluate(series: &LinearSeries) -> Result<Figures, EvaluationError> {
-    let first = series.measurements().first().map(|m| m.approach);
-    if let Some(measured) = first
-        && series.measurements().iter().all(|m| m.approach == measured)
-    {
+    if let Some(measured) = only_approach(series) {
         return Err(EvaluationError::OneApproach { measured });
     }
     let mut runs = usize::MAX;
@@ -237,8 +251,8 @@ fn target_figures(
     s_reverse: Metres,
 ) -> TargetFigures {
     let reversal_value = mean_forward - mean_reverse;
-    let repeatability_forward = s_forward * (2.0 * K);
-    let repeatability_reverse = s_reverse * (2.0 * K);
+    let repeatability_forward = repeatability(s_forward);
+    let repeatability_reverse = repeatability(s_reverse);
     let across = (s_forward + s_reverse) * K + reversal_value.abs();
     TargetFigures {
         target,
@@ -255,48 +269,29 @@ fn target_figures(
 
 fn axis_figures(targets: Vec<TargetFigures>, runs: usize) -> Figures {
     let of = |f: fn(&TargetFigures) -> Metres| Extent::of(targets.iter().map(f));
-    let mean_forward = of(|t| t.mean_forward);
-    let mean_reverse = of(|t| t.mean_reverse);
-    let upper_forward = of(|t| t.mean_forward + t.s_forward * K);
-    let lower_forward = of(|t| t.mean_forward - t.s_forward * K);
-    let upper_reverse = of(|t| t.mean_reverse + t.s_reverse * K);
-    let lower_reverse = of(|t| t.mean_reverse - t.s_reverse * K);
-    let band_forward = Extent {
-        low: lower_forward.low,
-        high: upper_forward.high,
-    };
-    let band_reverse = Extent {
-        low: lower_reverse.low,
-        high: upper_reverse.high,
-    };
+    let forward = Direction::of(targets.iter().map(|t| (t.mean_forward, t.s_forward)));
+    let reverse = Direction::of(targets.iter().map(|t| (t.mean_reverse, t.s_reverse)));
     let reversal = of(|t| t.reversal_value);
-    let span = of(|t| t.target).range();
-    let per_metre = (span.value() * TARGETS_WANTED as f64).ceil() as usize;
     let sum: Metres = targets.iter().map(|t| t.reversal_value).sum();
-    let conformity = Conformity {
-        runs,
-        runs_wanted: RUNS_WANTED,
-        targets: targets.len(),
-        targets_wanted: per_metre.max(TARGETS_WANTED),
-    };
+    let conformity = Conformity::of(runs, targets.iter().map(|t| t.target));
     Figures {
         reversal_value: reversal.low.abs().max(reversal.high.abs()),
         mean_reversal_value: sum / targets.len() as f64,
         mean_bidirectional_deviation_range: of(TargetFigures::mean_bidirectional).range(),
         systematic_deviation: Directional {
-            bidirectional: mean_forward.with(mean_reverse).range(),
-            forward: mean_forward.range(),
-            reverse: mean_reverse.range(),
+            bidirectional: forward.means.with(reverse.means).range(),
+            forward: forward.means.range(),
+            reverse: reverse.means.range(),
         },
         repeatability: Directional {
             bidirectional: of(|t| t.repeatability).high,
-            forward: of(|t| t.repeatability_forward).high,
-            reverse: of(|t| t.repeatability_reverse).high,
+            forward: forward.repeatability,
+            reverse: reverse.repeatability,
         },
         accuracy: Directional {
-            bidirectional: band_forward.with(band_reverse).range(),
-            forward: band_forward.range(),
-            reverse: band_reverse.range(),
+            bidirectional: forward.band.with(reverse.band).range(),
+            forward: forward.band.range(),
+            reverse: reverse.band.range(),
         },
         runs,
         conformity,
@@ -305,7 +300,7 @@ fn axis_figures(targets: Vec<TargetFigures>, runs: usize) -> Figures {
 }
 
 /// The smallest and largest of some lengths.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Extent {
     low: Metres,
     high: Metres,
