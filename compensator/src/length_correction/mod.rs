@@ -312,14 +312,9 @@ impl LengthCorrection {
         }
         if let Some(dead) = s.dead_path.filter(|_| s.air) {
             let change = (index - self.index_at_datum) / index;
-            let line = line(Source::DeadPath, dead.u_length.value(), change);
-            lines.push((
-                Source::DeadPath,
-                budget::Contribution {
-                    correlation: Correlation::CommonOffset,
-                    ..line
-                },
-            ));
+            let mut line = scale(Source::DeadPath, dead.u_length.value(), change);
+            line.1.correlation = Correlation::CommonOffset;
+            lines.push(line);
         }
         if let Some(cosine) = s.cosine {
             let (angle, u) = (cosine.angle.value(), cosine.u_angle.value());
@@ -375,12 +370,8 @@ fn air_lines(
 
 /// An input that stretches every length: so many metres per metre for one of its units.
 fn scale(source: Source, value: f64, sensitivity: f64) -> (Source, budget::Contribution) {
-    (source, line(source, value, sensitivity))
-}
-
-fn line(source: Source, value: f64, sensitivity: f64) -> budget::Contribution {
     let (name, unit) = source.name();
-    budget::Contribution {
+    let line = budget::Contribution {
         name: name.to_owned(),
         evaluation: Evaluation::B,
         value,
@@ -389,7 +380,8 @@ fn line(source: Source, value: f64, sensitivity: f64) -> budget::Contribution {
         degrees_of_freedom: None,
         correlation: Correlation::CommonScale,
         approach: None,
-    }
+    };
+    (source, line)
 }
 
 /// The combined standard uncertainty of a budget.

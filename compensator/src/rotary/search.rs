@@ -68,15 +68,12 @@ impl<'a> Solver<'a> {
         if outliers.is_empty() {
             return (fit, None);
         }
-        let scatter = judge.scatter(&fit.scan);
-        // Whether a reading fits what the others predict for it after all.
-        let belongs = |at: &usize| {
-            let variance = fit.prediction_variance(*at);
-            let apart = readings[*at] - fit.readings[*at];
-            variance.is_some_and(|variance| judge.fits(apart, variance, scatter))
-        };
         let left = outliers.len();
-        let kept: Vec<usize> = outliers.into_iter().filter(|at| !belongs(at)).collect();
+        let kept: Vec<usize> = {
+            let agrees = agreement(judge, readings, &fit);
+            let stays_out = |at: &usize| agrees(*at) != Some(true);
+            outliers.into_iter().filter(stays_out).collect()
+        };
         if kept.len() == left {
             return (fit, None);
         }
@@ -104,16 +101,12 @@ impl<'a> Solver<'a> {
         for _ in 0..MASKED_MAX.min(limit.saturating_sub(outliers.len())) {
             outliers.push(worst);
             let freed = self.fit(readings, &outliers).ok()?;
-            let scatter = judge.scatter(&freed.scan);
-            let stands_off = |at: &usize| {
-                let variance = freed.prediction_variance(*at);
-                let apart = readings[*at] - freed.readings[*at];
-                variance.is_some_and(|variance| !judge.fits(apart, variance, scatter))
-            };
             let residuals = self.residuals(&freed);
-            if outliers.iter().all(stands_off)
-                && judge.suspects(&freed.scan, || residuals.clone()).is_empty()
-            {
+            let all_stand_off = {
+                let agrees = agreement(judge, readings, &freed);
+                outliers.iter().all(|at| agrees(*at) == Some(false))
+            };
+            if all_stand_off && judge.suspects(&freed.scan, || residuals.clone()).is_empty() {
                 return Some((freed, outliers));
             }
             worst = judge.worst(&residuals)?;
@@ -333,5 +326,18 @@ impl<'a> Solver<'a> {
         } else {
             doubt
         }
+    }
+}
+
+/// Whether a reading that was left out fits what the others predict for it; `None` where they predict nothing.
+fn agreement(
+    judge: &Judge<'_>,
+    readings: &[f64],
+    fit: &Fit<'_, '_>,
+) -> impl Fn(usize) -> Option<bool> {
+    let scatter = judge.scatter(&fit.scan);
+    move |at| {
+        let variance = fit.prediction_variance(at)?;
+        Some(judge.fits(readings[at] - fit.readings[at], variance, scatter))
     }
 }
