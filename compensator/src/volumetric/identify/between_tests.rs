@@ -32,7 +32,7 @@ fn ratios(rig: &Rig, seed: u64, find: impl Fn(&Plan, &[Observation]) -> Identifi
     let mut own = truth.machine().clone();
     own.axes = found.axis_errors(Shape::Spline).unwrap();
     own.squareness = found.squareness;
-    let own = model(own);
+    let own = model(own, Metres::from_um(3000.0));
     let mut noise = Noise(seed ^ 0x5555);
     let mut ratios = Vec::new();
     for _ in 0..12 {

@@ -102,23 +102,11 @@ impl Rig {
                 own.about[k.index()] = Some(Function::new(&at, &about, Shape::Spline).unwrap());
             }
         }
-        let mut lean = || Radians(30.0 * ARCSEC * self.size * noise.within(1.0));
-        let machine = Machine {
-            chain: self.chain.parse().unwrap(),
-            volume: self.volume(),
-            axes,
-            squareness: Squareness {
-                y_to_x: lean(),
-                z_to_x: lean(),
-                z_to_y: lean(),
-                u: [Radians::ZERO; 3],
-            },
-            thermal: Thermal::default(),
-            tool_max: Metres(0.4),
-            displacement_max: Metres::ZERO,
-            roll_max: Radians::ZERO,
-        };
-        model(machine)
+        let lean = || Radians(30.0 * ARCSEC * self.size * noise.within(1.0));
+        model(
+            machine(self.chain, self.volume(), axes, lean),
+            Metres::from_um(3000.0),
+        )
     }
 
     /// A polynomial of the third degree and some half waves, as high as the band, over 0 to 1.
@@ -231,9 +219,34 @@ fn read(truth: &VolumetricModel, line: &StandardLine, at: Point, lean: f64) -> (
     }
 }
 
-pub(super) fn model(machine: Machine) -> VolumetricModel {
+/// A machine that neither grows nor is moved by anything, whose axes lean against each other so.
+pub(super) fn machine(
+    chain: &str,
+    volume: Volume,
+    axes: [AxisErrors; 3],
+    mut lean: impl FnMut() -> Radians,
+) -> Machine {
+    Machine {
+        chain: chain.parse().unwrap(),
+        volume,
+        axes,
+        squareness: Squareness {
+            y_to_x: lean(),
+            z_to_x: lean(),
+            z_to_y: lean(),
+            u: [Radians::ZERO; 3],
+        },
+        thermal: Thermal::default(),
+        tool_max: Metres(0.4),
+        displacement_max: Metres::ZERO,
+        roll_max: Radians::ZERO,
+    }
+}
+
+/// Its model, which permits deviations up to `size`.
+pub(super) fn model(machine: Machine, size: Metres) -> VolumetricModel {
     let limits = Limits {
-        size: Metres::from_um(3000.0),
+        size,
         slope: 0.1,
         rate: MetresPerSecond(0.1),
     };

@@ -1,15 +1,9 @@
-use units::MetresPerSecond;
-
-use super::rig::{Measured, Rig, TOOL, as_drawn};
-use super::tests::{Chance, um};
+use super::rig::{Measured, Rig, TOOL, as_drawn, machine, still};
+use super::tests::{Chance, model, um};
 use super::*;
-use crate::error_table::Limits;
 use crate::volumetric::Volume;
 use crate::volumetric::function::{Function, Shape};
-use crate::volumetric::model::{
-    AxisErrors, Conditions, Machine, Squareness, Thermal, VolumetricModel,
-};
-use crate::volumetric::online::MovingState;
+use crate::volumetric::model::{AxisErrors, VolumetricModel};
 
 /// The machine of three axes that is shipped: its volume, a node every 50 mm.
 const SPAN_M: [f64; 3] = [0.5, 0.4, 0.3];
@@ -64,37 +58,8 @@ pub(super) fn truth(
             }
         }
     }
-    let mut squareness = || Radians(15.0 * ARCSEC * chance.even());
-    let machine = Machine {
-        chain: chain.parse().unwrap(),
-        volume: volume(),
-        axes,
-        squareness: Squareness {
-            y_to_x: squareness(),
-            z_to_x: squareness(),
-            z_to_y: squareness(),
-            u: [Radians::ZERO; 3],
-        },
-        thermal: Thermal::default(),
-        tool_max: Metres(0.4),
-        displacement_max: Metres::ZERO,
-        roll_max: Radians::ZERO,
-    };
-    model(machine)
-}
-
-fn model(machine: Machine) -> VolumetricModel {
-    let limits = Limits {
-        size: um(500.0),
-        slope: 0.1,
-        rate: MetresPerSecond(0.1),
-    };
-    VolumetricModel::new(machine, limits).unwrap()
-}
-
-fn still(model: &VolumetricModel, tool: Point) -> Conditions {
-    let live = MovingState::default();
-    model.conditions(tool, &[], &live).unwrap()
+    let lean = || Radians(15.0 * ARCSEC * chance.even());
+    model(machine(chain, volume(), axes, lean))
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

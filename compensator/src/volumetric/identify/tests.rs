@@ -1,11 +1,8 @@
-use units::MetresPerSecond;
-
 use super::rig::as_drawn;
 use super::*;
-use crate::error_table::Limits;
 use crate::volumetric::Volume;
 use crate::volumetric::function::{Function, Shape};
-use crate::volumetric::model::{AxisErrors, Machine, Squareness, Thermal, VolumetricModel};
+use crate::volumetric::model::{AxisErrors, Machine, Squareness, VolumetricModel};
 use crate::volumetric::online::MovingState;
 
 const SPAN: [f64; 3] = [0.6, 0.5, 0.4];
@@ -76,29 +73,13 @@ pub(super) fn machine(chain: &str, chance: &mut Chance) -> Machine {
         }
     }
     Machine {
-        chain: chain.parse().unwrap(),
-        volume: volume(),
-        axes,
-        squareness: Squareness {
-            y_to_x: Radians(30e-6 * chance.even()),
-            z_to_x: Radians(30e-6 * chance.even()),
-            z_to_y: Radians(30e-6 * chance.even()),
-            u: [Radians::ZERO; 3],
-        },
-        thermal: Thermal::default(),
         tool_max: Metres(0.3),
-        displacement_max: Metres::ZERO,
-        roll_max: Radians::ZERO,
+        ..rig::machine(chain, volume(), axes, || Radians(30e-6 * chance.even()))
     }
 }
 
 pub(super) fn model(machine: Machine) -> VolumetricModel {
-    let limits = Limits {
-        size: um(500.0),
-        slope: 0.1,
-        rate: MetresPerSecond(0.1),
-    };
-    VolumetricModel::new(machine, limits).unwrap()
+    rig::model(machine, um(500.0))
 }
 
 pub(super) fn plan(chain: &str, names: &[ErrorName], count: usize, runs: Vec<RunSetup>) -> Plan {
