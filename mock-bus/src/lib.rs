@@ -39,3 +39,4 @@ pub mod random;
 #[cfg(feature = "live")]
 pub mod runner;
 pub mod simulation;
+mod span;

@@ -14,7 +14,7 @@ use compensator::rotary::{
 };
 use compensator::rotary::{Placement, RotarySeries};
 use serde_json::{Value, json};
-use tests::random;
+use tests::{normal, random};
 use units::Radians;
 
 const REPETITIONS: usize = 101;
@@ -43,7 +43,7 @@ fn series(lines: usize, offsets: &[usize]) -> RotarySeries {
         .collect();
     let placements = offsets.iter().map(|&offset| {
         let mut read = |line: usize| {
-            let noise = (0..12).map(|_| random(&mut state)).sum::<f64>() - 6.0;
+            let noise = normal(&mut state);
             let table = table_arcsec((line + offset) % lines, lines);
             Some(Radians::from_arcsec(table + plate[line] + 0.05 * noise))
         };

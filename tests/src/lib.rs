@@ -30,7 +30,7 @@ pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use not_run::{left_out, not_run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
-pub use random::{random, seeds};
+pub use random::{normal, random, seeds};
 pub use rig::{Bench, Rig, machine_config, rigs, shipped_config, vcan_is_native};
 pub use shipped::*;
 pub use slcan_hub::SlcanHub;

@@ -9,6 +9,11 @@ pub fn random(state: &mut u64) -> f64 {
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// Near enough to a normal distribution of standard deviation 1: twelve even ones.
+pub fn normal(state: &mut u64) -> f64 {
+    (0..12).map(|_| random(state)).sum::<f64>() - 6.0
+}
+
 /// The seeds from FIRST to LAST of the environment's `SEEDS=FIRST..LAST`, or of `usual`.
 pub fn seeds(usual: &str) -> impl Iterator<Item = u64> + Clone + use<> {
     let given = std::env::var("SEEDS").unwrap_or_else(|_| usual.into());

@@ -6,6 +6,7 @@ use wire::can::CanFrame;
 
 use super::{Fault, FaultConfig, FaultId};
 use crate::random::Stream;
+use crate::span::seconds;
 
 /// What becomes of one frame on its way to its receivers.
 #[derive(Clone, Debug, PartialEq)]
@@ -295,10 +296,6 @@ impl Planned {
             _ => fate.runs.clear(),
         }
     }
-}
-
-fn seconds(seconds: f64) -> Duration {
-    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO)
 }
 
 /// Cuts the last run in two, the second half 5 ms later.

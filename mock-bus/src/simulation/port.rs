@@ -10,6 +10,7 @@ use wire::{LineControl, Payload, Port};
 use super::{DeliverError, Link};
 use crate::bus::{CanBus, Sender};
 use crate::config::PortConfig;
+use crate::span::seconds;
 
 /// Start, eight data and stop bits.
 const BITS_PER_BYTE: u64 = 10;
@@ -64,8 +65,8 @@ impl PortState {
         Self {
             name: config.name().to_owned(),
             link: Link::Up,
-            latency: span_of(latency_us),
-            every: span_of(every_us),
+            latency: seconds(latency_us * 1e-6),
+            every: seconds(every_us * 1e-6),
             medium,
         }
     }
@@ -221,10 +222,6 @@ impl SerialPort {
     const fn span(&self, bytes: usize) -> Duration {
         Duration::from_nanos(self.byte_ns * bytes as u64)
     }
-}
-
-fn span_of(us: f64) -> Duration {
-    Duration::try_from_secs_f64(us * 1e-6).unwrap_or(Duration::ZERO)
 }
 
 fn byte_ns(baud: u32) -> u64 {

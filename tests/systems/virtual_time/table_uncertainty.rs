@@ -5,7 +5,7 @@
 //! range and prints it.
 
 use compensator::error_table::ErrorTable;
-use tests::{Bench, Edit, random, seeds};
+use tests::{Bench, Edit, normal, random, seeds};
 use truestage::{CalibrateOptions, Failure};
 use units::{Approach, Metres};
 
@@ -28,7 +28,6 @@ struct Drawn {
 impl Drawn {
     fn new(seed: u64) -> Self {
         let mut state = seed ^ 0xC0FE_E000;
-        let normal = |state: &mut u64| -> f64 { (0..12).map(|_| random(state)).sum::<f64>() - 6.0 };
         let within = |state: &mut u64, low: f64, high: f64| low + (high - low) * random(state);
         let per_kelvin_ppm = 11.5 + 1.15 * normal(&mut state);
         let laser = format!(

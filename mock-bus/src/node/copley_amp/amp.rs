@@ -15,6 +15,7 @@ use self::trajectory::Motion;
 use super::config::CopleyAmpConfig;
 use crate::node::profile::{MotionState, Profile};
 use crate::plant::{Plant, Servo};
+use crate::span::seconds;
 
 /// How often the demand is updated while something moves.
 const SERVO_PERIOD: Duration = Duration::from_millis(1);
@@ -275,5 +276,5 @@ impl Amp {
 }
 
 pub(super) fn milliseconds(ms: f64) -> Duration {
-    Duration::try_from_secs_f64(ms * 1e-3).unwrap_or(Duration::ZERO)
+    seconds(ms * 1e-3)
 }
