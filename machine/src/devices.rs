@@ -168,30 +168,28 @@ impl Devices {
 
     /// The number of a named axis, linear or rotary.
     pub(crate) fn drive_index(&self, axis: &str) -> Result<usize, Failure> {
-        let mut names = self.names();
-        names.truncate(self.drive_count());
-        place_of_axis(axis, &names)
+        let names = names_of(&self.axes).chain(names_of(&self.rotaries));
+        place_of_axis(axis, names)
     }
 
     /// The number of a named linear axis.
     pub(crate) fn axis_index(&self, axis: &str) -> Result<usize, Failure> {
-        let found = self.axes.iter().position(|unit| unit.name == axis);
-        found.map_or_else(|| place_of_axis(axis, &self.axis_names()), Ok)
+        place_of_axis(axis, names_of(&self.axes))
     }
 
     /// The number of a named rotary axis among those.
     pub(crate) fn rotary_index(&self, axis: &str) -> Result<usize, Failure> {
-        place_of_axis(axis, &self.rotary_names())
+        place_of_axis(axis, names_of(&self.rotaries))
     }
 
     /// The number of a named instrument among those.
     pub(crate) fn instrument_index(&self, name: &str) -> Result<usize, Failure> {
-        place_of(name, "instrument", &names_of(&self.instruments))
+        place_of(name, "instrument", names_of(&self.instruments))
     }
 
     /// The number of a named image controller among those.
     pub(crate) fn camera_index(&self, name: &str) -> Result<usize, Failure> {
-        place_of(name, "camera", &self.camera_names())
+        place_of(name, "camera", self.names_of_cameras())
     }
 
     /// The number, among all devices, of instrument number `at`.
@@ -206,18 +204,21 @@ impl Devices {
 
     /// The names of the linear axes.
     pub fn axis_names(&self) -> Vec<String> {
-        names_of(&self.axes)
+        names_of(&self.axes).cloned().collect()
     }
 
     /// The names of the rotary axes.
     pub fn rotary_names(&self) -> Vec<String> {
-        names_of(&self.rotaries)
+        names_of(&self.rotaries).cloned().collect()
     }
 
     /// The names of the image controllers.
     pub fn camera_names(&self) -> Vec<String> {
-        let names = self.cameras.iter().map(|it| it.unit.name.clone());
-        names.collect()
+        self.names_of_cameras().cloned().collect()
+    }
+
+    fn names_of_cameras(&self) -> impl Iterator<Item = &String> + Clone {
+        self.cameras.iter().map(|it| &it.unit.name)
     }
 
     /// The newest sample of the rotary axis `axis`; its position counts on over the turns.
@@ -241,7 +242,7 @@ impl Devices {
     /// # Errors
     /// When there is no such module.
     pub fn analog(&self, module: &str) -> Result<&dyn AnalogInput, Failure> {
-        let at = place_of(module, "analog module", &names_of(&self.analogs))?;
+        let at = place_of(module, "analog module", names_of(&self.analogs))?;
         Ok(&*self.analogs[at].device)
     }
 
@@ -292,23 +293,35 @@ impl Devices {
     }
 }
 
-fn names_of<D: ?Sized>(units: &[Unit<D>]) -> Vec<String> {
-    units.iter().map(|unit| unit.name.clone()).collect()
+fn names_of<D: ?Sized>(units: &[Unit<D>]) -> impl Iterator<Item = &String> + Clone {
+    units.iter().map(|unit| &unit.name)
 }
 
-fn place_of_axis(axis: &str, names: &[String]) -> Result<usize, Failure> {
-    let at = names.iter().position(|name| name == axis);
-    at.ok_or_else(|| Failure::NoSuchAxis {
+/// Procedures ask at each of their samples: names are copied for a failure only.
+fn place_of_axis<'n>(
+    axis: &str,
+    names: impl Iterator<Item = &'n String> + Clone,
+) -> Result<usize, Failure> {
+    let place = names.clone().position(|name| name == axis);
+    place.ok_or_else(|| Failure::NoSuchAxis {
         axis: axis.to_owned(),
-        known: names.join(", "),
+        known: joined(names),
     })
 }
 
-fn place_of(name: &str, what: &'static str, names: &[String]) -> Result<usize, Failure> {
-    let place = names.iter().position(|it| it == name);
+fn place_of<'n>(
+    name: &str,
+    what: &'static str,
+    names: impl Iterator<Item = &'n String> + Clone,
+) -> Result<usize, Failure> {
+    let place = names.clone().position(|it| it == name);
     place.ok_or_else(|| Failure::NoSuchDevice {
         what,
         name: name.to_owned(),
-        known: names.join(", "),
+        known: joined(names),
     })
+}
+
+fn joined<'n>(names: impl Iterator<Item = &'n String>) -> String {
+    names.map(String::as_str).collect::<Vec<_>>().join(", ")
 }

@@ -1,5 +1,7 @@
 //! What is said of an uncertainty budget: the same figures in text, JSON and on the page.
 
+use core::cmp::Ordering;
+
 use compensator::budget::{COVERAGE_FACTOR, Combined};
 use serde_json::{Value, json};
 use units::{Approach, Metres, Short};
@@ -151,23 +153,22 @@ pub(crate) fn combined(combined: Option<Combined>) -> Value {
     })
 }
 
+fn by_size(a: &Combined, b: &Combined) -> Ordering {
+    let (a, b) = (a.standard_uncertainty, b.standard_uncertainty);
+    a.value().total_cmp(&b.value())
+}
+
 /// How uncertain the corrected position is over the targets of a verification; `None` for one as found.
 pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
     let worst = |it: &UncertaintyAtTarget| {
         let both = [it.forward, it.reverse].into_iter().flatten();
-        both.max_by(|a, b| {
-            let (a, b) = (a.standard_uncertainty, b.standard_uncertainty);
-            a.value().total_cmp(&b.value())
-        })
+        both.max_by(by_size)
     };
     let mut known: Vec<(Metres, Combined)> = targets
         .iter()
         .filter_map(|it| Some((it.target, worst(it)?)))
         .collect();
-    known.sort_by(|a, b| {
-        let (a, b) = (a.1.standard_uncertainty, b.1.standard_uncertainty);
-        a.value().total_cmp(&b.value())
-    });
+    known.sort_by(|a, b| by_size(&a.1, &b.1));
     let at = |(target, it): &(Metres, Combined)| {
         format!("{:.3} µm at {} mm", it.expanded().um(), Short(target.mm()))
     };
