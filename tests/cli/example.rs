@@ -7,8 +7,9 @@ use tests::{Edit, Rig, not_run};
 
 use crate::programs::{Bench, live_rigs};
 
-/// The example lives in real time: SYNC periods as shipped, and what a busier computer may bear.
-const TRIES_MS: [&str; 3] = ["5.0", "20.0", "50.0"];
+/// The example lives in real time: SYNC periods as shipped, and what a busier computer may bear. With longer
+/// ones the search of the zero takes longer than its `time_limit_s`.
+const TRIES_MS: [&str; 3] = ["5.0", "20.0", "20.0"];
 
 /// What was measured on some other stage: 20 um off at one end, 2 um apart between directions.
 fn measured() -> String {
@@ -75,42 +76,54 @@ fn lives(printed: &str) -> Vec<[f64; 3]> {
     lines.collect()
 }
 
+/// A machine that has just been powered on, with a calibration in force and a path to follow.
+fn prepared(rig: Rig, period_ms: &str) -> Bench {
+    let bench = Bench::in_real_time(rig);
+    let machine = |text: String| streaming(&bench, &text, period_ms);
+    bench.configure("machine.toml", machine);
+    let file = |name: &str, text: String| {
+        fs::write(bench.folder().join(name), text).expect("a file can be written");
+    };
+    file("data.csv", measured());
+    file("path.csv", path());
+    let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
+    let saved = bench.run_plainly(&fit).with_code(0);
+    let id = saved["calibration"].as_str().expect("its name");
+    let activate = ["cal", "activate", "machine.toml", id];
+    bench.run_plainly(&activate).with_code(0);
+    bench
+}
+
+/// What the example printed, or why it came to no end. The machine is a new one each time: a drive
+/// that was left without set-points stands in a fault, and would refuse whatever comes next.
+fn try_once(rig: Rig, period_ms: &str) -> Result<String, String> {
+    let bench = prepared(rig, period_ms);
+    let (well, printed, said) = bench.example("stream", &["machine.toml", "path.csv"]);
+    // A computer that is too busy is told so.
+    assert!(well || !said.is_empty(), "it failed without a word");
+    let all = format!("{printed}{said}");
+    println!(
+        "{rig:?}, {period_ms} ms: {}",
+        all.lines().last().unwrap_or("")
+    );
+    if well && printed.contains("the path is done") {
+        Ok(printed)
+    } else {
+        Err(all)
+    }
+}
+
 #[test]
 fn the_example_streams_a_path_and_shows_the_correction_and_its_uncertainty() {
     for rig in live_rigs() {
-        let bench = Bench::in_real_time(rig);
-        let configure = |period_ms| {
-            let machine = |text: String| streaming(&bench, &text, period_ms);
-            bench.configure("machine.toml", machine);
-        };
-        configure("5.0");
-        let file = |name: &str, text: String| {
-            fs::write(bench.folder().join(name), text).expect("a file can be written");
-        };
-        file("data.csv", measured());
-        file("path.csv", path());
-        let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
-        let saved = bench.run_plainly(&fit).with_code(0);
-        let id = saved["calibration"].as_str().expect("its name");
-        let activate = ["cal", "activate", "machine.toml", id];
-        bench.run_plainly(&activate).with_code(0);
-
-        let mut flagged = String::new();
+        let mut failures = Vec::new();
         let done = TRIES_MS.into_iter().find_map(|period_ms| {
-            configure(period_ms);
-            let words = ["machine.toml", "path.csv"];
-            let (well, printed, said) = bench.example("stream", &words);
-            // A computer that is too busy is told so.
-            assert!(well || !said.is_empty(), "it failed without a word");
-            flagged = format!("{printed}{said}");
-            println!(
-                "{rig:?}, {period_ms} ms: {}",
-                flagged.lines().last().unwrap_or("")
-            );
-            (well && printed.contains("the path is done")).then_some(printed)
+            let tried = try_once(rig, period_ms);
+            tried.map_err(|why| failures.push(why)).ok()
         });
         let Some(printed) = done else {
-            let why = format!("3 times this computer was too busy ({rig:?}): {flagged}");
+            let why = failures.join("\n");
+            let why = format!("3 times this computer was too busy ({rig:?}): {why}");
             not_run("the example streams a path", &why);
             continue;
         };

@@ -55,6 +55,8 @@ impl Zeroed {
 
 /// How long the axis stands before its drive's coordinates are set.
 const REST: Duration = Duration::from_millis(30);
+/// And in how many samples that must show at least: a drive takes no coordinates before three lie together.
+const RESTING_SAMPLES: u32 = 4;
 /// How often both flanks are passed, half of them in reverse; two in each direction would do.
 const PASSES: u32 = 6;
 /// A pass begins and ends this share of the distance of G1 and G2 beyond them.
@@ -117,7 +119,7 @@ impl LinearStage<'_> {
         let estimate = self.estimate(config, &settings, &outcome, &passes)?;
         let entry = self.zero_entry(&estimate);
         journal.write(&LinearEntry::Zero(entry))?;
-        self.adopt_zero(estimate.origin)?;
+        self.adopt_zero(config, estimate.origin)?;
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, STEPS, STEPS);
@@ -146,7 +148,7 @@ impl LinearStage<'_> {
             source,
         };
         let mut search = Search::new(settings, Metres::ZERO, self.core.now()).map_err(failed)?;
-        let mut pairing = self.pairing(config)?;
+        let mut pairing = self.pairing(config);
         let mut motion = None;
         loop {
             let deadline = search
@@ -183,7 +185,7 @@ impl LinearStage<'_> {
         outcome: &Outcome,
     ) -> Result<Vec<Pass>, Failure> {
         let (low, high) = pass_ends(settings, outcome);
-        let speed = self.pass_speed(config, settings);
+        let speed = self.pass_speed(config, settings, outcome);
         self.pass(config, low, speed)?;
         (0..PASSES)
             .map(|number| {
@@ -201,14 +203,32 @@ impl LinearStage<'_> {
     }
 
     /// Voltages that are sampled with the position are as good at four times the speed, as a delay drops out of
-    /// the mean of both directions; those that are asked for are not, as nobody knows the delay of each.
-    fn pass_speed(&self, config: &ZeroConfig, settings: &Settings) -> MetresPerSecond {
+    /// the mean of both directions; those that are asked for are not, as nobody knows the delay of each. Either
+    /// is slow enough for the samples that the flanks need.
+    fn pass_speed(
+        &self,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> MetresPerSecond {
         let module = &self.core.config.analog[&config.analog];
-        if module.poll_period() == Duration::ZERO {
+        let wanted = if module.poll_period() == Duration::ZERO {
             settings.speed * 4.0
         } else {
             settings.speed
-        }
+        };
+        let fastest = outcome.fastest_pass(settings, self.sampling(config));
+        wanted.min(fastest)
+    }
+
+    /// How often a position and voltages that belong to it are read.
+    fn sampling(&self, config: &ZeroConfig) -> Duration {
+        let node = self.config.node();
+        let bus = &node.expect("the check asks for a drive on CAN").bus;
+        let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
+        let module = &self.core.config.analog[&config.analog];
+        let poll_s = module.poll_period().as_secs_f64();
+        Duration::from_secs_f64(sync_s.max(poll_s))
     }
 
     /// Goes to `end`; what was read on the way.
@@ -224,7 +244,7 @@ impl LinearStage<'_> {
             speed,
             acceleration,
         };
-        let mut pairing = self.pairing(config)?;
+        let mut pairing = self.pairing(config);
         let mut points = Vec::new();
         self.core.begin(self.axis, command)?;
         loop {
@@ -295,9 +315,10 @@ impl LinearStage<'_> {
     }
 
     /// Goes to the origin and makes it the drive's zero.
-    fn adopt_zero(&mut self, origin: Metres) -> Result<(), Failure> {
+    fn adopt_zero(&mut self, config: &ZeroConfig, origin: Metres) -> Result<(), Failure> {
         self.travel(origin, Correction::Off)?;
-        self.core.stand_still(self.axis, REST)?;
+        let rest = REST.max(self.sampling(config) * RESTING_SAMPLES);
+        self.core.stand_still(self.axis, rest)?;
         let reading = self
             .core
             .reading(self.axis)?
@@ -342,18 +363,12 @@ impl LinearStage<'_> {
         }
     }
 
-    fn pairing(&self, config: &ZeroConfig) -> Result<Pairing, Failure> {
-        let node = self.config.node();
-        let bus = &node.expect("the check asks for a drive on CAN").bus;
-        let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
-        let module = &self.core.config.analog[&config.analog];
-        let poll_s = module.poll_period().as_secs_f64();
-        let window = Duration::from_secs_f64(0.6 * sync_s.max(poll_s));
-        Ok(Pairing {
-            window,
+    fn pairing(&self, config: &ZeroConfig) -> Pairing {
+        Pairing {
+            window: self.sampling(config).mul_f64(0.6),
             used_axis: Time::ZERO,
             used_analog: Time::ZERO,
-        })
+        }
     }
 
     /// The newest position and voltages that belong together and were not used before.

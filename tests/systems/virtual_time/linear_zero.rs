@@ -4,7 +4,7 @@
 //! lie. The stage's own repeatability at a stop has no part in it.
 
 use mock_bus::plant::DriftLimits;
-use tests::Bench;
+use tests::{Bench, Rig, Setup, Stand};
 use truestage::emulated::HallDrift;
 use units::{Metres, Volts};
 
@@ -142,4 +142,23 @@ fn the_origin_is_where_the_undrifted_curves_have_their_centre() {
     );
     let centre = Metres(mean(&zeros.refined));
     assert!(centre.abs() <= Metres(50e-9), "{} nm", centre.nm());
+}
+
+#[test]
+fn a_zero_is_found_whatever_the_sync_period() {
+    for period in ["2.0", "10.0", "20.0"] {
+        for seed in 1..=3 {
+            let setup = Setup::new(seed).machine(
+                "sync_period_ms = 5.0",
+                &format!("sync_period_ms = {period}"),
+            );
+            let mut stand = Stand::new(Rig::InProcess, &setup);
+            let store = stand.store.clone();
+            let zeroed = stand.machine.guarded(|machine| {
+                machine.start()?;
+                machine.linear("x")?.zero(&store)
+            });
+            zeroed.unwrap_or_else(|failure| panic!("{period} ms, seed {seed}: {failure}"));
+        }
+    }
 }

@@ -8,7 +8,7 @@ use crate::hall_zero::profile::{Bin, profile, slopes};
 use crate::uncertainty::median;
 
 /// Windows reach this share of the half distance between the flanks, when not given.
-const WINDOW_SHARE: f64 = 0.3;
+pub(super) const WINDOW_SHARE: f64 = 0.3;
 
 pub(super) fn bin_count(points: usize) -> usize {
     (points / 6).clamp(16, 400)

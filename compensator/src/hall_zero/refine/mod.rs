@@ -29,14 +29,16 @@ mod error;
 mod symmetry;
 mod window;
 
-use units::{Metres, Volts};
+use core::time::Duration;
+
+use units::{Metres, MetresPerSecond, Volts};
 
 use super::profile::profile;
 use super::{Sensor, Settings};
 use crate::hall_zero::{HallPoint, HallSeries};
 use crate::uncertainty::{combine, rms};
 
-use coarse::{Coarse, bin_count, crossing};
+use coarse::{Coarse, WINDOW_SHARE, bin_count, crossing};
 pub use error::{RefineError, Side};
 use symmetry::check_symmetry;
 use window::{Data, Window, lag};
@@ -49,6 +51,9 @@ pub enum Level {
     /// Where the flatter of the two flanks is steepest.
     Steepest,
 }
+
+/// Points a window must have beyond the coefficients of its polynomial.
+const SPARE_POINTS: usize = 6;
 
 /// How to refine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,6 +96,26 @@ impl RefineOptions {
             level: Level::BelowPeak(settings.vc * 0.7),
             ..Self::default()
         }
+    }
+
+    /// Samples that each window must have: the coefficients of its polynomial, the lag, and a few to spare.
+    pub(super) fn samples_min(&self) -> usize {
+        self.degree_max + 2 + SPARE_POINTS
+    }
+
+    /// How fast both flanks, `distance` apart, may be passed so that each window gets twice the samples that
+    /// it must have when one is taken every `sampling`. The flanks are further apart where they were found
+    /// than where they are cut: half of the samples may be missing for that and for what is left out.
+    pub(in crate::hall_zero) fn fastest_pass(
+        &self,
+        distance: Metres,
+        sampling: Duration,
+    ) -> MetresPerSecond {
+        let window = self
+            .half_window
+            .map_or(distance * WINDOW_SHARE, |half| half * 2.0);
+        let samples = 2.0 * self.samples_min() as f64;
+        MetresPerSecond(window.value() / (samples * sampling.as_secs_f64()))
     }
 }
 

@@ -7,9 +7,6 @@ use crate::hall_zero::HallPoint;
 use crate::least_squares::{self, LeastSquaresError, powers};
 use crate::uncertainty::{reduced_chi_square_limit, robust_sigma};
 
-/// Points a window must have beyond the coefficients of its polynomial.
-const SPARE_POINTS: usize = 6;
-
 /// The samples with their travel per sample, and the noise of both sensors.
 pub(super) struct Data<'a> {
     points: &'a [HallPoint],
@@ -128,7 +125,7 @@ impl<'a> Data<'a> {
             })
             .filter(|row| row.z.abs() <= 1.0)
             .collect();
-        let (seen, needed) = (rows.len(), options.degree_max + 2 + SPARE_POINTS);
+        let (seen, needed) = (rows.len(), options.samples_min());
         if seen < needed {
             return Err(RefineError::TooFewSamples {
                 around: Metres(around),

@@ -56,6 +56,12 @@ impl Outcome {
         self.agreed(refine_passes(passes, &options)?, settings)
     }
 
+    /// How fast the flanks that were found may be passed when a sample is taken every `sampling`.
+    pub fn fastest_pass(&self, settings: &Settings, sampling: Duration) -> MetresPerSecond {
+        let distance = self.g2.position - self.g1.position;
+        RefineOptions::for_search(settings).fastest_pass(distance, sampling)
+    }
+
     /// `estimate`, if it is where the search stands.
     fn agreed(
         &self,
