@@ -36,10 +36,10 @@ pub(crate) fn load(config: &MachineConfig, name: &str) -> Result<BusLoad, BusLoa
             .with_pdos(&DRIVE_PDO_BYTES)
             .with_heartbeat(ms(axis.heartbeat_producer_ms));
     }
-    for rotary in config.rotary.values().filter(|it| it.bus == name) {
+    for rotary in config.rotary.values().filter(|it| it.node.bus == name) {
         plan = plan
             .with_pdos(&DRIVE_PDO_BYTES)
-            .with_heartbeat(ms(rotary.heartbeat_producer_ms));
+            .with_heartbeat(ms(rotary.node.heartbeat_producer_ms));
         if rotary.line_detector.is_some() {
             plan = plan.with_pdos(&[LATCH_PDO_BYTES]);
         }

@@ -23,8 +23,8 @@ const LATENCY_ARCSEC: f64 = 0.216;
 fn table(rig: Rig, setup: &Setup) -> Table {
     let emulator = Emulator::new(rig, setup);
     let loaded = &emulator.loaded;
-    let (rotary, bus) = (&loaded.config.rotary["c"], &loaded.config.can["can0"]);
-    let settings = truestage::for_tests::rotary_settings(rotary, bus, loaded.patience);
+    let (rotary, can) = (&loaded.config.rotary["c"], &loaded.config.can);
+    let settings = truestage::for_tests::rotary_settings(rotary, can, loaded.patience);
     Desk::new(emulator, "can0", Cia402Drive::new(settings))
 }
 

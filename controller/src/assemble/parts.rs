@@ -117,8 +117,8 @@ fn nodes(config: &MachineConfig, bus: &str) -> Vec<Node> {
         .map(|(name, axis)| node(axis.node_id, true, name, &axis.identity));
     let rotaries = config.rotary.iter();
     let rotaries = rotaries
-        .filter(|(_, rotary)| rotary.bus == bus)
-        .map(|(name, rotary)| node(rotary.node_id, true, name, &rotary.identity));
+        .filter(|(_, rotary)| rotary.node.bus == bus)
+        .map(|(name, rotary)| node(rotary.node.node_id, true, name, &rotary.node.identity));
     let analogs = config.analog.iter();
     let analogs = analogs
         .filter_map(|(name, it)| Some((name, it.node()?)))

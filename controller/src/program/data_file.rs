@@ -46,7 +46,7 @@ pub(crate) fn rotary_head_of(
     let it = axes.get(axis).ok_or_else(|| no_such_axis(axis, axes))?;
     Ok(RecordHead {
         resolution_rad: Some(TAU / f64::from(it.counts_per_turn)),
-        ..head(loaded, axis, &it.identity.configured(), data)
+        ..head(loaded, axis, &it.node.identity.configured(), data)
     })
 }
 

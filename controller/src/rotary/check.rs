@@ -4,7 +4,6 @@ use super::line_speed;
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
 use crate::config::validate::drive::check_axis_name;
-use crate::hardware::node::check_node;
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
 
 pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -84,7 +83,7 @@ fn check_run(
     }
     let speed = run.speed_deg_per_s.unwrap_or(rotary.speed_deg_per_s);
     judge.within("speed_deg_per_s", speed, 1e-3, rotary.speed_max_deg_per_s);
-    let Some(bus) = config.can.get(&rotary.bus) else {
+    let Some(bus) = config.can.get(&rotary.node.bus) else {
         return;
     };
     let fits = line_speed::speed_max(run.lines, bus.sync_period_ms);
@@ -157,12 +156,7 @@ fn check_verify(
 fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
     let speed_max = rotary.speed_max_deg_per_s;
     judge.within("speed_deg_per_s", rotary.speed_deg_per_s, 0.0, speed_max);
-    let heartbeats = [
-        rotary.heartbeat_producer_ms,
-        rotary.heartbeat_consumer_ms,
-        rotary.watch_master_ms,
-    ];
-    check_node(judge, &config.can, &rotary.bus, heartbeats);
+    rotary.node.check(judge, &config.can);
 }
 
 /// What the drive's 32 bits can hold.

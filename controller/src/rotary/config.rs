@@ -6,7 +6,8 @@ use compensator::rotary::{self, Criterion, Design, PlanError};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::config::{HomeOffsetName, IdentityConfig, OptionCodesConfig};
+use crate::config::{HomeOffsetName, OptionCodesConfig};
+use crate::hardware::node::NodeConfig;
 
 /// The kinds of drive of a rotary axis: those with a touch probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -54,16 +55,13 @@ pub enum EdgeName {
 /// Angles count on over the turns; a table may turn any number of them. Speeds and accelerations
 /// must fit 31 bits of counts.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(extend("unevaluatedProperties" = false))]
 pub struct RotaryConfig {
     /// The kind of drive.
     pub device: RotaryDevice,
-    /// The bus that the drive is on.
-    #[schemars(extend("x-range" = "a `[can.NAME]`"))]
-    pub bus: String,
-    /// Its number there.
-    #[schemars(range(min = 1, max = 127))]
-    pub node_id: u8,
+    /// Where the drive is, and who it must be.
+    #[serde(flatten)]
+    pub node: NodeConfig,
     /// Position units of the drive in one turn: exactly a whole number.
     #[schemars(range(min = 360, max = 2147483647))]
     pub counts_per_turn: u32,
@@ -102,23 +100,12 @@ pub struct RotaryConfig {
     /// Longest time of one move.
     #[schemars(range(min = 0.01, max = 100000.0))]
     pub move_timeout_s: f64,
-    /// Period of the drive's heartbeat (0x1017).
-    #[schemars(range(min = 5, max = 10000))]
-    pub heartbeat_producer_ms: u16,
-    /// Without a heartbeat for this long the drive counts as lost.
-    #[schemars(extend("x-range" = "at least 2 × `heartbeat_producer_ms`"))]
-    pub heartbeat_consumer_ms: u16,
-    /// Without the controller's heartbeat for this long the drive stops by itself (0x1016).
-    #[schemars(extend("x-range" = "at least 2 × `master_heartbeat_ms`"))]
-    pub watch_master_ms: u16,
     /// What the drive takes 0x607C for, as for a linear axis.
     #[serde(default)]
     pub home_offset: HomeOffsetName,
     /// As for a linear axis.
     #[serde(default)]
     pub option_codes: OptionCodesConfig,
-    /// Who the drive must be.
-    pub identity: IdentityConfig,
     /// How it gets its origin: the encoder's index mark.
     pub zero: Option<RotaryZeroConfig>,
     /// What sees the lines of a plate pass.

@@ -16,7 +16,6 @@ use wire::Port;
 use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
 use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
-use crate::hardware::node::node_settings;
 use crate::hardware::{CHECKED, millis};
 use crate::rotary::{
     EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
@@ -37,13 +36,13 @@ pub(crate) fn rotaries(
             let device: Box<dyn RotaryAxis> = match rotary.device {
                 RotaryDevice::Cia402 => Box::new(Cia402Drive::new(rotary_settings(
                     rotary,
-                    &config.can[&rotary.bus],
+                    &config.can,
                     patience,
                 ))),
             };
             Unit {
                 name: name.clone(),
-                port: ports[&rotary.bus],
+                port: ports[&rotary.node.bus],
                 device,
             }
         })
@@ -56,16 +55,10 @@ pub(crate) fn rotaries(
 /// When the configuration has not been checked.
 pub fn rotary_settings(
     rotary: &RotaryConfig,
-    bus: &CanBus,
+    can: &BTreeMap<String, CanBus>,
     patience: Patience,
 ) -> Cia402Settings<Radians> {
-    let heartbeats = (
-        rotary.heartbeat_producer_ms,
-        rotary.heartbeat_consumer_ms,
-        rotary.watch_master_ms,
-    );
-    let identity = &rotary.identity;
-    let common = node_settings(rotary.node_id, bus, identity, heartbeats, patience);
+    let common = rotary.node.settings(can, patience);
     let per_s = |deg: f64| RadiansPerSecond(deg.to_radians());
     let per_s2 = |deg: f64| RadiansPerSecondSquared(deg.to_radians());
     let quick_stop = per_s2(rotary.quick_stop_deceleration_deg_per_s2);

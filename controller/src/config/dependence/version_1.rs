@@ -66,8 +66,8 @@ fn rotary(name: &str, rotary: &RotaryConfig) -> String {
         });
         (direction, zero.index_deg)
     });
-    let (node_id, counts, reverse) = (rotary.node_id, rotary.counts_per_turn, rotary.reverse);
-    let identity = Identity(&rotary.identity);
+    let (node_id, counts, reverse) = (rotary.node.node_id, rotary.counts_per_turn, rotary.reverse);
+    let identity = Identity(&rotary.node.identity);
     format!("\nrotary {name} Cia402 {node_id} {counts} {reverse} {identity:?} {zero:?}")
 }
 

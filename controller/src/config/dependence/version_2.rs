@@ -76,10 +76,10 @@ fn say_identity(mut place: Place<'_>, identity: &IdentityConfig) {
 
 fn say_rotary(mut place: Place<'_>, rotary: &RotaryConfig) {
     place.say("device", rotary.device);
-    place.say("node_id", rotary.node_id);
+    place.say("node_id", rotary.node.node_id);
     place.say("counts_per_turn", rotary.counts_per_turn);
     place.say("reverse", rotary.reverse);
-    say_identity(place.at("identity"), &rotary.identity);
+    say_identity(place.at("identity"), &rotary.node.identity);
     if let Some(zero) = &rotary.zero {
         let mut place = place.at("zero");
         place.say("index_direction", zero.index_direction);

@@ -140,7 +140,7 @@ fn check_node_ids(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let rotaries = config
         .rotary
         .iter()
-        .map(|(name, it)| (&*it.bus, it.node_id, format!("rotary.{name}")));
+        .map(|(name, it)| (&*it.node.bus, it.node.node_id, format!("rotary.{name}")));
     let analogs = config
         .analog
         .iter()
