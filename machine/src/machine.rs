@@ -1,5 +1,7 @@
 //! One machine: its devices, its transport, and what its drives remember.
 
+mod attendant;
+
 use core::time::Duration;
 use std::collections::BTreeSet;
 
@@ -22,6 +24,9 @@ use crate::parts::{AxisSettings, Bus, Parts};
 use crate::patience::Patience;
 use crate::ports::Ports;
 use crate::stop_request::StopRequest;
+
+pub(crate) use attendant::call as call_attendant;
+pub use attendant::{Attendant, attend};
 
 /// How alarms are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +91,8 @@ pub struct Machine {
     pub(crate) instrument_in_use: Option<String>,
     pub(crate) notices: Notices,
     pub(crate) stop: StopRequest,
+    /// Who looks after it at the end of every tick.
+    pub(crate) attendant: Option<Box<dyn Attendant>>,
     /// Whether its cyclic loops ask for SCHED_FIFO and locked memory.
     pub(crate) real_time: bool,
 }
@@ -126,6 +133,7 @@ impl Machine {
             instrument_in_use: None,
             notices: Notices::default(),
             stop: StopRequest::default(),
+            attendant: None,
             real_time: false,
         }
     }

@@ -11,15 +11,15 @@ use wire::can::{BusError, BusErrorClass, ControllerProblem};
 use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::failure::Failure;
-use crate::machine::{Machine, Supervision};
+use crate::machine::{Machine, Supervision, call_attendant};
 use crate::outbox::Sender;
 
 impl Machine {
     /// Lets the machine live until something happened or the clock reaches `until`.
     ///
     /// # Errors
-    /// When somebody asked to stop, a bus failed, a device raised an alarm, or something
-    /// could not be sent. The axes still move then: see [`Machine::guarded`].
+    /// When somebody asked to stop, a bus failed, a device raised an alarm, something
+    /// could not be sent, or an [`Attendant`](crate::Attendant) ends what runs. The axes still move then: see [`Machine::guarded`].
     pub fn tick(&mut self, until: Time) -> Result<(), Failure> {
         self.send_pending()?;
         let again = self.outbox.poll_timeout(self.transport.now());
@@ -43,7 +43,12 @@ impl Machine {
         if self.supervision != Supervision::Stopping && self.stop.is_requested() {
             return Err(self.stop.failure());
         }
-        Ok(())
+        let attended = call_attendant(self);
+        if self.supervision == Supervision::Stopping {
+            // Nothing keeps a stop from finishing.
+            return Ok(());
+        }
+        attended
     }
 
     /// Ticks until the clock reaches `until`.

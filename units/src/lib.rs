@@ -24,6 +24,7 @@ mod counts;
 pub mod portable;
 mod quantity;
 mod short;
+pub mod text;
 mod time;
 
 pub use coordinate::{Coordinate, LengthOrAngle};

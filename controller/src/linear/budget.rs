@@ -41,7 +41,7 @@ impl LinearStage<'_> {
         let known = Circumstances {
             instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
             closure: measured.closure,
-            zero: (self.memory.zero.unwrap_or(Metres::ZERO), None),
+            zero: (self.memory.course.zero.unwrap_or(Metres::ZERO), None),
             short_period: Metres(short_period_nm * 1e-9),
             interpolation: settings::interpolation_of(self.config),
             corrections: self.corrections(plan, instrument, measured)?,
@@ -78,15 +78,9 @@ impl LinearStage<'_> {
     }
 
     /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
-    /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
-    ///
-    /// That is the calibration's budget, with the zero that the axis has now and the scatter of one
-    /// stop.
+    /// the calibration in use says nothing of it ([`Course::uncertainty_at`](crate::linear::Course::uncertainty_at)).
     pub fn uncertainty_at(&self, position: Metres, approach: Approach) -> Option<Combined> {
-        let calibrated = self.memory.budget.as_ref()?;
-        let zero = self.memory.zero.map(|it| (it, None));
-        let of_stops = uncertainty::budget_of_stops(calibrated, zero).ok()?;
-        of_stops.at(position, approach)
+        self.memory.course.uncertainty_at(position, approach)
     }
 }
 

@@ -205,7 +205,7 @@ pub(super) fn open_journal(
     }
 }
 
-fn run_plan(config: &CalibrateConfig) -> RunPlan {
+pub(super) fn run_plan(config: &CalibrateConfig) -> RunPlan {
     RunPlan {
         instrument: config.instrument.clone(),
         targets: targets(config),

@@ -5,6 +5,7 @@ mod budget;
 mod calibrate;
 pub(crate) mod check;
 mod config;
+mod course;
 mod cross_check;
 mod datum;
 mod datum_in_use;
@@ -27,9 +28,10 @@ mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use calibrate::Calibrated;
+pub use course::{Corrected, Course, PlannedMove};
 pub use log::LinearLog;
-pub use moved::Corrected;
 pub use record::LinearContent;
+pub use run_plan::PlannedRun;
 pub use stage::LinearStage;
 pub use verify::{Verified, VerifyOptions};
 pub use zero::Zeroed;

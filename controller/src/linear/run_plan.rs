@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,4 +23,35 @@ pub(crate) struct RunPlan {
     pub scale_limit_ppm: f64,
     /// How far the datum may have drifted at the end of each run; `None` for any distance.
     pub closure_limit: Option<Metres>,
+}
+
+impl RunPlan {
+    /// What it comes to when the axis moves with `speed`.
+    pub(crate) fn planned(&self, speed: MetresPerSecond) -> PlannedRun {
+        let (first, last) = match self.targets.as_slice() {
+            [first, .., last] => (*first, *last),
+            _ => (Metres::ZERO, Metres::ZERO),
+        };
+        let runs = f64::from(self.runs);
+        let travel = (last - first + self.overrun * 2.0) * (2.0 * runs);
+        let points = 2 * u64::from(self.runs) * self.targets.len() as u64;
+        let ways = travel.value() / speed.value();
+        let standing = self.settle.as_secs_f64() * points as f64;
+        PlannedRun {
+            points,
+            travel,
+            at_least: Duration::try_from_secs_f64(ways + standing).unwrap_or_default(),
+        }
+    }
+}
+
+/// What a measuring run will do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedRun {
+    /// How many points it measures.
+    pub points: u64,
+    /// How far the axis goes from the first of them to the last.
+    pub travel: Metres,
+    /// How long that takes at least: the ways at the usual speed, and standing.
+    pub at_least: Duration,
 }

@@ -2,23 +2,18 @@
 
 use compensator::budget::AxisBudget;
 use compensator::error_table::Compensation;
-use units::Metres;
 
 use crate::config::AxisConfig;
 use crate::handle::Core;
-use crate::linear::{Datum, RunPlan};
+use crate::linear::{Course, Datum, RunPlan};
 
 /// What is known about a linear axis beyond what its drive says.
 #[derive(Default)]
 pub(crate) struct AxisMemory {
-    /// The calibration in use.
-    pub(crate) compensation: Option<Compensation>,
+    /// What corrects its moves.
+    pub(crate) course: Course,
     /// What was measured last, and how lengths were corrected since its datum.
     pub(crate) datum: Option<(RunPlan, Datum)>,
-    /// How uncertain the calibration in use is, where it says so.
-    pub(crate) budget: Option<AxisBudget>,
-    /// Standard uncertainty of the zero that was found last.
-    pub(crate) zero: Option<Metres>,
 }
 
 /// One linear axis of a machine: its zero, its moves, its calibration and what they need to
@@ -40,13 +35,18 @@ impl<'m> LinearStage<'m> {
 impl LinearStage<'_> {
     /// The calibration in use.
     pub fn compensation(&self) -> Option<&Compensation> {
-        self.memory.compensation.as_ref()
+        self.memory.course.compensation.as_ref()
+    }
+
+    /// What corrects its moves now, for whoever begins moves without waiting for them.
+    pub fn course(&self) -> Course {
+        self.memory.course.clone()
     }
 
     /// Uses `compensation` (or none) for every move from now on; how uncertain it is, is then not known.
     pub fn set_compensation(&mut self, compensation: Option<Compensation>) {
-        self.memory.compensation = compensation;
-        self.memory.budget = None;
+        self.memory.course.compensation = compensation;
+        self.memory.course.budget = None;
     }
 
     /// Uses a calibration for every move from now on.
@@ -55,7 +55,7 @@ impl LinearStage<'_> {
         compensation: Compensation,
         budget: Option<AxisBudget>,
     ) {
-        self.memory.compensation = Some(compensation);
-        self.memory.budget = budget;
+        self.memory.course.compensation = Some(compensation);
+        self.memory.course.budget = budget;
     }
 }

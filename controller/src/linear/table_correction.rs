@@ -19,7 +19,7 @@ pub(crate) fn table_correction(
     for (own, axis) in tables.iter_mut().zip(axes) {
         let settings = machine.cyclic_settings(axis)?;
         let known = memory.get(*axis);
-        let Some(table) = known.and_then(|it| it.compensation.as_ref()) else {
+        let Some(table) = known.and_then(|it| it.course.compensation.as_ref()) else {
             continue;
         };
         let rate = MetresPerSecond(table.steepest_slope() * settings.limits.speed.value());

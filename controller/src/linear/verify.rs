@@ -10,9 +10,9 @@ use units::{Approach, Metres};
 
 use crate::failure::Failure;
 use crate::linear::VerifyConfig;
-use crate::linear::calibrate::open_journal;
+use crate::linear::calibrate::{self, open_journal};
 use crate::linear::measure::{MeasureOptions, Measured};
-use crate::linear::run_plan::RunPlan;
+use crate::linear::run_plan::{PlannedRun, RunPlan};
 use crate::linear::stage::LinearStage;
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
@@ -66,6 +66,18 @@ impl Verified {
 }
 
 impl LinearStage<'_> {
+    /// What a calibration or a verification of the axis would do; `None` for what is not configured, and for
+    /// everything that does not measure.
+    pub fn planned(&self, of: Stage) -> Option<PlannedRun> {
+        let plan = match of {
+            Stage::Calibrate => calibrate::run_plan(self.config.calibrate.as_ref()?),
+            Stage::Verify => run_plan(self.config.verify.as_ref()?, 0.0),
+            Stage::Zero | Stage::Reference => return None,
+        };
+        let settings = self.core.axis_settings(self.axis).ok()?;
+        Some(plan.planned(settings.speed))
+    }
+
     /// Measures the axis at the configuration's verification targets and evaluates ISO 230-2.
     /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
     /// than without the calibration is one, and takes the calibration out of use.

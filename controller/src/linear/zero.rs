@@ -82,7 +82,7 @@ impl LinearStage<'_> {
         let (outcome, estimate, entry) =
             found.inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.complete()?;
-        self.memory.zero = Some(estimate.standard_uncertainty);
+        self.memory.course.zero = Some(estimate.standard_uncertainty);
         Ok(Zeroed {
             estimate,
             outcome,

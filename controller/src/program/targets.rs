@@ -1,6 +1,7 @@
 //! Targets as a person types them: the unit is never guessed.
 
-use units::{Metres, Radians};
+use units::Metres;
+use units::text::length;
 
 use crate::Failure;
 
@@ -16,39 +17,6 @@ pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {
         return Err(usage());
     }
     Ok((axis.to_owned(), length))
-}
-
-/// `-300um`.
-pub(crate) fn length(text: &str) -> Option<Metres> {
-    let units = [
-        ("mm", 1e-3),
-        ("um", 1e-6),
-        ("µm", 1e-6),
-        ("nm", 1e-9),
-        ("m", 1.0),
-    ];
-    measure(text, &units).map(Metres)
-}
-
-/// `20arcsec`.
-pub(crate) fn angle(text: &str) -> Option<Radians> {
-    let degree = 1.0_f64.to_radians();
-    let units = [
-        ("arcsec", degree / 3600.0),
-        ("arcmin", degree / 60.0),
-        ("deg", degree),
-        ("mrad", 1e-3),
-        ("rad", 1.0),
-    ];
-    measure(text, &units).map(Radians)
-}
-
-fn measure(text: &str, units: &[(&str, f64)]) -> Option<f64> {
-    let (digits, scale) = units
-        .iter()
-        .find_map(|(unit, scale)| Some((text.strip_suffix(unit)?, *scale)))?;
-    let value: f64 = digits.trim().parse().ok()?;
-    value.is_finite().then_some(value * scale)
 }
 
 #[cfg(test)]

@@ -10,9 +10,9 @@ use crate::program::json as to_json;
 use crate::program::output::{Ended, Output};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::session::Session;
-use crate::program::targets::{angle, length};
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::{Failure, Machine, Store};
+use units::text::{angle, length};
 
 /// Starts the platform, zeroes it, runs `procedure`, switches off; what `possible` refuses, before
 /// anything is sent.

@@ -11,7 +11,6 @@ use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::rotary::json::{arcsec, solution};
 use crate::program::session::{Session, choose_axis};
-use crate::program::targets::angle;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs, WayName};
 use crate::rotary::Way;
 use crate::rotary::moves::RotaryMoved;
@@ -19,6 +18,7 @@ use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
 use crate::run::CalibrateOptions;
 use crate::{Failure, Machine, Store};
+use units::text::angle;
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let run = |_: &mut Machine, _: &str, _: &Store| Ok(());

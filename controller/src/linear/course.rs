@@ -1,0 +1,256 @@
+//! What leads a linear axis to its targets: limits before anything moves, compensation, and the direction
+//! of approach.
+
+use compensator::apply::ApproachTracker;
+use compensator::budget::{AxisBudget, Combined};
+use compensator::error_table::uncertainty;
+use compensator::error_table::{Compensation, EndPolicy, OutOfRange};
+use units::{Approach, Metres, MetresPerSecond};
+
+use crate::correction::Correction;
+use crate::failure::Failure;
+
+/// What corrects the moves of a linear axis, apart from the machine, for whoever begins moves without
+/// waiting for them ([`machine::Moving`]). It is what was in use when
+/// [`LinearStage::course`](crate::linear::LinearStage::course) gave it.
+#[derive(Clone, Default)]
+pub struct Course {
+    /// The calibration in use.
+    pub(crate) compensation: Option<Compensation>,
+    /// How uncertain the calibration in use is, where it says so.
+    pub(crate) budget: Option<AxisBudget>,
+    /// Standard uncertainty of the zero that was found last.
+    pub(crate) zero: Option<Metres>,
+}
+
+/// What corrected a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Corrected {
+    /// Nothing: no calibration is in use.
+    No,
+    /// The calibration, between its first and last position.
+    Within,
+    /// Beyond the calibrated range, from `first` to `last`: the deviation at its end is used, which
+    /// was not measured there.
+    Held {
+        /// First calibrated position.
+        first: Metres,
+        /// Last calibrated position.
+        last: Metres,
+    },
+    /// Beyond the calibrated range: the deviation of its end, fading to nothing over `distance`.
+    Fading {
+        /// First calibrated position.
+        first: Metres,
+        /// Last calibrated position.
+        last: Metres,
+        /// Where nothing is left of it, from the end on.
+        distance: Metres,
+    },
+}
+
+/// A move that may be begun.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedMove {
+    /// Where the drive is to be sent.
+    pub set_point: Metres,
+    /// How fast.
+    pub speed: MetresPerSecond,
+    /// What corrects it.
+    pub corrected: Corrected,
+}
+
+impl Course {
+    /// The move of `axis` to `target` from where it is now, at its usual speed or, where that is slower, so
+    /// fast that the correction changes no faster than its limit.
+    ///
+    /// # Errors
+    /// Not zeroed, outside the soft limits, outside the calibrated range.
+    pub fn plan(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        target: Metres,
+    ) -> Result<PlannedMove, Failure> {
+        machine.require_zeroed(axis)?;
+        self.plan_anywhere(machine, axis, target, Correction::On)
+    }
+
+    /// The same without asking for a zero.
+    pub(crate) fn plan_anywhere(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        target: Metres,
+        correction: Correction,
+    ) -> Result<PlannedMove, Failure> {
+        machine.check_soft_limits(axis, target)?;
+        let set_point = self.set_point(machine, axis, target, correction)?;
+        machine.check_soft_limits(axis, set_point)?;
+        let own_speed = machine.axis_settings(axis)?.speed;
+        let (speed, corrected) = match (correction, &self.compensation) {
+            (Correction::On, Some(table)) => (
+                own_speed.min(table.speed_max()),
+                corrected_at(table, target),
+            ),
+            _ => (own_speed, Corrected::No),
+        };
+        Ok(PlannedMove {
+            set_point,
+            speed,
+            corrected,
+        })
+    }
+
+    /// The set-point that brings the point to `target` from where the axis is now.
+    fn set_point(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        target: Metres,
+        correction: Correction,
+    ) -> Result<Metres, Failure> {
+        let (Correction::On, Some(compensation)) = (correction, &self.compensation) else {
+            return Ok(target);
+        };
+        let tracker = machine.approach(axis)?;
+        let here = machine.reading(axis)?.map(|reading| reading.position);
+        set_point_of(compensation, &tracker, here, target).map_err(|source| {
+            Failure::OutOfCalibration {
+                axis: axis.to_owned(),
+                source,
+            }
+        })
+    }
+
+    /// Where the point stands when the drive's encoder says `encoder`; `None` without a calibration.
+    pub fn place(&self, encoder: Metres, approach: Approach) -> Option<Metres> {
+        let table = self.compensation.as_ref()?;
+        Some(encoder + table.deviation(encoder, approach).ok()?)
+    }
+
+    /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
+    /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
+    ///
+    /// That is the calibration's budget, with the zero that the axis has now and the scatter of one
+    /// stop.
+    pub fn uncertainty_at(&self, position: Metres, approach: Approach) -> Option<Combined> {
+        let calibrated = self.budget.as_ref()?;
+        let zero = self.zero.map(|it| (it, None));
+        let of_stops = uncertainty::budget_of_stops(calibrated, zero).ok()?;
+        of_stops.at(position, approach)
+    }
+
+    /// What corrects a move to `target`.
+    pub(crate) fn corrected(&self, target: Metres) -> Corrected {
+        let table = self.compensation.as_ref();
+        table.map_or(Corrected::No, |table| corrected_at(table, target))
+    }
+}
+
+fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
+    let (first, last) = table.table().range();
+    if target >= first && target <= last {
+        return Corrected::Within;
+    }
+    match table.end_policy() {
+        // Never driven: the move itself is refused.
+        EndPolicy::Refuse => Corrected::Within,
+        EndPolicy::Hold => Corrected::Held { first, last },
+        EndPolicy::FadeOut(distance) => Corrected::Fading {
+            first,
+            last,
+            distance,
+        },
+    }
+}
+
+/// The set-point for `target` from the side from which the drive will really come.
+///
+/// Which side that is depends on the set-point itself: over less than the deviation, target and
+/// set-point may lie on different sides of where the axis is. With no motion remembered (after
+/// a zero), `here` says where it starts.
+fn set_point_of(
+    compensation: &Compensation,
+    tracker: &ApproachTracker,
+    here: Option<Metres>,
+    target: Metres,
+) -> Result<Metres, OutOfRange> {
+    let mut from = *tracker;
+    if from == ApproachTracker::new()
+        && let Some(here) = here
+    {
+        from.update(here);
+    }
+    let usual = from.approach().unwrap_or(Approach::Forward);
+    let other = match usual {
+        Approach::Forward => Approach::Reverse,
+        Approach::Reverse => Approach::Forward,
+    };
+    for approach in [usual, other] {
+        if let Ok(set_point) = compensation.set_point(target, approach)
+            && from.approach_of(set_point) == Some(approach)
+        {
+            return Ok(set_point);
+        }
+    }
+    // Within the lost motion of where it is, no side is right: the one asked for is the best.
+    compensation.set_point(target, from.approach_of(target).unwrap_or(usual))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use compensator::error_table::{EndPolicy, ErrorTable, Interpolation, Limits, Node};
+    use units::MetresPerSecond;
+
+    /// Forward 2 µm too far, reverse 5 µm.
+    fn compensation() -> Compensation {
+        let node = |mm: f64| Node {
+            position: Metres::from_mm(mm),
+            forward: Some(Metres::from_um(2.0)),
+            reverse: Some(Metres::from_um(5.0)),
+            u_forward: None,
+            u_reverse: None,
+        };
+        let limits = Limits {
+            size: Metres::from_um(50.0),
+            slope: 0.01,
+            rate: MetresPerSecond(1.0),
+        };
+        let table = ErrorTable::new(vec![node(-10.0), node(10.0)]).unwrap();
+        Compensation::new(table, Interpolation::Linear, limits, EndPolicy::Hold).unwrap()
+    }
+
+    #[track_caller]
+    fn check(moves_um: &[f64], here_um: Option<f64>, target_um: f64, expected_um: f64) {
+        let mut tracker = ApproachTracker::new();
+        for um in moves_um {
+            tracker.update(Metres::from_um(*um));
+        }
+        let here = here_um.map(Metres::from_um);
+        let target = Metres::from_um(target_um);
+        let seen = set_point_of(&compensation(), &tracker, here, target).unwrap();
+        assert!((seen.um() - expected_um).abs() < 1e-6, "{}", seen.um());
+    }
+
+    #[test]
+    fn the_first_move_after_a_zero_is_corrected_for_the_side_it_really_comes_from() {
+        check(&[], Some(0.0), -2000.0, -2005.0);
+        check(&[], Some(0.0), 2000.0, 1998.0);
+        check(&[], None, -2000.0, -2002.0);
+    }
+
+    #[test]
+    fn a_remembered_direction_says_more_than_the_encoder() {
+        check(&[0.0, 1000.0], Some(0.0), 500.0, 495.0);
+        check(&[0.0, 1000.0], Some(0.0), 1500.0, 1498.0);
+    }
+
+    /// The set-point of 1000 µm was 998 µm: 999 µm lies beyond that, its set-point before it.
+    #[test]
+    fn a_step_smaller_than_the_deviation_is_corrected_for_the_drives_own_direction() {
+        check(&[0.0, 998.0], Some(998.0), 999.0, 994.0);
+        check(&[0.0, 998.0], Some(998.0), 1001.0, 999.0);
+    }
+}
