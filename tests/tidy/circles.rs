@@ -16,6 +16,7 @@ const CRATES: &[&str] = &[
     "machine/src/lib.rs",
     "controller/src/lib.rs",
     "controller/src/main.rs",
+    "service/src/lib.rs",
 ];
 
 #[test]

@@ -33,6 +33,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "service",
+        &["units", "wire", "drivers", "machine", "truestage"],
+    ),
+    (
         "tests",
         &[
             "units",
@@ -42,6 +46,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "machine",
             "mock-bus",
             "truestage",
+            "service",
         ],
     ),
 ];
@@ -76,6 +81,7 @@ const PACKAGES: &[&str] = &[
     "mock-bus",
     "machine",
     "controller",
+    "service",
 ];
 
 const FILE_LINES_MAX: usize = 500;
@@ -176,7 +182,15 @@ fn the_library_alone_links_no_command_line_and_no_emulator() {
         .expect("cargo runs");
     let tree = String::from_utf8(tree.stdout).expect("names are text");
     assert!(tree.contains("machine v"), "no tree: {tree}");
-    for absent in ["clap v", "indicatif v", "signal-hook v", "mock-bus v"] {
+    let absent = [
+        "clap v",
+        "indicatif v",
+        "signal-hook v",
+        "mock-bus v",
+        "axum v",
+        "utoipa v",
+    ];
+    for absent in absent {
         assert!(!tree.contains(absent), "{absent}:\n{tree}");
     }
 }

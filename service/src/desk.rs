@@ -1,0 +1,459 @@
+//! Where clients come: orders go to the machine's thread, and what it publishes is read.
+
+use core::time::Duration;
+use std::fs::File;
+use std::io::Read;
+use std::sync::mpsc::{SyncSender, TrySendError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Instant;
+
+use tokio::sync::oneshot;
+
+use crate::keeper::utc_now;
+use crate::ledger::{Asked, Ledger, LedgerError};
+use crate::order::{Answer, Answered, Letter, Order};
+use crate::problem::{Code, Problem};
+use crate::request::{Caller, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::snapshot::{Board, Fixed, Snapshot};
+use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView, RunView};
+
+/// How often whoever waits looks.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// Takes orders to a machine, and reads what is known of it; copies share both.
+#[derive(Clone, Debug)]
+pub struct Desk {
+    letters: SyncSender<Letter>,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    board: Board,
+    fixed: Arc<Fixed>,
+    ledger: Mutex<Ledger>,
+}
+
+/// An answer that will come.
+#[derive(Debug)]
+pub(crate) struct Pending(oneshot::Receiver<Answered>);
+
+impl Pending {
+    /// Waits for it, and lets the thread do nothing else.
+    fn wait(self) -> Answered {
+        self.0.blocking_recv().unwrap_or_else(|_| Err(ended()))
+    }
+}
+
+fn ended() -> Problem {
+    Problem::new(Code::Ending, "the service has ended", "start it again")
+}
+
+impl Desk {
+    pub(crate) fn new(
+        letters: SyncSender<Letter>,
+        board: Board,
+        fixed: Arc<Fixed>,
+        ledger: Ledger,
+    ) -> Self {
+        let shared = Shared {
+            board,
+            fixed,
+            ledger: Mutex::new(ledger),
+        };
+        Self {
+            letters,
+            shared: Arc::new(shared),
+        }
+    }
+
+    /// Gives an order; never waits.
+    pub(crate) fn give(&self, caller: &Caller, order: Order) -> Result<Pending, Problem> {
+        let (reply, answer) = oneshot::channel();
+        let letter = Letter {
+            order,
+            caller: caller.clone(),
+            reply,
+        };
+        match self.letters.try_send(letter) {
+            Ok(()) => Ok(Pending(answer)),
+            Err(TrySendError::Full(_)) => Err(Problem::new(
+                Code::Busy,
+                "too many orders are waiting",
+                "ask again in a moment",
+            )),
+            Err(TrySendError::Disconnected(_)) => Err(ended()),
+        }
+    }
+
+    fn done(&self, caller: &Caller, order: Order) -> Result<(), Problem> {
+        self.give(caller, order)?.wait().map(|_| ())
+    }
+
+    fn ledger(&self) -> MutexGuard<'_, Ledger> {
+        let ledger = &self.shared.ledger;
+        ledger.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        self.shared.board.newest()
+    }
+}
+
+/// What a request for a motion comes to before the machine is asked.
+pub(crate) enum Noted {
+    /// It was made before: the motion that it became.
+    Before(String),
+    /// It is on the disk under this name, and may be ordered.
+    New(String),
+}
+
+/// Motions.
+impl Desk {
+    /// Asks for a motion; returns its name, and does not wait for its end. With a `key`, the same request never
+    /// moves twice: it returns the motion that it became the first time, even after a restart.
+    ///
+    /// # Errors
+    /// When the request is refused; nothing has moved then.
+    pub fn begin_motion(
+        &self,
+        caller: &Caller,
+        request: &MoveRequest,
+        key: Option<&str>,
+    ) -> Result<String, Problem> {
+        let id = match self.note_motion(caller, request, key)? {
+            Noted::Before(id) => return Ok(id),
+            Noted::New(id) => id,
+        };
+        let order = Order::Move {
+            id: id.clone(),
+            request: request.clone(),
+        };
+        let answered = self.done(caller, order);
+        self.settle_motion(id, answered)
+    }
+
+    /// Looks whether a request was made before, and notes it when it was not.
+    pub(crate) fn note_motion(
+        &self,
+        caller: &Caller,
+        request: &MoveRequest,
+        key: Option<&str>,
+    ) -> Result<Noted, Problem> {
+        let mut ledger = self.ledger();
+        if let Some(before) = key.and_then(|key| ledger.of_key(key)) {
+            if before.request == *request {
+                return Ok(Noted::Before(before.id.clone()));
+            }
+            return Err(Problem::new(
+                Code::KeyReused,
+                format!(
+                    "this Idempotency-Key was used for motion {}, which is another one",
+                    before.id
+                ),
+                "give each request a key of its own",
+            ));
+        }
+        let id = ledger.next_id('m');
+        let asked = Asked {
+            id: id.clone(),
+            key: key.map(str::to_owned),
+            by: caller.name.clone(),
+            at: utc_now(),
+            request: request.clone(),
+        };
+        ledger.ask(asked).map_err(|it| storage(&it))?;
+        Ok(Noted::New(id))
+    }
+
+    /// What became of the order of a motion.
+    pub(crate) fn settle_motion(
+        &self,
+        id: String,
+        answered: Result<(), Problem>,
+    ) -> Result<String, Problem> {
+        match answered {
+            Ok(()) => Ok(id),
+            Err(problem) => {
+                // That nothing moved is said whatever becomes of the note.
+                let _ = self.ledger().refuse(&id);
+                Err(problem)
+            }
+        }
+    }
+
+    /// The motion `id`, also one of before a restart.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn motion(&self, id: &str) -> Result<MotionView, Problem> {
+        let snapshot = self.snapshot();
+        let mut motions = snapshot.motions.iter();
+        if let Some(view) = motions.find(|it| it.id == *id) {
+            return Ok(MotionView::clone(view));
+        }
+        let ledger = self.ledger();
+        if let Some(view) = ledger.end_of(id) {
+            return Ok(view.clone());
+        }
+        let asked = ledger.of_id(id).ok_or_else(|| {
+            Problem::new(Code::NoSuchMotion, format!("there is no motion {id}"), "")
+        })?;
+        Ok(unended(asked, ledger.is_of_earlier_boot(asked)))
+    }
+
+    /// The motion `id` once it has ended, or after `limit`, whichever comes first.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn wait_motion(&self, id: &str, limit: Duration) -> Result<MotionView, Problem> {
+        let begun = Instant::now();
+        loop {
+            let view = self.motion(id)?;
+            if view.state.is_end() || begun.elapsed() >= limit {
+                return Ok(view);
+            }
+            thread::sleep(LOOK_EVERY);
+        }
+    }
+
+    /// The motions that are known: those under way, and the last that ended.
+    pub fn motions(&self) -> Vec<MotionView> {
+        let snapshot = self.snapshot();
+        snapshot
+            .motions
+            .iter()
+            .map(|it| MotionView::clone(it))
+            .collect()
+    }
+
+    /// The dead-man of motion `id` still holds.
+    ///
+    /// # Errors
+    /// When it is not under way.
+    pub fn renew(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
+        let motion = id.to_owned();
+        self.done(caller, Order::Renew { motion })
+    }
+
+    /// Writes down how motions ended, for after a restart. Whoever serves calls it now and then.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write_ends(&self) -> Result<(), Problem> {
+        let snapshot = self.snapshot();
+        let mut ledger = self.ledger();
+        let ended = snapshot.motions.iter().filter(|it| it.state.is_end());
+        for view in ended {
+            ledger.end(view).map_err(|it| storage(&it))?;
+        }
+        Ok(())
+    }
+}
+
+/// A motion that the machine's thread does not know: asked for this moment, or before a restart.
+fn unended(asked: &Asked, is_of_earlier_boot: bool) -> MotionView {
+    let cause = Cause {
+        code: Code::ServiceRestarted,
+        cause: "the service ended before the end of this motion was written down".into(),
+        exit_code: Code::ServiceRestarted.exit_code(),
+    };
+    let (state, cause) = match is_of_earlier_boot {
+        true => (MotionState::Failed, Some(cause)),
+        false => (MotionState::Queued, None),
+    };
+    MotionView {
+        id: asked.id.clone(),
+        by: asked.by.clone(),
+        accepted: asked.at.clone(),
+        state,
+        stopped: None,
+        cause,
+        axes: std::collections::BTreeMap::new(),
+    }
+}
+
+fn storage(error: &LedgerError) -> Problem {
+    Problem::new(
+        Code::Storage,
+        error.to_string(),
+        "nothing was moved; free the disk",
+    )
+}
+
+/// The machine as a whole.
+impl Desk {
+    /// Stops everything; taken from anybody, whoever has the lease. Returns when it is under way.
+    ///
+    /// # Errors
+    /// When the service has ended, or too many orders wait.
+    pub fn stop(&self, caller: &Caller, mode: StopMode) -> Result<(), Problem> {
+        self.done(caller, Order::Stop { mode })
+    }
+
+    /// Starts the machine anew after a failure, and acknowledges each fault once.
+    ///
+    /// # Errors
+    /// When a cause is still there, or something is under way.
+    pub fn reset(&self, caller: &Caller) -> Result<(), Problem> {
+        self.done(caller, Order::Reset)
+    }
+
+    /// Switches `axis` on.
+    ///
+    /// # Errors
+    /// When it is in use, or its drive refuses.
+    pub fn enable(&self, caller: &Caller, axis: &str) -> Result<(), Problem> {
+        let axis = axis.to_owned();
+        self.done(caller, Order::Power { axis, on: true })
+    }
+
+    /// Switches `axis` off.
+    ///
+    /// # Errors
+    /// When it is in use, or its drive refuses.
+    pub fn disable(&self, caller: &Caller, axis: &str) -> Result<(), Problem> {
+        let axis = axis.to_owned();
+        self.done(caller, Order::Power { axis, on: false })
+    }
+
+    /// Ends the service: every drive is stopped and switched off.
+    ///
+    /// # Errors
+    /// When it has ended.
+    pub fn end(&self, caller: &Caller) -> Result<(), Problem> {
+        self.done(caller, Order::End)
+    }
+
+    /// Asks for the lease, or renews it: only its holder may command then.
+    ///
+    /// # Errors
+    /// When somebody else has it and it is not taken by force.
+    pub fn lease(&self, caller: &Caller, request: &LeaseRequest) -> Result<Leased, Problem> {
+        let order = Self::lease_order(request)?;
+        match self.give(caller, order)?.wait()? {
+            Answer::Leased(leased) => Ok(leased),
+            Answer::Done => Err(ended()),
+        }
+    }
+
+    /// Gives the lease back.
+    ///
+    /// # Errors
+    /// When somebody else has it.
+    pub fn release(&self, caller: &Caller) -> Result<(), Problem> {
+        self.done(caller, Order::Release)
+    }
+
+    pub(crate) fn lease_order(request: &LeaseRequest) -> Result<Order, Problem> {
+        let mut bytes = [0; 16];
+        let read = File::open("/dev/urandom").and_then(|mut it| it.read_exact(&mut bytes));
+        read.map_err(|it| Problem::new(Code::Storage, format!("/dev/urandom: {it}"), ""))?;
+        Ok(Order::Lease {
+            request: request.clone(),
+            token: bytes.iter().map(|it| format!("{it:02x}")).collect(),
+        })
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> MachineView {
+        self.snapshot().machine_of(&self.shared.fixed)
+    }
+
+    /// Its axes.
+    pub fn axes(&self) -> Vec<AxisView> {
+        self.snapshot().axes_of(&self.shared.fixed)
+    }
+
+    /// The axis `name`.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn axis(&self, name: &str) -> Result<AxisView, Problem> {
+        let found = self.axes().into_iter().find(|it| it.name == *name);
+        found
+            .ok_or_else(|| Problem::new(Code::NoSuchAxis, format!("there is no axis `{name}`"), ""))
+    }
+
+    /// The events after number `after`, as far as they are kept.
+    pub fn events(&self, after: u64) -> Vec<Event> {
+        let snapshot = self.snapshot();
+        let newer = snapshot.events.iter().filter(|it| it.id > after);
+        newer.map(|it| Event::clone(it)).collect()
+    }
+
+    /// What the devices counted: device, what, how often.
+    pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
+        Vec::clone(&self.snapshot().counters)
+    }
+}
+
+/// Runs.
+impl Desk {
+    /// Plans a run, and starts it when the request says so; returns its name.
+    ///
+    /// # Errors
+    /// When it is refused; nothing has moved then.
+    pub fn plan_run(&self, caller: &Caller, request: &RunRequest) -> Result<String, Problem> {
+        let id = self.next_run();
+        let order = Order::Plan {
+            id: id.clone(),
+            request: request.clone(),
+        };
+        self.done(caller, order)?;
+        Ok(id)
+    }
+
+    pub(crate) fn next_run(&self) -> String {
+        self.ledger().next_id('r')
+    }
+
+    /// Begins the planned run `id`.
+    ///
+    /// # Errors
+    /// When it is not planned any more, or an axis is in use.
+    pub fn start_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
+        let run = id.to_owned();
+        self.done(caller, Order::Start { run })
+    }
+
+    /// Ends the run `id`.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn abort_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
+        let run = id.to_owned();
+        self.done(caller, Order::Abort { run })
+    }
+
+    /// The run `id`.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn run(&self, id: &str) -> Result<RunView, Problem> {
+        let found = self.runs().into_iter().find(|it| it.id == *id);
+        found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
+    }
+
+    /// The run `id` once it has ended, or after `limit`, whichever comes first.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn wait_run(&self, id: &str, limit: Duration) -> Result<RunView, Problem> {
+        let begun = Instant::now();
+        loop {
+            let view = self.run(id)?;
+            if view.state.is_end() || begun.elapsed() >= limit {
+                return Ok(view);
+            }
+            thread::sleep(LOOK_EVERY);
+        }
+    }
+
+    /// The runs that are known.
+    pub fn runs(&self) -> Vec<RunView> {
+        let snapshot = self.snapshot();
+        snapshot.runs.iter().map(|it| RunView::clone(it)).collect()
+    }
+}

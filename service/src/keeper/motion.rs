@@ -1,0 +1,339 @@
+//! Motions: state machines that every tick carries on. Their end is a level.
+
+mod accept;
+mod shown;
+
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use machine::{Failure, Machine, Moving};
+use serde_json::json;
+use units::{Metres, MetresPerSecond, Time};
+
+use super::seat::{Seat, Task};
+use super::stop::cause_of;
+use super::{Keeper, utc_now};
+use crate::problem::{Code, Problem};
+use crate::view::{Cause, MotionView, Stopped};
+
+/// So many that have ended are kept in the snapshot.
+const ENDED_KEPT: usize = 256;
+/// What an axis may need to come to rest once its drive has called the target reached.
+const SETTLING: Duration = Duration::from_secs(2);
+
+/// How a motion ends.
+#[derive(Clone, Debug)]
+pub(super) enum End {
+    Done,
+    Stopped(Stopped),
+    Failed(Cause),
+    TimedOut(Cause),
+}
+
+/// How far a motion is.
+#[derive(Clone, Debug)]
+enum Phase {
+    Queued,
+    Moving,
+    /// It ends so when its axes stand.
+    Stopping(End),
+}
+
+/// How far one axis of a motion is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LegPhase {
+    Waiting,
+    Moving,
+    /// Its drive has called the target reached.
+    Settling,
+    There,
+}
+
+/// What one axis does in a motion.
+#[derive(Clone, Debug)]
+struct Leg {
+    at: usize,
+    target: Metres,
+    set_point: Option<Metres>,
+    corrected: &'static str,
+    deadline: Time,
+    phase: LegPhase,
+}
+
+/// A motion.
+#[derive(Clone, Debug)]
+pub(super) struct Motion {
+    id: Arc<str>,
+    by: String,
+    accepted: String,
+    speed: Option<MetresPerSecond>,
+    uncorrected: bool,
+    dead_man: Option<(Duration, Time)>,
+    legs: Vec<Leg>,
+    phase: Phase,
+}
+
+impl Motion {
+    fn axes(&self) -> impl Iterator<Item = usize> + Clone {
+        self.legs.iter().map(|leg| leg.at)
+    }
+}
+
+/// All motions.
+#[derive(Debug, Default)]
+pub(super) struct Motions {
+    /// In the order in which they were accepted.
+    active: Vec<Motion>,
+    ended: VecDeque<Arc<MotionView>>,
+    published: Option<Arc<Vec<Arc<MotionView>>>>,
+}
+
+impl Motions {
+    /// The list for a snapshot, the same one until something changes: those that ended, then the others.
+    pub(super) fn list(&mut self, seats: &[Seat]) -> Arc<Vec<Arc<MotionView>>> {
+        let (active, ended) = (&self.active, &self.ended);
+        let list = self.published.get_or_insert_with(|| {
+            let shown = active.iter().map(|it| Arc::new(shown::view(it, seats)));
+            Arc::new(ended.iter().cloned().chain(shown).collect())
+        });
+        Arc::clone(list)
+    }
+}
+
+impl Keeper {
+    /// Carries every motion on.
+    pub(super) fn advance_motions(&mut self, machine: &mut Machine) -> Result<(), Failure> {
+        self.watch_dead_men(machine);
+        for number in 0..self.motions.active.len() {
+            self.begin_queued(machine, number)?;
+        }
+        let mut number = 0;
+        while number < self.motions.active.len() {
+            match self.advance_motion(machine, number)? {
+                None => number += 1,
+                Some(end) => self.finish_motion(machine, number, end),
+            }
+        }
+        Ok(())
+    }
+
+    /// Begins motion `number` when it waits and its axes are free and nobody before it waits for them.
+    fn begin_queued(&mut self, machine: &mut Machine, number: usize) -> Result<(), Failure> {
+        let motion = &self.motions.active[number];
+        let mut earlier = self.motions.active[..number].iter();
+        let is_next = !earlier.any(|it| it.axes().any(|at| motion.axes().any(|own| own == at)));
+        let are_free = motion.axes().all(|at| self.seats[at].is_free());
+        if !matches!(motion.phase, Phase::Queued) || !is_next || !are_free {
+            return Ok(());
+        }
+        let mut motion = motion.clone();
+        self.motions.published = None;
+        match self.plan_legs(machine, &mut motion) {
+            Ok(speeds) => self.begin_legs(machine, &mut motion, &speeds)?,
+            Err(problem) => {
+                motion.phase = Phase::Stopping(End::Failed(Cause {
+                    code: problem.code,
+                    exit_code: problem.exit_code,
+                    cause: problem.detail(),
+                }));
+            }
+        }
+        self.motions.active[number] = motion;
+        Ok(())
+    }
+
+    fn begin_legs(
+        &mut self,
+        machine: &mut Machine,
+        motion: &mut Motion,
+        speeds: &[MetresPerSecond],
+    ) -> Result<(), Failure> {
+        motion.phase = Phase::Moving;
+        for (leg, speed) in motion.legs.iter_mut().zip(speeds) {
+            let seat = &mut self.seats[leg.at];
+            let limit = machine.patience().of(seat.settings.move_timeout + SETTLING);
+            leg.deadline = machine.now() + limit + seat.in_position;
+            leg.phase = LegPhase::Moving;
+            seat.task = Task::Motion(Arc::clone(&motion.id));
+            seat.target = Some(leg.target);
+            seat.set_point = leg.set_point;
+            let set_point = leg.set_point.unwrap_or(leg.target);
+            Moving::of(machine, &seat.name)?.begin(set_point, *speed)?;
+        }
+        Ok(())
+    }
+
+    /// How motion `number` ends, when it does.
+    fn advance_motion(
+        &mut self,
+        machine: &mut Machine,
+        number: usize,
+    ) -> Result<Option<End>, Failure> {
+        let motion = &self.motions.active[number];
+        match &motion.phase {
+            Phase::Queued => Ok(None),
+            Phase::Stopping(end) => {
+                let is_over = !self.is_stopping(motion.axes());
+                Ok(is_over.then(|| end.clone()))
+            }
+            Phase::Moving => self.advance_legs(machine, number),
+        }
+    }
+
+    fn advance_legs(
+        &mut self,
+        machine: &mut Machine,
+        number: usize,
+    ) -> Result<Option<End>, Failure> {
+        let now = machine.now();
+        for leg in &mut self.motions.active[number].legs {
+            let seat = &self.seats[leg.at];
+            if leg.phase == LegPhase::Moving
+                && let Some(outcome) = machine.outcome(&seat.name)?
+            {
+                outcome?;
+                let set_point = leg.set_point.unwrap_or(leg.target);
+                Moving::of(machine, &seat.name)?.arrived(set_point);
+                leg.phase = LegPhase::Settling;
+            }
+            if leg.phase == LegPhase::Settling && seat.is_in_position(now) {
+                leg.phase = LegPhase::There;
+            }
+        }
+        let legs = &self.motions.active[number].legs;
+        if legs.iter().all(|it| it.phase == LegPhase::There) {
+            return Ok(Some(End::Done));
+        }
+        let mut late = legs.iter();
+        let late = late.find(|it| it.phase != LegPhase::There && now >= it.deadline);
+        if let Some(leg) = late {
+            let end = End::TimedOut(self.overdue(leg));
+            self.stop_motion(machine, number, end);
+        }
+        Ok(None)
+    }
+
+    fn overdue(&self, leg: &Leg) -> Cause {
+        cause_of(&truestage::Failure::from(Failure::Overdue {
+            device: self.name(leg.at).to_string(),
+            step: "move",
+            waited: self.seats[leg.at].settings.move_timeout,
+        }))
+    }
+
+    /// Motion `number` ends as `end` when its axes stand.
+    fn stop_motion(&mut self, machine: &mut Machine, number: usize, end: End) {
+        let motion = &mut self.motions.active[number];
+        if let Phase::Stopping(_) = motion.phase {
+            return;
+        }
+        motion.phase = Phase::Stopping(end);
+        let id = Arc::clone(&motion.id);
+        self.motions.published = None;
+        self.halt_axes_of(machine, &id);
+    }
+
+    /// Every motion is stopped.
+    pub(super) fn stop_motions(&mut self, machine: &mut Machine, stopped: &Stopped) {
+        for number in 0..self.motions.active.len() {
+            self.stop_motion(machine, number, End::Stopped(stopped.clone()));
+        }
+    }
+
+    /// Every motion is to end as stopped, without a word to its axes.
+    pub(super) fn end_motions_as(&mut self, stopped: &Stopped) {
+        for motion in &mut self.motions.active {
+            if !matches!(motion.phase, Phase::Stopping(_)) {
+                motion.phase = Phase::Stopping(End::Stopped(stopped.clone()));
+            }
+        }
+        self.motions.published = None;
+    }
+
+    /// Every motion ends as it was to end.
+    pub(super) fn finish_motions(&mut self, machine: &Machine) {
+        while let Some(motion) = self.motions.active.first() {
+            let Phase::Stopping(end) = motion.phase.clone() else {
+                return;
+            };
+            self.finish_motion(machine, 0, end);
+        }
+    }
+
+    /// The dead-man of motion `id` still holds.
+    pub(super) fn renew(&mut self, now: Time, id: &str) -> Result<(), Problem> {
+        let mut active = self.motions.active.iter_mut();
+        let motion = active.find(|it| *it.id == *id).ok_or_else(|| {
+            let what = format!("there is no motion {id} under way");
+            Problem::new(Code::NoSuchMotion, what, "ask how it ended")
+        })?;
+        if let Some((span, until)) = &mut motion.dead_man {
+            *until = now + *span;
+        }
+        Ok(())
+    }
+
+    fn watch_dead_men(&mut self, machine: &mut Machine) {
+        let now = machine.now();
+        for number in 0..self.motions.active.len() {
+            let motion = &self.motions.active[number];
+            if motion.dead_man.is_some_and(|(_, until)| now >= until) {
+                let by = format!("the dead-man of {}", motion.by);
+                let stopped = Stopped { by, at: utc_now() };
+                self.stop_motion(machine, number, End::Stopped(stopped));
+            }
+        }
+    }
+
+    /// Every motion fails.
+    pub(super) fn fail_motions(&mut self, machine: &Machine, cause: &Cause) {
+        while !self.motions.active.is_empty() {
+            self.finish_motion(machine, 0, End::Failed(cause.clone()));
+        }
+    }
+
+    /// The final positions are published, and then the end.
+    fn finish_motion(&mut self, machine: &Machine, number: usize, end: End) {
+        let motion = self.motions.active.remove(number);
+        for leg in &motion.legs {
+            self.settle(machine, leg);
+        }
+        let view = Arc::new(shown::ended(&motion, &self.seats, machine, end));
+        for (axis, leg) in &view.axes {
+            let data = json!({"position": leg.position, "encoder": leg.encoder,
+                              "standard_uncertainty": leg.standard_uncertainty, "motion": view.id});
+            self.events.push("position", axis, data);
+        }
+        // It is still under way in this snapshot, which has the positions.
+        self.motions.active.insert(number, motion);
+        self.motions.published = None;
+        self.publish(machine);
+        let motion = self.motions.active.remove(number);
+        let cause = view.cause.clone().map(Arc::new);
+        for leg in &motion.legs {
+            let seat = &mut self.seats[leg.at];
+            if seat.is_of(&motion.id) {
+                seat.task = Task::Free;
+            }
+            if cause.is_some() {
+                seat.last_cause.clone_from(&cause);
+            }
+        }
+        self.events.push("motion", &view.id, json!(&*view));
+        self.motions.ended.push_back(view);
+        if self.motions.ended.len() > ENDED_KEPT {
+            self.motions.ended.pop_front();
+        }
+        self.motions.published = None;
+    }
+
+    /// What is known of an axis at rest after a motion.
+    fn settle(&mut self, machine: &Machine, leg: &Leg) {
+        let seat = &mut self.seats[leg.at];
+        let approach = seat.approach(machine);
+        let reading = machine.reading(&seat.name).ok().flatten();
+        let combined = reading.and_then(|it| seat.course.uncertainty_at(it.position, approach));
+        seat.standard_uncertainty = combined.map(|it| it.standard_uncertainty);
+    }
+}

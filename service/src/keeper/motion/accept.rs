@@ -1,0 +1,201 @@
+//! Which motions are accepted, and what they become.
+
+use core::time::Duration;
+
+use machine::Machine;
+use serde_json::json;
+use truestage::linear::{Corrected, Course, PlannedMove};
+use units::{Metres, MetresPerSecond, Time};
+
+use super::super::seat::{MovedBy, Seat, Task};
+use super::super::{Keeper, utc_now};
+use super::{End, Leg, LegPhase, Motion, Phase};
+use crate::problem::{Code, Problem};
+use crate::request::{IfMoving, MoveRequest};
+use crate::view::Stopped;
+
+/// So many may wait or be under way.
+const ACTIVE_MAX: usize = 64;
+
+impl Keeper {
+    /// Takes the motion `id`, or refuses it; nothing has moved then.
+    pub(in super::super) fn accept_motion(
+        &mut self,
+        machine: &mut Machine,
+        id: &str,
+        by: &str,
+        request: &MoveRequest,
+    ) -> Result<(), Problem> {
+        self.require_running()?;
+        let mut motion = self.motion_of(machine.now(), id, by, request)?;
+        self.plan_legs(machine, &mut motion)?;
+        self.clear_the_way(machine, &motion, request.if_moving)?;
+        self.events
+            .push("motion", id, json!({"state": "queued", "by": by}));
+        self.motions.active.push(motion);
+        self.motions.published = None;
+        Ok(())
+    }
+
+    fn motion_of(
+        &self,
+        now: Time,
+        id: &str,
+        by: &str,
+        request: &MoveRequest,
+    ) -> Result<Motion, Problem> {
+        if request.targets.is_empty() {
+            let what = "a motion without targets";
+            let help = "name an axis and its target: {\"targets\": {\"x\": \"12.5mm\"}}";
+            return Err(Problem::new(Code::BadRequest, what, help));
+        }
+        if self.motions.active.len() >= ACTIVE_MAX {
+            let what = format!("{ACTIVE_MAX} motions are under way or wait");
+            return Err(Problem::new(Code::Busy, what, "wait for the end of one"));
+        }
+        let legs = request.targets.iter().map(|(axis, target)| {
+            Ok(Leg {
+                at: self.place(axis)?,
+                target: target.0,
+                set_point: None,
+                corrected: "no",
+                deadline: Time::NEVER,
+                phase: LegPhase::Waiting,
+            })
+        });
+        let legs: Vec<_> = legs.collect::<Result<_, Problem>>()?;
+        let dead_man = request
+            .dead_man_ms
+            .map(|it| Duration::from_millis(it.into()));
+        Ok(Motion {
+            id: id.into(),
+            by: by.to_owned(),
+            accepted: utc_now(),
+            speed: speed_of(request)?,
+            uncorrected: request.uncorrected,
+            dead_man: dead_man.map(|it| (it, now + it)),
+            legs,
+            phase: Phase::Queued,
+        })
+    }
+
+    /// What each axis is sent, and how fast; everything is judged before anything moves.
+    pub(super) fn plan_legs(
+        &self,
+        machine: &Machine,
+        motion: &mut Motion,
+    ) -> Result<Vec<MetresPerSecond>, Problem> {
+        let (uncorrected, wanted) = (motion.uncorrected, motion.speed);
+        let planned = motion.legs.iter_mut().map(|leg| {
+            let seat = &self.seats[leg.at];
+            let planned = plan_leg(machine, seat, leg.target, uncorrected)?;
+            leg.set_point = Some(planned.set_point);
+            leg.corrected = word_of(planned.corrected);
+            Ok(wanted.map_or(planned.speed, |it| it.min(planned.speed)))
+        });
+        planned.collect()
+    }
+
+    /// Makes the axes of a new motion free, lets it wait, or refuses it.
+    fn clear_the_way(
+        &mut self,
+        machine: &mut Machine,
+        motion: &Motion,
+        if_moving: IfMoving,
+    ) -> Result<(), Problem> {
+        match if_moving {
+            IfMoving::Queue => Ok(()),
+            IfMoving::Refuse => {
+                motion.axes().try_for_each(|at| self.require_free(at))?;
+                self.require_unclaimed(motion)
+            }
+            IfMoving::Supersede => {
+                for at in motion.axes() {
+                    if let Task::Run(..) | Task::Power(_) = self.seats[at].task {
+                        self.require_free(at)?;
+                    }
+                }
+                self.supersede(machine, motion);
+                Ok(())
+            }
+        }
+    }
+
+    /// Another motion may wait for an axis that is free.
+    fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
+        let mut others = self.motions.active.iter();
+        let other = others.find(|it| it.axes().any(|at| motion.axes().any(|own| own == at)));
+        other.map_or(Ok(()), |other| {
+            Err(Problem::new(
+                Code::AxisBusy,
+                format!("motion {} waits for an axis of this one", other.id),
+                "wait for its end or stop it; a motion can be asked for with if_moving queue or \
+                 supersede",
+            ))
+        })
+    }
+
+    /// Stops the motions that have or want an axis of the new one.
+    fn supersede(&mut self, machine: &mut Machine, motion: &Motion) {
+        for number in 0..self.motions.active.len() {
+            let other = &self.motions.active[number];
+            if other.axes().any(|at| motion.axes().any(|own| own == at)) {
+                let by = format!("{} (superseded by {})", motion.by, motion.id);
+                let stopped = Stopped { by, at: utc_now() };
+                self.stop_motion(machine, number, End::Stopped(stopped));
+            }
+        }
+    }
+}
+
+fn speed_of(request: &MoveRequest) -> Result<Option<MetresPerSecond>, Problem> {
+    match request.speed {
+        // Written so that NaN is refused too.
+        Some(speed) if speed.0.value() > 0.0 => Ok(Some(speed.0)),
+        Some(_) => Err(Problem::new(
+            Code::BadQuantity,
+            "a speed that is not positive",
+            "give a positive one, or leave it out for the usual speed",
+        )),
+        None => Ok(None),
+    }
+}
+
+fn plan_leg(
+    machine: &Machine,
+    seat: &Seat,
+    target: Metres,
+    uncorrected: bool,
+) -> Result<PlannedMove, Problem> {
+    let axis = &seat.name;
+    let alone = Course::default();
+    let course = match (seat.moved_by, uncorrected) {
+        (MovedBy::Platform, _) => {
+            let what = format!("axis {axis} carries the platform and is not moved by itself");
+            let help = "use `truestage move` for the platform";
+            return Err(Problem::new(Code::NotOffered, what, help));
+        }
+        (MovedBy::Volume, false) => {
+            let what = format!("axis {axis} is corrected only together with the other two");
+            let help = "ask for it with uncorrected = true, or use `truestage move`";
+            return Err(Problem::new(Code::NotOffered, what, help));
+        }
+        (MovedBy::Volume, true) | (MovedBy::Itself, true) => &alone,
+        (MovedBy::Itself, false) => &seat.course,
+    };
+    let planned = course.plan(machine, axis, target)?;
+    if seat.is_enabled(machine) {
+        return Ok(planned);
+    }
+    let what = format!("axis {axis} is switched off; nothing was moved");
+    Err(Problem::new(Code::AxisDisabled, what, "enable it first"))
+}
+
+const fn word_of(corrected: Corrected) -> &'static str {
+    match corrected {
+        Corrected::No => "no",
+        Corrected::Within => "yes",
+        Corrected::Held { .. } => "held",
+        Corrected::Fading { .. } => "fading",
+    }
+}

@@ -1,0 +1,60 @@
+//! Motions as they are shown.
+
+use machine::Machine;
+use units::Metres;
+
+use super::super::seat::Seat;
+use super::{End, Motion, Phase};
+use crate::quantity::Quantity;
+use crate::view::{LegView, MotionState, MotionView};
+
+/// A motion that is under way.
+pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
+    let legs = motion.legs.iter().map(|leg| {
+        let view = LegView {
+            target: Quantity::mm(leg.target),
+            set_point: leg.set_point.map(Quantity::mm),
+            corrected: leg.corrected.to_owned(),
+            position: None,
+            encoder: None,
+            standard_uncertainty: None,
+        };
+        (seats[leg.at].name.to_string(), view)
+    });
+    MotionView {
+        id: motion.id.to_string(),
+        by: motion.by.clone(),
+        accepted: motion.accepted.clone(),
+        state: match motion.phase {
+            Phase::Queued => MotionState::Queued,
+            Phase::Moving => MotionState::Moving,
+            Phase::Stopping(_) => MotionState::Stopping,
+        },
+        stopped: None,
+        cause: None,
+        axes: legs.collect(),
+    }
+}
+
+/// A motion that has ended, with where its axes stand.
+pub(super) fn ended(motion: &Motion, seats: &[Seat], machine: &Machine, end: End) -> MotionView {
+    let mut view = view(motion, seats);
+    for leg in &motion.legs {
+        let seat = &seats[leg.at];
+        let Some(shown) = view.axes.get_mut(&*seat.name) else {
+            continue;
+        };
+        let sample = seat.sample(machine);
+        let place: Option<Metres> = sample.place.or(sample.encoder);
+        shown.position = place.map(Quantity::mm);
+        shown.encoder = sample.encoder.map(Quantity::mm);
+        shown.standard_uncertainty = sample.standard_uncertainty.map(Quantity::um);
+    }
+    (view.state, view.stopped, view.cause) = match end {
+        End::Done => (MotionState::Done, None, None),
+        End::Stopped(stopped) => (MotionState::Stopped, Some(stopped), None),
+        End::Failed(cause) => (MotionState::Failed, None, Some(cause)),
+        End::TimedOut(cause) => (MotionState::TimedOut, None, Some(cause)),
+    };
+    view
+}

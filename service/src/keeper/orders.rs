@@ -1,0 +1,172 @@
+//! Orders: taken, refused, carried out.
+
+use std::sync::Arc;
+
+use machine::{Machine, Moving};
+
+use super::seat::Task;
+use super::stop::stopped_problem;
+use super::{Job, Keeper, Mode};
+use crate::order::{Answer, Answered, Letter, Order, Reply};
+use crate::problem::{Code, Problem};
+
+impl Keeper {
+    /// Carries an order out, or begins to.
+    pub(super) fn obey(&mut self, machine: &mut Machine, letter: Letter) {
+        let Letter {
+            order,
+            caller,
+            reply,
+        } = letter;
+        let allowed = match order.needs_lease() {
+            true => self.check_lease(machine.now(), &caller),
+            false => Ok(()),
+        };
+        if let Err(problem) = allowed {
+            self.answer_later(reply, Err(problem));
+            return;
+        }
+        let by = caller.name.as_str();
+        let answered = match order {
+            Order::Stop { mode } => {
+                self.stop(machine, mode, by);
+                Ok(Answer::Done)
+            }
+            Order::Lease { request, token } => self
+                .give_lease(machine.now(), &caller, &request, token)
+                .map(Answer::Leased),
+            Order::Release => self.release(machine.now(), &caller).map(|()| Answer::Done),
+            Order::Move { id, request } => self
+                .accept_motion(machine, &id, by, &request)
+                .map(|()| Answer::Done),
+            Order::Renew { motion } => self.renew(machine.now(), &motion).map(|()| Answer::Done),
+            Order::Plan { id, request } => {
+                let planned = self.plan_run(&id, by, &request);
+                let started = planned.and_then(|()| match request.start {
+                    true => self.start_planned(machine, &id),
+                    false => Ok(()),
+                });
+                started.map(|()| Answer::Done)
+            }
+            Order::Start { run } => self.start_run(machine, &run).map(|()| Answer::Done),
+            Order::Abort { run } => self.abort_run(machine, &run, by).map(|()| Answer::Done),
+            Order::Power { axis, on } => return self.power(machine, &axis, on, reply),
+            Order::Reset => return self.take_reset(reply),
+            Order::End => return self.take_end(machine, by, reply),
+        };
+        self.answer_later(reply, answered);
+    }
+
+    /// The number of the axis `name`.
+    pub(super) fn place(&self, name: &str) -> Result<usize, Problem> {
+        let found = self.seats.iter().position(|it| *it.name == *name);
+        found.ok_or_else(|| {
+            let known: Vec<_> = self.seats.iter().map(|it| &*it.name).collect();
+            Problem::new(
+                Code::NoSuchAxis,
+                format!("there is no axis `{name}`"),
+                format!("known: {}", known.join(", ")),
+            )
+        })
+    }
+
+    /// Refuses what needs a machine that runs.
+    pub(super) fn require_running(&self) -> Result<(), Problem> {
+        match (self.mode, &self.fault) {
+            (Mode::Idle | Mode::Procedure, _) => Ok(()),
+            (Mode::Safe, Some(cause)) => Err(Problem::new(
+                Code::ErrorStop,
+                format!("the machine was stopped: {}", cause.cause),
+                "remove the cause, then reset; axes must be zeroed again",
+            )),
+            (Mode::Starting | Mode::Safe, _) => Err(Problem::new(
+                Code::Busy,
+                "the devices are being started",
+                "try again in a second",
+            )),
+            (Mode::Ending, _) => Err(Problem::new(Code::Ending, "the service ends", "")),
+        }
+    }
+
+    /// Refuses an axis that somebody has.
+    pub(super) fn require_free(&self, at: usize) -> Result<(), Problem> {
+        let seat = &self.seats[at];
+        if seat.is_free() {
+            return Ok(());
+        }
+        Err(Problem::new(
+            Code::AxisBusy,
+            format!("axis {}: in use by {}", seat.name, seat.user()),
+            "wait for its end or stop it; a motion can be asked for with if_moving queue or supersede",
+        ))
+    }
+
+    fn power(&mut self, machine: &mut Machine, axis: &str, on: bool, reply: Reply) {
+        match self.begin_power(machine, axis, on) {
+            Ok(at) => self.seats[at].task = Task::Power(Some(reply)),
+            Err(problem) => self.answer_later(reply, Err(problem)),
+        }
+    }
+
+    fn begin_power(&self, machine: &mut Machine, axis: &str, on: bool) -> Result<usize, Problem> {
+        self.require_running()?;
+        let at = self.place(axis)?;
+        self.require_free(at)?;
+        let failed = |it: machine::Failure| Problem::from(truestage::Failure::from(it));
+        let mut moving = Moving::of(machine, axis).map_err(failed)?;
+        if on {
+            moving.enable().map_err(failed)?;
+        } else {
+            moving.disable();
+        }
+        Ok(at)
+    }
+
+    fn take_reset(&mut self, reply: Reply) {
+        let is_free = self.job.is_none() && self.seats.iter().all(|it| it.is_free());
+        match self.mode {
+            Mode::Safe | Mode::Idle if is_free => self.job = Some(Job::Reset(reply)),
+            Mode::Ending => self.answer_later(reply, Err(stopped_problem())),
+            Mode::Starting | Mode::Idle | Mode::Procedure | Mode::Safe => {
+                let what = "an axis is in use, or a reset is under way";
+                let help = "stop the machine first";
+                self.answer_later(reply, Err(Problem::new(Code::AxisBusy, what, help)));
+            }
+        }
+    }
+
+    fn take_end(&mut self, machine: &mut Machine, by: &str, reply: Reply) {
+        self.stop(machine, crate::request::StopMode::Controlled, by);
+        self.job = Some(Job::End(reply));
+    }
+
+    /// Nothing more is taken: who still waits is told so.
+    pub(crate) fn dismiss(&mut self) {
+        while let Ok(letter) = self.inbox.try_recv() {
+            let problem = Problem::new(Code::Ending, "the service ends", "");
+            answer(letter.reply, Err(problem));
+        }
+    }
+
+    /// Answers once the snapshot has what the answer is about.
+    pub(super) fn answer_later(&mut self, reply: Reply, answered: Answered) {
+        self.answers.push((reply, answered));
+    }
+
+    /// Sends the answers whose snapshot is out.
+    pub(super) fn send_answers(&mut self) {
+        for (reply, answered) in self.answers.drain(..) {
+            answer(reply, answered);
+        }
+    }
+
+    /// The name of a seat's axis.
+    pub(super) fn name(&self, at: usize) -> &Arc<str> {
+        &self.seats[at].name
+    }
+}
+
+/// Whoever asked may have gone: that is no reason to do anything else.
+pub(crate) fn answer(reply: Reply, answered: Answered) {
+    let _ = reply.send(answered);
+}

@@ -1,0 +1,64 @@
+//! What goes out after each tick.
+
+use std::sync::Arc;
+
+use machine::Machine;
+use serde_json::json;
+
+use super::{Keeper, Mode};
+use crate::view::MachineState;
+
+/// Counters change slowly and cost memory: once in so many ticks is enough.
+const COUNTERS_EVERY: u64 = 256;
+
+impl Keeper {
+    /// What the machine as a whole is.
+    pub(super) const fn machine_state(&self) -> MachineState {
+        match self.mode {
+            Mode::Starting => MachineState::Starting,
+            Mode::Idle | Mode::Procedure => MachineState::Running,
+            Mode::Safe => MachineState::ErrorStop,
+            Mode::Ending => MachineState::Ending,
+        }
+    }
+
+    /// Publishes the newest snapshot, and tells what axes changed their state.
+    pub(crate) fn publish(&mut self, machine: &Machine) {
+        self.tell_states(machine);
+        let now = machine.now();
+        let state = self.machine_state();
+        let lease = self.holder(now).map(|it| (Arc::clone(&it.name), it.until));
+        let motions = self.motions.list(&self.seats);
+        let runs = self.runs.list(&self.seats);
+        let events = self.events.list();
+        // What is there is of some earlier tick: everything is written over.
+        let snapshot = self.output.input_buffer_mut();
+        snapshot.now = now;
+        snapshot.state = state;
+        snapshot.cause.clone_from(&self.fault);
+        snapshot.axes.clear();
+        let samples = self.seats.iter().map(|seat| seat.sample(machine));
+        snapshot.axes.extend(samples);
+        snapshot.motions = motions;
+        snapshot.runs = runs;
+        snapshot.events = events;
+        snapshot.lease = lease;
+        if self.ticks % COUNTERS_EVERY == 1 || snapshot.counters.is_empty() {
+            snapshot.counters = Arc::new(machine.devices().counters());
+        }
+        snapshot.ticks = self.ticks;
+        self.output.publish();
+    }
+
+    fn tell_states(&mut self, machine: &Machine) {
+        let is_faulted = self.fault.is_some();
+        for seat in &mut self.seats {
+            let state = seat.state_now(machine, is_faulted);
+            if state != seat.state {
+                seat.state = state;
+                self.events
+                    .push("axis", &seat.name, json!({"state": state}));
+            }
+        }
+    }
+}

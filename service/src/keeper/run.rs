@@ -1,0 +1,374 @@
+//! Runs: planned, started, stopped; what they do is sequential code on the machine's thread.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use machine::{Machine, Stage};
+use serde_json::{Value, json};
+
+use super::seat::{MovedBy, Seat, Task as SeatTask};
+use super::{Job, Keeper, Mode, utc_now};
+use crate::problem::{Code, Problem};
+use crate::request::{RunKind, RunRequest};
+use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped};
+
+/// So many runs are kept in the snapshot.
+const KEPT: usize = 64;
+
+/// What the machine's thread is to do for a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Task {
+    pub(crate) id: Arc<str>,
+    pub(crate) request: RunRequest,
+    /// The axis; `None` for all axes of a volume.
+    pub(crate) axis: Option<String>,
+}
+
+#[derive(Clone, Debug)]
+struct Run {
+    task: Task,
+    axes: Vec<usize>,
+    view: RunView,
+    /// Somebody stopped it; it ends so when its procedure has ended and its axes stand.
+    stopped: Option<Stopped>,
+    /// Its procedure has ended.
+    is_over: bool,
+}
+
+/// All runs.
+#[derive(Debug, Default)]
+pub(super) struct Runs {
+    kept: VecDeque<Run>,
+    published: Option<Arc<Vec<Arc<RunView>>>>,
+}
+
+impl Runs {
+    /// The list for a snapshot, the same one until something changes.
+    pub(super) fn list(&mut self, _seats: &[Seat]) -> Arc<Vec<Arc<RunView>>> {
+        let kept = &self.kept;
+        let list = self.published.get_or_insert_with(|| {
+            let views = kept.iter().map(|it| Arc::new(it.view.clone()));
+            Arc::new(views.collect())
+        });
+        Arc::clone(list)
+    }
+
+    /// Whether the procedure that runs has to end.
+    pub(super) fn is_to_end(&self) -> bool {
+        self.kept
+            .iter()
+            .any(|it| it.stopped.is_some() && !it.is_over)
+    }
+
+    fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
+        self.published = None;
+        let found = self.kept.iter_mut().find(|it| *it.task.id == *id);
+        found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
+    }
+
+    fn under_way(&mut self) -> Option<&mut Run> {
+        self.published = None;
+        let mut kept = self.kept.iter_mut();
+        kept.find(|it| matches!(it.view.state, RunState::Running | RunState::Stopping))
+    }
+}
+
+impl Keeper {
+    /// Plans the run `id`; nothing moves.
+    pub(super) fn plan_run(
+        &mut self,
+        id: &str,
+        by: &str,
+        request: &RunRequest,
+    ) -> Result<(), Problem> {
+        let (axis, axes) = self.axes_of_run(request)?;
+        let plan = self.plan_of(request.kind, axes[0])?;
+        let names = axes.iter().map(|at| self.name(*at).to_string());
+        let view = RunView {
+            id: id.to_owned(),
+            by: by.to_owned(),
+            kind: request.kind,
+            axes: names.collect(),
+            state: RunState::Planned,
+            plan,
+            steps_done: 0,
+            steps: 0,
+            stopped: None,
+            cause: None,
+            result: Value::Null,
+        };
+        self.events.push("run", id, json!(view));
+        self.runs.kept.push_back(Run {
+            task: Task {
+                id: id.into(),
+                request: request.clone(),
+                axis,
+            },
+            axes,
+            view,
+            stopped: None,
+            is_over: false,
+        });
+        if self.runs.kept.len() > KEPT {
+            let old = self
+                .runs
+                .kept
+                .iter()
+                .position(|it| it.view.state.is_end() || it.view.state == RunState::Planned);
+            old.map(|at| self.runs.kept.remove(at));
+        }
+        self.runs.published = None;
+        Ok(())
+    }
+
+    fn axes_of_run(&self, request: &RunRequest) -> Result<(Option<String>, Vec<usize>), Problem> {
+        let of_volume = |seat: &Seat| seat.moved_by == MovedBy::Volume;
+        if self.seats.iter().any(of_volume) && request.kind == RunKind::Zero {
+            let all = (0..self.seats.len()).filter(|at| of_volume(&self.seats[*at]));
+            return Ok((None, all.collect()));
+        }
+        let name = match (&request.axis, self.seats.as_slice()) {
+            (Some(axis), _) => axis.as_str(),
+            (None, [only]) => &only.name,
+            (None, _) => {
+                let what = "the machine has several axes";
+                return Err(Problem::new(Code::BadRequest, what, "name one in `axis`"));
+            }
+        };
+        let at = self.place(name)?;
+        if self.seats[at].moved_by != MovedBy::Itself {
+            let what = format!("axis {name} is not zeroed, calibrated or verified by itself");
+            let help = "use the verb of the command line";
+            return Err(Problem::new(Code::NotOffered, what, help));
+        }
+        Ok((Some(name.to_owned()), vec![at]))
+    }
+
+    fn plan_of(&self, kind: RunKind, at: usize) -> Result<RunPlanView, Problem> {
+        let plans = &self.seats[at].plans;
+        let (plan, section) = match kind {
+            RunKind::Zero => (&plans.zero, "zero"),
+            RunKind::Calibrate => (&plans.calibrate, "calibrate"),
+            RunKind::Verify => (&plans.verify, "verify"),
+        };
+        plan.clone().ok_or_else(|| {
+            let axis = self.name(at).to_string();
+            truestage::Failure::NotConfigured { axis, section }.into()
+        })
+    }
+
+    /// Begins the run `id` that was planned for that; one that cannot begin has failed.
+    pub(super) fn start_planned(&mut self, machine: &Machine, id: &str) -> Result<(), Problem> {
+        self.start_run(machine, id).inspect_err(|problem| {
+            let cause = Cause {
+                code: problem.code,
+                cause: problem.detail(),
+                exit_code: problem.exit_code,
+            };
+            self.run_failed(id, &cause);
+        })
+    }
+
+    /// Begins the planned run `id` as soon as this tick has ended.
+    pub(super) fn start_run(&mut self, machine: &Machine, id: &str) -> Result<(), Problem> {
+        self.require_running()?;
+        let run = self.runs.find(id)?;
+        let (axes, kind, state) = (run.axes.clone(), run.view.kind, run.view.state);
+        if state != RunState::Planned {
+            let what = format!("run {id} was started before");
+            return Err(Problem::new(Code::RunState, what, "plan another one"));
+        }
+        if self.mode == Mode::Procedure || self.job.is_some() {
+            let what = "another run is under way";
+            let help = "wait for its end or abort it";
+            return Err(Problem::new(Code::AxisBusy, what, help));
+        }
+        for at in &axes {
+            self.require_free(*at)?;
+            if kind != RunKind::Zero {
+                let zeroed = machine.require_zeroed(&self.seats[*at].name);
+                zeroed.map_err(truestage::Failure::from)?;
+            }
+        }
+        for at in axes {
+            self.seats[at].task = SeatTask::Run(id.into(), kind);
+        }
+        self.job = Some(Job::Run(id.into()));
+        self.change_run(id, |view| view.state = RunState::Running);
+        Ok(())
+    }
+
+    /// Ends the run `id`.
+    pub(super) fn abort_run(
+        &mut self,
+        machine: &mut Machine,
+        id: &str,
+        by: &str,
+    ) -> Result<(), Problem> {
+        let run = self.runs.find(id)?;
+        let stopped = Stopped {
+            by: by.to_owned(),
+            at: utc_now(),
+        };
+        match run.view.state {
+            RunState::Planned => self.change_run(id, |view| {
+                view.state = RunState::Stopped;
+                view.stopped = Some(stopped);
+            }),
+            RunState::Running => self.stop_run(machine, &stopped),
+            // A level: it stays.
+            RunState::Stopping | RunState::Done | RunState::Stopped | RunState::Failed => {}
+        }
+        Ok(())
+    }
+
+    /// The run that is under way is stopped.
+    pub(super) fn stop_runs(&mut self, machine: &mut Machine, stopped: &Stopped) {
+        self.stop_run(machine, stopped);
+    }
+
+    fn stop_run(&mut self, machine: &mut Machine, stopped: &Stopped) {
+        let is_waiting = matches!(self.job, Some(Job::Run(_)));
+        let Some(run) = self.runs.under_way() else {
+            return;
+        };
+        run.stopped.get_or_insert_with(|| stopped.clone());
+        run.view.state = RunState::Stopping;
+        // What has not begun is over.
+        run.is_over |= is_waiting;
+        let id = Arc::clone(&run.task.id);
+        if is_waiting {
+            self.job = None;
+        }
+        self.halt_axes_of(machine, &id);
+    }
+
+    /// The run under way is to end as stopped, without a word to its axes.
+    pub(super) fn end_runs_as(&mut self, stopped: &Stopped) {
+        if let Some(run) = self.runs.under_way() {
+            run.stopped.get_or_insert_with(|| stopped.clone());
+            run.view.state = RunState::Stopping;
+            run.is_over = true;
+        }
+    }
+
+    /// The run under way ends as it was to end.
+    pub(super) fn finish_runs(&mut self) {
+        if let Some(run) = self.runs.under_way() {
+            let (id, stopped) = (Arc::clone(&run.task.id), run.stopped.clone());
+            self.change_run(&id, |view| {
+                view.state = RunState::Stopped;
+                view.stopped = stopped;
+            });
+        }
+    }
+
+    /// Stopped runs end when their axes stand.
+    pub(super) fn advance_runs(&mut self) {
+        let Some(run) = self
+            .runs
+            .kept
+            .iter()
+            .find(|it| it.view.state == RunState::Stopping && it.is_over)
+        else {
+            return;
+        };
+        let (id, stopped) = (Arc::clone(&run.task.id), run.stopped.clone());
+        if !self.is_stopping(run.axes.iter().copied()) {
+            self.change_run(&id, |view| {
+                view.state = RunState::Stopped;
+                view.stopped = stopped;
+            });
+        }
+    }
+
+    /// What is to be done for the run `id`.
+    pub(crate) fn begin_run(&mut self, id: &str) -> Option<Task> {
+        let task = self.runs.find(id).ok()?.task.clone();
+        self.mode = Mode::Procedure;
+        Some(task)
+    }
+
+    /// The procedure of the run `id` has ended; says whether somebody stopped it.
+    pub(crate) fn end_procedure(&mut self, id: &str) -> bool {
+        self.mode = Mode::Idle;
+        let Ok(run) = self.runs.find(id) else {
+            return false;
+        };
+        run.is_over = true;
+        run.stopped.is_some()
+    }
+
+    /// The run `id` has its result.
+    pub(crate) fn run_done(&mut self, id: &str, result: Value) {
+        self.free_axes_of(id);
+        self.change_run(id, |view| {
+            view.state = RunState::Done;
+            view.steps_done = view.steps;
+            view.result = result;
+        });
+    }
+
+    /// The run `id` has no result, and its axes stand.
+    pub(crate) fn run_failed(&mut self, id: &str, cause: &Cause) {
+        for seat in &mut self.seats {
+            if seat.is_of(id) {
+                seat.last_cause = Some(Arc::new(cause.clone()));
+            }
+        }
+        self.free_axes_of(id);
+        self.change_run(id, |view| {
+            view.state = RunState::Failed;
+            view.cause = Some(cause.clone());
+        });
+    }
+
+    /// What is under way fails.
+    pub(super) fn fail_runs(&mut self, cause: &Cause) {
+        if let Some(run) = self.runs.under_way() {
+            run.is_over = true;
+            let id = Arc::clone(&run.task.id);
+            self.run_failed(&id, cause);
+        }
+    }
+
+    fn free_axes_of(&mut self, id: &str) {
+        for seat in &mut self.seats {
+            if seat.is_of(id) {
+                seat.task = SeatTask::Free;
+            }
+        }
+    }
+
+    pub(super) fn run_progress(&mut self, stage: Stage, done: u64, total: u64) {
+        let Some(run) = self.runs.under_way() else {
+            return;
+        };
+        (run.view.steps_done, run.view.steps) = (done, total);
+        let id = Arc::clone(&run.task.id);
+        let data = json!({"stage": stage.text(), "steps_done": done, "steps": total});
+        self.events.push("run", &id, data);
+    }
+
+    fn change_run(&mut self, id: &str, change: impl FnOnce(&mut RunView)) {
+        let Ok(run) = self.runs.find(id) else {
+            return;
+        };
+        change(&mut run.view);
+        let data = json!(run.view);
+        self.events.push("run", id, data);
+    }
+
+    /// What corrects the moves of the axis at `name` from now on.
+    pub(crate) fn set_course(
+        &mut self,
+        name: &str,
+        course: truestage::linear::Course,
+        calibration: Option<&str>,
+    ) {
+        if let Some(seat) = self.seats.iter_mut().find(|it| *it.name == *name) {
+            seat.course = course;
+            seat.calibration = calibration.map(Arc::from);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! An axis in the hands of the service: who has it, and what is known of it.
+
+use core::time::Duration;
+use std::sync::Arc;
+
+use machine::{AxisSettings, Machine};
+use truestage::linear::Course;
+use units::{Approach, Metres, Time};
+use wire::cia402::PowerState;
+
+use crate::order::Reply;
+use crate::request::RunKind;
+use crate::snapshot::AxisSample;
+use crate::view::{AxisState, Cause, RunPlanView};
+
+/// Who may move an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MovedBy {
+    /// Anybody, by itself.
+    Itself,
+    /// Three axes are corrected together: by itself only uncorrected.
+    Volume,
+    /// The platform that it carries: never by itself.
+    Platform,
+}
+
+/// What an axis is in use for.
+#[derive(Debug)]
+pub(super) enum Task {
+    Free,
+    /// The motion of this name.
+    Motion(Arc<str>),
+    /// The run of this name.
+    Run(Arc<str>, RunKind),
+    /// It is being switched on or off for somebody who waits.
+    Power(Option<Reply>),
+    /// It slows down.
+    Stopping,
+}
+
+/// What its runs would do.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plans {
+    pub(super) zero: Option<RunPlanView>,
+    pub(super) calibrate: Option<RunPlanView>,
+    pub(super) verify: Option<RunPlanView>,
+}
+
+/// An axis.
+pub(crate) struct Seat {
+    pub(super) name: Arc<str>,
+    pub(super) moved_by: MovedBy,
+    pub(super) settings: AxisSettings,
+    /// How long it must have been in position.
+    pub(super) in_position: Duration,
+    pub(super) course: Course,
+    pub(super) calibration: Option<Arc<str>>,
+    pub(super) plans: Plans,
+    pub(super) task: Task,
+    pub(super) standing_since: Option<Time>,
+    pub(super) target: Option<Metres>,
+    pub(super) set_point: Option<Metres>,
+    pub(super) standard_uncertainty: Option<Metres>,
+    pub(super) last_cause: Option<Arc<Cause>>,
+    pub(super) state: AxisState,
+}
+
+impl Seat {
+    /// Whether nobody has it.
+    pub(super) const fn is_free(&self) -> bool {
+        matches!(self.task, Task::Free)
+    }
+
+    /// Whether the motion or run `id` has it.
+    pub(super) fn is_of(&self, id: &str) -> bool {
+        match &self.task {
+            Task::Motion(of) | Task::Run(of, _) => **of == *id,
+            Task::Free | Task::Power(_) | Task::Stopping => false,
+        }
+    }
+
+    /// Who has it, for people.
+    pub(super) fn user(&self) -> String {
+        match &self.task {
+            Task::Free => "nobody".into(),
+            Task::Motion(id) => format!("motion {id}"),
+            Task::Run(id, _) => format!("run {id}"),
+            Task::Power(_) => "a change of its power".into(),
+            Task::Stopping => "a stop that has not ended".into(),
+        }
+    }
+
+    /// Takes note of whether it stands.
+    pub(super) fn watch_rest(&mut self, machine: &Machine) {
+        let Ok(Some(reading)) = machine.reading(&self.name) else {
+            return;
+        };
+        match (reading.standing, self.standing_since) {
+            (false, _) => {
+                self.standing_since = None;
+                self.standard_uncertainty = None;
+            }
+            (true, None) => self.standing_since = Some(reading.at),
+            (true, Some(_)) => {}
+        }
+    }
+
+    /// Whether it has been in position for its time.
+    pub(super) fn is_in_position(&self, now: Time) -> bool {
+        let since = self.standing_since;
+        since.is_some_and(|since| now.since(since) >= self.in_position)
+    }
+
+    /// From which side it came to where it is.
+    pub(super) fn approach(&self, machine: &Machine) -> Approach {
+        let tracker = machine.approach(&self.name).ok();
+        tracker
+            .and_then(|it| it.approach())
+            .unwrap_or(Approach::Forward)
+    }
+
+    /// What it does.
+    pub(super) fn state_now(&self, machine: &Machine, is_faulted: bool) -> AxisState {
+        let power = machine.power_state(&self.name).ok().flatten();
+        match &self.task {
+            _ if is_faulted => AxisState::ErrorStop,
+            Task::Stopping => AxisState::Stopping,
+            Task::Run(_, RunKind::Zero) => AxisState::Homing,
+            Task::Run(..) | Task::Motion(_) => AxisState::DiscreteMotion,
+            Task::Free | Task::Power(_) => match power {
+                Some(PowerState::OperationEnabled) => AxisState::Standstill,
+                Some(PowerState::Fault | PowerState::FaultReactionActive) => AxisState::ErrorStop,
+                _ => AxisState::Disabled,
+            },
+        }
+    }
+
+    /// Whether its drive is on.
+    pub(super) fn is_enabled(&self, machine: &Machine) -> bool {
+        let power = machine.power_state(&self.name).ok().flatten();
+        power == Some(PowerState::OperationEnabled)
+    }
+
+    /// What is published of it.
+    pub(super) fn sample(&self, machine: &Machine) -> AxisSample {
+        let reading = machine.reading(&self.name).ok().flatten();
+        let encoder = reading.map(|it| it.position);
+        let homed = machine.is_zeroed(&self.name);
+        let place = encoder
+            .filter(|_| homed)
+            .and_then(|it| self.course.place(it, self.approach(machine)));
+        AxisSample {
+            state: self.state,
+            encoder,
+            place,
+            standard_uncertainty: place.and(self.standard_uncertainty),
+            target: self.target,
+            set_point: self.set_point,
+            homed,
+            calibration: self.calibration.clone(),
+            used_by: match &self.task {
+                Task::Motion(id) | Task::Run(id, _) => Some(Arc::clone(id)),
+                Task::Free | Task::Power(_) | Task::Stopping => None,
+            },
+            last_cause: self.last_cause.clone(),
+        }
+    }
+}

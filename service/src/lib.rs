@@ -1,0 +1,34 @@
+//! One process keeps a machine zeroed, enabled and supervised, and many clients ask it.
+//!
+//! [`Service::start`] makes a machine on a thread of its own, which ticks for ever; a [`Desk`] takes orders to
+//! it and reads what it publishes, from any thread. [Decision
+//! 0034](../../docs/decisions/0034-one-process-keeps-the-machine.md) says why it is built this way, with a
+//! picture.
+//!
+//! Quantities go in as a text with a unit (`"12.5mm"`) or as `{"value": 12.5, "unit": "mm"}`, and come out in the
+//! second form. Nothing here is a safety function: wire STO.
+
+mod desk;
+mod keeper;
+mod ledger;
+mod order;
+mod problem;
+mod quantity;
+mod request;
+mod scribe;
+mod snapshot;
+mod thread;
+mod view;
+
+pub use desk::Desk;
+pub use ledger::LedgerError;
+pub use problem::{Code, Problem, ProblemBody};
+pub use quantity::{Length, Quantity, QuantityIn, Speed};
+pub use request::{
+    Caller, IfMoving, LeaseRequest, MoveRequest, RunKind, RunRequest, StopMode, Target,
+};
+pub use thread::{Opened, Service, StartError};
+pub use view::{
+    AxisState, AxisView, Cause, Event, LeaseView, Leased, LegView, MachineState, MachineView,
+    MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
+};

@@ -1,0 +1,76 @@
+//! What goes to the machine's thread, and what comes back.
+
+use tokio::sync::oneshot;
+
+use crate::problem::Problem;
+use crate::request::{Caller, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::view::Leased;
+
+/// What is asked of the machine's thread.
+#[derive(Clone, Debug)]
+pub(crate) enum Order {
+    /// A motion under the name that it is to have.
+    Move { id: String, request: MoveRequest },
+    /// The dead-man of a motion still holds.
+    Renew { motion: String },
+    /// Everything stops.
+    Stop { mode: StopMode },
+    /// What a failure stopped may be used again.
+    Reset,
+    /// Switches an axis on or off.
+    Power { axis: String, on: bool },
+    /// A run under the name that it is to have.
+    Plan { id: String, request: RunRequest },
+    /// A planned run begins.
+    Start { run: String },
+    /// A run ends.
+    Abort { run: String },
+    /// Who may command; the token is what the holder is given.
+    Lease {
+        request: LeaseRequest,
+        token: String,
+    },
+    /// The lease goes back.
+    Release,
+    /// The service ends.
+    End,
+}
+
+impl Order {
+    /// Whether only the holder of the lease may ask for it.
+    pub(crate) const fn needs_lease(&self) -> bool {
+        match self {
+            Self::Stop { .. } | Self::Lease { .. } | Self::Release | Self::End => false,
+            Self::Move { .. }
+            | Self::Renew { .. }
+            | Self::Reset
+            | Self::Power { .. }
+            | Self::Plan { .. }
+            | Self::Start { .. }
+            | Self::Abort { .. } => true,
+        }
+    }
+}
+
+/// What an order that was carried out comes to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// It is done, or goes on under its name.
+    Done,
+    /// The lease.
+    Leased(Leased),
+}
+
+/// Whether it is carried out.
+pub(crate) type Answered = Result<Answer, Problem>;
+
+/// The place for an answer; whoever asked may have gone.
+pub(crate) type Reply = oneshot::Sender<Answered>;
+
+/// An order on its way.
+#[derive(Debug)]
+pub(crate) struct Letter {
+    pub(crate) order: Order,
+    pub(crate) caller: Caller,
+    pub(crate) reply: Reply,
+}

@@ -1,0 +1,172 @@
+//! Quantities as they go in and come out: the unit is never guessed.
+
+use core::fmt;
+
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use units::{Metres, MetresPerSecond, text};
+use utoipa::ToSchema;
+
+/// A value and its unit, as it comes out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Quantity {
+    /// How much.
+    pub value: f64,
+    /// Of what: `mm`, `um`, `mm/s`.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// A position or a way, in millimetres.
+    pub fn mm(length: Metres) -> Self {
+        Self {
+            value: length.mm(),
+            unit: "mm".into(),
+        }
+    }
+
+    /// A small length, in micrometres.
+    pub fn um(length: Metres) -> Self {
+        Self {
+            value: length.um(),
+            unit: "um".into(),
+        }
+    }
+
+    /// The length that it is; `None` when it is none.
+    pub fn length(&self) -> Option<Metres> {
+        text::length(&self.text())
+    }
+
+    fn text(&self) -> String {
+        format!("{}{}", self.value, self.unit)
+    }
+}
+
+/// A quantity as it goes in: a text with a unit (`"12.5mm"`, `"20mm/s"`), or value and unit. A bare number is refused.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum QuantityIn {
+    /// A text with a unit.
+    Text(String),
+    /// Value and unit.
+    Object(Quantity),
+}
+
+/// A quantity that is written with its unit.
+trait Written: Sized {
+    /// What is expected, with examples.
+    const EXPECTED: &'static str;
+
+    fn from_text(text: &str) -> Option<Self>;
+}
+
+/// A length as it goes in: `"12.5mm"` or `{"value": 12.5, "unit": "mm"}`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Length(pub Metres);
+
+impl Written for Length {
+    const EXPECTED: &'static str = "a length with its unit (m, mm, um or nm): \"12.5mm\" or \
+                                    {\"value\": 12.5, \"unit\": \"mm\"}";
+
+    fn from_text(text: &str) -> Option<Self> {
+        text::length(text).map(Self)
+    }
+}
+
+/// A speed as it goes in: `"20mm/s"` or `{"value": 20, "unit": "mm/s"}`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speed(pub MetresPerSecond);
+
+impl Written for Speed {
+    const EXPECTED: &'static str = "a speed with its unit (m/s, mm/s or um/s): \"20mm/s\" or \
+                                    {\"value\": 20, \"unit\": \"mm/s\"}";
+
+    fn from_text(text: &str) -> Option<Self> {
+        text::speed(text).map(Self)
+    }
+}
+
+struct Reader<W>(core::marker::PhantomData<W>);
+
+impl<'de, W: Written> Visitor<'de> for Reader<W> {
+    type Value = W;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(W::EXPECTED)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<W, E> {
+        W::from_text(text).ok_or_else(|| E::invalid_value(de::Unexpected::Str(text), &self))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<W, A::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Object {
+            value: f64,
+            unit: String,
+        }
+        let object = Object::deserialize(de::value::MapAccessDeserializer::new(map))?;
+        let text = format!("{}{}", object.value, object.unit);
+        self.visit_str(&text)
+    }
+}
+
+macro_rules! written {
+    ($name:ident, $show:expr) => {
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                from.deserialize_any(Reader(core::marker::PhantomData))
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                $show(self).serialize(to)
+            }
+        }
+    };
+}
+
+written!(Length, |it: &Length| Quantity::mm(it.0));
+written!(Speed, |it: &Speed| Quantity {
+    value: it.0.value() * 1e3,
+    unit: "mm/s".into(),
+});
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantity_has_a_unit_or_is_refused_with_an_example() {
+        let read = |text: &str| serde_json::from_str::<Length>(text).map(|it| it.0.mm());
+        assert_eq!(read("\"12.5mm\"").unwrap(), 12.5);
+        assert_eq!(read(r#"{"value": 3, "unit": "mm"}"#).unwrap(), 3.0);
+        for text in [
+            "12.5",
+            "3",
+            "\"12.5\"",
+            "\"nanmm\"",
+            "\"1mm/s\"",
+            "null",
+            r#"{"value": 3, "unit": "deg"}"#,
+            r#"{"value": 3}"#,
+            r#"{"value": 3, "unit": "mm", "more": 1}"#,
+        ] {
+            assert!(read(text).is_err(), "{text}");
+        }
+        let said = read("12.5").unwrap_err().to_string();
+        assert!(said.contains("\"12.5mm\""), "{said}");
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let text = serde_json::to_string(&Length(Metres::from_mm(-0.25))).unwrap();
+        assert_eq!(serde_json::from_str::<Length>(&text).unwrap().0.mm(), -0.25);
+        let speed: Speed = serde_json::from_str("\"20mm/s\"").unwrap();
+        let text = serde_json::to_string(&speed).unwrap();
+        assert_eq!(serde_json::from_str::<Speed>(&text).unwrap(), speed);
+    }
+}

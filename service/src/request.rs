@@ -1,0 +1,155 @@
+//! What is asked of the service.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::quantity::{Length, QuantityIn, Speed};
+
+/// Who asks, and by which right.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Caller {
+    /// A name for people: events and ends of motions say it.
+    pub name: String,
+    /// What the holder of the lease was given.
+    pub lease: Option<String>,
+}
+
+impl Caller {
+    /// Somebody without a lease.
+    pub fn named(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            lease: None,
+        }
+    }
+}
+
+/// Where each axis goes.
+pub type Target = BTreeMap<String, Length>;
+
+/// A motion that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MoveRequest {
+    /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time.
+    #[schema(value_type = BTreeMap<String, QuantityIn>, example = json!({"x": "12.5mm"}))]
+    pub targets: Target,
+    /// How fast each may be at most; the usual speed of its configuration when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<QuantityIn>)]
+    pub speed: Option<Speed>,
+    /// What happens when one of the axes is in use.
+    #[serde(default)]
+    pub if_moving: IfMoving,
+    /// `true`: axes whose errors are corrected only together move uncorrected. Without it they are refused.
+    #[serde(default)]
+    pub uncorrected: bool,
+    /// A dead-man: the motion stops unless it is renewed within this time, again and again, in milliseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 50, maximum = 60000)]
+    pub dead_man_ms: Option<u32>,
+}
+
+impl MoveRequest {
+    /// The motion of one axis, as it is refused, corrected and limited by default.
+    pub fn of(axis: &str, target: units::Metres) -> Self {
+        Self {
+            targets: [(axis.to_owned(), Length(target))].into(),
+            speed: None,
+            if_moving: IfMoving::default(),
+            uncorrected: false,
+            dead_man_ms: None,
+        }
+    }
+}
+
+/// What happens when an axis of a new motion is in use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum IfMoving {
+    /// The new motion is refused.
+    #[default]
+    Refuse,
+    /// It begins when the axes are free.
+    Queue,
+    /// The motions of these axes are stopped, and it begins when the axes stand.
+    Supersede,
+}
+
+/// How everything is stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StopMode {
+    /// Each moving axis slows down and stays enabled.
+    #[default]
+    Controlled,
+    /// Every drive stops as fast as its quick stop deceleration allows, and is switched off.
+    Quick,
+}
+
+/// What is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RunKind {
+    /// Find the origin.
+    Zero,
+    /// Measure the deviations, store and activate the calibration.
+    Calibrate,
+    /// Measure between the calibrated positions, judge.
+    Verify,
+}
+
+/// A run that is asked for. It is planned, and begins when it is started.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunRequest {
+    /// What is run.
+    pub kind: RunKind,
+    /// Which axis; may be left out when there is only one. The zero of three axes of a volume is of all three.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<String>,
+    /// Calibrate: save although the same place measured at the beginning and at the end differs too much.
+    #[serde(default)]
+    pub accept_drift: bool,
+    /// Verify: without the calibration, the stage as found.
+    #[serde(default)]
+    pub uncompensated: bool,
+    /// Starts it at once.
+    #[serde(default)]
+    pub start: bool,
+}
+
+impl RunRequest {
+    /// A run of `axis` that begins at once.
+    pub fn of(kind: RunKind, axis: Option<&str>) -> Self {
+        Self {
+            kind,
+            axis: axis.map(str::to_owned),
+            accept_drift: false,
+            uncompensated: false,
+            start: true,
+        }
+    }
+}
+
+/// The right to command, asked for or renewed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeaseRequest {
+    /// Who: a name for people.
+    #[schema(max_length = 64)]
+    pub name: String,
+    /// For how long, in seconds, unless it is renewed.
+    #[serde(default = "lease_seconds")]
+    #[schema(minimum = 1, maximum = 3600)]
+    pub seconds: u32,
+    /// Takes it from whoever has it, who is told.
+    #[serde(default)]
+    pub force: bool,
+}
+
+const fn lease_seconds() -> u32 {
+    30
+}

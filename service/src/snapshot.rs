@@ -1,0 +1,148 @@
+//! What the machine's thread publishes after each tick, and where it is read.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use units::{Metres, Time};
+
+use crate::quantity::Quantity;
+use crate::view::{
+    AxisState, AxisView, Cause, Event, LeaseView, MachineState, MachineView, MotionView, RunView,
+};
+
+/// What never changes of a machine.
+#[derive(Debug)]
+pub(crate) struct Fixed {
+    pub(crate) name: String,
+    pub(crate) stage_serial: String,
+    pub(crate) config_hash: String,
+    pub(crate) axes: Vec<FixedAxis>,
+}
+
+/// What never changes of an axis.
+#[derive(Debug)]
+pub(crate) struct FixedAxis {
+    pub(crate) name: String,
+    pub(crate) soft_min: Metres,
+    pub(crate) soft_max: Metres,
+}
+
+/// An axis at one moment.
+#[derive(Clone, Debug)]
+pub(crate) struct AxisSample {
+    pub(crate) state: AxisState,
+    pub(crate) encoder: Option<Metres>,
+    pub(crate) place: Option<Metres>,
+    pub(crate) standard_uncertainty: Option<Metres>,
+    pub(crate) target: Option<Metres>,
+    pub(crate) set_point: Option<Metres>,
+    pub(crate) homed: bool,
+    pub(crate) calibration: Option<Arc<str>>,
+    pub(crate) used_by: Option<Arc<str>>,
+    pub(crate) last_cause: Option<Arc<Cause>>,
+}
+
+/// Everything that is known, at one moment. To copy it copies numbers and pointers.
+#[derive(Clone, Debug)]
+pub(crate) struct Snapshot {
+    pub(crate) now: Time,
+    pub(crate) state: MachineState,
+    pub(crate) cause: Option<Arc<Cause>>,
+    pub(crate) axes: Vec<AxisSample>,
+    pub(crate) motions: Arc<Vec<Arc<MotionView>>>,
+    pub(crate) runs: Arc<Vec<Arc<RunView>>>,
+    pub(crate) events: Arc<Vec<Arc<Event>>>,
+    pub(crate) lease: Option<(Arc<str>, Time)>,
+    pub(crate) counters: Arc<Vec<(String, &'static str, u64)>>,
+    pub(crate) ticks: u64,
+}
+
+impl Snapshot {
+    /// Of a machine that is not there yet.
+    pub(crate) fn before() -> Self {
+        Self {
+            now: Time::ZERO,
+            state: MachineState::Starting,
+            cause: None,
+            axes: Vec::new(),
+            motions: Arc::default(),
+            runs: Arc::default(),
+            events: Arc::default(),
+            lease: None,
+            counters: Arc::default(),
+            ticks: 0,
+        }
+    }
+
+    /// The number of the newest event, 0 before the first.
+    pub(crate) fn newest_event(&self) -> u64 {
+        self.events.last().map_or(0, |it| it.id)
+    }
+
+    /// The axes for people.
+    pub(crate) fn axes_of(&self, fixed: &Fixed) -> Vec<AxisView> {
+        let pairs = fixed.axes.iter().zip(&self.axes);
+        pairs
+            .map(|(fixed, sample)| view_of(fixed, sample))
+            .collect()
+    }
+
+    /// The machine for people.
+    pub(crate) fn machine_of(&self, fixed: &Fixed) -> MachineView {
+        MachineView {
+            name: fixed.name.clone(),
+            stage_serial: fixed.stage_serial.clone(),
+            config_hash: fixed.config_hash.clone(),
+            program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+            state: self.state,
+            cause: self.cause.as_deref().cloned(),
+            clock_s: self.now.seconds(),
+            lease: self.lease_view(),
+            newest_event: self.newest_event(),
+        }
+    }
+
+    /// Who has the lease.
+    pub(crate) fn lease_view(&self) -> Option<LeaseView> {
+        let (name, until) = self.lease.as_ref()?;
+        let left = until.since(self.now);
+        (*until > self.now).then(|| LeaseView {
+            name: name.to_string(),
+            seconds_left: left.as_secs_f64(),
+        })
+    }
+}
+
+fn view_of(fixed: &FixedAxis, sample: &AxisSample) -> AxisView {
+    AxisView {
+        name: fixed.name.clone(),
+        state: sample.state,
+        position: sample.place.or(sample.encoder).map(Quantity::mm),
+        corrected: sample.place.is_some(),
+        standard_uncertainty: sample.standard_uncertainty.map(Quantity::um),
+        encoder: sample.encoder.map(Quantity::mm),
+        target: sample.target.map(Quantity::mm),
+        set_point: sample.set_point.map(Quantity::mm),
+        homed: sample.homed,
+        soft_min: Quantity::mm(fixed.soft_min),
+        soft_max: Quantity::mm(fixed.soft_max),
+        calibration: sample.calibration.as_deref().map(str::to_owned),
+        used_by: sample.used_by.as_deref().map(str::to_owned),
+        last_cause: sample.last_cause.as_deref().cloned(),
+    }
+}
+
+/// Where the newest snapshot is read. Readers wait for one another, the writer for nobody.
+#[derive(Debug)]
+pub(crate) struct Board(Mutex<triple_buffer::Output<Snapshot>>);
+
+impl Board {
+    pub(crate) const fn new(output: triple_buffer::Output<Snapshot>) -> Self {
+        Self(Mutex::new(output))
+    }
+
+    /// The newest.
+    pub(crate) fn newest(&self) -> Snapshot {
+        let mut output = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        output.read().clone()
+    }
+}

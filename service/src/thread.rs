@@ -1,0 +1,395 @@
+//! The machine's thread: it makes the machine, ticks for ever, and runs procedures between two ticks.
+
+use core::time::Duration;
+use std::any::Any;
+use std::cell::RefCell;
+use std::io;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::{self, JoinHandle};
+
+use machine::attend;
+use serde_json::{Value, json};
+use triple_buffer::Input;
+use truestage::linear::VerifyOptions;
+use truestage::{CalibrateOptions, Failure, Machine, Store};
+use wire::cia402::PowerState;
+
+use crate::desk::Desk;
+use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fixed, seats};
+use crate::ledger::{Ledger, LedgerError};
+use crate::order::{Answer, Letter, Reply};
+use crate::problem::Problem;
+use crate::request::RunKind;
+use crate::scribe::Scribe;
+use crate::snapshot::{Board, Fixed, Snapshot};
+
+/// So many orders may wait for the next tick.
+const QUEUE: usize = 64;
+/// How long a tick lasts at most while nothing arrives: orders wait for its end.
+const IDLE: Duration = Duration::from_millis(2);
+/// How long nothing is tried while a bus is gone.
+const GONE: Duration = Duration::from_millis(20);
+
+/// A machine that is connected, and what must live as long as it does.
+pub struct Opened {
+    /// The machine; nothing has been sent yet.
+    pub machine: Machine,
+    /// Where its records are.
+    pub store: Store,
+    /// Its lease among programs, and whatever else; dropped when the service has ended.
+    pub held: Box<dyn Any>,
+}
+
+/// A service that could not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The machine.
+    #[error(transparent)]
+    Machine(#[from] Failure),
+    /// What was asked for earlier cannot be read.
+    #[error(transparent)]
+    Ledger(#[from] LedgerError),
+    /// No thread.
+    #[error("the machine's thread: {0}")]
+    Thread(#[from] io::Error),
+    /// The thread ended without a word.
+    #[error("the machine's thread ended before the machine was there")]
+    Gone,
+}
+
+/// One process keeps a machine.
+pub struct Service {
+    desk: Desk,
+    scribe: Scribe,
+    thread: JoinHandle<Result<(), Failure>>,
+}
+
+impl Service {
+    /// Makes a machine on a thread of its own by `open`, starts its devices, and keeps it. Returns when it
+    /// is there.
+    ///
+    /// # Errors
+    /// When the machine cannot be made or started, or its ledger cannot be read.
+    pub fn start(
+        open: impl FnOnce() -> Result<Opened, Failure> + Send + 'static,
+    ) -> Result<Self, StartError> {
+        let (letters, inbox) = mpsc::sync_channel(QUEUE);
+        let (input, output) = triple_buffer::triple_buffer(&Snapshot::before());
+        let (told, ready) = mpsc::channel();
+        let thread = thread::Builder::new()
+            .name("machine".into())
+            .spawn(move || keep(open, inbox, input, &told))?;
+        match ready.recv() {
+            Ok((fixed, root)) => {
+                let folder = root.join("service");
+                let ledger = Ledger::open(&folder)?;
+                let desk = Desk::new(letters, Board::new(output), fixed, ledger);
+                Ok(Self {
+                    scribe: Scribe::start(desk.clone(), folder)?,
+                    desk,
+                    thread,
+                })
+            }
+            // It has ended: nobody else holds the other end.
+            Err(_) => Err(match thread.join() {
+                Ok(Err(failure)) => failure.into(),
+                Ok(Ok(())) | Err(_) => StartError::Gone,
+            }),
+        }
+    }
+
+    /// Takes orders, from any thread.
+    pub fn desk(&self) -> Desk {
+        self.desk.clone()
+    }
+
+    /// Waits for the end of the service: asked for, by a signal, or because its thread failed.
+    ///
+    /// # Errors
+    /// What ended it, when that was not asked for.
+    pub fn wait(self) -> Result<(), Failure> {
+        let ended = self.thread.join();
+        self.scribe.finish();
+        ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+
+    /// Whether its thread has ended.
+    pub fn is_over(&self) -> bool {
+        self.thread.is_finished()
+    }
+}
+
+type Told = Sender<(Arc<Fixed>, std::path::PathBuf)>;
+
+/// All that the machine's thread does.
+fn keep(
+    open: impl FnOnce() -> Result<Opened, Failure>,
+    inbox: Receiver<Letter>,
+    input: Input<Snapshot>,
+    told: &Told,
+) -> Result<(), Failure> {
+    let Opened {
+        mut machine,
+        store,
+        held,
+    } = open()?;
+    let fixed = Arc::new(fixed(&machine)?);
+    let keeper = Keeper::new(inbox, input, seats(&mut machine)?);
+    machine.observe(Box::new(keeper.note_taker()));
+    let keeper = Rc::new(RefCell::new(keeper));
+    attend(&mut machine, Box::new(Attending(Rc::clone(&keeper))));
+    let mut kept = Kept {
+        machine,
+        store,
+        keeper,
+    };
+    kept.machine.guarded(Machine::start)?;
+    kept.load_courses();
+    kept.keeper.borrow_mut().set_mode(Mode::Idle);
+    // Whoever started it may have gone.
+    let _ = told.send((fixed, kept.store.root().to_owned()));
+    let ended = kept.live();
+    kept.keeper.borrow_mut().dismiss();
+    drop(held);
+    ended
+}
+
+/// A machine that is kept.
+struct Kept {
+    machine: Machine,
+    store: Store,
+    keeper: Rc<RefCell<Keeper>>,
+}
+
+impl Kept {
+    /// Ticks until the end.
+    fn live(&mut self) -> Result<(), Failure> {
+        loop {
+            let until = self.machine.now() + IDLE;
+            let ticked = self.machine.tick(until);
+            if self.machine.stop_request().is_requested() {
+                return self.end("a signal");
+            }
+            if let Err(failure) = ticked {
+                self.failed(failure.into());
+            }
+            let job = self.keeper.borrow_mut().take_job();
+            match job {
+                None => {}
+                Some(Job::Run(id)) => self.run(&id),
+                Some(Job::Reset(reply)) => {
+                    let reset = self.reset();
+                    answer(reply, reset);
+                }
+                Some(Job::End(reply)) => return self.end_for(reply),
+            }
+        }
+    }
+
+    /// Something failed: every drive is stopped, and what was under way ends with the cause.
+    fn failed(&mut self, failure: Failure) {
+        if self.keeper.borrow().mode() == Mode::Safe {
+            // It is safe already: a bus that is gone says so again and again.
+            thread::sleep(GONE);
+            return;
+        }
+        let failure = self.machine.explain(failure);
+        self.keeper.borrow_mut().begin_fault(cause_of(&failure));
+        self.machine.make_safe();
+        self.keeper.borrow_mut().end_fault(&self.machine);
+    }
+
+    fn end_for(&mut self, reply: Reply) -> Result<(), Failure> {
+        let ended = self.end("whoever ended the service");
+        answer(reply, Ok(Answer::Done));
+        ended
+    }
+
+    /// Every drive is stopped and switched off.
+    fn end(&mut self, by: &str) -> Result<(), Failure> {
+        let mut keeper = self.keeper.borrow_mut();
+        keeper.stop_all_for(by);
+        keeper.set_mode(Mode::Ending);
+        drop(keeper);
+        self.machine.make_safe();
+        self.keeper.borrow_mut().end_all(&self.machine);
+        Ok(())
+    }
+
+    fn reset(&mut self) -> Result<Answer, Problem> {
+        let was_safe = self.keeper.borrow().mode() == Mode::Safe;
+        self.keeper.borrow_mut().set_mode(Mode::Starting);
+        let result = match was_safe {
+            true => self.machine.start().and_then(|()| self.reset_drives()),
+            false => self.reset_drives(),
+        };
+        match result {
+            Ok(()) => {
+                self.load_courses();
+                self.keeper.borrow_mut().recovered(&self.machine);
+                Ok(Answer::Done)
+            }
+            Err(failure) => {
+                let problem = Problem::from(&failure);
+                self.failed(failure);
+                Err(problem)
+            }
+        }
+    }
+
+    /// Acknowledges each fault once.
+    fn reset_drives(&mut self) -> Result<(), Failure> {
+        let devices = self.machine.devices();
+        let names: Vec<_> = [devices.axis_names(), devices.rotary_names()].concat();
+        for axis in names {
+            if self.machine.power_state(&axis)? == Some(PowerState::Fault) {
+                self.machine.reset_fault(&axis)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Uses the active calibration of each axis, and says where one cannot be used.
+    fn load_courses(&mut self) {
+        for axis in self.machine.devices().axis_names() {
+            let (id, warning) = match self.load(&axis) {
+                Ok(id) => (id, None),
+                Err(failure) => (None, Some(failure)),
+            };
+            let course = self.machine.linear(&axis).map(|it| it.course());
+            let mut keeper = self.keeper.borrow_mut();
+            if let Ok(course) = course {
+                keeper.set_course(&axis, course, id.as_deref());
+            }
+            if let Some(failure) = warning {
+                keeper.warn(&format!(
+                    "axis {axis}: its calibration is not used: {failure}"
+                ));
+            }
+        }
+    }
+
+    fn load(&mut self, axis: &str) -> Result<Option<String>, Failure> {
+        if self.machine.config().axis[axis].compensation.is_none() {
+            return Ok(None);
+        }
+        self.machine.linear(axis)?.load_active(&self.store)
+    }
+
+    /// One run, from its begin to its end.
+    fn run(&mut self, id: &str) {
+        let Some(task) = self.keeper.borrow_mut().begin_run(id) else {
+            return;
+        };
+        let result = self.perform(&task);
+        self.machine.leave_instrument();
+        let was_stopped = self.keeper.borrow_mut().end_procedure(id);
+        match result {
+            // The next tick ends the service.
+            Err(_) if self.machine.stop_request().is_requested() => {}
+            Ok(result) => {
+                self.load_courses();
+                self.keeper.borrow_mut().run_done(id, result);
+            }
+            Err(failure) if was_stopped && is_stop(&failure) => {}
+            Err(failure) if stops_the_machine(&failure) => self.failed(failure),
+            Err(failure) => {
+                // A verification that finds a calibration harmful takes it out of use.
+                self.load_courses();
+                let cause = cause_of(&failure);
+                self.keeper.borrow_mut().run_failed(id, &cause);
+            }
+        }
+    }
+
+    fn perform(&mut self, task: &RunTask) -> Result<Value, Failure> {
+        let (machine, store) = (&mut self.machine, &self.store);
+        let Some(axis) = &task.axis else {
+            machine.volumetric()?.zero()?;
+            return Ok(json!({}));
+        };
+        if task.request.kind != RunKind::Zero {
+            machine.enable(axis)?;
+        }
+        match task.request.kind {
+            RunKind::Zero => zero(machine, store, axis),
+            RunKind::Calibrate => calibrate(machine, store, axis, task.request.accept_drift),
+            RunKind::Verify => verify(machine, store, axis, !task.request.uncompensated),
+        }
+    }
+}
+
+fn zero(machine: &mut Machine, store: &Store, axis: &str) -> Result<Value, Failure> {
+    let zeroed = machine.linear(axis)?.zero(store)?;
+    let estimate = &zeroed.estimate;
+    Ok(json!({
+        "origin_um": estimate.origin.um(),
+        "standard_uncertainty_um": estimate.standard_uncertainty.um(),
+        "points": estimate.points,
+        "journal": zeroed.journal,
+    }))
+}
+
+fn calibrate(
+    machine: &mut Machine,
+    store: &Store,
+    axis: &str,
+    accept_drift: bool,
+) -> Result<Value, Failure> {
+    let options = CalibrateOptions {
+        resume: None,
+        accept_drift,
+    };
+    let made = machine.linear(axis)?.calibrate(store, &options)?;
+    Ok(json!({
+        "calibration": made.id,
+        "largest_deviation_um": made.fitted.table.largest().um(),
+        "positions": made.fitted.table.nodes().len(),
+        "closure_um": made.measured.closure.um(),
+        "journal": made.journal,
+    }))
+}
+
+fn verify(
+    machine: &mut Machine,
+    store: &Store,
+    axis: &str,
+    compensated: bool,
+) -> Result<Value, Failure> {
+    let calibration = match compensated {
+        true => machine.linear(axis)?.load_active(store)?,
+        false => None,
+    };
+    let options = VerifyOptions {
+        compensated,
+        calibration,
+        resume: None,
+    };
+    let verified = machine.linear(axis)?.verify(store, &options)?;
+    Ok(json!({
+        "accuracy_um": verified.figures.accuracy.bidirectional.um(),
+        "tolerance_um": verified.tolerance.um(),
+        "within_tolerance": verified.is_within_tolerance(),
+        "journal": verified.journal,
+    }))
+}
+
+/// Whether it is what ends a procedure that was asked to end.
+fn is_stop(failure: &Failure) -> bool {
+    match failure {
+        Failure::Machine(machine::Failure::Interrupted) => true,
+        Failure::Resumable { source, .. } => is_stop(source),
+        _ => false,
+    }
+}
+
+/// Whether an axis may still move after it, or nobody supervises it: a device, a bus, or what is not known.
+fn stops_the_machine(failure: &Failure) -> bool {
+    match failure.exit_code() {
+        // A refusal, a configuration, a result: the axis stands, and is supervised.
+        2 | 3 | 5 => false,
+        _ => true,
+    }
+}

@@ -1,0 +1,293 @@
+//! What the service shows.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::problem::Code;
+use crate::quantity::Quantity;
+
+/// Why something ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Cause {
+    /// For programs.
+    pub code: Code,
+    /// For people, as the command line says it.
+    pub cause: String,
+    /// What the command line would end with.
+    pub exit_code: u8,
+}
+
+/// Who stopped something, and when.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Stopped {
+    /// Who.
+    pub by: String,
+    /// When, UTC, RFC 3339.
+    pub at: String,
+}
+
+/// What an axis does, in PLCopen's words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub enum AxisState {
+    /// Switched off.
+    Disabled,
+    /// Switched on, and nothing moves it.
+    Standstill,
+    /// Finds its origin.
+    Homing,
+    /// On its way to a target.
+    DiscreteMotion,
+    /// Moves without a target.
+    ContinuousMotion,
+    /// Follows a path together with others.
+    SynchronizedMotion,
+    /// Slows down.
+    Stopping,
+    /// Stopped by a failure; a reset is needed.
+    ErrorStop,
+}
+
+/// An axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct AxisView {
+    /// Its name.
+    pub name: String,
+    /// What it does.
+    pub state: AxisState,
+    /// Where its point stands: corrected by the calibration in use, by the encoder alone where there is none.
+    pub position: Option<Quantity>,
+    /// Whether a calibration corrects `position`.
+    pub corrected: bool,
+    /// Standard uncertainty of the corrected position at rest; null where nobody knows it.
+    pub standard_uncertainty: Option<Quantity>,
+    /// What the drive's encoder says.
+    pub encoder: Option<Quantity>,
+    /// Where it was sent last.
+    pub target: Option<Quantity>,
+    /// What the drive was sent for that.
+    pub set_point: Option<Quantity>,
+    /// Whether it has its zero.
+    pub homed: bool,
+    /// The lower soft limit.
+    pub soft_min: Quantity,
+    /// The upper soft limit.
+    pub soft_max: Quantity,
+    /// The calibration in use.
+    pub calibration: Option<String>,
+    /// The motion or run that has it.
+    pub used_by: Option<String>,
+    /// What stopped it last.
+    pub last_cause: Option<Cause>,
+}
+
+/// What the machine as a whole is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MachineState {
+    /// Its devices are being started.
+    Starting,
+    /// Supervised; orders are carried out.
+    Running,
+    /// Stopped by a failure; a reset is needed.
+    ErrorStop,
+    /// The service ends.
+    Ending,
+}
+
+/// The machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MachineView {
+    /// Its name.
+    pub name: String,
+    /// Its serial number.
+    pub stage_serial: String,
+    /// The hash of what a calibration depends on.
+    pub config_hash: String,
+    /// This program.
+    pub program: String,
+    /// What it is.
+    pub state: MachineState,
+    /// What stopped it, while it is in `error_stop`.
+    pub cause: Option<Cause>,
+    /// Its clock, in seconds.
+    pub clock_s: f64,
+    /// Who may command, when not everybody.
+    pub lease: Option<LeaseView>,
+    /// The number of the newest event.
+    pub newest_event: u64,
+}
+
+/// Who may command.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LeaseView {
+    /// Who.
+    pub name: String,
+    /// For how much longer unless it is renewed, in seconds.
+    pub seconds_left: f64,
+}
+
+/// A lease that was given.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Leased {
+    /// What proves it, with every order.
+    pub token: String,
+    /// For how long, in seconds.
+    pub seconds: u32,
+    /// From whom it was taken.
+    pub taken_from: Option<String>,
+}
+
+/// How far a motion is. Its end is a level: it never changes again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionState {
+    /// It waits for its axes.
+    Queued,
+    /// On its way.
+    Moving,
+    /// Its axes slow down.
+    Stopping,
+    /// Every axis has been in position for its time; the final positions were published before.
+    Done,
+    /// Somebody stopped it.
+    Stopped,
+    /// It did not get there.
+    Failed,
+    /// It did not get there in time, and was stopped.
+    TimedOut,
+}
+
+impl MotionState {
+    /// Whether it is an end.
+    pub const fn is_end(self) -> bool {
+        match self {
+            Self::Queued | Self::Moving | Self::Stopping => false,
+            Self::Done | Self::Stopped | Self::Failed | Self::TimedOut => true,
+        }
+    }
+}
+
+/// A motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MotionView {
+    /// Its name.
+    pub id: String,
+    /// Who asked for it.
+    pub by: String,
+    /// When it was accepted, UTC, RFC 3339.
+    pub accepted: String,
+    /// How far it is.
+    pub state: MotionState,
+    /// Who stopped it, when somebody did.
+    pub stopped: Option<Stopped>,
+    /// Why it failed, when it did.
+    pub cause: Option<Cause>,
+    /// Each axis.
+    pub axes: BTreeMap<String, LegView>,
+}
+
+/// What one axis does in a motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LegView {
+    /// Where its point is to go.
+    pub target: Quantity,
+    /// What the drive was sent for that, once it was.
+    pub set_point: Option<Quantity>,
+    /// Whether a calibration corrects it: `no`, `yes`, `held` or `fading` (beyond the calibrated range).
+    pub corrected: String,
+    /// Where it stood at the end.
+    pub position: Option<Quantity>,
+    /// What the drive's encoder said there.
+    pub encoder: Option<Quantity>,
+    /// Standard uncertainty of that position; null where nobody knows it.
+    pub standard_uncertainty: Option<Quantity>,
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RunState {
+    /// It waits to be started.
+    Planned,
+    /// Under way.
+    Running,
+    /// Its axes slow down.
+    Stopping,
+    /// It has its result.
+    Done,
+    /// Somebody stopped it.
+    Stopped,
+    /// It has no result.
+    Failed,
+}
+
+impl RunState {
+    /// Whether it is an end.
+    pub const fn is_end(self) -> bool {
+        match self {
+            Self::Planned | Self::Running | Self::Stopping => false,
+            Self::Done | Self::Stopped | Self::Failed => true,
+        }
+    }
+}
+
+/// What a run will do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RunPlanView {
+    /// How many points are measured; 0 for a zero.
+    pub points: u64,
+    /// How far the axis goes for them.
+    pub travel: Option<Quantity>,
+    /// How long that takes at least, in seconds: the ways at the usual speed, and standing.
+    pub seconds_at_least: f64,
+    /// What a person will be asked to do.
+    pub asks: Vec<String>,
+}
+
+/// A run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RunView {
+    /// Its name.
+    pub id: String,
+    /// Who asked for it.
+    pub by: String,
+    /// What it is: `zero`, `calibrate` or `verify`.
+    pub kind: crate::request::RunKind,
+    /// The axes that it takes for itself.
+    pub axes: Vec<String>,
+    /// How far it is.
+    pub state: RunState,
+    /// What it will do.
+    pub plan: RunPlanView,
+    /// So many steps are done.
+    pub steps_done: u64,
+    /// Of so many.
+    pub steps: u64,
+    /// Who stopped it, when somebody did.
+    pub stopped: Option<Stopped>,
+    /// Why it has no result.
+    pub cause: Option<Cause>,
+    /// What it found.
+    #[schema(value_type = Object)]
+    pub result: serde_json::Value,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Event {
+    /// Its number; the next one has the next.
+    pub id: u64,
+    /// When, UTC, RFC 3339.
+    pub at: String,
+    /// When by the machine's clock, in seconds.
+    pub clock_s: f64,
+    /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`, `warning`.
+    pub kind: String,
+    /// Of which axis, motion or run; empty for the machine.
+    pub of: String,
+    /// What is to be said of it.
+    #[schema(value_type = Object)]
+    pub data: serde_json::Value,
+}

@@ -1,0 +1,151 @@
+//! The contract of a motion, line by line, on every interface.
+
+mod machine;
+mod motions;
+mod repeated;
+mod runs;
+
+use core::time::Duration;
+use std::path::Path;
+
+use service::{Caller, Code, Length, MotionState, MotionView, MoveRequest, Problem, Speed};
+use tests::{Edit, LINEAR, VOLUMETRIC};
+use units::{Metres, MetresPerSecond};
+
+use crate::client::{Client, InProcess, PATIENCE};
+use crate::stage::Stage;
+
+/// The same stage everywhere: what differs is asked of seeds elsewhere.
+const SEED: u64 = 51;
+
+/// A service and somebody who asks it.
+pub(crate) struct Bed<'b> {
+    pub(crate) stage: &'b Stage,
+    pub(crate) client: &'b dyn Client,
+}
+
+/// Every interface that there is.
+fn interfaces(stage: &Stage) -> Vec<(&'static str, Box<dyn Client>)> {
+    vec![("in process", Box::new(InProcess::of(stage)))]
+}
+
+/// How many of them.
+const INTERFACES: usize = 1;
+
+/// A linear stage that gives a slow move all the time that it wants.
+fn patient(text: String) -> String {
+    text.edit("move_timeout_s = 10.0", "move_timeout_s = 10000.0")
+}
+
+fn each(new: impl Fn(&Path) -> Stage, body: impl Fn(&Bed<'_>)) {
+    for number in 0..INTERFACES {
+        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let stage = new(folder.path());
+        let (name, client) = interfaces(&stage).swap_remove(number);
+        println!("interface: {name}");
+        let client = &*client;
+        body(&Bed {
+            stage: &stage,
+            client,
+        });
+        stage.end();
+    }
+}
+
+/// A linear stage that has its zero, on each interface.
+fn with_zeroed_stage(body: impl Fn(&Bed<'_>)) {
+    with_stage(|bed| {
+        bed.client.zero(&anna(), None);
+        body(bed);
+    });
+}
+
+/// A linear stage as it is after its start, on each interface.
+fn with_stage(body: impl Fn(&Bed<'_>)) {
+    each(|folder| Stage::new(LINEAR, SEED, folder, patient), body);
+}
+
+/// Three axes that have their zero, on each interface.
+fn with_three_axes(body: impl Fn(&Bed<'_>)) {
+    let new = |folder: &Path| Stage::new(VOLUMETRIC, SEED, folder, |text| text);
+    each(new, |bed| {
+        bed.client.zero(&anna(), None);
+        body(bed);
+    });
+}
+
+fn anna() -> Caller {
+    Caller::named("anna")
+}
+
+fn bert() -> Caller {
+    Caller::named("bert")
+}
+
+fn to(axis: &str, mm: f64) -> MoveRequest {
+    MoveRequest::of(axis, Metres::from_mm(mm))
+}
+
+/// A motion that takes minutes.
+fn slowly(axis: &str, mm: f64) -> MoveRequest {
+    MoveRequest {
+        speed: Some(Speed(MetresPerSecond(0.1e-3))),
+        ..to(axis, mm)
+    }
+}
+
+impl Bed<'_> {
+    fn begin(&self, request: &MoveRequest) -> String {
+        let begun = self.client.begin(&anna(), request, None);
+        begun.unwrap_or_else(|problem| panic!("{problem}"))
+    }
+
+    #[track_caller]
+    fn refused(&self, request: &MoveRequest, code: Code) -> Problem {
+        let refused = self.client.begin(&anna(), request, None);
+        let problem = refused.expect_err("it must be refused");
+        assert_eq!(problem.code, code, "{problem:?}");
+        problem
+    }
+
+    fn ended(&self, id: &str) -> MotionView {
+        let view = self.client.motion(id, PATIENCE).expect("it was begun");
+        assert!(view.state.is_end(), "{view:?}");
+        view
+    }
+
+    fn now(&self, id: &str) -> MotionView {
+        self.client
+            .motion(id, Duration::ZERO)
+            .expect("it was begun")
+    }
+
+    /// Waits until the axis is under way.
+    fn under_way(&self, id: &str) {
+        for _ in 0..1000 {
+            let view = self.client.motion(id, Duration::from_millis(2));
+            let view = view.expect("it was begun");
+            let encoder = self.client.axis("x").expect("there is x").encoder;
+            let moves = encoder.is_some_and(|it| it.value.abs() > 1e-3);
+            if view.state == MotionState::Moving && moves {
+                return;
+            }
+            assert!(!view.state.is_end(), "{view:?}");
+        }
+        panic!("it does not move");
+    }
+
+    fn encoder_mm(&self, axis: &str) -> f64 {
+        let view = self.client.axis(axis).expect("there is such an axis");
+        view.encoder.expect("it was read").value
+    }
+
+    /// Lets time pass: a question about a motion does.
+    fn let_time_pass(&self, id: &str) {
+        let _ = self.client.motion(id, Duration::from_millis(20));
+    }
+}
+
+fn length(mm: f64) -> Length {
+    Length(Metres::from_mm(mm))
+}

@@ -1,0 +1,130 @@
+//! Runs: planned, started, answered meanwhile, stopped.
+
+use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
+use tests::{Edit, LINEAR};
+
+use super::{SEED, anna, bert, each, patient, to, with_stage, with_zeroed_stage};
+use crate::client::PATIENCE;
+use crate::stage::Stage;
+
+/// Fewer measurements: how good they are is asked elsewhere.
+fn short(text: String) -> String {
+    patient(text)
+        .edit("runs = 3", "runs = 2")
+        .edit("step_mm = 3.0", "step_mm = 10.0")
+        .edit("targets = 8\nruns = 5", "targets = 4\nruns = 2")
+}
+
+#[test]
+fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
+    each(
+        |folder| Stage::new(LINEAR, SEED, folder, short),
+        |bed| {
+            bed.client.zero(&anna(), Some("x"));
+            let plan = RunRequest {
+                start: false,
+                ..RunRequest::of(RunKind::Calibrate, Some("x"))
+            };
+            let id = bed.client.plan(&anna(), &plan).unwrap();
+            let planned = bed.client.run(&id, core::time::Duration::ZERO).unwrap();
+            assert_eq!(planned.state, RunState::Planned);
+            assert_eq!(planned.plan.points, 28, "7 places, 2 runs, both sides");
+            bed.client.start(&anna(), &id).unwrap();
+            let made = bed.client.run(&id, PATIENCE).unwrap();
+            assert_eq!(made.state, RunState::Done, "{made:?}");
+            let calibration = bed.client.axis("x").unwrap().calibration;
+            assert_eq!(made.result["calibration"], calibration.unwrap());
+
+            let id = bed
+                .client
+                .plan(&anna(), &RunRequest::of(RunKind::Verify, None));
+            let judged = bed.client.run(&id.unwrap(), PATIENCE).unwrap();
+            assert_eq!(judged.state, RunState::Done, "{judged:?}");
+            assert_eq!(judged.result["within_tolerance"], true, "{judged:?}");
+
+            let id = bed.begin(&to("x", 31.0));
+            let view = bed.ended(&id);
+            assert_eq!(view.state, MotionState::Done);
+            let leg = &view.axes["x"];
+            assert_eq!(leg.corrected, "yes");
+            assert!(leg.standard_uncertainty.is_some());
+            let position = leg.position.as_ref().unwrap().value;
+            assert!((position - 31.0).abs() < 1e-3, "{position}");
+            // The stage's deviation of up to 10 µm is corrected; what is left are its zero and its repeatability.
+            assert!(
+                (bed.stage.true_mm() - 31.0).abs() < 3e-3,
+                "{}",
+                bed.stage.true_mm()
+            );
+        },
+    );
+}
+
+#[test]
+fn while_a_run_is_under_way_everything_is_answered_and_its_axis_is_refused() {
+    with_stage(|bed| {
+        let id = bed
+            .client
+            .plan(&anna(), &RunRequest::of(RunKind::Zero, None));
+        let id = id.unwrap();
+        let axis = bed.client.axis("x").unwrap();
+        assert_eq!(axis.used_by.as_deref(), Some(&*id));
+        let busy = bed.client.power(&bert(), "x", false).unwrap_err();
+        assert_eq!(busy.code, Code::AxisBusy, "{busy}");
+        let second = bed
+            .client
+            .plan(&bert(), &RunRequest::of(RunKind::Zero, None));
+        assert_eq!(second.unwrap_err().code, Code::AxisBusy);
+        let run = bed
+            .client
+            .run(&id, core::time::Duration::from_millis(5))
+            .unwrap();
+        assert_eq!(run.state, RunState::Running);
+        assert_eq!(bed.client.axis("x").unwrap().state, AxisState::Homing);
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Done, "{run:?}");
+    });
+}
+
+#[test]
+fn a_stop_by_anybody_ends_a_run_at_once_and_names_who() {
+    for mode in [StopMode::Controlled, StopMode::Quick] {
+        with_stage(|bed| {
+            let id = bed
+                .client
+                .plan(&anna(), &RunRequest::of(RunKind::Zero, None));
+            let id = id.unwrap();
+            let _ = bed.client.run(&id, core::time::Duration::from_millis(5));
+            bed.client.stop(&bert(), mode).unwrap();
+            let run = bed.client.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+            assert_eq!(run.stopped.unwrap().by, "bert");
+            let axis = bed.client.axis("x").unwrap();
+            let expected = match mode {
+                StopMode::Controlled => AxisState::Standstill,
+                StopMode::Quick => AxisState::Disabled,
+            };
+            assert_eq!(axis.state, expected);
+            assert!(!axis.homed);
+            // The machine is as it was: the next zero needs no reset.
+            bed.client.zero(&anna(), None);
+        });
+    }
+}
+
+#[test]
+fn a_run_that_is_aborted_before_it_begins_never_moves() {
+    with_zeroed_stage(|bed| {
+        let plan = RunRequest {
+            start: false,
+            ..RunRequest::of(RunKind::Zero, None)
+        };
+        let id = bed.client.plan(&anna(), &plan).unwrap();
+        bed.client.abort(&bert(), &id).unwrap();
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Stopped);
+        let problem = bed.client.start(&anna(), &id).unwrap_err();
+        assert_eq!(problem.code, Code::RunState);
+        assert!(bed.client.axis("x").unwrap().homed, "nothing was done");
+    });
+}

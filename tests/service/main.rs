@@ -1,0 +1,5 @@
+//! The resident service: its contract, each line a test, written once for every interface.
+
+mod client;
+mod contract;
+mod stage;
