@@ -347,7 +347,7 @@ fn calibrate(
         "calibration": made.id,
         "largest_deviation_um": made.fitted.table.largest().um(),
         "positions": made.fitted.table.nodes().len(),
-        "closure_um": made.measured.closure.um(),
+        "closure_um": made.measured.closure.map(|it| it.um()),
         "journal": made.journal,
     }))
 }

@@ -57,12 +57,13 @@ const EMULATOR_USERS: &[&str] = &[
     "controller/src/emulated/error.rs",
 ];
 
-/// What may use an emulated machine: who shows it, and who tells its failures.
+/// What may use an emulated machine: who shows it, who tells its failures, and what compares all that is said of it.
 const EMULATED_MACHINE_USERS: &[&str] = &[
     "controller/src/emulated.rs",
     "controller/examples/emulated.rs",
     "controller/src/failure.rs",
     "controller/src/program/demo/",
+    "controller/src/program/same_figures_tests.rs",
 ];
 
 /// In the folder of each kind, its demonstration.

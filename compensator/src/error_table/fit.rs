@@ -72,10 +72,11 @@ pub struct RunDrift {
 pub struct Drift {
     /// Each run's offset, in order.
     pub runs: Vec<RunDrift>,
-    /// Offset of the last run − offset of the first.
-    pub closure: Metres,
+    /// Offset of the last run − offset of the first; `None` for a single run, which has no other to differ
+    /// from.
+    pub closure: Option<Metres>,
     /// Standard uncertainty of the closure from the scatter within the runs.
-    pub u_closure: Metres,
+    pub u_closure: Option<Metres>,
 }
 
 /// A table and how it came about.
@@ -181,7 +182,8 @@ pub fn fit(series: &LinearSeries, options: &FitOptions) -> Result<ErrorTable, Fi
 /// let csv = "run,approach,target_mm,measured_mm\n\
 ///            1,+,0,0.0005\n1,+,10,10.0005\n2,+,0,-0.0005\n2,+,10,9.9995\n";
 /// let fitted = analyse(&LinearSeries::from_csv(csv, "x.csv")?, &FitOptions::default())?;
-/// assert!((fitted.drift.closure.um() + 1.0).abs() < 1e-6, "last − first");
+/// let closure = fitted.drift.closure.expect("there are two runs");
+/// assert!((closure.um() + 1.0).abs() < 1e-6, "last − first");
 /// let u = fitted.table.nodes()[0].u_forward.expect("each target was repeated");
 /// assert!((u.um() - 0.5).abs() < 1e-6, "s/√2, with s = 1 µm/√2");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -197,13 +199,10 @@ pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, Fi
     }
     let mut cells = Cells::new(series, &bad);
     let drift = cells.drift();
-    if let Some(limit) = options.closure_max
-        && drift.closure.abs() > limit
+    if let (Some(limit), Some(closure)) = (options.closure_max, drift.closure)
+        && closure.abs() > limit
     {
-        return Err(FitError::Closure {
-            closure: drift.closure,
-            limit,
-        });
+        return Err(FitError::Closure { closure, limit });
     }
     if options.remove_drift {
         cells.remove(&drift);
@@ -334,16 +333,15 @@ impl Cells {
                 offset: Metres(*o),
             })
             .collect();
-        let ends = runs.first().zip(runs.last());
-        let closure = ends.map_or(Metres::ZERO, |(first, last)| last.offset - first.offset);
         let own = |run: u32| scatter / (sizes.get(&run).copied().unwrap_or(1) as f64).sqrt();
-        let u_closure = ends.map_or(0.0, |(first, last)| {
-            combine(&[own(first.run), own(last.run)])
-        });
+        let ends = match runs.as_slice() {
+            [first, .., last] => Some((*first, *last)),
+            _ => None,
+        };
         Drift {
+            closure: ends.map(|(first, last)| last.offset - first.offset),
+            u_closure: ends.map(|(first, last)| Metres(combine(&[own(first.run), own(last.run)]))),
             runs,
-            closure,
-            u_closure: Metres(u_closure),
         }
     }
 

@@ -155,7 +155,7 @@ fn more_than_a_fifth_of_outliers_aborts() {
 fn thermal_drift_shows_as_closure_and_can_be_limited_or_removed() {
     let data = series(5, |run, _, _| 0.7 * f64::from(run));
     let fitted = analyse(&data, &FitOptions::default()).unwrap();
-    check_um(fitted.drift.closure, 2.8, 1e-9);
+    check_um(fitted.drift.closure.unwrap(), 2.8, 1e-9);
     assert_eq!(fitted.drift.runs.len(), 5);
     let limited = FitOptions {
         closure_max: Some(Metres::from_um(1.0)),

@@ -221,7 +221,7 @@ fn drift(fitted: &Fitted, closure: Metres, scatter: Metres) -> Metres {
     } else {
         0.0
     };
-    let trend = fitted.drift.closure.abs() * to_the_middle;
+    let trend = fitted.drift.closure.unwrap_or(Metres::ZERO).abs() * to_the_middle;
     let two_stops = 2.0 * scatter.value() * scatter.value() * CLOSURE_SIGMAS * CLOSURE_SIGMAS;
     let excess = (closure.value() * closure.value() - two_stops).max(0.0);
     trend.max(Metres(excess.sqrt()))

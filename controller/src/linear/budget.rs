@@ -40,7 +40,7 @@ impl LinearStage<'_> {
             .map_or(0.0, |it| it.short_period_standard_uncertainty_nm);
         let known = Circumstances {
             instrument: Metres(instrument.instrument_standard_uncertainty_nm * 1e-9),
-            closure: measured.closure,
+            closure: measured.closure.unwrap_or(Metres::ZERO),
             zero: (self.memory.course.zero.unwrap_or(Metres::ZERO), None),
             short_period: Metres(short_period_nm * 1e-9),
             interpolation: settings::interpolation_of(self.config),

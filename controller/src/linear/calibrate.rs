@@ -155,7 +155,7 @@ impl LinearStage<'_> {
             environment: measured.environment,
             ..self.core.this_machine(self.axis)
         };
-        let content = LinearContent::new(&fitted.table, plan.runs, Some(measured.closure))
+        let content = LinearContent::new(&fitted.table, plan.runs, measured.closure)
             .with_budget(budget);
         CalibrationRecord { head, content }
     }

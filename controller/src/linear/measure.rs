@@ -41,8 +41,9 @@ pub(crate) struct EarlierRuns {
 pub struct Measured {
     /// Every point.
     pub points: Vec<PointEntry>,
-    /// The same place, measured after a run minus before the first: the largest of all runs.
-    pub closure: Metres,
+    /// The same place, measured after a run minus before the first: the largest of all runs. `None` where no
+    /// run was closed.
+    pub closure: Option<Metres>,
     /// Mean environment of the points.
     pub environment: EnvironmentRecord,
 }
@@ -205,7 +206,7 @@ impl LinearStage<'_> {
         self.core.leave_instrument();
         let environment = mean_environment(&runs.points);
         Ok(Measured {
-            closure: largest(&runs.closures),
+            closure: largest_closure(&runs.closures),
             points: runs.points,
             environment,
         })
@@ -327,12 +328,12 @@ impl LinearStage<'_> {
     }
 }
 
-fn largest(closures: &[ClosureEntry]) -> Metres {
+/// The closure of a measurement: that of the run which drifted most; `None` where no run was closed.
+pub(crate) fn largest_closure(closures: &[ClosureEntry]) -> Option<Metres> {
     closures
         .iter()
         .map(|closure| Metres(closure.closure_m))
         .max_by(|a, b| a.abs().value().total_cmp(&b.abs().value()))
-        .unwrap_or(Metres::ZERO)
 }
 
 fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {

@@ -32,6 +32,39 @@ pub struct PoseChecked {
     pub skew_s: Option<f64>,
 }
 
+impl PoseChecked {
+    /// What `seen` at `target` comes to with errors of the angle counted at `edge`.
+    pub(crate) fn new(target: Pose, seen: Pose, edge: Metres, skew_s: Option<f64>) -> Self {
+        Self {
+            target,
+            seen,
+            error: largest_error(difference(seen, target), edge),
+            skew_s,
+        }
+    }
+}
+
+/// What all poses of a verification come to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct PoseFigures {
+    pub(crate) largest: Metres,
+    pub(crate) rms: Metres,
+    pub(crate) skew_max_s: Option<f64>,
+}
+
+impl PoseFigures {
+    /// Of poses that were seen.
+    pub(crate) fn of(poses: &[PoseChecked]) -> Self {
+        let squares: f64 = poses.iter().map(|it| powi(it.error.value(), 2)).sum();
+        let errors = poses.iter().map(|it| it.error);
+        Self {
+            largest: errors.fold(Metres::ZERO, Metres::max),
+            rms: Metres((squares / poses.len().max(1) as f64).sqrt()),
+            skew_max_s: poses.iter().filter_map(|it| it.skew_s).reduce(f64::max),
+        }
+    }
+}
+
 /// A verification of a platform.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlatformVerified {
@@ -97,12 +130,15 @@ impl AlignmentPlatform<'_> {
         let checked = self
             .check_poses(&targets, compensated, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let squares: f64 = checked.iter().map(|it| powi(it.error.value(), 2)).sum();
-        let errors = checked.iter().map(|it| it.error);
+        let PoseFigures {
+            largest,
+            rms,
+            skew_max_s,
+        } = PoseFigures::of(&checked);
         Ok(PlatformVerified {
-            largest: errors.fold(Metres::ZERO, Metres::max),
-            rms: Metres((squares / checked.len() as f64).sqrt()),
-            skew_max_s: checked.iter().filter_map(|it| it.skew_s).reduce(f64::max),
+            largest,
+            rms,
+            skew_max_s,
             tolerance,
             journal: journal.path().to_owned(),
             poses: checked,
@@ -132,12 +168,7 @@ impl AlignmentPlatform<'_> {
                 skew_s,
                 at_s: self.core.now().seconds(),
             }))?;
-            checked.push(PoseChecked {
-                target: *target,
-                seen,
-                error: largest_error(difference(seen, *target), edge),
-                skew_s,
-            });
+            checked.push(PoseChecked::new(*target, seen, edge, skew_s));
             let total = targets.len() as u64;
             self.core
                 .observer()

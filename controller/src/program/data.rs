@@ -94,6 +94,8 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
     let fitted = error_table::analyse(&series, &FitOptions::default())
         .map_err(|source| Failure::Fit { axis: name, source })?;
     let mut value = to_json::fitted(&fitted);
+    value["closure_um"] = json!(fitted.drift.closure.map(to_json::um));
+    value["closure_um_u"] = json!(fitted.drift.u_closure.map(to_json::um));
     let mut text = format!(
         "{} positions, largest deviation {:.3} µm, {} of {} points left out",
         fitted.table.nodes().len(),
@@ -109,6 +111,10 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
             u.map_or("unknown (one run)".into(), |u| format!("{:.3} µm", u.um()))
         );
     }
+    text += &format!(
+        "\n{} (last run − first)",
+        text::closure(fitted.drift.closure)
+    );
     let judged = fitted.table.judge_neighbours(Metres::ZERO);
     text += &match judged {
         Ok(noticed) => format!("\n{}", text::noticed(noticed)),

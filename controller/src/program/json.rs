@@ -124,7 +124,7 @@ pub(crate) fn table(table: &ErrorTable) -> Value {
     })
 }
 
-/// How a table was fitted.
+/// How a table was fitted, without its drift.
 pub(crate) fn fitted(fitted: &Fitted) -> Value {
     let outliers: Vec<_> = fitted
         .robust
@@ -142,8 +142,6 @@ pub(crate) fn fitted(fitted: &Fitted) -> Value {
     let mut value = table(&fitted.table);
     value["outliers"] = json!(outliers);
     value["outlier_share"] = json!(fitted.robust.share);
-    value["closure_um"] = json!(um(fitted.drift.closure));
-    value["closure_um_u"] = json!(um(fitted.drift.u_closure));
     value
 }
 

@@ -18,6 +18,8 @@ mod report;
 mod reset;
 mod resume;
 mod rotary;
+#[cfg(test)]
+mod same_figures_tests;
 mod scan;
 mod session;
 mod show;

@@ -78,7 +78,7 @@ pub(crate) fn one_way_figures(figures: &OneWayFigures) -> String {
 }
 
 /// What a measurement lacks of the standard's: the figures are computed all the same.
-fn lack(conformity: &Conformity) -> Option<String> {
+pub(crate) fn lack(conformity: &Conformity) -> Option<String> {
     let Conformity {
         runs,
         runs_wanted,
@@ -96,6 +96,13 @@ fn lack(conformity: &Conformity) -> Option<String> {
     .filter_map(|(is_so, text)| is_so.then_some(text))
     .collect();
     (!lacks.is_empty()).then(|| format!("DOES NOT CONFORM TO ISO 230-2: {}", lacks.join("; ")))
+}
+
+/// A closure in words; a single run of a file has none.
+pub(crate) fn closure(closure: Option<Metres>) -> String {
+    closure.map_or("no closure".into(), |it| {
+        format!("closure {:.3} µm", it.um())
+    })
 }
 
 /// Which positions of its tables each linear axis accepts, and why.

@@ -11,7 +11,7 @@ use crate::rotary::estimate::{evaluate, series};
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
-use crate::rotary::placement::{Placed, PlateRun};
+use crate::rotary::placement::{Placed, PlateRun, largest_closure};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlateEntry, PlateLog};
 use crate::rotary::{PlatePlanEntry, RotaryContent};
@@ -93,13 +93,12 @@ impl RotaryTable<'_> {
         let stored = self.store_table(store, &run, &journal, content.clone());
         let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
-        let closures = placed.iter().map(|it| it.closure.abs());
         Ok(RotaryCalibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
             id,
             solution,
-            closure: closures.fold(Radians::ZERO, Radians::max),
+            closure: largest_closure(placed.iter().map(|it| it.closure)),
             scatter: placed
                 .iter()
                 .filter_map(|it| it.scatter)

@@ -141,6 +141,11 @@ impl Placed {
     }
 }
 
+/// By how much the plate moved in the worst placement.
+pub(crate) fn largest_closure(closures: impl Iterator<Item = Radians>) -> Radians {
+    closures.map(Radians::abs).fold(Radians::ZERO, Radians::max)
+}
+
 /// The standard deviation of values of which some are wild.
 fn scatter_of(mut values: Vec<f64>) -> Option<f64> {
     let middle = median(&values)?;

@@ -44,6 +44,23 @@ pub struct RotaryFigures {
     pub rms: Radians,
 }
 
+impl RotaryFigures {
+    /// Of deviations that count from their mean.
+    pub(crate) fn of(deviations: Vec<Option<Radians>>) -> Self {
+        let seen: Vec<f64> = deviations.iter().flatten().map(|it| it.value()).collect();
+        Self {
+            largest: Radians(seen.iter().fold(0.0, |a: f64, b| a.max(b.abs()))),
+            rms: Radians(if seen.is_empty() { 0.0 } else { rms(&seen) }),
+            deviations,
+        }
+    }
+
+    /// As a journal has them.
+    pub(crate) fn of_record(radians: &[Option<f64>]) -> Self {
+        Self::of(radians.iter().map(|it| it.map(Radians)).collect())
+    }
+}
+
 /// A verification of a rotary table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotaryVerified {
@@ -261,15 +278,10 @@ fn deviations(
 }
 
 fn centred(values: Vec<Option<Radians>>) -> RotaryFigures {
-    let seen: Vec<f64> = values.iter().flatten().map(|it| it.value()).collect();
-    let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
-    let less: Vec<f64> = seen.iter().map(|it| it - mean).collect();
-    let deviations = values.iter().map(|it| it.map(|it| it - Radians(mean)));
-    RotaryFigures {
-        deviations: deviations.collect(),
-        largest: Radians(less.iter().fold(0.0, |a, b| a.max(b.abs()))),
-        rms: Radians(if less.is_empty() { 0.0 } else { rms(&less) }),
-    }
+    let seen = values.iter().flatten();
+    let count = seen.clone().count().max(1) as f64;
+    let mean = seen.copied().sum::<Radians>() / count;
+    RotaryFigures::of(values.iter().map(|it| it.map(|it| it - mean)).collect())
 }
 
 /// Whether the lines that were read are those that lie there, by what the calibration knows of the

@@ -245,22 +245,30 @@ impl WorkVolume<'_> {
     }
 }
 
-/// Deviations count from the first place: the line began before the correction did.
 fn judged(
     mut points: Vec<VolumetricVerifiedPoint>,
     limit: Metres,
     journal: PathBuf,
 ) -> VolumetricVerified {
-    let first = points.first().map_or(Metres(0.0), |it| it.deviation);
-    let (mut low, mut high) = (Metres(0.0), Metres(0.0));
-    for it in &mut points {
-        it.deviation -= first;
-        (low, high) = (low.min(it.deviation), high.max(it.deviation));
+    let read: Vec<Metres> = points.iter().map(|it| it.deviation).collect();
+    let (deviations, range) = from_the_first(&read);
+    for (it, deviation) in points.iter_mut().zip(deviations) {
+        it.deviation = deviation;
     }
     VolumetricVerified {
         points,
-        range: high - low,
+        range,
         limit,
         journal,
     }
+}
+
+/// Deviations along a line counted from its first place, because the line began before the correction did, and
+/// largest minus smallest of them.
+pub(crate) fn from_the_first(read: &[Metres]) -> (Vec<Metres>, Metres) {
+    let first = read.first().copied().unwrap_or(Metres::ZERO);
+    let deviations: Vec<Metres> = read.iter().map(|it| *it - first).collect();
+    let low = deviations.iter().copied().fold(Metres::ZERO, Metres::min);
+    let high = deviations.iter().copied().fold(Metres::ZERO, Metres::max);
+    (deviations, high - low)
 }

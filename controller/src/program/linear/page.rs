@@ -6,10 +6,12 @@ use compensator::iso230::{self, Figures};
 use machine::records::read_journal;
 
 use crate::Failure;
-use crate::linear::measure::series_of;
-use crate::linear::{LinearLog, PointEntry};
+use crate::linear::measure::{largest_closure, series_of};
+use crate::linear::{LinearContent, LinearLog, PointEntry};
 use crate::program::linear::report::{self, Page, Section};
+use crate::program::made_from::made_from;
 use crate::program::page::facts_of;
+use crate::program::text;
 
 /// The page of the journal at `path`.
 pub(crate) fn html(path: &Path) -> Result<String, Failure> {
@@ -24,11 +26,21 @@ pub(crate) fn html(path: &Path) -> Result<String, Failure> {
             points,
         })
         .collect();
+    let made = made_from::<LinearContent>(path)?;
+    let mut facts = facts_of(&journal, points.len());
+    if !points.is_empty() {
+        let closure = largest_closure(&journal.log.closures);
+        facts.push(("datum after the runs".into(), text::closure(closure)));
+    }
+    facts.extend(
+        made.iter()
+            .map(|(id, _)| ("calibration made".into(), id.clone())),
+    );
     let page = Page {
         title: format!("{} of axis {}", journal.header.verb, journal.header.axis),
-        facts: facts_of(&journal, points.len()),
+        facts,
         sections,
-        calibration: None,
+        calibration: made.first().map(|(_, it)| &it.content),
         zeros: journal.log.zeros.clone(),
     };
     Ok(report::render(&page))

@@ -76,7 +76,13 @@ fn figures(sections: &[Section<'_>]) -> String {
         }
         html += "</tr>";
     }
-    html + "</table>"
+    html += "</table>";
+    for section in sections {
+        if let Some(lack) = text::lack(&section.figures.conformity) {
+            html += &format!("<p>{}: {}</p>", escape(&section.title), escape(&lack));
+        }
+    }
+    html
 }
 
 fn table(content: &LinearContent) -> String {
@@ -85,9 +91,15 @@ fn table(content: &LinearContent) -> String {
             format!("{:.3}", Metres(metres).um())
         })
     };
-    let mut html = String::from(
-        "<table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
+    let mut html = format!(
+        "<p>{} positions, largest deviation {}, {} runs, {}</p><table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
          <th>u ↑ (µm)</th><th>u ↓ (µm)</th></tr>",
+        content.nodes.len(),
+        content
+            .table("")
+            .map_or("–".into(), |it| format!("{:.3} µm", it.largest().um())),
+        content.runs,
+        text::closure(content.closure_m.map(Metres))
     );
     for node in &content.nodes {
         let _ = write!(

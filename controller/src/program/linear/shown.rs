@@ -6,13 +6,14 @@ use units::Metres;
 use crate::linear::LinearContent;
 use crate::linear::record::NodeRecord;
 use crate::program::show::{Changes, Show};
+use crate::program::text;
 
 impl Show for LinearContent {
     fn lines(&self) -> String {
         let head = format!(
-            "{} runs, closure {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
+            "{} runs, {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",
             self.runs,
-            micrometres(self.closure_m),
+            text::closure(self.closure_m.map(Metres)),
         );
         let table = self
             .nodes

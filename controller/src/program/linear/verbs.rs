@@ -6,7 +6,7 @@ use machine::records::Store;
 use serde_json::{Value, json};
 use units::{Metres, Short};
 
-use crate::linear::VerifyOptions;
+use crate::linear::{Calibrated, Verified, VerifyOptions};
 use crate::ports::Use;
 use crate::program::linear::{moved, uncertainty};
 use crate::program::output::{Ended, Output};
@@ -125,14 +125,20 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             machine.linear(axis)?.calibrate(store, &options)
         },
     )?;
+    let mut value = calibrated_value(&calibrated);
+    value["counters"] = counters;
+    output.result(&calibrated_text(&calibrated), &value)
+}
+
+pub(crate) fn calibrated_text(calibrated: &Calibrated) -> String {
     let fitted = &calibrated.fitted;
     let mut text = format!(
-        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, \
-         closure {:.3} µm\n  {}\n  points in {}",
+        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, {}\n  {}\n  \
+         points in {}",
         &calibrated.id[..12],
         fitted.table.nodes().len(),
         fitted.table.largest().um(),
-        calibrated.measured.closure.um(),
+        text::closure(calibrated.measured.closure),
         calibrated.path.display(),
         calibrated.journal.display()
     );
@@ -148,17 +154,24 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             point.residual.um()
         );
     }
-    let value = json!({
+    text
+}
+
+pub(crate) fn calibrated_value(calibrated: &Calibrated) -> Value {
+    let mut fit = to_json::fitted(&calibrated.fitted);
+    // Closure means what the datum's place shows; from run to run the whole table moves.
+    fit["drift_um"] = json!(calibrated.fitted.drift.closure.map(to_json::um));
+    fit["drift_um_u"] = json!(calibrated.fitted.drift.u_closure.map(to_json::um));
+    let budget = calibrated.record.content.budget.as_ref();
+    json!({
         "calibration": calibrated.id,
         "path": calibrated.path,
         "journal": calibrated.journal,
-        "closure_um": to_json::um(calibrated.measured.closure),
-        "fit": to_json::fitted(fitted),
+        "closure_um": calibrated.measured.closure.map(to_json::um),
+        "fit": fit,
         "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
-        "uncertainty": content.budget.as_ref().map(uncertainty::value),
-        "counters": counters,
-    });
-    output.result(&text, &value)
+        "uncertainty": budget.map(uncertainty::value),
+    })
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
@@ -183,27 +196,41 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         args.resume.as_ref(),
         run,
     )?;
-    let title = name.replace('_', " ");
-    let mut text = text::figures_table(&[(&title, &verified.figures)]);
-    let uncertain = uncertainty::of_targets(&verified.uncertainty);
-    text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
-    text += &format!("\npoints in {}", verified.journal.display());
+    let text = verified_text(name, &verified);
     let within = verified.is_within_tolerance();
-    let value = json!({
-        "axis": axis,
-        name: to_json::figures(&verified.figures),
-        "tolerance_um": to_json::um(verified.tolerance),
-        "within_tolerance": within,
-        "uncertainty": uncertainty::targets(&verified.uncertainty),
-        "counters": counters,
-        "journal": verified.journal,
-    });
+    let mut value = verified_value(name, &verified);
+    value["axis"] = json!(axis);
+    value["counters"] = counters;
     if compensated && !within {
         let seen = verified.figures.accuracy.bidirectional;
         let limit = verified.tolerance;
         return output.bad_result(&text, value, Failure::OutOfTolerance { axis, seen, limit });
     }
     output.result(&text, &value)
+}
+
+/// `name` is `as_found` or `as_left`.
+pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
+    let title = name.replace('_', " ");
+    let mut text = text::figures_table(&[(&title, &verified.figures)]);
+    let uncertain = uncertainty::of_targets(&verified.uncertainty);
+    text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
+    text += &format!(
+        "\ndatum after the runs: {}",
+        text::closure(verified.measured.closure)
+    );
+    text + &format!("\npoints in {}", verified.journal.display())
+}
+
+pub(crate) fn verified_value(name: &str, verified: &Verified) -> Value {
+    json!({
+        name: to_json::figures(&verified.figures),
+        "closure_um": verified.measured.closure.map(to_json::um),
+        "tolerance_um": to_json::um(verified.tolerance),
+        "within_tolerance": verified.is_within_tolerance(),
+        "uncertainty": uncertainty::targets(&verified.uncertainty),
+        "journal": verified.journal,
+    })
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {

@@ -10,7 +10,8 @@ use machine::records::{CalibrationRecord, ReadJournal, short};
 use units::{Approach, Metres, Radians};
 
 use crate::platform::PlatformLog;
-use crate::platform::state::{difference, largest_error};
+use crate::platform::state::difference;
+use crate::platform::verify::{PoseChecked, PoseFigures};
 use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
 use crate::program::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
 use crate::program::page::{IN_USE, document, escape, facts};
@@ -110,55 +111,33 @@ pub(crate) fn render(page: &PlatformPage<'_>) -> String {
 /// A verification, computed.
 struct Visit<'a> {
     title: &'a str,
-    poses: Vec<Visited<'a>>,
+    poses: Vec<PoseChecked>,
+    figures: PoseFigures,
     edge: Metres,
     tolerance: Option<Metres>,
-}
-
-struct Visited<'a> {
-    entry: &'a PoseEntry,
-    target: Pose,
-    error: Pose,
-    largest: Metres,
 }
 
 impl<'a> Visit<'a> {
     fn of((title, journal): &'a (String, &'a ReadJournal<PlatformLog>)) -> Self {
         let arrangement = journal.log.arrangement.as_ref();
         let edge = Metres(arrangement.map_or(0.0, |it| it.edge_m));
-        let visited = |entry: &'a PoseEntry| {
-            let target = Pose::from(entry.target?);
-            let error = difference(entry.seen.into(), target);
-            let largest = largest_error(error, edge);
-            Some(Visited {
-                entry,
-                target,
-                error,
-                largest,
-            })
+        let checked = |it: &PoseEntry| {
+            let (target, seen) = (it.target?.into(), it.seen.into());
+            Some(PoseChecked::new(target, seen, edge, it.skew_s))
         };
+        let poses: Vec<_> = journal.log.poses.iter().filter_map(checked).collect();
         Self {
             title,
-            poses: journal.log.poses.iter().filter_map(visited).collect(),
+            figures: PoseFigures::of(&poses),
+            poses,
             edge,
             tolerance: arrangement.and_then(|it| it.tolerance_m).map(Metres),
         }
     }
+}
 
-    fn largest(&self) -> Metres {
-        let errors = self.poses.iter().map(|it| it.largest);
-        errors.fold(Metres::ZERO, Metres::max)
-    }
-
-    fn rms(&self) -> Metres {
-        let squares: f64 = self.poses.iter().map(|it| it.largest.value().powi(2)).sum();
-        Metres((squares / self.poses.len().max(1) as f64).sqrt())
-    }
-
-    fn skew_max_s(&self) -> Option<f64> {
-        let skews = self.poses.iter().filter_map(|it| it.entry.skew_s);
-        skews.reduce(f64::max)
-    }
+fn error_of(it: &PoseChecked) -> Pose {
+    difference(it.seen, it.target)
 }
 
 fn at_edge(angle: Radians, edge: Metres) -> Metres {
@@ -170,11 +149,11 @@ type Row = (&'static str, fn(&Visit<'_>) -> String);
 
 const ROWS: [Row; 5] = [
     ("poses", |it| it.poses.len().to_string()),
-    ("largest error (µm)", |it| um(it.largest())),
-    ("rms error (µm)", |it| um(it.rms())),
+    ("largest error (µm)", |it| um(it.figures.largest)),
+    ("rms error (µm)", |it| um(it.figures.rms)),
     ("tolerance (µm)", |it| or_dash(it.tolerance.map(um))),
     ("largest skew of the starts (ms)", |it| {
-        or_dash(it.skew_max_s().map(|it| format!("{:.3}", it * 1e3)))
+        or_dash(it.figures.skew_max_s.map(|it| format!("{:.3}", it * 1e3)))
     }),
 ];
 
@@ -204,7 +183,7 @@ fn visit_figures(visits: &[Visit<'_>]) -> String {
 
 fn visit_section(visit: &Visit<'_>) -> String {
     let title = escape(visit.title);
-    let numbered = |of: &dyn Fn(&Visited<'_>) -> Metres| {
+    let numbered = |of: &dyn Fn(&PoseChecked) -> Metres| {
         let poses = visit.poses.iter().enumerate();
         poses
             .map(|(at, it)| ((at + 1) as f64, of(it).um()))
@@ -217,12 +196,12 @@ fn visit_section(visit: &Visit<'_>) -> String {
         points,
     };
     let all = [
-        series("x", BLUE, numbered(&|it| it.error.x)),
-        series("y", ORANGE, numbered(&|it| it.error.y)),
+        series("x", BLUE, numbered(&|it| error_of(it).x)),
+        series("y", ORANGE, numbered(&|it| error_of(it).y)),
         series(
             "angle at the edge",
             GREEN,
-            numbered(&|it| at_edge(it.error.angle, visit.edge)),
+            numbered(&|it| at_edge(error_of(it).angle, visit.edge)),
         ),
     ];
     let limit = visit.tolerance.map(Metres::um);
@@ -237,7 +216,7 @@ fn visit_section(visit: &Visit<'_>) -> String {
         .iter()
         .map(|it| Arrow {
             at: (it.target.x.mm(), it.target.y.mm()),
-            shows: (it.error.x.um(), it.error.y.um()),
+            shows: (error_of(it).x.um(), error_of(it).y.um()),
         })
         .collect();
     let place = map(
@@ -261,7 +240,7 @@ fn pose_table(visit: &Visit<'_>) -> String {
          <th>skew (ms)</th></tr>",
     );
     for (at, it) in visit.poses.iter().enumerate() {
-        let skew = it.entry.skew_s;
+        let (skew, error) = (it.skew_s, error_of(it));
         let _ = write!(
             html,
             "<tr><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.2}</td><td>{:.3}</td><td>{:.3}</td>\
@@ -270,10 +249,10 @@ fn pose_table(visit: &Visit<'_>) -> String {
             it.target.x.mm(),
             it.target.y.mm(),
             it.target.angle.arcsec(),
-            it.error.x.um(),
-            it.error.y.um(),
-            it.error.angle.arcsec(),
-            it.largest.um(),
+            error.x.um(),
+            error.y.um(),
+            error.angle.arcsec(),
+            it.error.um(),
             or_dash(skew.map(|it| format!("{:.3}", it * 1e3))),
         );
     }

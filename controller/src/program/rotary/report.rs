@@ -11,6 +11,8 @@ use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts, facts_of};
 use crate::program::rotary::residuals::residuals_of;
 use crate::rotary::PlateLog;
+use crate::rotary::placement::largest_closure;
+use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{JudgedEntry, RotaryContent};
 
 /// So many readings that were left out are named.
@@ -108,7 +110,7 @@ fn placements(journal: &ReadJournal<PlateLog>) -> String {
         let read: usize = read.sum();
         let closed = journal.log.placements.iter().find(|it| it.offset == offset);
         let moved = closed.map_or("not read to its end".to_owned(), |it| {
-            format!("{:+.4}", arcsec(it.closure_rad))
+            format!("{:+.3}", arcsec(it.closure_rad))
         });
         let _ = write!(
             html,
@@ -117,7 +119,13 @@ fn placements(journal: &ReadJournal<PlateLog>) -> String {
             all - read
         );
     }
-    html + "</table>"
+    html += "</table>";
+    let closures = journal.log.placements.iter();
+    let moved = largest_closure(closures.map(|it| Radians(it.closure_rad)));
+    html + &format!(
+        "<p>The plate moved by {:.3} ″ at most while it was read.</p>",
+        moved.arcsec()
+    )
 }
 
 /// Degrees on the table, and arcseconds.
@@ -168,7 +176,7 @@ fn calibration(content: &RotaryContent) -> String {
     let mut html = format!(
         "<h2>Table error</h2><p>Up to {:.3} ″ at the lines; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
          degrees of freedom; noise of a reading amplified {:.3} times. The table error {}.</p><figure>{}</figure>{shaded}\
-         <h2>Plate error</h2><figure>{}</figure>",
+         <h2>Plate error</h2><p>Up to {:.3} ″.</p><figure>{}</figure>",
         content.largest_error().arcsec(),
         arcsec(content.residual_rms_rad),
         content.degrees_of_freedom,
@@ -180,6 +188,7 @@ fn calibration(content: &RotaryContent) -> String {
             &table_series,
             None,
         ),
+        content.largest_plate_error().arcsec(),
         chart(
             "Plate error",
             (
@@ -255,15 +264,19 @@ fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog
     let both = [("as found", Some(&judged.found_rad)), ("as left", left)];
     for (name, values) in both {
         let Some(values) = values else { continue };
-        let seen: Vec<f64> = values.iter().flatten().map(|it| arcsec(*it)).collect();
-        let largest = seen.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let rms = compensator::uncertainty::rms(&seen);
+        let RotaryFigures { largest, rms, .. } = RotaryFigures::of_record(values);
         let _ = write!(
             html,
-            "<tr><td>{name}</td><td>{largest:.4}</td><td>{rms:.4}</td></tr>"
+            "<tr><td>{name}</td><td>{:.3}</td><td>{:.3}</td></tr>",
+            largest.arcsec(),
+            rms.arcsec()
         );
     }
-    html += "</table>";
+    let _ = write!(
+        html,
+        "</table><p>tolerance {:.3} ″ as left</p>",
+        arcsec(judged.tolerance_rad)
+    );
     for (name, values) in both {
         let Some(values) = values else { continue };
         let lines = values.len().max(1) as f64;

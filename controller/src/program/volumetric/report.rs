@@ -12,6 +12,8 @@ use units::{Metres, Radians};
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts};
+use crate::program::volumetric::shown;
+use crate::volumetric::verify::from_the_first;
 use crate::volumetric::{
     FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeLog,
 };
@@ -26,7 +28,6 @@ const NAMES: [[[&str; 3]; 2]; 3] = [
 ];
 /// Thermometers in the order of the configuration, as charts call them.
 const THERMOMETERS: [&str; 8] = ["1", "2", "3", "4", "5", "6", "7", "8"];
-const SQUARENESSES: [&str; 3] = ["y to x", "z to x", "z to y"];
 
 /// What a line showed at one hour of a day, in each state.
 #[derive(Clone, Debug)]
@@ -138,7 +139,7 @@ fn curves(day: &[HourOfDay<'_>]) -> String {
         ("corrected live", BLUE),
     ];
     let ranges = STATES.iter().enumerate().map(|(state, (name, colour))| {
-        let range = |it: &HourOfDay<'_>| (it.hour, um(range_of(it.runs[state])));
+        let range = |it: &HourOfDay<'_>| (it.hour, range_of(it.runs[state]));
         line(name, colour, day.iter().map(range).collect())
     });
     let ranges: Vec<_> = ranges.collect();
@@ -180,29 +181,31 @@ fn way(reading: &LineReadingEntry, from: [f64; 3]) -> f64 {
     mm((0..3).map(square).sum::<f64>().sqrt())
 }
 
-/// Way in millimetres and deviation in micrometres, from what it was at the beginning.
+/// Of each reading its way in millimetres and its deviation in micrometres, from what these were at the beginning.
 fn deviations(journal: &ReadJournal<VolumeLog>) -> Vec<(f64, f64)> {
     let readings = &journal.log.readings;
-    let first = readings.first();
-    let (from, zero) = first.map_or(([0.0; 3], 0.0), |it| (it.at_m, it.deviation_si));
-    let each = readings.iter();
-    each.map(|it| (way(it, from), um(it.deviation_si - zero)))
+    let from = readings.first().map_or([0.0; 3], |it| it.at_m);
+    let (deviations, _) = read_along(journal);
+    let each = readings.iter().zip(deviations);
+    each.map(|(it, deviation)| (way(it, from), deviation.um()))
         .collect()
 }
 
+fn read_along(journal: &ReadJournal<VolumeLog>) -> (Vec<Metres>, Metres) {
+    let readings = journal.log.readings.iter();
+    let read: Vec<Metres> = readings.map(|it| Metres(it.deviation_si)).collect();
+    from_the_first(&read)
+}
+
 fn range_of(journal: &ReadJournal<VolumeLog>) -> f64 {
-    let each = journal.log.readings.iter().map(|it| it.deviation_si);
-    let (low, high) = each.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| {
-        (low.min(it), high.max(it))
-    });
-    (high - low).max(0.0)
+    read_along(journal).1.um()
 }
 
 fn verification(journal: &ReadJournal<VolumeLog>) -> String {
     let Some(check) = &journal.log.check else {
         return String::new();
     };
-    let range = um(range_of(journal));
+    let range = range_of(journal);
     let points = deviations(journal);
     let readings = &journal.log.readings;
     let sure = points.iter().zip(readings);
@@ -301,9 +304,7 @@ pub(crate) fn geometry(content: &GeometryContent) -> String {
     }
     html += &largest(content);
     html += "<h2>Squareness</h2><table><tr><th></th><th>″</th><th>u (″)</th></tr>";
-    let values = content.squareness_rad.iter().zip(content.squareness_u_rad);
-    for (name, (value, u)) in SQUARENESSES.iter().zip(values) {
-        let (value, u) = (arcsec(*value), arcsec(u));
+    for (name, value, u) in shown::squarenesses(content) {
         let _ = write!(
             html,
             "<tr><td>{name}</td><td>{value:+.3}</td><td>{u:.3}</td></tr>"
@@ -403,24 +404,15 @@ fn largest(content: &GeometryContent) -> String {
     let mut html = String::from(
         "<table><tr><th>error</th><th>nodes</th><th>largest</th><th>u (largest)</th><th></th></tr>",
     );
-    for it in &content.functions {
-        let is_tilt = NAMES
-            .iter()
-            .any(|names| names[1].contains(&it.name.as_str()));
-        let (unit, name): (fn(f64) -> f64, _) = if is_tilt {
-            (arcsec, "″")
-        } else {
-            (um, "µm")
-        };
-        let most = |values: &[f64]| unit(values.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
-        let u = it.standard_uncertainties_si.as_deref();
-        let u = u.map_or("–".to_owned(), |u| format!("{:.3}", most(u)));
+    for it in shown::errors(content) {
+        let u = it.u.map_or("–".to_owned(), |u| format!("{u:.3}"));
         let _ = write!(
             html,
-            "<tr><td>{}</td><td>{}</td><td>{:.3}</td><td>{u}</td><td>{name}</td></tr>",
-            escape(&it.name),
-            it.values_si.len(),
-            most(&it.values_si)
+            "<tr><td>{}</td><td>{}</td><td>{:.3}</td><td>{u}</td><td>{}</td></tr>",
+            escape(it.name),
+            it.nodes,
+            it.largest,
+            it.unit
         );
     }
     html + "</table>"

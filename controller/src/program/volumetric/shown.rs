@@ -43,24 +43,53 @@ pub(crate) fn shown(content: &GeometryContent) -> String {
     let agreement = content.agreement.as_ref();
     let agreement = agreement.map(|it| format!("{}\n  {}", it.readings_text(), it.tool_text()));
     let head = agreement.unwrap_or_default() + "\n  error     nodes   largest        u (largest)";
-    let mut text = content.functions.iter().fold(head, |text, it| {
-        let unit = unit(it);
-        let u = it.standard_uncertainties_si.as_deref().map(largest);
-        let u = u.map_or("–".into(), |u| format!("{:.3}", u * unit.1));
-        let (count, value) = (it.positions_m.len(), largest(&it.values_si) * unit.1);
+    let mut text = errors(content).fold(head, |text, it| {
+        let u = it.u.map_or("–".into(), |u| format!("{u:.3}"));
         let row = format!(
-            "\n  {:<8} {count:>6}   {value:.3} {}   {u}",
-            it.name, unit.0
+            "\n  {:<8} {:>6}   {:.3} {}   {u}",
+            it.name, it.nodes, it.largest, it.unit
         );
         text + &row
     });
-    let names = ["y to x", "z to x", "z to y"];
-    let squareness = content.squareness_rad.iter().zip(content.squareness_u_rad);
-    for (name, (value, u)) in names.iter().zip(squareness) {
-        let (value, u) = (value * ARCSEC, u * ARCSEC);
-        text += &format!("\n  {name}: {value:.3} arcsec, u {u:.3} arcsec");
+    for (name, value, u) in squarenesses(content) {
+        text += &format!("\n  {name}: {value:+.3} ″, u {u:.3} ″");
     }
     text
+}
+
+/// What is shown of an error function, in micrometres or arcseconds.
+pub(crate) struct ShownError<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) nodes: usize,
+    /// The largest at a node, whatever its sign.
+    pub(crate) largest: f64,
+    /// The largest standard uncertainty at a node.
+    pub(crate) u: Option<f64>,
+    pub(crate) unit: &'static str,
+}
+
+/// Each error function.
+pub(crate) fn errors(content: &GeometryContent) -> impl Iterator<Item = ShownError<'_>> {
+    content.functions.iter().map(|it| {
+        let (name, per_si) = unit(it);
+        let u = it.standard_uncertainties_si.as_deref();
+        ShownError {
+            name: &it.name,
+            nodes: it.positions_m.len(),
+            largest: largest(&it.values_si) * per_si,
+            u: u.map(|u| largest(u) * per_si),
+            unit: name,
+        }
+    })
+}
+
+/// Each squareness and its standard uncertainty, in arcseconds.
+pub(crate) fn squarenesses(content: &GeometryContent) -> Vec<(&'static str, f64, f64)> {
+    let values = content.squareness_rad.iter().zip(content.squareness_u_rad);
+    let names = ["y to x", "z to x", "z to y"].into_iter();
+    let each = names.zip(values);
+    each.map(|(name, (value, u))| (name, value * ARCSEC, u * ARCSEC))
+        .collect()
 }
 
 /// Two stored geometries, for `cal diff`: the largest change of each function at its nodes.
@@ -89,7 +118,7 @@ const ARCSEC: f64 = 180.0 * 3600.0 / core::f64::consts::PI;
 /// Displacements are called after their direction, tilts after a, b and c.
 fn unit(function: &FunctionRecord) -> (&'static str, f64) {
     match function.name.chars().nth(2) {
-        Some('a' | 'b' | 'c') => ("arcsec", ARCSEC),
+        Some('a' | 'b' | 'c') => ("″", ARCSEC),
         _ => ("µm", 1e6),
     }
 }

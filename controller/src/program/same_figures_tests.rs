@@ -1,0 +1,624 @@
+//! A figure is the same wherever it is shown: each kind of machine is calibrated and verified in virtual time, and
+//! what its text, its JSON, its pages and its records say of it is read again and compared, figure by figure.
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::emulated::Emulated;
+use crate::linear::{Calibrated, Verified};
+use crate::platform::calibrate::PlatformCalibrated;
+use crate::platform::verify::PlatformVerified;
+use crate::program::kind::KINDS;
+use crate::program::linear::verbs as linear;
+use crate::program::platform::verbs as platform;
+use crate::program::report;
+use crate::program::rotary::verbs as rotary;
+use crate::program::text::ROWS;
+use crate::program::volumetric::verbs as volumetric;
+use crate::rotary::{RotaryCalibrated, RotaryVerified};
+use crate::volumetric::VolumetricCalibrated;
+use crate::volumetric::verify::VolumetricVerified;
+use crate::{Machine, Store, config, store_of};
+
+/// A machine in virtual time, and where it keeps its records.
+struct Desk {
+    machine: Machine,
+    emulated: Emulated,
+    store: Store,
+    _folder: TempDir,
+}
+
+impl Desk {
+    fn new([machine, emulated]: [&str; 2]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut loaded = config::parse(machine, "m.toml").unwrap();
+        loaded.config.machine.data_dir = folder.path().to_owned();
+        let emulated = Emulated::new(emulated, 20_261_125, &loaded.config).unwrap();
+        Self {
+            machine: Machine::new(&loaded, Box::new(emulated.transport())),
+            store: store_of(&loaded.config.machine),
+            emulated,
+            _folder: folder,
+        }
+    }
+
+    /// What `cal show` says of a calibration, and the calibration.
+    fn shown(&self, id: &str) -> (String, Value) {
+        let kind = self.store.glance(id).unwrap().kind;
+        let mut shown = KINDS.iter().flat_map(|it| it.shown);
+        let shown = shown.find(|it| it.kind == kind).unwrap();
+        (shown.one)(&self.store, id).unwrap()
+    }
+}
+
+/// A page without its markup and pictures.
+fn words(html: &str) -> String {
+    let mut words = String::new();
+    let (mut rest, mut picture) = (html, false);
+    while let Some(begin) = rest.find('<') {
+        if !picture {
+            words += &rest[..begin];
+        }
+        let end = begin + rest[begin..].find('>').unwrap();
+        picture =
+            (picture || rest[begin..].starts_with("<svg")) && !rest[begin..].starts_with("</svg");
+        words.push(' ');
+        rest = &rest[end + 1..];
+    }
+    words += rest;
+    words.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The figures behind each `label` in `text`, with their decimals.
+fn behind(text: &str, label: &str, count: usize) -> Vec<(f64, usize)> {
+    let at = text.find(label);
+    let at = at.unwrap_or_else(|| panic!("`{label}` is not in:\n{text}")) + label.len();
+    let mut figures = Vec::new();
+    for word in text[at..].split(|c: char| !(c.is_ascii_digit() || "+-.".contains(c))) {
+        let word = word.trim_end_matches('.');
+        if let Ok(figure) = word.parse::<f64>() {
+            let decimals = word.split_once('.').map_or(0, |(_, it)| it.len());
+            figures.push((figure, decimals));
+        }
+        if figures.len() == count {
+            return figures;
+        }
+    }
+    panic!("`{label}` has {figures:?} behind it and not {count} figures in:\n{text}")
+}
+
+/// Whether what is printed is `wanted`, to its last decimal.
+#[track_caller]
+fn check(what: &str, wanted: f64, printed: (f64, usize)) {
+    let (figure, decimals) = printed;
+    let last = 10_f64.powi(-i32::try_from(decimals).unwrap());
+    // Half a decimal, and what JSON was rounded to.
+    let is_it = (figure - wanted).abs() <= 0.5 * last + 1e-4 * last.min(1.0) + 1e-9 * wanted.abs();
+    assert!(
+        is_it && wanted.is_finite(),
+        "{what}: {figure} printed, {wanted} meant"
+    );
+}
+
+/// The number at `place` of `value`.
+#[track_caller]
+fn at(value: &Value, place: &str) -> f64 {
+    let number = value.pointer(place).and_then(Value::as_f64);
+    number.unwrap_or_else(|| panic!("{place} is no number in {value:#}"))
+}
+
+/// The figure of JSON, `wanted`, behind a label of each text.
+#[track_caller]
+fn everywhere(wanted: f64, shown: &[(&str, &str)]) {
+    for (text, label) in shown {
+        check(label, wanted, behind(text, label, 1)[0]);
+    }
+}
+
+/// What JSON says and what a record says in SI.
+#[track_caller]
+fn stored(json: f64, record: f64, per_si: f64) {
+    let (seen, tolerance) = (record * per_si, 0.51e-4);
+    assert!(
+        (json - seen).abs() <= tolerance,
+        "{json} in JSON, {seen} stored"
+    );
+}
+
+const UM: f64 = 1e6;
+const ARCSEC: f64 = 180.0 * 3600.0 / core::f64::consts::PI;
+
+fn largest<'a>(values: impl IntoIterator<Item = &'a Value>) -> f64 {
+    let values = values.into_iter().filter_map(Value::as_f64);
+    values.fold(0.0, |a, b| a.max(b.abs()))
+}
+
+fn list<'a>(value: &'a Value, place: &str) -> &'a Vec<Value> {
+    value.pointer(place).and_then(Value::as_array).unwrap()
+}
+
+#[test]
+fn a_linear_axis_is_told_by_the_same_figures_everywhere() {
+    use crate::linear::VerifyOptions;
+    let mut desk = Desk::new([
+        include_str!("../../../configs/machines/linear.toml"),
+        include_str!("../../../configs/emulated/linear.toml"),
+    ]);
+    let store = desk.store.clone();
+    let (calibrated, verified) = desk
+        .machine
+        .guarded(|machine| {
+            machine.start()?;
+            machine.linear("x")?.zero(&store)?;
+            let calibrated = machine
+                .linear("x")?
+                .calibrate(&store, &Default::default())?;
+            let options = VerifyOptions {
+                compensated: true,
+                calibration: Some(calibrated.id.clone()),
+                resume: None,
+            };
+            let verified = machine.linear("x")?.verify(&store, &options)?;
+            Ok((calibrated, verified))
+        })
+        .unwrap();
+    check_linear_calibration(&desk, &calibrated);
+    check_linear_verification(&verified);
+}
+
+#[track_caller]
+fn check_linear_calibration(desk: &Desk, calibrated: &Calibrated) {
+    let (text, json) = (
+        linear::calibrated_text(calibrated),
+        linear::calibrated_value(calibrated),
+    );
+    let page = words(&report::html(&calibrated.journal).unwrap());
+    let (lines, record) = desk.shown(&calibrated.id);
+    let content = &record;
+
+    let closure = at(&json, "/closure_um");
+    stored(closure, at(content, "/closure_m"), UM);
+    let datum = ("closure ", "datum after the runs closure ");
+    everywhere(
+        closure,
+        &[
+            (&text, datum.0),
+            (&lines, datum.0),
+            (&page, datum.0),
+            (&page, datum.1),
+        ],
+    );
+    let most = "largest deviation ";
+    everywhere(
+        at(&json, "/fit/largest_deviation_um"),
+        &[(&text, most), (&page, most)],
+    );
+    let sides = content["nodes"].as_array().unwrap().iter();
+    let sides = sides.flat_map(|it| [&it["forward_m"], &it["reverse_m"]]);
+    stored(at(&json, "/fit/largest_deviation_um"), largest(sides), UM);
+    stored(
+        at(&json, "/fit/lost_motion_um"),
+        at(content, "/lost_motion_m"),
+        UM,
+    );
+    let up_to = "uncertainty U (k = 2) up to ";
+    let expanded = at(&json, "/uncertainty/largest/expanded_um");
+    everywhere(expanded, &[(&text, up_to), (&page, up_to)]);
+    let nanometres = behind(&lines, "U (k = 2) ", 1)[0];
+    check("U of the calibration", expanded * 1e3, nanometres);
+
+    let (nodes, kept) = (list(&json, "/fit/nodes"), list(content, "/nodes"));
+    let rows = behind(&page, "u ↓ (µm)", nodes.len() * 5);
+    let shown = behind(&lines, "u (µm)", nodes.len() * 4);
+    assert_eq!(nodes.len(), kept.len());
+    let keys = [
+        ("/deviation_um/forward", "/forward_m"),
+        ("/deviation_um/reverse", "/reverse_m"),
+        ("/standard_uncertainty_um/forward", "/forward_u_m"),
+        ("/standard_uncertainty_um/reverse", "/reverse_u_m"),
+    ];
+    for (number, (node, kept)) in nodes.iter().zip(kept).enumerate() {
+        check("position", at(node, "/position_mm"), rows[5 * number]);
+        for (column, (of_json, of_record)) in keys.into_iter().enumerate() {
+            let figure = at(node, of_json);
+            stored(figure, at(kept, of_record), UM);
+            check(of_json, figure, rows[5 * number + 1 + column]);
+            if column < 3 {
+                check(of_json, figure, shown[4 * number + 1 + column]);
+            }
+        }
+    }
+}
+
+#[track_caller]
+fn check_linear_verification(verified: &Verified) {
+    let (text, json) = (
+        linear::verified_text("as_left", verified),
+        linear::verified_value("as_left", verified),
+    );
+    let page = words(&report::html(&verified.journal).unwrap());
+    let places = [
+        "accuracy/bidirectional",
+        "accuracy/forward",
+        "accuracy/reverse",
+        "repeatability/bidirectional",
+        "repeatability/forward",
+        "repeatability/reverse",
+        "systematic_deviation/bidirectional",
+        "mean_bidirectional_deviation_range",
+        "reversal_value",
+        "mean_reversal_value",
+    ];
+    assert_eq!(ROWS.len(), places.len());
+    for ((name, ..), place) in ROWS.iter().zip(places) {
+        let figure = at(&json, &format!("/as_left/{place}"));
+        everywhere(figure, &[(&text, name), (&page, name)]);
+    }
+    everywhere(
+        at(&json, "/closure_um"),
+        &[
+            (&text, "datum after the runs: closure "),
+            (&page, "datum after the runs closure "),
+        ],
+    );
+}
+
+#[test]
+fn a_platform_is_told_by_the_same_figures_everywhere() {
+    let mut desk = Desk::new([
+        include_str!("../../../configs/machines/uvw.toml"),
+        include_str!("../../../configs/emulated/uvw.toml"),
+    ]);
+    let store = desk.store.clone();
+    let (calibrated, verified) = desk
+        .machine
+        .guarded(|machine| {
+            machine.start()?;
+            machine.platform()?.zero(&store)?;
+            let calibrated = machine.platform()?.calibrate(&store)?;
+            Ok((calibrated, machine.platform()?.verify(&store, true)?))
+        })
+        .unwrap();
+    check_platform_calibration(&desk, &calibrated);
+    check_platform_verification(&verified);
+}
+
+#[track_caller]
+fn check_platform_calibration(desk: &Desk, calibrated: &PlatformCalibrated) {
+    let (text, json) = (
+        platform::calibrated_text(calibrated),
+        platform::calibrated_value(calibrated),
+    );
+    let page = words(&report::html(&calibrated.journal).unwrap());
+    let closure = at(&json, "/closure_um");
+    everywhere(
+        closure,
+        &[(&text, "closure "), (&page, "the zero was off by ")],
+    );
+    for screw in list(&json, "/screws") {
+        let axis = screw["axis"].as_str().unwrap();
+        let (lines, record) = desk.shown(screw["calibration"].as_str().unwrap());
+        let content = &record;
+        let own_page = &page[page.find(&format!("Screw {axis}")).unwrap()..];
+        let own_text = &text[text.find(&format!("\n  {axis}  ")).unwrap()..];
+        let slope = at(screw, "/slope_um_per_mm");
+        stored(slope, at(content, "/slope_m_per_m"), 1e3);
+        everywhere(
+            slope,
+            &[
+                (own_text, "slope "),
+                (own_page, "slope (µm/mm) "),
+                (&lines, "slope "),
+            ],
+        );
+        let lost = at(screw, "/lost_motion_um");
+        stored(lost, at(content, "/lost_motion_m"), UM);
+        let lost_motion = "lost motion ";
+        everywhere(
+            lost,
+            &[
+                (own_text, lost_motion),
+                (own_page, "lost motion (µm) "),
+                (&lines, lost_motion),
+            ],
+        );
+        let u = at(screw, "/lost_motion_um_u");
+        check(
+            "u of the lost motion",
+            u,
+            behind(own_page, "lost motion (µm) ", 2)[1],
+        );
+        let scatter = at(screw, "/scatter_um");
+        stored(scatter, at(content, "/scatter_m"), UM);
+        everywhere(scatter, &[(own_page, "scatters by ")]);
+        let strokes = at(screw, "/strokes");
+        assert_eq!(strokes, at(content, "/rows"));
+        check("strokes", strokes, behind(own_page, ", ", 1)[0]);
+        let harmonics = list(screw, "/harmonics").len() as f64;
+        everywhere(
+            harmonics,
+            &[(&own_text[own_text.find("lost motion").unwrap()..], "µm, ")],
+        );
+        assert_eq!(list(content, "/harmonics").len() as f64, harmonics);
+    }
+}
+
+#[track_caller]
+fn check_platform_verification(verified: &PlatformVerified) {
+    let (text, json) = (
+        platform::verified_text("as left", verified),
+        platform::verified_value(verified),
+    );
+    let page = words(&report::html(&verified.journal).unwrap());
+    everywhere(
+        at(&json, "/largest_um"),
+        &[(&text, "largest error "), (&page, "largest error (µm) ")],
+    );
+    everywhere(
+        at(&json, "/rms_um"),
+        &[(&text, "rms "), (&page, "rms error (µm) ")],
+    );
+    everywhere(
+        at(&json, "/tolerance_um"),
+        &[(&text, "tolerance "), (&page, "tolerance (µm) ")],
+    );
+    let skew = at(&json, "/skew_max_ms");
+    everywhere(
+        skew,
+        &[
+            (&text, "started within "),
+            (&page, "skew of the starts (ms) "),
+        ],
+    );
+    let poses = list(&json, "/poses");
+    everywhere(poses.len() as f64, &[(&text, " over "), (&page, " poses ")]);
+    let rows = behind(&page, "skew (ms)", poses.len() * 9);
+    for (row, pose) in rows.chunks(9).zip(poses) {
+        check("error of a pose", at(pose, "/error_um"), row[7]);
+        check("skew of a pose", at(pose, "/skew_ms"), row[8]);
+    }
+}
+
+struct Hand {
+    emulated: Emulated,
+    lies_at: f64,
+}
+
+impl crate::rotary::Operator for Hand {
+    fn ask(&mut self, task: &crate::rotary::PlateTask) -> Result<(), crate::Failure> {
+        self.emulated.turn_plate(task.offset - self.lies_at);
+        self.lies_at = task.offset;
+        Ok(())
+    }
+
+    fn is_done(&mut self) -> Result<bool, crate::Failure> {
+        Ok(true)
+    }
+}
+
+#[test]
+fn a_rotary_table_is_told_by_the_same_figures_everywhere() {
+    let mut desk = Desk::new([
+        include_str!("../../../configs/machines/rotary.toml"),
+        include_str!("../../../configs/emulated/rotary.toml"),
+    ]);
+    let store = desk.store.clone();
+    let mut hand = Hand {
+        emulated: desk.emulated.clone(),
+        lies_at: 0.0,
+    };
+    let (calibrated, verified) = desk
+        .machine
+        .guarded(|machine| {
+            machine.start()?;
+            machine.rotary("c")?.zero()?;
+            let options = Default::default();
+            let calibrated = machine
+                .rotary("c")?
+                .calibrate(&store, &options, &mut hand)?;
+            Ok((
+                calibrated,
+                machine.rotary("c")?.verify(&store, true, &mut hand)?,
+            ))
+        })
+        .unwrap();
+    check_rotary_calibration(&desk, &calibrated);
+    check_rotary_verification(&verified);
+}
+
+#[track_caller]
+fn check_rotary_calibration(desk: &Desk, calibrated: &RotaryCalibrated) {
+    let (text, json) = (
+        rotary::calibrated_text(calibrated),
+        rotary::calibrated_value(calibrated),
+    );
+    let page = words(&report::html(&calibrated.journal).unwrap());
+    let (lines, record) = desk.shown(&calibrated.id);
+    let content = &record;
+    let most = at(&json, "/largest_deviation_arcsec");
+    stored(most, largest(list(content, "/table_error_rad")), ARCSEC);
+    stored(most, largest(list(&json, "/table_error_arcsec")), 1.0);
+    everywhere(
+        most,
+        &[(&text, "table error up to "), (&page, "Table error Up to ")],
+    );
+    let plate = largest(list(&json, "/plate_error_arcsec"));
+    stored(plate, largest(list(content, "/plate_error_rad")), ARCSEC);
+    everywhere(
+        plate,
+        &[(&text, "plate up to "), (&page, "Plate error Up to ")],
+    );
+    let u = largest(list(&json, "/standard_uncertainty_arcsec"));
+    stored(
+        u,
+        largest(list(content, "/standard_uncertainty_rad")),
+        ARCSEC,
+    );
+    everywhere(
+        u,
+        &[
+            (&text, "standard uncertainty "),
+            (&page, "standard uncertainty "),
+        ],
+    );
+    let closure = at(&json, "/closure_arcsec");
+    everywhere(
+        closure,
+        &[
+            (&text, "the plate moved by "),
+            (&page, "The plate moved by "),
+        ],
+    );
+    let residual = at(&json, "/residual_rms_arcsec");
+    stored(residual, at(content, "/residual_rms_rad"), ARCSEC);
+    everywhere(
+        residual,
+        &[(&page, "residuals "), (&lines, "residual rms ")],
+    );
+    for (key, label) in [
+        ("degrees_of_freedom", "rms with "),
+        ("noise_amplification", "amplified "),
+    ] {
+        let figure = at(&json, &format!("/{key}"));
+        stored(figure, at(content, &format!("/{key}")), 1.0);
+        everywhere(figure, &[(&page, label)]);
+    }
+}
+
+#[track_caller]
+fn check_rotary_verification(verified: &RotaryVerified) {
+    let (text, json) = (
+        rotary::verified_text(verified),
+        rotary::verified_value(verified),
+    );
+    let page = words(&report::html(&verified.journal).unwrap());
+    for (state, name) in [("as_found", "as found"), ("as_left", "as left")] {
+        let own_text = &text[text.find(name).unwrap()..];
+        let table = &page[page.find("largest (″)").unwrap()..];
+        let in_table = behind(table, name, 2);
+        for (at_place, (key, label)) in [("largest", "largest deviation "), ("rms", "rms ")]
+            .into_iter()
+            .enumerate()
+        {
+            let figure = at(&json, &format!("/{state}/{key}_arcsec"));
+            everywhere(figure, &[(own_text, label)]);
+            check(key, figure, in_table[at_place]);
+        }
+    }
+    everywhere(
+        at(&json, "/tolerance_arcsec"),
+        &[(&text, "tolerance "), (&page, "tolerance ")],
+    );
+    let closure = at(&json, "/closure_arcsec");
+    everywhere(closure, &[(&text, "it moved by ")]);
+    // Offset, passes, readings, not read, moved meanwhile.
+    let row = behind(&page, "moved meanwhile (″)", 5);
+    check("moved meanwhile", closure, row[4]);
+    check(
+        "moved at most",
+        closure.abs(),
+        behind(&page, "The plate moved by ", 1)[0],
+    );
+}
+
+#[test]
+fn three_axes_are_told_by_the_same_figures_everywhere() {
+    use crate::edit::with_rare_heartbeats;
+    use crate::volumetric::{VerifyBy, WarmUp};
+    let machine = with_rare_heartbeats(include_str!("../../../configs/machines/volumetric.toml"));
+    let mut desk = Desk::new([
+        &machine,
+        include_str!("../../../configs/emulated/volumetric.toml"),
+    ]);
+    let store = desk.store.clone();
+    let mut hand = desk.emulated.clone();
+    let (made, verified) = desk
+        .machine
+        .guarded(|machine| {
+            machine.start()?;
+            machine.volumetric()?.zero()?;
+            let made = machine
+                .volumetric()?
+                .calibrate(&store, WarmUp::None, None, &mut hand)?;
+            let by = VerifyBy::Everything;
+            Ok((made, machine.volumetric()?.verify(&store, by, &mut hand)?))
+        })
+        .unwrap();
+    check_volumetric_calibration(&desk, &made);
+    check_volumetric_verification(&verified);
+}
+
+#[track_caller]
+fn check_volumetric_calibration(desk: &Desk, made: &VolumetricCalibrated) {
+    let (text, json) = (
+        volumetric::calibrated_text(made),
+        volumetric::calibrated_value(made),
+    );
+    let page = words(&report::html(&made.journal).unwrap());
+    let (lines, record) = desk.shown(&made.id);
+    let content = &record;
+    let all = [text.as_str(), &page, &lines];
+    let u = at(&json, "/u_tool_max_um");
+    stored(u, at(content, "/agreement/tool_u_max_m"), UM);
+    let freedom = at(&json, "/degrees_of_freedom");
+    assert_eq!(freedom, at(content, "/agreement/degrees_of_freedom"));
+    let ratio = at(&json, "/birge_ratio");
+    stored(ratio, at(content, "/agreement/scatter_ratio"), 1.0);
+    for text in all {
+        everywhere(u, &[(text, "tool: standard uncertainty ")]);
+        everywhere(freedom, &[(text, " readings, ")]);
+        everywhere(ratio, &[(text, "scatter ")]);
+    }
+    let functions = list(content, "/functions");
+    let table = &page[page.find("u (largest)").unwrap()..];
+    for function in functions {
+        let name = function["name"].as_str().unwrap();
+        let per_si = if "abc".contains(name.chars().nth(2).unwrap()) {
+            ARCSEC
+        } else {
+            UM
+        };
+        let most = largest(list(function, "/values_si")) * per_si;
+        let u = largest(list(function, "/standard_uncertainties_si")) * per_si;
+        for text in [table, lines.as_str()] {
+            let figures = behind(text, name, 3);
+            check(name, most, figures[1]);
+            check(name, u, figures[2]);
+        }
+    }
+    let squareness = ["y to x", "z to x", "z to y"].into_iter().enumerate();
+    for (number, name) in squareness {
+        let value = at(content, &format!("/squareness_rad/{number}")) * ARCSEC;
+        let u = at(content, &format!("/squareness_u_rad/{number}")) * ARCSEC;
+        let section = &page[page.rfind("Squareness").unwrap()..];
+        check(name, value, behind(section, name, 1)[0]);
+        check(name, value, behind(&lines, name, 1)[0]);
+        check(name, u, behind(section, name, 2)[1]);
+        check(name, u, behind(&lines, name, 2)[1]);
+    }
+}
+
+#[track_caller]
+fn check_volumetric_verification(verified: &VolumetricVerified) {
+    let (text, json) = (
+        volumetric::verified_text(verified),
+        volumetric::verified_value(verified),
+    );
+    let page = words(&report::html(&verified.journal).unwrap());
+    for (key, label) in [("range_um", "range "), ("limit_um", "limit ")] {
+        everywhere(
+            at(&json, &format!("/{key}")),
+            &[(&text, label), (&page, label)],
+        );
+    }
+    let points = list(&json, "/points");
+    let in_text = behind(&text, "u (µm)", points.len() * 5);
+    let on_page = behind(&page, "correction x, y, z (µm)", points.len() * 8);
+    for (number, point) in points.iter().enumerate() {
+        for (key, column) in [("deviation_um", 3), ("u_um", 4)] {
+            let figure = at(point, &format!("/{key}"));
+            check(key, figure, in_text[5 * number + column]);
+            check(key, figure, on_page[8 * number + column]);
+        }
+    }
+}
