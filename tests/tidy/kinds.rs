@@ -33,6 +33,7 @@ const OF_DATA: &[&str] = &[
     "entries",
     "line_speed",
     "log",
+    "positions",
     "record",
     "settings",
     "sound",

@@ -13,6 +13,7 @@ use crate::linear::CalibrateConfig;
 use crate::linear::LinearContent;
 use crate::linear::LinearLog;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
+use crate::linear::positions::positions;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::settings;
 use crate::linear::stage::LinearStage;
@@ -155,8 +156,8 @@ impl LinearStage<'_> {
             environment: measured.environment,
             ..self.core.this_machine(self.axis)
         };
-        let content = LinearContent::new(&fitted.table, plan.runs, measured.closure)
-            .with_budget(budget);
+        let content =
+            LinearContent::new(&fitted.table, plan.runs, measured.closure).with_budget(budget);
         CalibrationRecord { head, content }
     }
 
@@ -208,54 +209,12 @@ pub(super) fn open_journal(
 pub(super) fn run_plan(config: &CalibrateConfig) -> RunPlan {
     RunPlan {
         instrument: config.instrument.clone(),
-        targets: targets(config),
+        targets: positions(config),
         runs: config.runs,
         overrun: Metres::from_mm(config.overrun_mm),
         settle: Duration::from_millis(config.settle_ms.into()),
         average_samples: config.average_samples,
         scale_limit_ppm: config.scale_limit_ppm,
         closure_limit: None,
-    }
-}
-
-/// From start to end by steps, the last of them between half as long and one and a half times as long: a stage
-/// arrives otherwise after a move that is much shorter than the others.
-fn targets(config: &CalibrateConfig) -> Vec<Metres> {
-    let steps = ((config.end_mm - config.start_mm) / config.step_mm + 0.5 + 1e-9).floor();
-    let at = |step: u32| Metres::from_mm(config.start_mm + f64::from(step) * config.step_mm);
-    // At least both ends; the last one to the digit that the file has.
-    let before_the_end = (0..(steps as u32).max(1)).map(at);
-    before_the_end
-        .chain([Metres::from_mm(config.end_mm)])
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[track_caller]
-    fn check(end_mm: f64, step_mm: f64, expected_mm: &[f64]) {
-        let text = format!(
-            "instrument = \"laser\"\nstart_mm = 1.0\nend_mm = {end_mm}\nstep_mm = {step_mm}\noverrun_mm = 0.5\n\
-             runs = 2\nsettle_ms = 1\naverage_samples = 1\nscale_limit_ppm = 1.0\nclosure_limit_um = 1.0\n"
-        );
-        let config: CalibrateConfig = toml::from_str(&text).unwrap();
-        let seen: Vec<f64> = targets(&config).iter().map(|it| it.mm()).collect();
-        let near = seen
-            .iter()
-            .zip(expected_mm)
-            .all(|(a, b)| (a - b).abs() < 1e-9);
-        assert!(near && seen.len() == expected_mm.len(), "{seen:?}");
-    }
-
-    #[test]
-    fn no_step_is_much_shorter_than_the_others() {
-        check(7.0, 3.0, &[1.0, 4.0, 7.0]);
-        check(7.2, 3.0, &[1.0, 4.0, 7.2]);
-        check(9.0, 3.0, &[1.0, 4.0, 7.0, 9.0]);
-        check(8.4, 3.0, &[1.0, 4.0, 8.4]);
-        check(2.0, 3.0, &[1.0, 2.0]);
-        check(1.3, 0.1, &[1.0, 1.1, 1.2, 1.3]);
     }
 }

@@ -5,7 +5,12 @@ use units::Short;
 use crate::assemble;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
+use crate::linear::positions::spaced;
 use crate::linear::{CalibrateConfig, CompensationConfig, EndPolicyName, VerifyConfig, ZeroConfig};
+
+/// Positions closer than this are one.
+const STEP_MIN_MM: f64 = 1e-3;
+const POSITIONS_MAX: usize = 10_000;
 
 pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     for (name, axis) in &config.axis {
@@ -64,8 +69,10 @@ fn check_jump_limit(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &Compensat
     let Some(jump_limit_um) = limits.jump_limit_um else {
         return;
     };
-    let Some(run) = &axis.calibrate else { return };
-    let steepest_um = limits.slope_limit * run.step_mm * 1e3;
+    let Some(step_mm) = axis.calibrate.as_ref().and_then(largest_step) else {
+        return;
+    };
+    let steepest_um = limits.slope_limit * step_mm * 1e3;
     if jump_limit_um > steepest_um {
         judge.say(
             "jump_limit_um",
@@ -74,12 +81,19 @@ fn check_jump_limit(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &Compensat
                  from one position to the next",
                 Short(jump_limit_um),
                 Short(steepest_um),
-                Short(run.step_mm)
+                Short(step_mm)
             ),
             "leave it out: the limit for each position then follows from the other positions of \
              the table",
         );
     }
+}
+
+/// The largest distance of two neighbouring positions, millimetres.
+fn largest_step(run: &CalibrateConfig) -> Option<f64> {
+    let listed = run.positions_mm.iter();
+    let listed = listed.flat_map(|it| it.windows(2).map(|pair| pair[1] - pair[0]));
+    run.step_mm.into_iter().chain(listed).reduce(f64::max)
 }
 
 fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig, zero: &ZeroConfig) {
@@ -172,8 +186,15 @@ fn check_rails(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig)
     }
 }
 
-fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, overrun: f64) {
-    judge.below(("start_mm", start), ("end_mm", end));
+/// The first and the last position, each with the key that says it.
+fn check_range(
+    judge: &mut Judge<'_>,
+    axis: &AxisConfig,
+    (start, start_key): (f64, &str),
+    (end, end_key): (f64, &str),
+    overrun: f64,
+) {
+    judge.below((start_key, start), (end_key, end));
     // Without it the first and the last target have no approach of their own.
     let reachable = axis.motion.soft_min_mm..=axis.motion.soft_max_mm;
     if !reachable.contains(&-overrun) {
@@ -186,7 +207,7 @@ fn check_range(judge: &mut Judge<'_>, axis: &AxisConfig, start: f64, end: f64, o
             "shorten it, or lower soft_min_mm",
         );
     }
-    for (key, value) in [("start_mm", start - overrun), ("end_mm", end + overrun)] {
+    for (key, value) in [(start_key, start - overrun), (end_key, end + overrun)] {
         if !reachable.contains(&value) {
             judge.say(
                 key,
@@ -213,13 +234,58 @@ fn check_calibrate(
         &config.instrument,
         "instrument",
     );
-    check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
-    judge.within(
-        "step_mm",
-        run.step_mm,
-        1e-3,
-        (run.end_mm - run.start_mm).max(1e-3),
-    );
+    check_positions(judge, axis, run);
+}
+
+fn check_positions(judge: &mut Judge<'_>, axis: &AxisConfig, run: &CalibrateConfig) {
+    let by_steps = [run.start_mm, run.end_mm, run.step_mm];
+    match (&run.positions_mm, spaced(run)) {
+        (None, Some([start, end, step])) => {
+            check_range(
+                judge,
+                axis,
+                (start, "start_mm"),
+                (end, "end_mm"),
+                run.overrun_mm,
+            );
+            judge.within("step_mm", step, STEP_MIN_MM, (end - start).max(STEP_MIN_MM));
+        }
+        (None, None) => judge.say(
+            "",
+            "it is not said where to measure",
+            "give `start_mm`, `end_mm` and `step_mm`, or a list `positions_mm`",
+        ),
+        (Some(_), _) if by_steps.iter().any(Option::is_some) => judge.say(
+            "positions_mm",
+            "a list of positions leaves nothing to `start_mm`, `end_mm` and `step_mm`",
+            "give either the list or these three",
+        ),
+        (Some(listed), _) => check_listed(judge, axis, listed, run.overrun_mm),
+    }
+}
+
+fn check_listed(judge: &mut Judge<'_>, axis: &AxisConfig, listed: &[f64], overrun: f64) {
+    let (2..=POSITIONS_MAX, [first, .., last]) = (listed.len(), listed) else {
+        return judge.say(
+            "positions_mm",
+            format!("{} positions are impossible", listed.len()),
+            format!("give 2 to {POSITIONS_MAX}"),
+        );
+    };
+    // A NaN, which TOML can write, is not in order, either.
+    let in_order = |pair: &&[f64]| pair[1] - pair[0] >= STEP_MIN_MM;
+    if let Some(pair) = listed.windows(2).find(|it| !in_order(it)) {
+        return judge.say(
+            "positions_mm",
+            format!("{} mm follows {} mm", Short(pair[1]), Short(pair[0])),
+            format!(
+                "list them increasing, {} mm apart or more",
+                Short(STEP_MIN_MM)
+            ),
+        );
+    }
+    let key = "positions_mm";
+    check_range(judge, axis, (*first, key), (*last, key), overrun);
 }
 
 fn check_verify(
@@ -234,5 +300,68 @@ fn check_verify(
         &config.instrument,
         "instrument",
     );
-    check_range(judge, axis, run.start_mm, run.end_mm, run.overrun_mm);
+    check_range(
+        judge,
+        axis,
+        (run.start_mm, "start_mm"),
+        (run.end_mm, "end_mm"),
+        run.overrun_mm,
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Edit;
+    use crate::config::parse;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const STEPS: &str = "start_mm = 0.0\nend_mm = 60.0\nstep_mm = 3.0";
+
+    #[track_caller]
+    fn check(instead: &str, key: &str, parts: [&str; 2]) {
+        let said = parse(&LINEAR.edit(STEPS, instead), "m.toml")
+            .unwrap_err()
+            .to_string();
+        let named = format!("axis.x.calibrate{key}: ");
+        let found = said.contains(&named) && parts.iter().all(|it| said.contains(it));
+        assert!(found, "{named} {parts:?} in: {said}");
+    }
+
+    #[test]
+    fn positions_are_listed_or_follow_from_steps_and_lie_where_the_axis_can_go() {
+        let listed = |list: &str| parse(&LINEAR.edit(STEPS, list), "m.toml");
+        listed("positions_mm = [0.0, 1.5, 1.75, 20.0, 62.5]").unwrap_or_else(|it| panic!("{it}"));
+        let key = ".positions_mm";
+        check("", "", ["not said where to measure", "positions_mm"]);
+        check(
+            "start_mm = 0.0\nstep_mm = 3.0",
+            "",
+            ["not said where to measure", "end_mm"],
+        );
+        let both = "positions_mm = [0.0, 1.0]\nstep_mm = 3.0";
+        check(both, key, ["leaves nothing to", "either the list"]);
+        check("positions_mm = [0.0]", key, ["1 positions", "2 to 10000"]);
+        check(
+            "positions_mm = [0.0, 3.0, 2.0]",
+            key,
+            ["2 mm follows 3 mm", "increasing"],
+        );
+        check(
+            "positions_mm = [0.0, nan, 2.0]",
+            key,
+            ["NaN is impossible", "give a number"],
+        );
+        check(
+            "positions_mm = [0.0, 62.6]",
+            key,
+            ["reaches 63.1 mm", "-3 to 63 mm"],
+        );
+        let jump = "positions_mm = [0.0, 1.0, 5.0]";
+        let text = LINEAR.edit(STEPS, jump).edit(
+            "slope_limit = 0.01",
+            "slope_limit = 0.01\njump_limit_um = 41.0",
+        );
+        let said = parse(&text, "m.toml").unwrap_err().to_string();
+        assert!(said.contains("40 um over the 4 mm"), "{said}");
+    }
 }

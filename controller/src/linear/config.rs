@@ -69,15 +69,19 @@ pub struct CalibrateConfig {
     #[schemars(extend("x-range" = "an `[instrument.NAME]`"))]
     pub instrument: String,
     /// First position.
-    #[schemars(extend("x-range" = "with `overrun_mm` within the soft limits"))]
-    pub start_mm: f64,
+    #[schemars(extend("x-range" = "with `overrun_mm` within the soft limits; without `positions_mm`, only then"))]
+    pub start_mm: Option<f64>,
     /// Last position.
-    #[schemars(extend("x-range" = "with `overrun_mm` within the soft limits"))]
-    pub end_mm: f64,
+    #[schemars(extend("x-range" = "with `overrun_mm` within the soft limits; without `positions_mm`, only then"))]
+    pub end_mm: Option<f64>,
     /// Distance of positions; the last one is stretched or split so that the end is measured and no step is
     /// shorter than half of it.
-    #[schemars(range(min = 0.001), extend("x-range" = "at most the range"))]
-    pub step_mm: f64,
+    #[schemars(range(min = 0.001), extend("x-range" = "at most the range; without `positions_mm`, only then"))]
+    pub step_mm: Option<f64>,
+    /// Every position, in place of `start_mm`, `end_mm` and `step_mm`: at unequal steps, closer where the stage is
+    /// rougher. A stage arrives otherwise after a move that is much shorter than the others.
+    #[schemars(extend("x-range" = "2 to 10000 of them, increasing by 0.001 or more, the ends with `overrun_mm` within the soft limits"))]
+    pub positions_mm: Option<Vec<f64>>,
     /// Bidirectional runs.
     #[schemars(range(min = 2, max = 1000))]
     pub runs: u32,
@@ -95,7 +99,7 @@ pub struct CalibrateConfig {
     /// How far instrument and encoder may differ over a run; in `verify` too.
     #[schemars(range(min = 1.0, max = 100000.0))]
     pub scale_limit_ppm: f64,
-    /// Standard uncertainty of errors that repeat within less than `step_mm`, so that no position shows them,
+    /// Standard uncertainty of errors that repeat within less than the steps, so that no position shows them,
     /// such as the interpolation of a scale's signal: its maker's limit divided by √2. By default 0: none.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1000000.0))]
@@ -204,6 +208,6 @@ pub struct CompensationConfig {
     pub rate_limit_um_per_s: f64,
     /// So far a position may stand off its neighbours whatever the other positions do; not needed,
     /// see above.
-    #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at most `slope_limit` × `step_mm`"))]
+    #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at most `slope_limit` × the largest step"))]
     pub jump_limit_um: Option<f64>,
 }

@@ -16,6 +16,7 @@ mod kind;
 mod log;
 pub(crate) mod measure;
 pub(crate) mod moved;
+pub(crate) mod positions;
 pub(crate) mod record;
 mod run_plan;
 pub(crate) mod settings;

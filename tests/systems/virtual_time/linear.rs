@@ -111,6 +111,55 @@ fn a_move_tells_the_encoders_place_and_what_did_not_correct_it() {
     assert!(moved.place.is_some());
 }
 
+/// Closer where the stage is rougher; the run is interrupted after the first of its runs and continued.
+#[test]
+fn a_stage_is_calibrated_at_unequal_steps_and_such_a_run_is_continued() {
+    let listed: Vec<f64> = (0..=30)
+        .map(|at| f64::from(at * (at + 30)) / 30.0)
+        .collect();
+    let unequal = |text: String| {
+        let steps = "start_mm = 0.0\nend_mm = 60.0\nstep_mm = 3.0";
+        text.edit(steps, &format!("positions_mm = {listed:?}"))
+    };
+    let mut bench = Bench::with(5, unequal, |text| text);
+    let store = bench.store.clone();
+    let calibrate = |bench: &mut Bench, resume| {
+        let options = CalibrateOptions {
+            resume,
+            ..CalibrateOptions::default()
+        };
+        let stage = bench.machine.linear("x");
+        stage.unwrap().calibrate(&store, &options)
+    };
+    bench.machine.start().unwrap();
+    bench.machine.linear("x").unwrap().zero(&store).unwrap();
+    let whole = calibrate(&mut bench, None).unwrap();
+    let lines = std::fs::read_to_string(&whole.journal).unwrap();
+    let end = lines.find("\"entry\":\"closed\"").unwrap();
+    let end = end + lines[end..].find('\n').unwrap() + 1;
+    let interrupted = whole
+        .journal
+        .with_file_name("20260101T000000Z-calibrate-x-00.jsonl");
+    std::fs::write(&interrupted, &lines[..end]).unwrap();
+    let continued = calibrate(&mut bench, Some(interrupted)).unwrap();
+    for calibrated in [whole, continued] {
+        let nodes = &calibrated.record.content.nodes;
+        let positions = nodes.iter().map(|it| it.position_m * 1e3);
+        assert_eq!(nodes.len(), listed.len());
+        assert!(
+            positions
+                .zip(&listed)
+                .all(|(seen, it)| (seen - it).abs() < 1e-9)
+        );
+        assert_eq!(calibrated.measured.points.len(), 3 * 2 * listed.len());
+    }
+    let id = store.active("x").unwrap().current;
+    let left = bench.machine.linear("x").unwrap();
+    let left = { left }.verify(&store, &options(id)).unwrap();
+    let accuracy = left.figures.accuracy.bidirectional;
+    assert!(accuracy <= Metres::from_um(2.0), "A = {} µm", accuracy.um());
+}
+
 #[test]
 fn a_compensated_move_brings_the_point_itself_to_its_target() {
     let mut bench = Bench::new(3);
