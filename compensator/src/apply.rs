@@ -228,6 +228,11 @@ impl ApproachTracker {
         self.approach
     }
 
+    /// The last commanded position.
+    pub const fn last(&self) -> Option<Metres> {
+        self.last
+    }
+
     /// The approach, if it is known.
     pub fn approach(&self) -> Option<Approach> {
         self.approach

@@ -43,6 +43,10 @@ pub const CURVE: &str = "curve between positions";
 pub const SHORT_PERIOD: &str = "errors of short period";
 /// Name of the scatter of the stop that is being made.
 pub const ONE_STOP: &str = "one stop";
+/// Name of what no position shows, where the calibration read it with a position.
+pub const SHORT_PERIOD_READ: &str = "errors of short period at the positions";
+/// Name of what lost motion does after an approach unlike those of the calibration.
+pub const APPROACH: &str = "unlike approach";
 
 /// Width of a rectangular distribution that begins at zero to its root mean square: 1/√3.
 const RECTANGULAR: f64 = 0.577_350_269_189_625_8;
@@ -120,11 +124,21 @@ pub fn budget(fitted: &Fitted, known: Circumstances) -> Result<AxisBudget, Budge
 /// The zero that the axis was calibrated with is the datum of the table, so that its error does not
 /// outlive it.
 ///
+/// The set-point of a stop lies beside its target by the deviation, and so elsewhere on a scale whose errors
+/// repeat within micrometres: those of the stop and those of the positions that were read both count, at the
+/// calibrated positions too.
+///
+/// After an approach unlike those of the calibration (shorter, after a turn, with another overshoot) nobody
+/// knows how much of the lost motion is taken up: the point stands anywhere from where the table says to
+/// where it says for the other side, `unlike_approach` further (rectangular, GUM 4.3.7; about its end, as it
+/// is not corrected).
+///
 /// # Errors
-/// When `zero` can be no uncertainty.
+/// When `zero` or `unlike_approach` can be no uncertainty.
 pub fn budget_of_stops(
     calibrated: &AxisBudget,
     zero: Option<(Metres, Option<f64>)>,
+    unlike_approach: Option<Metres>,
 ) -> Result<AxisBudget, BudgetError> {
     let mut lines = calibrated.contributions().to_vec();
     for line in lines.iter_mut().filter(|it| it.name == ZERO) {
@@ -133,6 +147,19 @@ pub fn budget_of_stops(
             line.degrees_of_freedom = degrees_of_freedom;
         }
     }
+    let short: Vec<Contribution> = lines
+        .iter_mut()
+        .filter(|it| it.name == SHORT_PERIOD)
+        .map(|stop| {
+            stop.correlation = Correlation::CommonOffset;
+            Contribution {
+                name: SHORT_PERIOD_READ.to_owned(),
+                correlation: Correlation::Independent,
+                ..stop.clone()
+            }
+        })
+        .collect();
+    lines.extend(short);
     let scatters = calibrated
         .contributions()
         .iter()
@@ -142,6 +169,10 @@ pub fn budget_of_stops(
         sensitivity: 1.0,
         correlation: Correlation::CommonOffset,
         ..it.clone()
+    }));
+    lines.extend(unlike_approach.map(|it| Contribution {
+        sensitivity: RECTANGULAR,
+        ..offset(APPROACH, Evaluation::B, it)
     }));
     AxisBudget::new(lines, calibrated.positions().to_vec())
 }

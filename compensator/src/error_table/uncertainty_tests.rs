@@ -151,14 +151,20 @@ fn drift_shows_in_the_runs_or_in_the_closure() {
 fn a_stop_has_its_own_scatter_and_the_zero_of_today() {
     let fitted = fitted(|_| 0.0);
     let calibrated = budget(&fitted, circumstances(&environment(20.8))).unwrap();
-    let today = budget_of_stops(&calibrated, Some((Metres(40e-9), None))).unwrap();
+    let today = budget_of_stops(&calibrated, Some((Metres(40e-9), None)), None).unwrap();
     let variance = |it: &AxisBudget| {
         let u = it.at(Metres::ZERO, Approach::Reverse).unwrap();
         let nm = u.standard_uncertainty.nm();
         nm * nm
     };
-    let more = 40.0 * 40.0 - 30.0 * 30.0 + 25.0 * 25.0;
+    // Errors of short period at the stop, and at the position when it was read.
+    let short = circumstances(&environment(20.8)).short_period.nm();
+    let more = 40.0 * 40.0 - 30.0 * 30.0 + 25.0 * 25.0 + 2.0 * short * short;
     assert!((variance(&today) - variance(&calibrated) - more).abs() < 1e-6);
+    let lost_motion = Some(Metres(600e-9));
+    let unlike = budget_of_stops(&calibrated, Some((Metres(40e-9), None)), lost_motion).unwrap();
+    // 600²/3.
+    assert!((variance(&unlike) - variance(&today) - 120_000.0).abs() < 1e-6);
 }
 
 #[test]

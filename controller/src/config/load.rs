@@ -227,6 +227,16 @@ mod tests {
                 "axis.x.calibrate.overrun_mm",
             ),
             (
+                "approach_mm = 1.0",
+                "approach_mm = 34.0",
+                "axis.x.compensation.approach_mm",
+            ),
+            (
+                "approach_mm = 1.0",
+                "approach_mm = 2.96",
+                "axis.x.calibrate.end_mm",
+            ),
+            (
                 "baud_bit_per_s = 115200",
                 "baud_bit_per_s = 0",
                 "serial.laser.baud_bit_per_s",

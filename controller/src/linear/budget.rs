@@ -78,9 +78,13 @@ impl LinearStage<'_> {
     }
 
     /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
-    /// the calibration in use says nothing of it ([`Course::uncertainty_at`](crate::linear::Course::uncertainty_at)).
+    /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
+    ///
+    /// That is the calibration's budget, with the zero that the axis has now, the scatter of one stop and,
+    /// where the axis does not arrive as it did in the calibration, what lost motion may do then.
     pub fn uncertainty_at(&self, position: Metres, approach: Approach) -> Option<Combined> {
-        self.memory.course.uncertainty_at(position, approach)
+        let course = &self.memory.course;
+        course.uncertainty_after(self.approach_length(), position, approach)
     }
 }
 

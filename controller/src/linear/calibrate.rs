@@ -86,7 +86,7 @@ impl LinearStage<'_> {
         let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
         let id = store.save(&record)?;
         store.activate(self.axis, &id)?;
-        self.use_calibration(compensation, Some(budget.clone()));
+        self.use_calibration(compensation, Some(budget.clone()), self.approach_length());
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -115,7 +115,8 @@ impl LinearStage<'_> {
             self.core.config_hash,
         )?;
         let compensation = self.prepare(record.content.table(&id)?)?;
-        self.use_calibration(compensation, record.content.axis_budget(&id)?);
+        let budget = record.content.axis_budget(&id)?;
+        self.use_calibration(compensation, budget, record.content.approach_m.map(Metres));
         Ok(Some(id))
     }
 
@@ -156,8 +157,9 @@ impl LinearStage<'_> {
             environment: measured.environment,
             ..self.core.this_machine(self.axis)
         };
-        let content =
-            LinearContent::new(&fitted.table, plan.runs, measured.closure).with_budget(budget);
+        let content = LinearContent::new(&fitted.table, plan.runs, measured.closure)
+            .with_budget(budget)
+            .with_approach(self.approach_length());
         CalibrationRecord { head, content }
     }
 
@@ -180,6 +182,7 @@ impl LinearStage<'_> {
             calibration,
             targets_m: plan.targets.iter().map(|target| target.value()).collect(),
             runs: plan.runs,
+            approach_m: self.approach_length().map(Metres::value),
         }
     }
 }

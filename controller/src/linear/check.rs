@@ -53,6 +53,7 @@ fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, 
     if let Some(compensation) = &axis.compensation {
         let judge = &mut Judge::at(format!("axis.{name}.compensation"), findings);
         check_jump_limit(judge, axis, compensation);
+        check_approach(judge, axis, compensation);
         let fades = compensation.end_policy == EndPolicyName::FadeOut;
         if fades != compensation.fade_out_mm.is_some() {
             judge.say(
@@ -61,6 +62,21 @@ fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, 
                 "give both or neither",
             );
         }
+    }
+}
+
+/// From one side at least there must be room for it everywhere.
+fn check_approach(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &CompensationConfig) {
+    let half = (axis.motion.soft_max_mm - axis.motion.soft_min_mm) / 2.0;
+    if let Some(length) = limits.approach_mm.filter(|it| *it > half) {
+        judge.say(
+            "approach_mm",
+            format!(
+                "{} mm is more than half of what the soft limits leave",
+                Short(length)
+            ),
+            format!("shorten it to at most {} mm", Short(half)),
+        );
     }
 }
 
@@ -186,6 +202,13 @@ fn check_rails(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig)
     }
 }
 
+/// How far an approach begins from its target at most: what its correction is, it begins further away.
+fn longest_approach_mm(axis: &AxisConfig, overrun_mm: f64) -> f64 {
+    let own = axis.compensation.as_ref();
+    let own = own.and_then(|it| Some(it.approach_mm? + it.size_limit_um * 1e-3));
+    own.unwrap_or(0.0).max(overrun_mm)
+}
+
 /// The first and the last position, each with the key that says it.
 fn check_range(
     judge: &mut Judge<'_>,
@@ -194,6 +217,7 @@ fn check_range(
     (end, end_key): (f64, &str),
     overrun: f64,
 ) {
+    let overrun = longest_approach_mm(axis, overrun);
     judge.below((start_key, start), (end_key, end));
     // Without it the first and the last target have no approach of their own.
     let reachable = axis.motion.soft_min_mm..=axis.motion.soft_max_mm;
@@ -204,14 +228,14 @@ fn check_range(
                 "the datum at 0 mm is approached from {} mm, outside the soft limits",
                 Short(-overrun)
             ),
-            "shorten it, or lower soft_min_mm",
+            "shorten it (or `approach_mm` of the compensation), or lower soft_min_mm",
         );
     }
     for (key, value) in [(start_key, start - overrun), (end_key, end + overrun)] {
         if !reachable.contains(&value) {
             judge.say(
                 key,
-                format!("with its overrun reaches {} mm", Short(value)),
+                format!("with its overrun or approach reaches {} mm", Short(value)),
                 format!(
                     "stay within {} to {} mm",
                     Short(axis.motion.soft_min_mm),
@@ -330,7 +354,7 @@ mod tests {
     #[test]
     fn positions_are_listed_or_follow_from_steps_and_lie_where_the_axis_can_go() {
         let listed = |list: &str| parse(&LINEAR.edit(STEPS, list), "m.toml");
-        listed("positions_mm = [0.0, 1.5, 1.75, 20.0, 62.5]").unwrap_or_else(|it| panic!("{it}"));
+        listed("positions_mm = [0.0, 1.5, 1.75, 20.0, 61.9]").unwrap_or_else(|it| panic!("{it}"));
         let key = ".positions_mm";
         check("", "", ["not said where to measure", "positions_mm"]);
         check(
@@ -354,7 +378,7 @@ mod tests {
         check(
             "positions_mm = [0.0, 62.6]",
             key,
-            ["reaches 63.1 mm", "-3 to 63 mm"],
+            ["reaches 63.65 mm", "-3 to 63 mm"],
         );
         let jump = "positions_mm = [0.0, 1.0, 5.0]";
         let text = LINEAR.edit(STEPS, jump).edit(

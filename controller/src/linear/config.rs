@@ -206,6 +206,13 @@ pub struct CompensationConfig {
     /// correct the end of a move only, so nothing is limited by it yet.
     #[schemars(range(min = 0.001, max = 1000000000.0))]
     pub rate_limit_um_per_s: f64,
+    /// Each stop of `calibrate` and `verify` and each corrected move ends with an approach over this distance,
+    /// from the side that the move comes from, or from the other one where the soft limits leave no room:
+    /// the axis arrives as it did when it was calibrated, whatever it did before. To be longer than what
+    /// takes up the lost motion. Without it a move arrives as it happens to, and its uncertainty counts the
+    /// whole lost motion.
+    #[schemars(range(min = 0.001, max = 10000.0), extend("x-range" = "at most half of the soft limits' range"))]
+    pub approach_mm: Option<f64>,
     /// So far a position may stand off its neighbours whatever the other positions do; not needed,
     /// see above.
     #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at most `slope_limit` × the largest step"))]

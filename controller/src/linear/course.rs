@@ -19,6 +19,8 @@ pub struct Course {
     pub(crate) compensation: Option<Compensation>,
     /// How uncertain the calibration in use is, where it says so.
     pub(crate) budget: Option<AxisBudget>,
+    /// Over which distance its positions were approached, where that was always the same.
+    pub(crate) approach: Option<Metres>,
     /// Standard uncertainty of the zero that was found last.
     pub(crate) zero: Option<Metres>,
 }
@@ -47,6 +49,16 @@ pub enum Corrected {
         /// Where nothing is left of it, from the end on.
         distance: Metres,
     },
+}
+
+/// A move that ends with an approach of a given length.
+pub(crate) struct Arrival {
+    /// Where the approach begins.
+    pub(crate) from: Metres,
+    /// Where the drive is to be sent then.
+    pub(crate) set_point: Metres,
+    /// How fast.
+    pub(crate) speed: MetresPerSecond,
 }
 
 /// A move that may be begun.
@@ -87,18 +99,72 @@ impl Course {
         machine.check_soft_limits(axis, target)?;
         let set_point = self.set_point(machine, axis, target, correction)?;
         machine.check_soft_limits(axis, set_point)?;
-        let own_speed = machine.axis_settings(axis)?.speed;
-        let (speed, corrected) = match (correction, &self.compensation) {
-            (Correction::On, Some(table)) => (
-                own_speed.min(table.speed_max()),
-                corrected_at(table, target),
-            ),
-            _ => (own_speed, Corrected::No),
-        };
         Ok(PlannedMove {
             set_point,
-            speed,
-            corrected,
+            speed: self.speed(machine, axis, correction)?,
+            corrected: match correction {
+                Correction::On => self.corrected(target),
+                Correction::Off => Corrected::No,
+            },
+        })
+    }
+
+    /// The move to `target` that ends with an approach over `length`: from the side that the axis comes from,
+    /// or, where the soft limits leave no room for that, from the other one.
+    pub(crate) fn plan_arrival(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        (target, length): (Metres, Metres),
+        correction: Correction,
+    ) -> Result<Arrival, Failure> {
+        machine.check_soft_limits(axis, target)?;
+        let speed = self.speed(machine, axis, correction)?;
+        let from_side = |side: Approach| {
+            let set_point = self.set_point_from(axis, target, side, correction)?;
+            let from = set_point - length * side.sign();
+            let is_free = machine.check_soft_limits(axis, set_point);
+            is_free.and_then(|()| machine.check_soft_limits(axis, from))?;
+            Ok(Arrival {
+                from,
+                set_point,
+                speed,
+            })
+        };
+        let here = machine.reading(axis)?.map(|reading| reading.position);
+        let usual = started(&machine.approach(axis)?, here).approach_of(target);
+        let usual = usual.unwrap_or(Approach::Forward);
+        from_side(usual).or_else(|_: Failure| from_side(opposite(usual)))
+    }
+
+    /// So fast that the correction changes no faster than its limit.
+    fn speed(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        correction: Correction,
+    ) -> Result<MetresPerSecond, Failure> {
+        let own_speed = machine.axis_settings(axis)?.speed;
+        Ok(match (correction, &self.compensation) {
+            (Correction::On, Some(table)) => own_speed.min(table.speed_max()),
+            _ => own_speed,
+        })
+    }
+
+    fn set_point_from(
+        &self,
+        axis: &str,
+        target: Metres,
+        side: Approach,
+        correction: Correction,
+    ) -> Result<Metres, Failure> {
+        let (Correction::On, Some(compensation)) = (correction, &self.compensation) else {
+            return Ok(target);
+        };
+        let set_point = compensation.set_point(target, side);
+        set_point.map_err(|source| Failure::OutOfCalibration {
+            axis: axis.to_owned(),
+            source,
         })
     }
 
@@ -132,13 +198,39 @@ impl Course {
     /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
     /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
     ///
-    /// That is the calibration's budget, with the zero that the axis has now and the scatter of one
-    /// stop.
+    /// That is the calibration's budget, with the zero that the axis has now, the scatter of one stop and what
+    /// lost motion may do: a move that is begun by its plan arrives as it happens to.
     pub fn uncertainty_at(&self, position: Metres, approach: Approach) -> Option<Combined> {
+        self.uncertainty_after(None, position, approach)
+    }
+
+    /// The same after an approach over `length`: where the positions were approached so, lost motion does what
+    /// it did then.
+    pub(crate) fn uncertainty_after(
+        &self,
+        length: Option<Metres>,
+        position: Metres,
+        approach: Approach,
+    ) -> Option<Combined> {
         let calibrated = self.budget.as_ref()?;
         let zero = self.zero.map(|it| (it, None));
-        let of_stops = uncertainty::budget_of_stops(calibrated, zero).ok()?;
+        let unlike = match length.is_some() && length == self.approach {
+            true => None,
+            false => Some(self.lost_motion_at(position)?),
+        };
+        let of_stops = uncertainty::budget_of_stops(calibrated, zero, unlike).ok()?;
         of_stops.at(position, approach)
+    }
+
+    /// How far both approaches are apart; `None` where only one of them was measured.
+    fn lost_motion_at(&self, position: Metres) -> Option<Metres> {
+        let compensation = self.compensation.as_ref()?;
+        let at = |approach| {
+            let is_known = compensation.table().knows(approach);
+            let deviation = compensation.deviation(position, approach).ok();
+            deviation.filter(|_| is_known)
+        };
+        Some((at(Approach::Reverse)? - at(Approach::Forward)?).abs())
     }
 
     /// What corrects a move to `target`.
@@ -165,6 +257,24 @@ fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
     }
 }
 
+const fn opposite(side: Approach) -> Approach {
+    match side {
+        Approach::Forward => Approach::Reverse,
+        Approach::Reverse => Approach::Forward,
+    }
+}
+
+/// `tracker`, which with no motion remembered (after a zero) starts `here`.
+fn started(tracker: &ApproachTracker, here: Option<Metres>) -> ApproachTracker {
+    let mut from = *tracker;
+    if from == ApproachTracker::new()
+        && let Some(here) = here
+    {
+        from.update(here);
+    }
+    from
+}
+
 /// The set-point for `target` from the side from which the drive will really come.
 ///
 /// Which side that is depends on the set-point itself: over less than the deviation, target and
@@ -176,18 +286,9 @@ fn set_point_of(
     here: Option<Metres>,
     target: Metres,
 ) -> Result<Metres, OutOfRange> {
-    let mut from = *tracker;
-    if from == ApproachTracker::new()
-        && let Some(here) = here
-    {
-        from.update(here);
-    }
+    let from = started(tracker, here);
     let usual = from.approach().unwrap_or(Approach::Forward);
-    let other = match usual {
-        Approach::Forward => Approach::Reverse,
-        Approach::Reverse => Approach::Forward,
-    };
-    for approach in [usual, other] {
+    for approach in [usual, opposite(usual)] {
         if let Ok(set_point) = compensation.set_point(target, approach)
             && from.approach_of(set_point) == Some(approach)
         {

@@ -103,7 +103,7 @@ impl LinearStage<'_> {
 
     pub(super) fn go_to_datum(&mut self, plan: &RunPlan) -> Result<(), Failure> {
         self.travel(Metres::ZERO - plan.overrun, Correction::Off)?;
-        self.travel(Metres::ZERO, Correction::Off)?;
+        self.arrive(Metres::ZERO, Correction::Off)?;
         Ok(())
     }
 
@@ -112,7 +112,7 @@ impl LinearStage<'_> {
         let is_passed = plan.targets[plan.targets.len() - 1] >= Metres::ZERO;
         if is_passed {
             self.travel(plan.overrun, Correction::Off)?;
-            self.travel(Metres::ZERO, Correction::Off)?;
+            self.arrive(Metres::ZERO, Correction::Off)?;
         }
         Ok(is_passed)
     }

@@ -240,7 +240,7 @@ impl LinearStage<'_> {
         target: Metres,
     ) -> Result<PointEntry, Failure> {
         let axis = session.axis;
-        let set_point = self.travel(target, session.correction)?;
+        let set_point = self.arrive(target, session.correction)?;
         let reading = self.read_displacement(session.plan)?;
         let environment = self.watched_environment(session)?;
         let measured = self.correct(session.plan, &reading, &environment, &session.datum)?;

@@ -30,6 +30,10 @@ pub struct LinearContent {
     /// of the instrument alone, as programs stated them before there was a budget.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<BudgetRecord>,
+    /// Over which distance each position and the datum were approached, metres; without it over distances
+    /// that differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approach_m: Option<f64>,
 }
 
 /// One calibrated position, metres.
@@ -65,6 +69,7 @@ impl LinearContent {
             lost_motion_u_m: metres(lost_motion.and_then(|it| it.standard_uncertainty)),
             nodes: nodes.collect(),
             budget: None,
+            approach_m: None,
         }
     }
 
@@ -82,6 +87,15 @@ impl LinearContent {
         }
         self.budget = Some(BudgetRecord::new(budget, &self.approaches()));
         self
+    }
+
+    /// The same, of positions that were each approached over this distance.
+    #[must_use]
+    pub fn with_approach(self, length: Option<Metres>) -> Self {
+        Self {
+            approach_m: length.map(Metres::value),
+            ..self
+        }
     }
 
     /// From which sides it was measured.

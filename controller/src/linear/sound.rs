@@ -35,6 +35,7 @@ fn linear(it: &LinearContent) -> Judged {
     optional("closure_m", it.closure_m, &ERROR_M)?;
     optional("lost_motion_m", it.lost_motion_m, &ERROR_M)?;
     optional("lost_motion_u_m", it.lost_motion_u_m, &ERROR_U_M)?;
+    optional("approach_m", it.approach_m, &PLACE_M)?;
     for (at, node) in it.nodes.iter().enumerate() {
         let place = |key: &str| format!("nodes[{at}].{key}");
         number(place("position_m"), node.position_m, &PLACE_M)?;

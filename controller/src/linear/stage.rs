@@ -2,6 +2,7 @@
 
 use compensator::budget::AxisBudget;
 use compensator::error_table::Compensation;
+use units::Metres;
 
 use crate::config::AxisConfig;
 use crate::handle::Core;
@@ -47,6 +48,7 @@ impl LinearStage<'_> {
     pub fn set_compensation(&mut self, compensation: Option<Compensation>) {
         self.memory.course.compensation = compensation;
         self.memory.course.budget = None;
+        self.memory.course.approach = None;
     }
 
     /// Uses a calibration for every move from now on.
@@ -54,8 +56,10 @@ impl LinearStage<'_> {
         &mut self,
         compensation: Compensation,
         budget: Option<AxisBudget>,
+        approach: Option<Metres>,
     ) {
         self.memory.course.compensation = Some(compensation);
         self.memory.course.budget = budget;
+        self.memory.course.approach = approach;
     }
 }

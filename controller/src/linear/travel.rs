@@ -6,16 +6,20 @@ use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::stage::LinearStage;
 
+/// Places that differ by less are one.
+const ROUNDING: Metres = Metres(1e-9);
+
 impl LinearStage<'_> {
     /// Moves the point of the axis to `target` (machine coordinates), compensated when a
-    /// calibration is in use, and returns the set-point the drive was sent.
+    /// calibration is in use, and returns the set-point the drive was sent. The move ends with an approach
+    /// over `approach_mm` of the configuration, where it says one.
     ///
     /// # Errors
     /// Before anything moves: not zeroed, outside the soft limits, outside the calibrated
     /// range. While moving: whatever stops the machine.
     pub fn move_to(&mut self, target: Metres) -> Result<Metres, Failure> {
         self.core.require_zeroed(self.axis)?;
-        self.travel(target, Correction::On)
+        self.arrive(target, Correction::On)
     }
 
     /// Moves without asking for a zero: procedures that make the zero use it too.
@@ -29,5 +33,33 @@ impl LinearStage<'_> {
         self.core
             .profile_move(self.axis, planned.set_point, planned.speed)?;
         Ok(planned.set_point)
+    }
+
+    /// Moves to `target` as [`Self::travel`], so that the move ends with an approach over the length of the
+    /// configuration, where it says one: what lost motion and servo do at the end is then always the same.
+    pub(crate) fn arrive(
+        &mut self,
+        target: Metres,
+        correction: Correction,
+    ) -> Result<Metres, Failure> {
+        let Some(length) = self.approach_length() else {
+            return self.travel(target, correction);
+        };
+        let (course, to) = (&self.memory.course, (target, length));
+        let planned = course.plan_arrival(self.core.machine, self.axis, to, correction)?;
+        let stands_at = self.core.approach(self.axis)?.last();
+        if !stands_at.is_some_and(|it| (it - planned.from).abs() <= ROUNDING) {
+            self.core
+                .profile_move(self.axis, planned.from, planned.speed)?;
+        }
+        self.core
+            .profile_move(self.axis, planned.set_point, planned.speed)?;
+        Ok(planned.set_point)
+    }
+
+    /// The length of approaches, where the configuration says one.
+    pub(crate) fn approach_length(&self) -> Option<Metres> {
+        let own = self.config.compensation.as_ref();
+        own.and_then(|it| it.approach_mm).map(Metres::from_mm)
     }
 }

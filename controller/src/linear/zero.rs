@@ -360,6 +360,7 @@ impl LinearStage<'_> {
             calibration: None,
             targets_m: Vec::new(),
             runs: 0,
+            approach_m: None,
         }
     }
 

@@ -51,6 +51,7 @@ impl AlignmentPlatform<'_> {
             calibration,
             targets_m: Vec::new(),
             runs,
+            approach_m: None,
         })
     }
 

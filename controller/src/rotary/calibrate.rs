@@ -178,6 +178,7 @@ impl RotaryTable<'_> {
             calibration,
             targets_m: Vec::new(),
             runs: run.passes,
+            approach_m: None,
         }
     }
 }

@@ -17,7 +17,7 @@ use super::difference::{Difference, first_difference};
 use super::hash::ConfigHash;
 use super::head::{IdentityRecord, InstrumentRecord};
 use super::sound::{
-    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers,
+    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
 };
 use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
 
@@ -49,6 +49,9 @@ pub struct JournalHeader {
     pub targets_m: Vec<f64>,
     /// How many runs.
     pub runs: u32,
+    /// Over which distance each target was approached, metres, where that is always the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approach_m: Option<f64>,
 }
 
 impl JournalHeader {
@@ -56,6 +59,7 @@ impl JournalHeader {
         counted("runs", self.runs as usize, 0..=PASSES_MAX)?;
         counted("targets_m", self.targets_m.len(), 0..=COUNT_MAX)?;
         numbers("targets_m", &self.targets_m, &PLACE_M)?;
+        optional("approach_m", self.approach_m, &PLACE_M)?;
         let u = self.instrument.standard_uncertainty_m;
         number("instrument.standard_uncertainty_m", u, &ERROR_U_M)
     }
@@ -321,6 +325,10 @@ fn same_run(
         ),
         ("number of runs", first_difference(&old.runs, &new.runs)),
         ("targets", first_difference(&old.targets_m, &new.targets_m)),
+        (
+            "length of approach",
+            first_difference(&old.approach_m, &new.approach_m),
+        ),
     ];
     let different = comparisons
         .into_iter()

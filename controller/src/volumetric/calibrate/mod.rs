@@ -178,6 +178,7 @@ impl WorkVolume<'_> {
             calibration,
             targets_m: Vec::new(),
             runs: 1,
+            approach_m: None,
         })
     }
 
