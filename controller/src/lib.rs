@@ -74,9 +74,9 @@ pub use stores::{store_in, store_of};
 // Who is told how far a procedure is, and who asks it to stop.
 pub use machine::{Observer, Stage, StopRequest};
 
-// The command, whose `main` is this alone.
+// The command, whose `main` is this alone; who keeps a machine for others is given to it.
 #[cfg(feature = "program")]
-pub use program::main;
+pub use program::{Serving, main};
 
 /// Several axes as one motion, a set-point at every SYNC. What a correction of one's own is given and
 /// has to say is in [`machine::engine`].

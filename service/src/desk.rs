@@ -40,6 +40,11 @@ struct Shared {
 pub(crate) struct Pending(oneshot::Receiver<Answered>);
 
 impl Pending {
+    /// Waits for it.
+    pub(crate) async fn answer(self) -> Answered {
+        self.0.await.unwrap_or_else(|_| Err(ended()))
+    }
+
     /// Waits for it, and lets the thread do nothing else.
     fn wait(self) -> Answered {
         self.0.blocking_recv().unwrap_or_else(|_| Err(ended()))

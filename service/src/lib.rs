@@ -9,6 +9,7 @@
 //! second form. Nothing here is a safety function: wire STO.
 
 mod desk;
+mod http;
 mod keeper;
 mod ledger;
 mod order;
@@ -21,6 +22,7 @@ mod thread;
 mod view;
 
 pub use desk::Desk;
+pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
 pub use problem::{Code, Problem, ProblemBody};
 pub use quantity::{Length, Quantity, QuantityIn, Speed};

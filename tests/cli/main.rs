@@ -10,6 +10,7 @@ mod platform;
 mod programs;
 mod rotary;
 mod screw;
+mod serve;
 mod soak;
 mod table;
 mod verbs;

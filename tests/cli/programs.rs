@@ -282,7 +282,7 @@ impl Bench {
     pub(crate) fn start(&self, words: &[&str]) -> Process {
         let mut command = self.command();
         command.arg(words[0]);
-        let uses_machine = ["scan", "zero", "calibrate", "verify", "move"];
+        let uses_machine = ["scan", "zero", "calibrate", "verify", "move", "serve"];
         if uses_machine.contains(&words[0]) {
             command.args(["--clock", LOCKSTEP]);
             let machine = self.shipped.machine;

@@ -13,6 +13,7 @@ use tests::{Edit, LINEAR, VOLUMETRIC};
 use units::{Metres, MetresPerSecond};
 
 use crate::client::{Client, InProcess, PATIENCE};
+use crate::http::Http;
 use crate::stage::Stage;
 
 /// The same stage everywhere: what differs is asked of seeds elsewhere.
@@ -26,11 +27,14 @@ pub(crate) struct Bed<'b> {
 
 /// Every interface that there is.
 fn interfaces(stage: &Stage) -> Vec<(&'static str, Box<dyn Client>)> {
-    vec![("in process", Box::new(InProcess::of(stage)))]
+    vec![
+        ("in process", Box::new(InProcess::of(stage))),
+        ("HTTP", Box::new(Http::of(stage))),
+    ]
 }
 
 /// How many of them.
-const INTERFACES: usize = 1;
+const INTERFACES: usize = 2;
 
 /// A linear stage that gives a slow move all the time that it wants.
 fn patient(text: String) -> String {

@@ -2,4 +2,6 @@
 
 mod client;
 mod contract;
+mod edge;
+mod http;
 mod stage;

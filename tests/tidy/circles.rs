@@ -15,8 +15,8 @@ const CRATES: &[&str] = &[
     "mock-bus/src/main.rs",
     "machine/src/lib.rs",
     "controller/src/lib.rs",
-    "controller/src/main.rs",
     "service/src/lib.rs",
+    "command/src/main.rs",
 ];
 
 #[test]

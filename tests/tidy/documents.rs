@@ -19,6 +19,7 @@ const DOCUMENTS: &[&str] = &[
     "docs/lockstep.md",
     "docs/safety.md",
     "docs/seeds.md",
+    "docs/service.md",
     "tests/README.md",
 ];
 

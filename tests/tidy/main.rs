@@ -36,6 +36,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "service",
         &["units", "wire", "drivers", "machine", "truestage"],
     ),
+    ("command", &["truestage", "service"]),
     (
         "tests",
         &[
@@ -83,6 +84,7 @@ const PACKAGES: &[&str] = &[
     "machine",
     "controller",
     "service",
+    "command",
 ];
 
 const FILE_LINES_MAX: usize = 500;

@@ -21,6 +21,7 @@ mod rotary;
 #[cfg(test)]
 mod same_figures_tests;
 mod scan;
+mod serve;
 mod session;
 mod show;
 #[cfg(test)]
@@ -106,6 +107,8 @@ enum Command {
         /// The data file.
         data: PathBuf,
     },
+    /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
+    Serve(ServeArgs),
     /// A self-contained HTML page of a run.
     Report(report::ReportArgs),
 }
@@ -322,8 +325,21 @@ impl MoveArgs {
     }
 }
 
-/// Runs the command line of this process.
-pub fn main() -> ExitCode {
+pub use serve::Serving;
+
+/// A machine that is kept, and where it is found.
+#[derive(Clone, Debug, Args)]
+struct ServeArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Where: `unix:PATH` (mode 0660), or `tcp:127.0.0.1:PORT` for everybody on this computer. May be given
+    /// several times.
+    #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
+    listen: Vec<String>,
+}
+
+/// Runs the command line of this process; `keep` keeps a machine for `truestage serve`.
+pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
     let cli = Cli::parse();
     let output = Output::new(cli.json);
     let result = match cli.command {
@@ -356,6 +372,7 @@ pub fn main() -> ExitCode {
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => data::plan(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
+        Command::Serve(args) => serve::run(args, output, keep),
         Command::Report(args) => report::run(&args, output),
     };
     match result {

@@ -19,7 +19,8 @@ use crate::{Failure, Machine, StopRequest, Store, assemble, store_of};
 pub(crate) struct Session {
     pub(crate) machine: Machine,
     pub(crate) store: Store,
-    _lease: Lease,
+    /// Held for as long as the machine is used.
+    pub(crate) lease: Lease,
 }
 
 impl Session {
@@ -48,7 +49,7 @@ impl Session {
         Ok(Self {
             machine,
             store,
-            _lease: lease,
+            lease,
         })
     }
 }

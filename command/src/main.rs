@@ -1,0 +1,57 @@
+//! The command `truestage`: the command line of the library, with the service that `truestage serve` keeps a
+//! machine by. It is the only package that knows both.
+
+use std::process::ExitCode;
+
+use service::{Edge, Listen, Opened, Service, StartError};
+use truestage::{Failure, Serving};
+
+fn main() -> ExitCode {
+    truestage::main(serve)
+}
+
+/// Keeps a machine until somebody ends it.
+fn serve(serving: Serving) -> Result<(), Failure> {
+    let Serving { listen, open, told } = serving;
+    let places = listen.iter().map(|place| place.parse::<Listen>());
+    let places: Vec<_> = places
+        .collect::<Result<_, _>>()
+        .map_err(|it| refused("--listen", &it))?;
+    let service = Service::start(move || {
+        let (machine, store, held) = open()?;
+        Ok(Opened {
+            machine,
+            store,
+            held,
+        })
+    });
+    let service = service.map_err(|failure| match failure {
+        StartError::Machine(failure) => failure,
+        other => refused("truestage serve", &other),
+    })?;
+    match Edge::open(service.desk(), &places) {
+        Ok(edge) => {
+            for place in edge.places() {
+                told(&format!("listening at {place}"));
+            }
+            let ended = service.wait();
+            drop(edge);
+            ended
+        }
+        Err(error) => {
+            // Nobody could ask this machine anything: its drives are switched off again.
+            let _ = service
+                .desk()
+                .end(&service::Caller::named("truestage serve"));
+            service.wait()?;
+            Err(refused("--listen", &error))
+        }
+    }
+}
+
+fn refused(what: &str, why: &dyn std::error::Error) -> Failure {
+    Failure::Usage {
+        what: format!("{what}: {why}"),
+        help: "see `truestage serve --help`".into(),
+    }
+}

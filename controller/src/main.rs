@@ -1,7 +1,0 @@
-//! The command `truestage`.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    truestage::main()
-}

@@ -1,0 +1,134 @@
+//! Events as they happen: Server-Sent Events with ids.
+
+use core::convert::Infallible;
+use core::time::Duration;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::{Arc, LazyLock};
+
+use axum::extract::{Query, State};
+use axum::http::HeaderMap;
+use axum::response::sse::{Event as Sent, KeepAlive, Sse};
+use futures_util::stream::{self, Stream};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::{Instant, sleep};
+use utoipa::IntoParams;
+
+use super::state::State as Shared;
+use crate::desk::Desk;
+use crate::problem::{Code, Problem, ProblemBody};
+
+/// So many streams are open at once.
+const STREAMS: usize = 16;
+/// How often a stream looks.
+const LOOK_EVERY: Duration = Duration::from_millis(5);
+
+static FREE: LazyLock<Arc<Semaphore>> = LazyLock::new(|| Arc::new(Semaphore::new(STREAMS)));
+
+/// What of it is sent.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wanted {
+    /// Only these kinds, with commas between: `motion,run,axis`.
+    kinds: Option<String>,
+    /// After the event of this number; the header `Last-Event-ID` says the same.
+    after: Option<u64>,
+    /// Also a sample of every axis each so many milliseconds, at least 5, as events `sample` without an id.
+    #[param(minimum = 5, maximum = 60000)]
+    sample_ms: Option<u64>,
+}
+
+struct Following {
+    desk: Desk,
+    kinds: Option<BTreeSet<String>>,
+    newest: u64,
+    waiting: VecDeque<Sent>,
+    sample: Option<(Duration, Instant)>,
+    _place: OwnedSemaphorePermit,
+}
+
+/// Events as they happen.
+#[utoipa::path(
+    get, path = "/events", tag = "events", params(Wanted),
+    responses(
+        (status = 200, description = "Server-Sent Events, each with its id; `data` is an Event", content_type = "text/event-stream", body = String),
+        (status = 400, description = "Not understood", body = ProblemBody, content_type = "application/problem+json"),
+        (status = 503, description = "Too many streams", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn events(
+    State(shared): State<Shared>,
+    wanted: Result<Query<Wanted>, axum::extract::rejection::QueryRejection>,
+    headers: HeaderMap,
+) -> Result<Sse<impl Stream<Item = Result<Sent, Infallible>>>, Problem> {
+    let Query(wanted) = wanted.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
+    let place = Arc::clone(&FREE).try_acquire_owned().map_err(|_| {
+        let what = format!("{STREAMS} event streams are open");
+        Problem::new(Code::Busy, what, "close one")
+    })?;
+    let resumed = headers.get("last-event-id").and_then(|it| it.to_str().ok());
+    let resumed = resumed.and_then(|it| it.parse().ok()).or(wanted.after);
+    let newest = resumed.unwrap_or_else(|| shared.desk.snapshot().newest_event());
+    let every = wanted.sample_ms.map(|it| Duration::from_millis(it.max(5)));
+    let following = Following {
+        desk: shared.desk,
+        kinds: wanted
+            .kinds
+            .map(|it| it.split(',').map(str::to_owned).collect()),
+        newest,
+        waiting: VecDeque::new(),
+        sample: every.map(|it| (it, Instant::now())),
+        _place: place,
+    };
+    let stream = stream::unfold(following, async |mut following| {
+        let sent = following.next().await;
+        Some((Ok(sent), following))
+    });
+    Ok(Sse::new(stream).keep_alive(KeepAlive::new()))
+}
+
+impl Following {
+    async fn next(&mut self) -> Sent {
+        loop {
+            if let Some(sent) = self.waiting.pop_front() {
+                return sent;
+            }
+            self.look();
+            if self.waiting.is_empty() {
+                sleep(LOOK_EVERY).await;
+            }
+        }
+    }
+
+    fn look(&mut self) {
+        let events = self.desk.events(self.newest);
+        if let Some(first) = events.first()
+            && first.id > self.newest + 1
+            && self.newest > 0
+        {
+            let lost = json!({"from": self.newest + 1, "to": first.id - 1});
+            let gap = Sent::default().event("gap").data(lost.to_string());
+            self.waiting.push_back(gap);
+        }
+        for event in events {
+            self.newest = event.id;
+            let is_wanted = self
+                .kinds
+                .as_ref()
+                .is_none_or(|it| it.contains(&event.kind));
+            if is_wanted {
+                let sent = Sent::default().id(event.id.to_string()).event(&event.kind);
+                self.waiting.push_back(sent.data(json!(event).to_string()));
+            }
+        }
+        if let Some((every, due)) = &mut self.sample
+            && *due <= Instant::now()
+        {
+            *due = Instant::now() + *every;
+            let axes = json!(self.desk.axes()).to_string();
+            self.waiting
+                .push_back(Sent::default().event("sample").data(axes));
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Who is let in, and what is taken from a request.
+
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Request, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use futures_util::StreamExt;
+use serde::de::DeserializeOwned;
+
+use super::door::Peer;
+use crate::problem::{Code, Problem};
+use crate::request::Caller;
+
+/// So large a request may be, in bytes.
+const BODY_MAX: usize = 64 << 10;
+/// So much of a larger one is heard, so that its answer is heard, too.
+const HEARD_MAX: usize = 1 << 20;
+/// So long a name of a client may be.
+const NAME_MAX: usize = 64;
+/// Who a client says that it is, for people.
+const CLIENT: &str = "truestage-client";
+/// What proves the lease.
+const LEASE: &str = "truestage-lease";
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.code.status());
+        let status = status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let kind = [(header::CONTENT_TYPE, "application/problem+json")];
+        (status, kind, Json(self)).into_response()
+    }
+}
+
+/// Whether a page in a browser, which may come from anywhere, is kept out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guarded {
+    /// Over TCP every page on this computer could ask; nobody's page opens a Unix socket.
+    pub(super) is_tcp: bool,
+}
+
+/// Host and Origin must be this computer's: a name that was made to point here is not.
+pub(super) async fn guard(
+    State(guarded): State<Guarded>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let allowed = check(guarded, request.headers());
+    let (parts, body) = request.into_parts();
+    // Who is answered before he has said all may never hear it.
+    let whole = whole(body).await;
+    match allowed.and(whole) {
+        Ok(body) => next.run(Request::from_parts(parts, body.into())).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+/// All of a body, also where nobody asks for it.
+async fn whole(body: axum::body::Body) -> Result<Vec<u8>, Problem> {
+    let mut stream = body.into_data_stream();
+    let (mut whole, mut length) = (Vec::new(), 0);
+    while let Some(part) = stream.next().await {
+        let part = part.map_err(|it| Problem::new(Code::BadRequest, it.to_string(), ""))?;
+        length += part.len();
+        if length > HEARD_MAX {
+            break;
+        }
+        if length <= BODY_MAX {
+            whole.extend_from_slice(&part);
+        }
+    }
+    if length <= BODY_MAX {
+        return Ok(whole);
+    }
+    let what = format!("a request of more than {} kB", BODY_MAX >> 10);
+    Err(Problem::new(Code::TooLarge, what, ""))
+}
+
+fn check(guarded: Guarded, headers: &HeaderMap) -> Result<(), Problem> {
+    let text = |name| headers.get(name).map(|it| it.to_str().unwrap_or_default());
+    let host = text(header::HOST);
+    if guarded.is_tcp && !host.is_some_and(is_own_host) {
+        let what = "the Host of this request is not this computer";
+        return Err(Problem::new(
+            Code::Forbidden,
+            what,
+            "ask for 127.0.0.1 or localhost",
+        ));
+    }
+    let origin = text(header::ORIGIN);
+    let own = host.map(|host| format!("http://{host}"));
+    if guarded.is_tcp && origin.is_some() && origin != own.as_deref() {
+        let what = "a page from elsewhere must not ask this service";
+        return Err(Problem::new(Code::Forbidden, what, ""));
+    }
+    Ok(())
+}
+
+fn is_own_host(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => name,
+        _ => host,
+    };
+    matches!(name, "localhost" | "127.0.0.1" | "[::1]")
+}
+
+/// Who asks: by the header `Truestage-Client`, or by the connection.
+#[derive(Clone, Debug)]
+pub(super) struct By(pub(super) Caller);
+
+impl<S: Send + Sync> FromRequestParts<S> for By {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
+        let text = |name: &str| parts.headers.get(name).and_then(|it| it.to_str().ok());
+        let peer = parts.extensions.get::<ConnectInfo<Peer>>();
+        let peer = peer.map_or_else(|| "unknown".to_owned(), |it| it.0.to_string());
+        let name = match text(CLIENT).map(plain) {
+            Some(name) if !name.is_empty() => name,
+            _ => peer,
+        };
+        let lease = text(LEASE).map(str::to_owned);
+        Ok(Self(Caller { name, lease }))
+    }
+}
+
+/// A name without anything that a terminal, a log or a page would obey.
+pub(super) fn plain(text: &str) -> String {
+    let is_plain = |it: &char| it.is_alphanumeric() || " .-_@:/".contains(*it);
+    text.chars().filter(is_plain).take(NAME_MAX).collect()
+}
+
+/// A body in JSON.
+#[derive(Debug)]
+pub(super) struct Body<T>(pub(super) T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let bytes = Bytes::from_request(request, state).await;
+        let bytes = bytes.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
+        // What may be left out may be left out as a whole.
+        let bytes = if bytes.is_empty() { &b"{}"[..] } else { &bytes };
+        let read = serde_json::from_slice(bytes);
+        read.map(Self).map_err(|it| {
+            let said = it.to_string();
+            let code = match said.contains("with its unit") {
+                true => Code::BadQuantity,
+                false => Code::BadRequest,
+            };
+            Problem::new(code, said, "GET /openapi.json says what is expected")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(is_tcp: bool, host: &str, origin: Option<&str>) -> bool {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, host.parse().unwrap());
+        if let Some(origin) = origin {
+            headers.insert(header::ORIGIN, origin.parse().unwrap());
+        }
+        check(Guarded { is_tcp }, &headers).is_ok()
+    }
+
+    #[test]
+    fn a_page_from_elsewhere_and_a_name_that_points_here_are_kept_out() {
+        assert!(checked(true, "127.0.0.1:8470", None));
+        assert!(checked(true, "localhost", None));
+        assert!(checked(true, "[::1]:8470", Some("http://[::1]:8470")));
+        assert!(!checked(true, "evil.example", None));
+        assert!(!checked(true, "127.0.0.1.evil.example:8470", None));
+        assert!(!checked(
+            true,
+            "127.0.0.1:8470",
+            Some("http://evil.example")
+        ));
+        assert!(!checked(
+            true,
+            "127.0.0.1:8470",
+            Some("http://127.0.0.1:80")
+        ));
+        assert!(!checked(true, "127.0.0.1:8470", Some("null")));
+        assert!(
+            checked(false, "anything", None),
+            "nobody's page opens a Unix socket"
+        );
+    }
+
+    #[test]
+    fn a_name_carries_nothing_that_a_terminal_obeys() {
+        assert_eq!(plain("anna\u{1b}[31m<b>"), "anna31mb");
+        assert_eq!(plain(&"x".repeat(1000)).len(), NAME_MAX);
+    }
+}

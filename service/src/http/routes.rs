@@ -1,0 +1,161 @@
+//! The resources.
+
+mod machine;
+mod motions;
+mod runs;
+
+use core::time::Duration;
+
+use axum::http::Uri;
+use axum::middleware::from_fn_with_state;
+use axum::routing::get;
+use axum::{Json, Router};
+use serde::{Deserialize, Serialize};
+use utoipa::openapi::OpenApi;
+use utoipa::{IntoParams, OpenApi as _, ToSchema};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::guard::{Guarded, guard};
+use super::state::State;
+use super::{events, metrics};
+use crate::desk::Desk;
+use crate::order::{Answer, Order};
+use crate::problem::{Code, Problem};
+use crate::request::Caller;
+
+/// The longest that an answer is held back for an end.
+const WAIT_MAX: Duration = Duration::from_secs(300);
+/// How often an answer that is held back looks.
+const LOOK_EVERY: Duration = Duration::from_millis(2);
+
+#[derive(utoipa::OpenApi)]
+#[openapi(
+    info(
+        title = "truestage",
+        description = "One machine, kept zeroed, enabled and supervised. Not a safety function: wire STO.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    tags(
+        (name = "machine", description = "The machine and its axes"),
+        (name = "motions", description = "Motions; their end is a level"),
+        (name = "runs", description = "Procedures: plan, start, abort"),
+        (name = "events", description = "What happens"),
+        (name = "service", description = "The service itself")
+    )
+)]
+struct Described;
+
+/// The resources and what they are.
+pub(super) fn described() -> (Router<State>, OpenApi) {
+    let v1 = OpenApiRouter::new()
+        .routes(routes!(machine::machine))
+        .routes(routes!(machine::axes))
+        .routes(routes!(machine::axis))
+        .routes(routes!(machine::enable))
+        .routes(routes!(machine::disable))
+        .routes(routes!(machine::stop))
+        .routes(routes!(machine::reset))
+        .routes(routes!(machine::lease, machine::release))
+        .routes(routes!(motions::motions, motions::begin))
+        .routes(routes!(motions::motion))
+        .routes(routes!(motions::renew))
+        .routes(routes!(runs::runs, runs::plan))
+        .routes(routes!(runs::run))
+        .routes(routes!(runs::start))
+        .routes(routes!(runs::abort))
+        .routes(routes!(events::events));
+    OpenApiRouter::with_openapi(Described::openapi())
+        .routes(routes!(healthz))
+        .routes(routes!(metrics::metrics))
+        .nest("/v1", v1)
+        .split_for_parts()
+}
+
+/// All that is served to `desk`'s clients.
+pub(super) fn router(desk: Desk, is_tcp: bool) -> Router {
+    let (router, description) = described();
+    router
+        .route(
+            "/openapi.json",
+            get(async move || Json(description.clone())),
+        )
+        .fallback(async |uri: Uri| {
+            let what = format!("there is no {}", super::guard::plain(uri.path()));
+            Problem::new(Code::NotFound, what, "GET /openapi.json says what there is")
+        })
+        .method_not_allowed_fallback(async || {
+            let what = "this resource knows no such method";
+            Problem::new(
+                Code::MethodNotAllowed,
+                what,
+                "GET /openapi.json says what there is",
+            )
+        })
+        .layer(from_fn_with_state(Guarded { is_tcp }, guard))
+        .with_state(State { desk })
+}
+
+/// Whether the service is alive.
+#[derive(Debug, Serialize, ToSchema)]
+struct Health {
+    /// What the machine is.
+    state: crate::view::MachineState,
+}
+
+/// Whether the service is alive, and what the machine is.
+#[utoipa::path(
+    get, path = "/healthz", tag = "service",
+    responses((status = 200, description = "It is", body = Health))
+)]
+async fn healthz(axum::extract::State(state): axum::extract::State<State>) -> Json<Health> {
+    let state = state.desk.machine().state;
+    Json(Health { state })
+}
+
+/// How long an answer may be held back.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wait {
+    /// Seconds to wait for the end; 300 at most. At once when left out.
+    #[param(minimum = 0, maximum = 300)]
+    wait_s: Option<f64>,
+}
+
+impl Wait {
+    /// Asks until it has ended or the time is over.
+    pub(super) async fn until<T>(
+        self,
+        ask: impl Fn() -> Result<T, Problem>,
+        has_ended: impl Fn(&T) -> bool,
+    ) -> Result<T, Problem> {
+        let wait_s = self.wait_s.unwrap_or_default();
+        let limit = Duration::try_from_secs_f64(wait_s).map_err(|_| {
+            let what = format!("wait_s = {wait_s} is no time to wait");
+            Problem::new(Code::BadRequest, what, "give seconds from 0 to 300")
+        })?;
+        let limit = tokio::time::Instant::now() + limit.min(WAIT_MAX);
+        loop {
+            let asked = ask()?;
+            if has_ended(&asked) || tokio::time::Instant::now() >= limit {
+                return Ok(asked);
+            }
+            tokio::time::sleep(LOOK_EVERY).await;
+        }
+    }
+}
+
+/// A query of a request, with its refusal as a problem.
+pub(super) type MaybeQuery<T> =
+    Result<axum::extract::Query<T>, axum::extract::rejection::QueryRejection>;
+
+/// What a query says.
+pub(super) fn query<T>(query: MaybeQuery<T>) -> Result<T, Problem> {
+    let read = query.map(|it| it.0);
+    read.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))
+}
+
+/// Gives an order and waits for its answer, without keeping anybody else waiting.
+pub(super) async fn obey(desk: &Desk, caller: &Caller, order: Order) -> Result<Answer, Problem> {
+    desk.give(caller, order)?.answer().await
+}

@@ -1,0 +1,191 @@
+//! The machine as a whole, and its axes.
+
+use axum::Json;
+use axum::extract::{Path, State as Of};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::super::guard::{Body, By};
+use super::super::state::State;
+use super::obey;
+use crate::desk::Desk;
+use crate::order::{Answer, Order};
+use crate::problem::{Code, Problem, ProblemBody};
+use crate::request::{LeaseRequest, StopMode};
+use crate::view::{AxisView, Leased, MachineView};
+
+/// The machine.
+#[utoipa::path(
+    get, path = "/machine", tag = "machine",
+    responses((status = 200, description = "The machine", body = MachineView))
+)]
+pub(super) async fn machine(Of(state): Of<State>) -> Json<MachineView> {
+    Json(state.desk.machine())
+}
+
+/// Its linear axes.
+#[utoipa::path(
+    get, path = "/axes", tag = "machine",
+    responses((status = 200, description = "All axes", body = Vec<AxisView>))
+)]
+pub(super) async fn axes(Of(state): Of<State>) -> Json<Vec<AxisView>> {
+    Json(state.desk.axes())
+}
+
+/// One axis.
+#[utoipa::path(
+    get, path = "/axes/{axis}", tag = "machine", params(("axis" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "The axis", body = AxisView),
+        (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn axis(
+    Of(state): Of<State>,
+    Path(axis): Path<String>,
+) -> Result<Json<AxisView>, Problem> {
+    Ok(Json(state.desk.axis(&super::super::guard::plain(&axis))?))
+}
+
+/// Switches an axis on.
+#[utoipa::path(
+    post, path = "/axes/{axis}/enable", tag = "machine", params(("axis" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It is on", body = AxisView),
+        (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The drive, or the service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn enable(
+    Of(state): Of<State>,
+    By(caller): By,
+    Path(axis): Path<String>,
+) -> Result<Json<AxisView>, Problem> {
+    power(&state.desk, caller, axis, true).await
+}
+
+/// Switches an axis off.
+#[utoipa::path(
+    post, path = "/axes/{axis}/disable", tag = "machine", params(("axis" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It is off", body = AxisView),
+        (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The drive, or the service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn disable(
+    Of(state): Of<State>,
+    By(caller): By,
+    Path(axis): Path<String>,
+) -> Result<Json<AxisView>, Problem> {
+    power(&state.desk, caller, axis, false).await
+}
+
+async fn power(
+    desk: &Desk,
+    caller: crate::request::Caller,
+    axis: String,
+    on: bool,
+) -> Result<Json<AxisView>, Problem> {
+    let axis = super::super::guard::plain(&axis);
+    let order = Order::Power {
+        axis: axis.clone(),
+        on,
+    };
+    obey(desk, &caller, order).await?;
+    Ok(Json(desk.axis(&axis)?))
+}
+
+/// How everything is stopped.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StopRequest {
+    /// `controlled` when left out.
+    #[serde(default)]
+    mode: StopMode,
+}
+
+/// That it was done.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Done {
+    /// Always true.
+    done: bool,
+}
+
+const DONE: Json<Done> = Json(Done { done: true });
+
+/// Stops everything. Taken from anybody, whoever has the lease.
+#[utoipa::path(
+    post, path = "/stop", tag = "machine", request_body = StopRequest,
+    responses(
+        (status = 200, description = "The stop is under way; motions and runs say when it has ended", body = Done),
+        (status = "4XX", description = "Not understood", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn stop(
+    Of(state): Of<State>,
+    By(caller): By,
+    body: Result<Body<StopRequest>, Problem>,
+) -> Result<Json<Done>, Problem> {
+    let mode = body?.0.mode;
+    obey(&state.desk, &caller, Order::Stop { mode }).await?;
+    Ok(DONE)
+}
+
+/// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again.
+#[utoipa::path(
+    post, path = "/reset", tag = "machine",
+    responses(
+        (status = 200, description = "It runs", body = MachineView),
+        (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "A cause is still there", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn reset(
+    Of(state): Of<State>,
+    By(caller): By,
+) -> Result<Json<MachineView>, Problem> {
+    obey(&state.desk, &caller, Order::Reset).await?;
+    Ok(Json(state.desk.machine()))
+}
+
+/// Asks for the right to command, or renews it with the header `Truestage-Lease`.
+#[utoipa::path(
+    post, path = "/lease", tag = "machine", request_body = LeaseRequest,
+    responses(
+        (status = 200, description = "The lease; its token goes with every order, in `Truestage-Lease`", body = Leased),
+        (status = "4XX", description = "Somebody else has it", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn lease(
+    Of(state): Of<State>,
+    By(caller): By,
+    Body(mut request): Body<LeaseRequest>,
+) -> Result<Json<Leased>, Problem> {
+    request.name = super::super::guard::plain(&request.name);
+    if request.name.is_empty() || !(1..=3600).contains(&request.seconds) {
+        let what = "a lease needs a name, and 1 to 3600 seconds";
+        return Err(Problem::new(Code::BadRequest, what, ""));
+    }
+    let order = Desk::lease_order(&request)?;
+    match obey(&state.desk, &caller, order).await? {
+        Answer::Leased(leased) => Ok(Json(leased)),
+        Answer::Done => Err(Problem::new(Code::Ending, "the service ends", "")),
+    }
+}
+
+/// Gives the lease back.
+#[utoipa::path(
+    delete, path = "/lease", tag = "machine",
+    responses(
+        (status = 200, description = "Nobody has it", body = Done),
+        (status = "4XX", description = "Somebody else has it", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn release(Of(state): Of<State>, By(caller): By) -> Result<Json<Done>, Problem> {
+    obey(&state.desk, &caller, Order::Release).await?;
+    Ok(DONE)
+}

@@ -1,0 +1,123 @@
+//! Motions.
+
+use axum::Json;
+use axum::extract::{Path, State as Of};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::IntoResponse;
+
+use super::super::guard::{Body, By, plain};
+use super::super::state::State;
+use super::{MaybeQuery, Wait, obey, query};
+use crate::desk::Noted;
+use crate::order::Order;
+use crate::problem::{Code, Problem, ProblemBody};
+use crate::request::MoveRequest;
+use crate::view::MotionView;
+
+/// So long an Idempotency-Key may be.
+const KEY_MAX: usize = 256;
+
+/// The motions under way, and the last that ended.
+#[utoipa::path(
+    get, path = "/motions", tag = "motions",
+    responses((status = 200, description = "Motions, the oldest first", body = Vec<MotionView>))
+)]
+pub(super) async fn motions(Of(state): Of<State>) -> Json<Vec<MotionView>> {
+    Json(state.desk.motions())
+}
+
+/// Begins a motion. With an Idempotency-Key the same request never moves twice, not even after a restart.
+#[utoipa::path(
+    post, path = "/motions", tag = "motions", request_body = MoveRequest,
+    params(("Idempotency-Key" = Option<String>, Header, description = "A key of the client's own for this motion")),
+    responses(
+        (status = 201, description = "It was accepted", body = MotionView, headers(("Location" = String, description = "Where it is asked for"))),
+        (status = 200, description = "It was accepted before, with this key", body = MotionView),
+        (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn begin(
+    Of(state): Of<State>,
+    By(caller): By,
+    headers: HeaderMap,
+    Body(request): Body<MoveRequest>,
+) -> Result<impl IntoResponse, Problem> {
+    let key = key_of(&headers)?;
+    let noting = {
+        let (desk, caller, request) = (state.desk.clone(), caller.clone(), request.clone());
+        // It waits for the disk: others are served meanwhile.
+        tokio::task::spawn_blocking(move || desk.note_motion(&caller, &request, key.as_deref()))
+    };
+    let noted = noting
+        .await
+        .map_err(|it| Problem::new(Code::Storage, it.to_string(), ""))??;
+    let (status, id) = match noted {
+        Noted::Before(id) => (StatusCode::OK, id),
+        Noted::New(id) => {
+            let order = Order::Move {
+                id: id.clone(),
+                request,
+            };
+            let answered = obey(&state.desk, &caller, order).await.map(|_| ());
+            (StatusCode::CREATED, state.desk.settle_motion(id, answered)?)
+        }
+    };
+    let view = state.desk.motion(&id)?;
+    let location = [(header::LOCATION, format!("/v1/motions/{id}"))];
+    Ok((status, location, Json(view)))
+}
+
+fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let Some(key) = headers.get("idempotency-key") else {
+        return Ok(None);
+    };
+    match key.to_str() {
+        Ok(key) if !key.is_empty() && key.len() <= KEY_MAX => Ok(Some(key.to_owned())),
+        _ => Err(Problem::new(
+            Code::BadRequest,
+            format!("an Idempotency-Key has 1 to {KEY_MAX} visible characters"),
+            "a random number is a good one",
+        )),
+    }
+}
+
+/// A motion, once it has ended or the time to wait is over.
+#[utoipa::path(
+    get, path = "/motions/{id}", tag = "motions", params(("id" = String, Path, description = "Its name"), Wait),
+    responses(
+        (status = 200, description = "The motion", body = MotionView),
+        (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn motion(
+    Of(state): Of<State>,
+    Path(id): Path<String>,
+    wait: MaybeQuery<Wait>,
+) -> Result<Json<MotionView>, Problem> {
+    let id = plain(&id);
+    let asked = query(wait)?.until(|| state.desk.motion(&id), |it| it.state.is_end());
+    Ok(Json(asked.await?))
+}
+
+/// The dead-man of a motion still holds.
+#[utoipa::path(
+    post, path = "/motions/{id}/renew", tag = "motions", params(("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "Renewed", body = MotionView),
+        (status = "4XX", description = "It is not under way", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn renew(
+    Of(state): Of<State>,
+    By(caller): By,
+    Path(id): Path<String>,
+) -> Result<Json<MotionView>, Problem> {
+    let motion = plain(&id);
+    let order = Order::Renew {
+        motion: motion.clone(),
+    };
+    obey(&state.desk, &caller, order).await?;
+    Ok(Json(state.desk.motion(&motion)?))
+}

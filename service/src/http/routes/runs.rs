@@ -1,0 +1,103 @@
+//! Runs.
+
+use axum::Json;
+use axum::extract::{Path, State as Of};
+use axum::http::{StatusCode, header};
+use axum::response::IntoResponse;
+
+use super::super::guard::{Body, By, plain};
+use super::super::state::State;
+use super::{MaybeQuery, Wait, obey, query};
+use crate::order::Order;
+use crate::problem::{Problem, ProblemBody};
+use crate::request::RunRequest;
+use crate::view::RunView;
+
+/// The runs that are known.
+#[utoipa::path(
+    get, path = "/runs", tag = "runs",
+    responses((status = 200, description = "Runs, the oldest first", body = Vec<RunView>))
+)]
+pub(super) async fn runs(Of(state): Of<State>) -> Json<Vec<RunView>> {
+    Json(state.desk.runs())
+}
+
+/// Plans a run, and starts it when `start` says so.
+#[utoipa::path(
+    post, path = "/runs", tag = "runs", request_body = RunRequest,
+    responses(
+        (status = 201, description = "Planned, or started", body = RunView, headers(("Location" = String, description = "Where it is asked for"))),
+        (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn plan(
+    Of(state): Of<State>,
+    By(caller): By,
+    Body(request): Body<RunRequest>,
+) -> Result<impl IntoResponse, Problem> {
+    let id = state.desk.next_run();
+    let order = Order::Plan {
+        id: id.clone(),
+        request,
+    };
+    obey(&state.desk, &caller, order).await?;
+    let location = [(header::LOCATION, format!("/v1/runs/{id}"))];
+    Ok((StatusCode::CREATED, location, Json(state.desk.run(&id)?)))
+}
+
+/// A run, once it has ended or the time to wait is over.
+#[utoipa::path(
+    get, path = "/runs/{id}", tag = "runs", params(("id" = String, Path, description = "Its name"), Wait),
+    responses(
+        (status = 200, description = "The run", body = RunView),
+        (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn run(
+    Of(state): Of<State>,
+    Path(id): Path<String>,
+    wait: MaybeQuery<Wait>,
+) -> Result<Json<RunView>, Problem> {
+    let id = plain(&id);
+    let asked = query(wait)?.until(|| state.desk.run(&id), |it| it.state.is_end());
+    Ok(Json(asked.await?))
+}
+
+/// Begins a planned run.
+#[utoipa::path(
+    post, path = "/runs/{id}/start", tag = "runs", params(("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It begins", body = RunView),
+        (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn start(
+    Of(state): Of<State>,
+    By(caller): By,
+    Path(id): Path<String>,
+) -> Result<Json<RunView>, Problem> {
+    let id = plain(&id);
+    obey(&state.desk, &caller, Order::Start { run: id.clone() }).await?;
+    Ok(Json(state.desk.run(&id)?))
+}
+
+/// Ends a run: its axes slow down, and what was measured is kept.
+#[utoipa::path(
+    post, path = "/runs/{id}/abort", tag = "runs", params(("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It ends", body = RunView),
+        (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn abort(
+    Of(state): Of<State>,
+    By(caller): By,
+    Path(id): Path<String>,
+) -> Result<Json<RunView>, Problem> {
+    let id = plain(&id);
+    obey(&state.desk, &caller, Order::Abort { run: id.clone() }).await?;
+    Ok(Json(state.desk.run(&id)?))
+}

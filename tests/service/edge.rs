@@ -1,0 +1,181 @@
+//! What only HTTP has: units, problems, hosts, sizes, streams, its description.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::os::unix::fs::PermissionsExt;
+
+use serde_json::{Value, json};
+use service::{Caller, Edge, Listen};
+use tests::LINEAR;
+
+use crate::client::Client;
+use crate::http::Http;
+use crate::stage::Stage;
+
+fn on_a_stage(body: impl FnOnce(&Stage, &Http)) {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = Stage::new(LINEAR, 51, folder.path(), |text| text);
+    let http = Http::of(&stage);
+    body(&stage, &http);
+    drop(http);
+    stage.end();
+}
+
+#[test]
+fn a_quantity_without_a_unit_is_refused_with_what_to_write() {
+    on_a_stage(|_, http| {
+        for body in [
+            r#"{"targets": {"x": 12.5}}"#,
+            r#"{"targets": {"x": "12.5"}}"#,
+            r#"{"targets": {"x": "1mm"}, "speed": 20}"#,
+        ] {
+            let answer = http.ask("POST /v1/motions HTTP/1.1", body.as_bytes());
+            assert_eq!(answer.status, 400, "{answer:?}");
+            let problem = answer.json();
+            assert_eq!(problem["code"], "bad_quantity", "{problem}");
+            let cause = problem["cause"].as_str().unwrap();
+            assert!(cause.contains("mm"), "{problem}");
+        }
+    });
+}
+
+#[test]
+fn a_problem_has_the_members_of_rfc_9457_and_ours() {
+    on_a_stage(|_, http| {
+        let body = br#"{"targets": {"x": {"value": 1, "unit": "mm"}}}"#;
+        let answer = http.ask("POST /v1/motions HTTP/1.1", body);
+        assert!(
+            answer.head.contains("application/problem+json"),
+            "{answer:?}"
+        );
+        let problem = answer.json();
+        assert_eq!(answer.status, 409);
+        assert_eq!(
+            problem,
+            json!({
+                "type": "urn:truestage:problem:not_zeroed",
+                "title": "not zeroed",
+                "status": 409,
+                "detail": "axis x: not zeroed since power-on; run `truestage zero` first",
+                "code": "not_zeroed",
+                "cause": "axis x: not zeroed since power-on; run `truestage zero` first",
+                "help": "",
+                "exit_code": 3,
+            })
+        );
+    });
+}
+
+#[test]
+fn whatever_is_sent_is_answered_with_a_problem() {
+    on_a_stage(|_, http| {
+        let large = vec![b' '; 100_000];
+        let cases: [(&str, &[u8], u16); 8] = [
+            ("GET /nowhere HTTP/1.1", b"", 404),
+            ("DELETE /v1/machine HTTP/1.1", b"", 405),
+            ("POST /v1/motions HTTP/1.1", b"{", 400),
+            (
+                "POST /v1/motions HTTP/1.1",
+                b"{\"targets\": {}, \"more\": 1}",
+                400,
+            ),
+            ("POST /v1/motions HTTP/1.1", &large, 413),
+            ("GET /v1/motions/m0-0?wait_s=-1 HTTP/1.1", b"", 400),
+            ("GET /v1/motions/m0-0?wait=1 HTTP/1.1", b"", 400),
+            ("GET /v1/axes/%1b%5b31m HTTP/1.1", b"", 404),
+        ];
+        for (head, body, status) in cases {
+            let answer = http.ask(head, body);
+            assert_eq!(answer.status, status, "{head}: {answer:?}");
+            let problem = answer.json();
+            assert_eq!(problem["status"], status, "{head}: {problem}");
+            assert!(!answer.body.contains(&0x1b), "{head}: {problem}");
+        }
+    });
+}
+
+#[test]
+fn a_page_from_elsewhere_cannot_move_a_stage() {
+    on_a_stage(|stage, _| {
+        let any = "tcp:127.0.0.1:0".parse::<Listen>().unwrap();
+        let edge = Edge::open(stage.desk.clone(), &[any]).unwrap();
+        let Listen::Tcp(address) = edge.places()[0] else {
+            panic!("it is TCP")
+        };
+        let ask = |headers: &str| {
+            let _passing = stage.gate.pass();
+            let mut stream = TcpStream::connect(address).unwrap();
+            let request = format!(
+                "POST /v1/stop HTTP/1.1\r\n{headers}\r\nconnection: close\r\ncontent-length: 2\r\n\r\n{{}}"
+            );
+            stream.write_all(request.as_bytes()).unwrap();
+            let mut said = String::new();
+            stream.read_to_string(&mut said).unwrap();
+            said.split(' ').nth(1).unwrap().parse::<u16>().unwrap()
+        };
+        assert_eq!(ask(&format!("host: {address}")), 200);
+        assert_eq!(
+            ask(&format!("host: {address}\r\norigin: http://{address}")),
+            200
+        );
+        assert_eq!(
+            ask(&format!("host: {address}\r\norigin: http://evil.example")),
+            403
+        );
+        assert_eq!(ask("host: evil.example"), 403);
+    });
+}
+
+#[test]
+fn only_the_owner_and_the_group_may_use_the_socket() {
+    on_a_stage(|_, http| {
+        let mode = std::fs::metadata(http.socket())
+            .unwrap()
+            .permissions()
+            .mode();
+        assert_eq!(mode & 0o777, 0o660);
+    });
+}
+
+#[test]
+fn a_stream_of_events_goes_on_where_it_was_broken_off() {
+    on_a_stage(|_, http| {
+        let who = Caller::named("anna");
+        http.power(&who, "x", true).unwrap();
+        http.power(&who, "x", false).unwrap();
+        let newest = http.machine().newest_event;
+        let whole = http.stream("GET /v1/events?after=0 HTTP/1.1", newest);
+        let broken = whole[1].id;
+        let rest = http.stream(
+            &format!("GET /v1/events HTTP/1.1\r\nlast-event-id: {broken}"),
+            newest,
+        );
+        assert_eq!(rest, whole[2..]);
+        let axes = http.stream("GET /v1/events?after=0&kinds=axis HTTP/1.1", {
+            let last = whole.iter().rfind(|it| it.kind == "axis");
+            last.unwrap().id
+        });
+        assert!(
+            axes.len() >= 2 && axes.iter().all(|it| it.kind == "axis"),
+            "{axes:?}"
+        );
+    });
+}
+
+#[test]
+fn what_there_is_is_described_and_counted() {
+    on_a_stage(|_, http| {
+        let description = http.ask("GET /openapi.json HTTP/1.1", b"").json();
+        assert_eq!(description["openapi"], "3.1.0");
+        assert!(description["paths"]["/v1/motions"]["post"].is_object());
+        let health: Value = http.ask("GET /healthz HTTP/1.1", b"").json();
+        assert_eq!(health, json!({"state": "running"}));
+        let metrics = http.ask("GET /metrics HTTP/1.1", b"");
+        let text = String::from_utf8(metrics.body).unwrap();
+        assert!(text.contains("truestage_running 1\n"), "{text}");
+        assert!(
+            text.contains("truestage_axis_homed{axis=\"x\"} 0\n"),
+            "{text}"
+        );
+    });
+}
