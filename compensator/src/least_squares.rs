@@ -18,6 +18,8 @@ use nalgebra::{DMatrix, DVector};
 /// Columns whose independent part is smaller than this share of their length count as
 /// dependent. Wampler1 (powers 0…5 of 0…20, one of the hardest legitimate designs) has 1e-4.
 const RANK_TOLERANCE: f64 = 1e-11;
+/// Below this share of the largest singular value (columns scaled to unit length) nothing is told.
+const TOLD_SHARE: f64 = 1e-7;
 
 /// Why a least-squares problem has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -139,23 +141,88 @@ pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, Le
         .map(|k| (k / columns, k % columns))
         .map(|(i, j)| scaled_cofactor[(i, j)] / (lengths[i] * lengths[j]))
         .collect();
-    let residuals = observed
-        .iter()
-        .zip(design.chunks_exact(columns))
-        .map(|(y, row)| {
-            y - row
-                .iter()
-                .zip(&coefficients)
-                .map(|(x, b)| x * b)
-                .sum::<f64>()
-        })
-        .collect();
+    let residuals = residuals(design, columns, observed, &coefficients);
     Ok(Fit {
         coefficients,
         cofactor,
         residuals,
         degrees_of_freedom: rows - columns,
     })
+}
+
+/// The same where some combinations of coefficients make nothing of the observations: these are left at
+/// nothing, and count neither as coefficients nor as uncertain (singular values; Moore and Penrose).
+///
+/// # Errors
+/// As [`solve`], but for coefficients that cannot be distinguished.
+pub(crate) fn solve_what_is_told(
+    design: &[f64],
+    columns: usize,
+    observed: &[f64],
+) -> Result<Fit, LeastSquaresError> {
+    check(design, columns, observed)?;
+    let rows = observed.len();
+    let mut matrix = DMatrix::from_row_slice(rows, columns, design);
+    let lengths: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
+    for (column, length) in lengths.iter().enumerate() {
+        matrix
+            .column_mut(column)
+            .unscale_mut(length.max(f64::MIN_POSITIVE));
+    }
+    let (q, r) = matrix.qr().unpack();
+    let rotated = q.transpose() * DVector::from_column_slice(observed);
+    let svd = r.svd(true, true);
+    let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+    let largest = svd.singular_values.max();
+    let told: Vec<usize> = (0..columns)
+        .filter(|at| svd.singular_values[*at] > TOLD_SHARE * largest)
+        .collect();
+    let mut scaled = DVector::zeros(columns);
+    let mut scaled_cofactor = DMatrix::zeros(columns, columns);
+    for at in &told {
+        let own = v_t.row(*at).transpose();
+        let value = svd.singular_values[*at];
+        scaled += &own * (u.column(*at).dot(&rotated) / value);
+        scaled_cofactor += &own * own.transpose() / (value * value);
+    }
+    let unscaled = |at: usize| 1.0 / lengths[at].max(f64::MIN_POSITIVE);
+    let is_there = |at: usize| lengths[at] > 0.0;
+    let coefficients: Vec<f64> = (0..columns)
+        .map(|at| {
+            if is_there(at) {
+                scaled[at] * unscaled(at)
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let cofactor = (0..columns * columns).map(|k| {
+        let (i, j) = (k / columns, k % columns);
+        let is_there = is_there(i) && is_there(j);
+        if is_there {
+            scaled_cofactor[(i, j)] * unscaled(i) * unscaled(j)
+        } else {
+            0.0
+        }
+    });
+    Ok(Fit {
+        cofactor: cofactor.collect(),
+        residuals: residuals(design, columns, observed, &coefficients),
+        coefficients,
+        degrees_of_freedom: rows - told.len(),
+    })
+}
+
+fn residuals(design: &[f64], columns: usize, observed: &[f64], coefficients: &[f64]) -> Vec<f64> {
+    let rows = observed.iter().zip(design.chunks_exact(columns));
+    rows.map(|(y, row)| {
+        y - row
+            .iter()
+            .zip(coefficients)
+            .map(|(x, b)| x * b)
+            .sum::<f64>()
+    })
+    .collect()
 }
 
 /// By row, orthonormal columns that span those of `design` (rows of `columns` entries each, which are

@@ -433,8 +433,18 @@ mod tests {
             "every 20 ms",
         );
         check("end_mm = 600.0\n", "", ".beam.x.drift", "`end_mm`");
-        let (from, to) = ("drift = \"pivoting\"", "drift = \"translating\"");
-        check(from, to, ".beam.x.source_mm", "does not take this key");
+        let (from, to) = (
+            "end_mm = 600.0\n",
+            "end_mm = 600.0\ntranslation_share = 0.5\n",
+        );
+        let key = ".beam.x.translation_share";
+        check(from, to, key, "does not take this key");
+        check(
+            "drift = \"pivoting\"             # or \"translating\", \"mixed\"\nsource_mm = -100.0\n",
+            "drift = \"translating\"\n",
+            ".beam.x.drift",
+            "`source_mm` is not",
+        );
         let key = format!("{slider}.saturation_v");
         check(
             "saturation_v = 3.2",

@@ -154,6 +154,11 @@ pub struct LineReadingEntry {
     pub sideways_m: [[f64; 2]; 3],
     /// By what they had rolled.
     pub roll_rad: [f64; 3],
+    /// How far the beams along x, y and z had moved at their ends, two directions each, which was counted
+    /// in `sideways_m`; of a line that detectors read, in what they read. `None` in files of earlier
+    /// programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam_shift_m: Option<[[f64; 2]; 3]>,
     /// What the thermometers showed, °C.
     pub temperatures_c: Vec<Option<f64>>,
     /// What the machine was corrected by, where it was.

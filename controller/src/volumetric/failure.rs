@@ -229,7 +229,7 @@ pub enum VolumetricFailure {
     Identify(#[from] IdentifyError),
     /// Readings that are worse than they can be.
     #[error("three axes: {0}")]
-    Scatter(Scatter),
+    Scatter(Box<Scatter>),
     /// What detectors see is more than a correction is proven for.
     #[error(transparent)]
     Conditions(#[from] ConditionsError),

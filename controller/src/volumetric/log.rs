@@ -233,6 +233,8 @@ fn reading(read: &VolumeLog, it: &LineReadingEntry) -> Judged {
     optional("scatter_m", it.scatter_m, &ERROR_U_M)?;
     numbers("sideways_m", it.sideways_m.as_flattened(), &ERROR_M)?;
     numbers("roll_rad", &it.roll_rad, &ANGLE_RAD)?;
+    let shift = it.beam_shift_m.unwrap_or_default();
+    numbers("beam_shift_m", shift.as_flattened(), &ERROR_M)?;
     counted(
         "temperatures_c",
         it.temperatures_c.len(),

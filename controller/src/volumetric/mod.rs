@@ -73,7 +73,7 @@ pub(crate) use memory::Remembered;
 pub(crate) use path_refusal::PathRefusal;
 pub(crate) use record::{AXES, error_name};
 pub(crate) use record::{
-    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, ExpansionRecord,
+    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, DriftRecord, ExpansionRecord,
     FunctionRecord, FunctionShape, UnknownRecord,
 };
 pub(crate) use reference::References;

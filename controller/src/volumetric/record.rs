@@ -271,6 +271,36 @@ pub struct BeamRecord {
     pub slider: [FunctionRecord; 2],
     /// The end detector, where there is one.
     pub end_m: Option<[f64; 2]>,
+    /// How the beam was taken to move, where its ends are known; `None` in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift: Option<DriftRecord>,
+    /// At each of the slide's positions, how far the end detector saw the beam from where it was on average:
+    /// as far as it is taken to move the slide's reading was brought back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wandered_m: Option<[Vec<f64>; 2]>,
+}
+
+/// How a beam moves when it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriftRecord {
+    /// Where its source is, by the axis's scale.
+    pub source_m: f64,
+    /// Where its end detector is.
+    pub end_m: f64,
+    /// The share of the shift at the end that is sideways as a whole.
+    pub translation_share: f64,
+}
+
+impl BeamRecord {
+    /// How far the beam had wandered when the slide was at `position`: that of the nearest stop.
+    pub(crate) fn wandered(&self, position: Metres) -> Option<[f64; 2]> {
+        let stops = self.slider[0].positions_m.iter().enumerate();
+        let off = |it: &(usize, &f64)| (it.1 - position.value()).abs();
+        let (nearest, _) = stops.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let [first, second] = self.wandered_m.as_ref()?;
+        Some([*first.get(nearest)?, *second.get(nearest)?])
+    }
 }
 
 /// What all detectors read when the geometry was measured.
@@ -520,6 +550,8 @@ mod tests {
                 axis: 'y',
                 slider: [one(), one()],
                 end_m: Some([1e-5, -2e-5]),
+                drift: None,
+                wandered_m: None,
             }],
             roll: None,
         };

@@ -5,6 +5,8 @@
 //! brings the slide's reading to the same place of the beam. A detector in trouble ends it; half a
 //! set of references is none.
 
+mod mean;
+
 use core::time::Duration;
 
 use compensator::volumetric::Axis;
@@ -18,13 +20,14 @@ use crate::run::utc_now;
 use crate::store::{CalibrationRecord, RecordHead, Store, short};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
-use crate::volumetric::settings::{beam_detector, beam_drift, volume_axis};
+use crate::volumetric::settings::{beam_detector, beam_drift, drift_record, volume_axis};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AXES, BeamRecord, BeamReferencesContent, FunctionRecord};
 use crate::volumetric::{BeamConfig, BeamDetectorConfig, RollConfig, VolumetricConfig};
 use crate::volumetric::{GEOMETRY, GeometryContent, REFERENCES, VolumetricFailure};
 use machine::Stage;
 use machine::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
+use mean::Mean;
 
 /// How long an axis stands before its detectors count.
 const REST: Duration = Duration::from_millis(50);
@@ -76,38 +79,6 @@ impl Still {
             channels: &self.channels,
             temperatures: &self.temperatures,
         }
-    }
-}
-
-/// Mean and standard uncertainty of the mean.
-#[derive(Clone, Copy, Debug, Default)]
-struct Mean {
-    count: f64,
-    sum: f64,
-    squares: f64,
-}
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        self.count += 1.0;
-        let before = self.sum;
-        self.sum += value;
-        if self.count > 1.0 {
-            // Welford's update: what the value is off the mean before and after it.
-            let old = before / (self.count - 1.0);
-            self.squares += (value - old) * (value - self.mean());
-        }
-    }
-
-    fn mean(&self) -> f64 {
-        self.sum / self.count
-    }
-
-    fn u(&self) -> f64 {
-        if self.count < 2.0 {
-            return 0.0;
-        }
-        (self.squares / (self.count - 1.0) / self.count).sqrt()
     }
 }
 
@@ -479,6 +450,11 @@ impl Stops {
             axis: AXES[axis.index()],
             slider: [function(0)?, function(1)?],
             end_m: config.end.as_ref().map(|_| end),
+            drift: drift_record(config),
+            wandered_m: config.end.as_ref().map(|_| {
+                let of = |k: usize| self.end.iter().map(move |it| it[k].mean() - end[k]);
+                [of(0).collect(), of(1).collect()]
+            }),
         })
     }
 
@@ -502,17 +478,6 @@ fn record<Q: Quantity>(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_mean_knows_how_sure_it_is() {
-        let mut mean = Mean::default();
-        for value in [1.0, 2.0, 3.0, 4.0] {
-            mean.add(value);
-        }
-        assert!((mean.mean() - 2.5).abs() < 1e-15);
-        // s² = 5/3, of the mean a quarter.
-        assert!((mean.u() - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
-    }
 
     #[test]
     fn stops_are_at_both_ends_and_no_farther_apart_than_said() {

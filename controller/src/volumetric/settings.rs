@@ -14,6 +14,7 @@ use compensator::volumetric::{Axis, Point, Volume, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Radians, Volts};
 
 use crate::hardware::CHECKED;
+use crate::volumetric::DriftRecord;
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, FeedConfig, InfluenceConfig, LayoutName,
     ReactionName, RollConfig, ShapeName, TemperatureConfig, VolumeAxisName,
@@ -142,6 +143,19 @@ pub fn beam_drift(config: &BeamConfig) -> Option<BeamDrift> {
             source: place(config.source_mm)?,
             end: place(config.end_mm)?,
             translation: config.translation_share?,
+        },
+    })
+}
+
+/// The same as it is written down; `None` where it is not known where the beam begins and ends.
+pub(crate) fn drift_record(config: &BeamConfig) -> Option<DriftRecord> {
+    Some(DriftRecord {
+        source_m: Metres::from_mm(config.source_mm?).value(),
+        end_m: Metres::from_mm(config.end_mm?).value(),
+        translation_share: match config.drift {
+            BeamDriftName::Translating => 1.0,
+            BeamDriftName::Pivoting => 0.0,
+            BeamDriftName::Mixed => config.translation_share?,
         },
     })
 }

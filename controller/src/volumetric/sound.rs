@@ -169,6 +169,21 @@ pub(super) fn references(it: &BeamReferencesContent) -> Judged {
         }
         let end = beam.end_m.unwrap_or_default();
         numbers(&format!("{place}.end_m"), &end, &ERROR_M)?;
+        let stops = beam.slider[0].positions_m.len();
+        for own in beam.wandered_m.iter().flatten() {
+            let key = format!("{place}.wandered_m");
+            as_many(&key, own.len(), stops, "the positions")?;
+            numbers(&key, own, &ERROR_M)?;
+        }
+        if let Some(own) = &beam.drift {
+            let key = format!("{place}.drift");
+            numbers(&key, &[own.source_m, own.end_m], &PLACE_M)?;
+            let expected = || "a source elsewhere than the end".to_owned();
+            is(&key, own.source_m != own.end_m, expected, || {
+                own.source_m.to_string()
+            })?;
+            number(&key, own.translation_share, &RATIO)?;
+        }
     }
     it.roll.as_ref().map_or(Ok(()), |it| function("roll", it))
 }

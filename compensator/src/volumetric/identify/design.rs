@@ -7,7 +7,7 @@ use super::block::{Block, axis_of, block};
 use super::effect::{Effect, lever, seen, u_of};
 use super::thermal::ThermalPlan;
 use super::{Axis, IdentifyError, Observation, Plan, Reading, Unknown};
-use crate::least_squares;
+use crate::least_squares::{self, Fit};
 use crate::volumetric::Point;
 use crate::volumetric::model::{ErrorName, Squareness};
 use crate::volumetric::point::cross;
@@ -136,7 +136,7 @@ impl Design {
     /// Weighted with what the functions do between their nodes, which is told by a first fit; `wrong`:
     /// columns of what is grossly wrong in the readings, which is no part of that.
     pub(super) fn with_between(
-        mut self,
+        self,
         plan: &Plan,
         observations: &[Observation],
         wrong: &[Vec<f64>],
@@ -151,7 +151,13 @@ impl Design {
             })
             .collect();
         let fit = least_squares::solve(&rows, columns + wrong.len(), &self.values)?;
-        self.between = Between::of(&self.blocks, &fit, plan.shape);
+        Ok(self.between(plan, observations, &fit))
+    }
+
+    /// Likewise, told by a fit of these and any other unknowns.
+    pub(super) fn between(mut self, plan: &Plan, observations: &[Observation], fit: &Fit) -> Self {
+        let columns = self.columns();
+        self.between = Between::of(&self.blocks, fit, plan.shape);
         for (at, it) in observations.iter().enumerate() {
             let square = between_square(
                 plan,
@@ -169,7 +175,7 @@ impl Design {
             let row = &mut self.rows[at * columns..(at + 1) * columns];
             row.iter_mut().for_each(|it| *it *= share);
         }
-        Ok(self)
+        self
     }
 }
 

@@ -32,7 +32,8 @@
 //! Readings that scatter more than their stated uncertainties are reported
 //! ([`Identified::scattered`]), with those that fit least.
 //!
-//! Gross errors are looked for by [`Plan::snoop`], and named by reading and run; none is left out.
+//! Gross errors are looked for by [`Plan::snoop`], and named by reading and run; none is left out. What else
+//! than was stated would explain all readings is looked for by [`Plan::causes`].
 //!
 //! Absent: hysteresis, laser tracker lengths from unknown stations, the instrument's own
 //! temperature and air (correct the readings first: [`crate::length_correction`]), temperatures
@@ -40,6 +41,7 @@
 
 mod between;
 mod block;
+mod cause;
 mod design;
 mod diagonals;
 mod effect;
@@ -56,6 +58,7 @@ use core::fmt;
 
 use units::{Metres, Quantity, Radians};
 
+pub use cause::{Cause, Causes, Circumstance, Doubt, Explanation, Suspect, Trial, suspects};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
 pub use scatter::{Conspicuous, SCATTER_RATIO_MAX, Scattered, scatter_limit};
@@ -401,6 +404,8 @@ impl Plan {
 
 #[cfg(test)]
 mod between_tests;
+#[cfg(test)]
+mod cause_tests;
 #[cfg(test)]
 mod rig;
 

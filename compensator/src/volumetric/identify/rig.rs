@@ -20,7 +20,7 @@ const ARCSEC: f64 = 4.848_137e-6;
 /// Nodes that draw the truth.
 const FINE: usize = 121;
 pub(super) const TOOL: Point = Point::from_mm(0.0, 0.0, -100.0);
-const ARM: Point = Point::from_mm(100.0, 0.0, -100.0);
+pub(super) const ARM: Point = Point::from_mm(100.0, 0.0, -100.0);
 
 /// What kind of machine, and how it is measured.
 #[derive(Clone, Debug)]
@@ -53,6 +53,15 @@ impl Default for Rig {
     }
 }
 
+/// What is stated of a machine and how its lines were really read.
+pub(super) struct Stated<'a> {
+    pub(super) chain: &'a str,
+    /// By line, the arm that is written down.
+    pub(super) arm: &'a dyn Fn(usize, &StandardLine) -> Point,
+    /// The arm that it really was.
+    pub(super) real: &'a dyn Fn(usize, &StandardLine) -> Point,
+}
+
 /// A machine with its readings.
 pub(super) struct Measured {
     pub(super) truth: VolumetricModel,
@@ -67,12 +76,24 @@ impl Rig {
     }
 
     pub(super) fn measured(&self, seed: u64) -> Measured {
+        self.measured_as(
+            seed,
+            &Stated {
+                chain: self.chain,
+                arm: &|_, line| line.tool,
+                real: &|_, line| line.tool,
+            },
+        )
+    }
+
+    /// Along the lines that tell a machine as it is stated.
+    pub(super) fn measured_as(&self, seed: u64, stated: &Stated<'_>) -> Measured {
         let mut noise = Noise(seed);
-        let chain = self.chain.parse().unwrap();
+        let chain = stated.chain.parse().unwrap();
         let rolls = [true, false, false];
         let design = standard_design(chain, &self.volume(), &[TOOL, ARM], rolls);
         let truth = self.truth(&mut noise);
-        let observations = self.observations(&truth, &design, &mut noise);
+        let observations = self.observations(&truth, &design, stated, &mut noise);
         let plan = design.plan(self.nodes, Point::ZERO, Shape::Spline);
         Measured {
             truth,
@@ -150,6 +171,7 @@ impl Rig {
         &self,
         truth: &VolumetricModel,
         design: &StandardDesign,
+        stated: &Stated<'_>,
         noise: &mut Noise,
     ) -> Vec<Observation> {
         let mut observations = Vec::new();
@@ -160,13 +182,17 @@ impl Rig {
                 .into_iter()
                 .filter(|it| way.along(*it) != Metres::ZERO);
             let count = moved.map(|it| self.nodes[it.index()]).max().unwrap_or(2);
+            let real = StandardLine {
+                tool: (stated.real)(run, line),
+                ..*line
+            };
             for at in line.points(count) {
-                let (value, usual) = read(truth, line, at, lean);
+                let (value, usual) = read(truth, &real, at, lean);
                 let u = usual * self.stated;
                 let value = value + zero + u * self.noise * noise.normal();
                 observations.push(Observation {
                     at,
-                    tool: line.tool,
+                    tool: (stated.arm)(run, line),
                     run,
                     reading: line.reading(value, u),
                 });

@@ -63,10 +63,18 @@ impl GrossKind {
 impl Design {
     /// The weighted column of what is off by one unit.
     pub(super) fn column_of(&self, gross: &Gross, observations: &[Observation]) -> Vec<f64> {
-        let own = observations.iter().enumerate().zip(&self.u);
-        own.map(|((index, it), u)| {
-            let is_off = it.run == gross.run && gross.kind.concerns(index, gross.index);
-            if is_off { 1.0 / u } else { 0.0 }
+        let column = gross.column(observations).into_iter().zip(&self.u);
+        column.map(|(it, u)| it / u).collect()
+    }
+}
+
+impl Gross {
+    /// By reading, whether it is off.
+    pub(super) fn column(&self, observations: &[Observation]) -> Vec<f64> {
+        let own = observations.iter().enumerate();
+        own.map(|(index, it)| {
+            let is_off = it.run == self.run && self.kind.concerns(index, self.index);
+            if is_off { 1.0 } else { 0.0 }
         })
         .collect()
     }

@@ -93,6 +93,15 @@ impl fmt::Display for Chain {
 }
 
 impl Chain {
+    /// All that there are.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let orders = Axis::ALL.into_iter().flat_map(|first| {
+            let [second, third] = first.others();
+            [[first, second, third], [first, third, second]]
+        });
+        orders.flat_map(|axes| (0..=3).map(move |workpiece| Self { axes, workpiece }))
+    }
+
     /// The axes from the workpiece to the tool.
     pub fn axes(&self) -> [Axis; 3] {
         self.axes
@@ -152,6 +161,14 @@ mod tests {
         for text in ["XYZ", "FXYX", "FXYZF", "xfyz", "FXY", "FXÿZ", "", "FFXYZ"] {
             assert!(text.parse::<Chain>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn there_are_24_chains() {
+        let mut all: Vec<String> = Chain::all().map(|it| it.to_string()).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 24);
     }
 
     #[test]

@@ -68,6 +68,17 @@ impl BeamDrift {
         }
     }
 
+    /// The share that a beam has at `position` which only turns about its source.
+    pub(in crate::volumetric) fn swing(&self, position: Metres) -> f64 {
+        match *self {
+            // Nobody says where its source is: it is far away, as far as this beam knows.
+            Self::Translating => 1.0,
+            Self::Pivoting { source, end } | Self::Mixed { source, end, .. } => {
+                (position - source) / (end - source)
+            }
+        }
+    }
+
     fn check(&self) -> Result<(), DriftError> {
         let (source, end, share) = match *self {
             Self::Translating => return Ok(()),

@@ -13,6 +13,7 @@ use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::store::IdentityRecord;
 use crate::volumetric::VolumetricConfig;
+use crate::volumetric::calibrate::cause::LikelyCauses;
 use crate::volumetric::calibrate::plan::axis_of;
 use crate::volumetric::settings::{beam_drift, bend_plans};
 use crate::volumetric::{
@@ -61,8 +62,10 @@ impl VolumetricEvaluated {
         let axes = axes.map_err(VolumetricFailure::from)?;
         let temperatures = references(read);
         let wrong = contradiction(&plan, &found, &observations).map_err(VolumetricFailure::from)?;
-        let scatter = wrong
-            .map(|(scattered, gross)| Scatter::of(&scattered, &gross, entry, read, &observations));
+        let scatter = wrong.map(|(scattered, gross)| {
+            let causes = LikelyCauses::of((&plan, &observations, &gross), entry, read);
+            Scatter::of(&scattered, (&gross, causes), entry, read, &observations)
+        });
         Ok(Self {
             scatter,
             u_max: largest_u(entry, &found, &temperatures),
@@ -116,7 +119,7 @@ impl VolumetricEvaluated {
         references: Option<&BeamReferencesContent>,
     ) -> Result<(), Failure> {
         if let Some(scatter) = &self.scatter {
-            return Err(VolumetricFailure::Scatter(scatter.clone()).into());
+            return Err(VolumetricFailure::Scatter(Box::new(scatter.clone())).into());
         }
         let own = config.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
         let mut state = VolumetricState {

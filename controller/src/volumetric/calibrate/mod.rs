@@ -14,9 +14,11 @@
 //! is what was written down: the journal alone gives the same errors again.
 //!
 //! A result that cannot be applied, whose readings scatter much more than was stated of them (`scatter`),
-//! or of which some are grossly wrong (`gross`) is refused before it is stored. Lines that are named then
+//! or of which some are grossly wrong (`gross`) is refused before it is stored, with what else than was
+//! stated would explain all readings (`cause`). Lines that are named then
 //! count as not read, so that a run that is continued reads them again.
 
+mod cause;
 mod evaluate;
 mod gross;
 mod known;

@@ -5,6 +5,7 @@ use compensator::volumetric::{Axis, Point};
 use units::portable::hypot;
 use units::{Metres, Radians};
 
+use crate::volumetric::AXES;
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::calibrate::plan::nodes;
 use crate::volumetric::settings::point_of_mm;
@@ -31,6 +32,19 @@ impl Session<'_> {
             | Purpose::EvenRollOnLever(_)
             | Purpose::Squarenesses => None,
         }
+    }
+
+    /// How far the beam had wandered when the line `run` was read there, where a beam read it.
+    pub(super) fn wandered(&self, run: usize, it: &Observation) -> Option<[[f64; 2]; 3]> {
+        let Purpose::Straightness(axis, _) = self.lines[run].purpose else {
+            return None;
+        };
+        let letter = AXES[axis.index()];
+        let mut beams = self.references.content.beams.iter();
+        let record = beams.find(|beam| beam.axis == letter)?;
+        let mut shift = [[0.0; 2]; 3];
+        shift[axis.index()] = record.wandered(it.at.along(axis))?;
+        Some(shift)
     }
 
     fn straightness_by_beam(

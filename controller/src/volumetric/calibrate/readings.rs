@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use compensator::volumetric::identify::{Observation, Optics};
-use compensator::volumetric::online::MovingState;
+use compensator::volumetric::online::{Displacement, MovingState};
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres};
 
@@ -28,7 +28,10 @@ impl WorkVolume<'_> {
         let shown = match session.by_own_detectors(at) {
             Some(observations) => {
                 for it in &observations {
-                    let reading = LineReadingEntry::of(at, it);
+                    let reading = LineReadingEntry {
+                        beam_shift_m: session.wandered(at, it),
+                        ..LineReadingEntry::of(at, it)
+                    };
                     session.keep(reading, journal)?;
                 }
                 session.references.temperatures.clone()
@@ -74,7 +77,7 @@ impl WorkVolume<'_> {
         let mut shown = vec![Vec::new(); session.config.temperature.len()];
         for at in line.points(session.points_of(number)) {
             let read = self.read_line(&set_up, at)?;
-            let (state, temperatures) = self.state_now(session, at)?;
+            let (state, shift, temperatures) = self.state_now(session, at)?;
             for (sum, celsius) in shown.iter_mut().zip(&temperatures) {
                 sum.push(celsius.value());
             }
@@ -91,6 +94,7 @@ impl WorkVolume<'_> {
                 scatter_m: Some(read.scatter.value()),
                 sideways_m: state.sideways.map(|it| it.map(Metres::value)),
                 roll_rad: state.roll.map(|it| it.value()),
+                beam_shift_m: Some(shift.map(|it| it.map(Metres::value))),
                 temperatures_c: temperatures.iter().map(|it| Some(it.value())).collect(),
                 at_s: read.when.seconds(),
                 ..LineReadingEntry::of(number, &observation)
@@ -101,14 +105,16 @@ impl WorkVolume<'_> {
         Ok(shown.iter().map(mean).collect())
     }
 
-    /// What the detectors see beyond their references, and what the thermometers show.
+    /// What the detectors see beyond their references, how far the beams have moved at their ends, and
+    /// what the thermometers show.
     fn state_now(
         &mut self,
         session: &mut Session<'_>,
         at: Point,
-    ) -> Result<(MovingState, Vec<Celsius>), Failure> {
+    ) -> Result<(MovingState, [Displacement; 3], Vec<Celsius>), Failure> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
         let mut state = MovingState::default();
+        let mut shifts = [Displacement::default(); 3];
         if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
             let axis = volume_axis(config.axis);
             let position = at.along(axis);
@@ -124,6 +130,7 @@ impl WorkVolume<'_> {
             let places = self.places_of_beam(axis, position, beam, &seen)?;
             let end = places.1.unwrap_or_else(|| reference.end());
             let shift = reference.beam_shift(end);
+            shifts[axis.index()] = shift;
             // How guides bend is still to be found: what the detector sees of that is part of the
             // unknown (`BendPlan::seen_from`).
             let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
@@ -133,7 +140,7 @@ impl WorkVolume<'_> {
         for still in &seen {
             session.thermometry.add(still.now, &still.temperatures)?;
         }
-        Ok((state, session.thermometry.take()))
+        Ok((state, shifts, session.thermometry.take()))
     }
 }
 

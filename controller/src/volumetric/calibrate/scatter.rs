@@ -7,6 +7,7 @@ use compensator::volumetric::Point;
 use compensator::volumetric::identify::{Observation, Scattered, Snooped, scatter_limit};
 use units::Metres;
 
+use super::cause::LikelyCauses;
 use super::gross::GrossReading;
 use super::off::Off;
 use crate::volumetric::{VolumeLog, VolumePlanEntry};
@@ -26,6 +27,8 @@ pub struct Scatter {
     pub gross: Vec<GrossReading>,
     /// How much the others scatter without them.
     pub left: f64,
+    /// What explains all readings, none left out.
+    pub causes: LikelyCauses,
     /// Whether the run can be continued, with these lines measured again.
     pub is_run: bool,
 }
@@ -50,7 +53,7 @@ impl Scatter {
     /// evaluated; `None` where nothing contradicts.
     pub(super) fn of(
         scattered: &Scattered,
-        snooped: &Snooped,
+        (snooped, causes): (&Snooped, LikelyCauses),
         plan: &VolumePlanEntry,
         read: &VolumeLog,
         observations: &[Observation],
@@ -78,25 +81,29 @@ impl Scatter {
             worst: worst.collect(),
             gross: gross.collect(),
             left: snooped.ratio_left.unwrap_or(0.0),
+            causes,
             is_run: !plan.drives.is_empty(),
         }
     }
 
     /// The lines, from 0, that have to be measured again; none where it is no matter of single lines.
     pub(super) fn lines(&self) -> Vec<usize> {
-        if !self.is_explained() {
+        let Some(mut lines) = self.causes.lines() else {
             return Vec::new();
+        };
+        if self.is_gross() {
+            let gross = self.gross.iter().flat_map(GrossReading::lines);
+            lines.extend(gross.map(|it| it - 1));
         }
-        let mut lines: Vec<usize> = self.gross.iter().flat_map(GrossReading::lines).collect();
         lines.sort_unstable();
         lines.dedup();
-        lines.into_iter().map(|it| it - 1).collect()
+        lines
     }
 
     /// Those of them that are read again when the run is continued: what the machine's own detectors read
     /// counts from the references of the run, and would be the same.
     pub(super) fn void(&self) -> Vec<usize> {
-        if self.gross.iter().any(|it| it.by_detectors) {
+        if self.is_gross() && self.gross.iter().any(|it| it.by_detectors) {
             return Vec::new();
         }
         self.lines()
@@ -106,6 +113,42 @@ impl Scatter {
     fn is_explained(&self) -> bool {
         let spare = self.spare.saturating_sub(self.gross.len());
         !self.gross.is_empty() && self.left <= scatter_limit(spare)
+    }
+
+    /// Whether what is grossly wrong is to be told: nothing that leaves no reading out is far likelier.
+    fn is_gross(&self) -> bool {
+        self.is_explained() && (self.causes.told.is_empty() || self.causes.gross_as_well)
+    }
+
+    fn write_causes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the readings scatter {:.2} times as much as their stated uncertainties, the limit is {:.2} \
+             times ({} readings beyond the unknowns); nothing was stored, what was in use stays in use; ",
+            self.seen, self.limit, self.spare
+        )?;
+        let count = self.causes.told.len();
+        f.write_str(match count {
+            1 => "one cause explains all of them, none left out",
+            _ => "each of these causes alone explains all of them, none left out, and the readings do not \
+                  tell which it is",
+        })?;
+        for (cause, ratio) in &self.causes.told {
+            write!(
+                f,
+                "; likely cause: {cause} (the readings then scatter {ratio:.2} times)"
+            )?;
+        }
+        if self.is_gross() {
+            f.write_str("; or single readings are wrong, which explains the others as well: ")?;
+            self.write_gross(f)?;
+        } else if self.is_run && !self.void().is_empty() {
+            f.write_str(
+                "; `truestage calibrate --resume` with this run's journal reads the lines named here once \
+                 more, and keeps all other lines",
+            )?;
+        }
+        Ok(())
     }
 
     fn write_gross(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -141,6 +184,9 @@ impl Scatter {
 
 impl fmt::Display for Scatter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.causes.told.is_empty() {
+            return self.write_causes(f);
+        }
         if self.is_explained() {
             return self.write_gross(f);
         }
@@ -198,6 +244,7 @@ mod tests {
             worst: vec![worst, tilt],
             gross: Vec::new(),
             left: 546.0,
+            causes: LikelyCauses::default(),
             is_run: true,
         }
         .to_string();
@@ -236,6 +283,7 @@ mod tests {
             worst: Vec::new(),
             gross: vec![gross],
             left: 0.9,
+            causes: LikelyCauses::default(),
             is_run: true,
         }
     }

@@ -56,18 +56,26 @@ fn check_beams<'a>(
 }
 
 fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
-    let places = beam.drift != BeamDriftName::Translating;
+    let is_turning = beam.drift != BeamDriftName::Translating;
+    // A beam that does not turn needs no ends; with both of them it can be told that it does.
+    let has_ends = beam.source_mm.is_some() || beam.end_mm.is_some();
+    let ends = is_turning || has_ends;
     let share = beam.drift == BeamDriftName::Mixed;
     for (key, is_there, needed) in [
-        ("source_mm", beam.source_mm.is_some(), places),
-        ("end_mm", beam.end_mm.is_some(), places),
+        ("source_mm", beam.source_mm.is_some(), ends),
+        ("end_mm", beam.end_mm.is_some(), ends),
         ("translation_share", beam.translation_share.is_some(), share),
     ] {
         match (is_there, needed) {
-            (false, true) => judge.say(
+            (false, true) if is_turning => judge.say(
                 "drift",
                 format!("a beam that drifts like this needs `{key}`"),
                 "add it",
+            ),
+            (false, true) => judge.say(
+                "drift",
+                format!("one end of the beam is given, `{key}` is not"),
+                "give both or none",
             ),
             (true, false) => judge.say(
                 key,
@@ -77,7 +85,7 @@ fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
             (true, true) | (false, false) => {}
         }
     }
-    if let (true, Some(source), Some(end)) = (places, beam.source_mm, beam.end_mm) {
+    if let (Some(source), Some(end)) = (beam.source_mm, beam.end_mm) {
         let apart = (end - source).abs();
         judge.within("end_mm", apart, 1e-3, 1e6);
     }

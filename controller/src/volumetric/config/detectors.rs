@@ -44,11 +44,12 @@ pub enum BeamDriftName {
 pub struct BeamConfig {
     /// How the beam moves when it moves: about its source, sideways as a whole, or both.
     pub drift: BeamDriftName,
-    /// Where the source is, by the axis's scale.
-    #[schemars(extend("x-range" = "unless `translating`"))]
+    /// Where the source is, by the axis's scale. With both ends of the beam readings that contradict each
+    /// other are also tried with another `drift`.
+    #[schemars(extend("x-range" = "needed unless `translating`; with `end_mm`"))]
     pub source_mm: Option<f64>,
     /// Where the end detector is, by the axis's scale.
-    #[schemars(extend("x-range" = "unless `translating`; elsewhere than the source"))]
+    #[schemars(extend("x-range" = "needed unless `translating`; elsewhere than the source"))]
     pub end_mm: Option<f64>,
     /// The share of the shift at the end that is sideways as a whole.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-range" = "with `mixed`, only then"))]

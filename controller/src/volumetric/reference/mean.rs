@@ -1,0 +1,49 @@
+//! The mean of samples that come one by one.
+
+/// Mean and standard uncertainty of the mean.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Mean {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Mean {
+    pub(super) fn add(&mut self, value: f64) {
+        self.count += 1.0;
+        let before = self.sum;
+        self.sum += value;
+        if self.count > 1.0 {
+            // Welford's update: what the value is off the mean before and after it.
+            let old = before / (self.count - 1.0);
+            self.squares += (value - old) * (value - self.mean());
+        }
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    pub(super) fn u(&self) -> f64 {
+        if self.count < 2.0 {
+            return 0.0;
+        }
+        (self.squares / (self.count - 1.0) / self.count).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_knows_how_sure_it_is() {
+        let mut mean = Mean::default();
+        for value in [1.0, 2.0, 3.0, 4.0] {
+            mean.add(value);
+        }
+        assert!((mean.mean() - 2.5).abs() < 1e-15);
+        // s² = 5/3, of the mean a quarter.
+        assert!((mean.u() - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+    }
+}
