@@ -6,6 +6,7 @@ use std::path::Path;
 
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
+use tests::Edit;
 
 use crate::programs::{Bench, Process, live_rigs, number};
 
@@ -40,6 +41,10 @@ fn keep(bench: &Bench) -> Process {
 fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
+        // A slow motion has all the time that it wants: the clock here is as fast as the computer.
+        bench.configure("machine.toml", |text| {
+            text.edit("move_timeout_s = 10.0", "move_timeout_s = 100000.0")
+        });
         let service = keep(&bench);
         let folder = bench.folder();
         let refused = bench.run(&["move", "machine.toml", "x=1mm"]);
@@ -71,6 +76,25 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
             let stands = number(&motion["axes"]["x"]["encoder"]["value"]);
             assert!((stands - mm).abs() < 0.001, "{motion}");
         }
+        let status = bench.run(&["status"]).with_code(0);
+        assert_eq!(status["machine"]["state"], "running", "{status}");
+        assert_eq!(status["axes"][0]["homed"], true, "{status}");
+        // Slowly: it would take minutes.
+        let body = json!({"targets": {"x": "60mm"}, "speed": "0.1mm/s"});
+        let (status, motion) = ask(folder, "POST /v1/motions", &body);
+        assert_eq!(status, 201, "{motion}");
+        bench.run(&["stop"]).with_code(0);
+        let id = motion["id"].as_str().expect("it has a name");
+        let (_, motion) = ask(
+            folder,
+            &format!("GET /v1/motions/{id}?wait_s=60"),
+            &json!({}),
+        );
+        assert_eq!(motion["state"], "stopped", "{motion}");
+        assert!(
+            motion["stopped"]["by"].to_string().contains("uid"),
+            "{motion}"
+        );
         service.signal(Signal::SIGTERM);
         let ended = service.end();
         assert_eq!(ended.code, Some(0), "{ended:?}");

@@ -1,5 +1,6 @@
 //! The command line. Its words are the cycle's own.
 
+mod ask;
 mod cal;
 mod check;
 mod data;
@@ -109,6 +110,16 @@ enum Command {
     },
     /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
     Serve(ServeArgs),
+    /// What a machine that is kept by a service does, and its axes.
+    Status(ServiceArgs),
+    /// Stop everything that a service moves; taken from anybody.
+    Stop {
+        #[command(flatten)]
+        service: ServiceArgs,
+        /// Quick stop, and every drive off; without it axes slow down and stay enabled.
+        #[arg(long)]
+        quick: bool,
+    },
     /// A self-contained HTML page of a run.
     Report(report::ReportArgs),
 }
@@ -338,6 +349,14 @@ struct ServeArgs {
     listen: Vec<String>,
 }
 
+/// A service that keeps a machine.
+#[derive(Clone, Debug, Args)]
+struct ServiceArgs {
+    /// Where it is found: what `truestage serve --listen` said.
+    #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
+    at: String,
+}
+
 /// Runs the command line of this process; `keep` keeps a machine for `truestage serve`.
 pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
     let cli = Cli::parse();
@@ -372,6 +391,8 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => data::plan(&command, output),
         Command::Iso230 { data } => data::iso230(&data, output),
+        Command::Status(service) => ask::status(&service, output),
+        Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
         Command::Report(args) => report::run(&args, output),
     };
