@@ -15,7 +15,7 @@ use units::Metres;
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
-use crate::platform::PlatformFailure;
+use crate::platform::{Explanation, PlatformFailure};
 use crate::rotary::RotaryFailure;
 use crate::store::StoreError;
 use crate::volumetric::{PathRefusal, VolumetricFailure};
@@ -243,6 +243,14 @@ pub enum Failure {
         axis: String,
         /// Why.
         source: compensator::screw::ScrewError,
+    },
+    /// A platform whose readings contradict its configuration by far.
+    #[error("platform: {explanation}; nothing was stored. {source}")]
+    Misdescribed {
+        /// What explains them, if anything.
+        explanation: Box<Explanation>,
+        /// What its calibration was refused for.
+        source: Box<Failure>,
     },
     /// A rotary table's error cannot be computed.
     #[error("{place}: {source}")]

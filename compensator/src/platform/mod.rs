@@ -22,7 +22,9 @@
 //!
 //! Absent: motion out of the plane, compliance, the straightness of the passive slides.
 
+pub mod cause;
 mod condition;
+mod datum;
 mod forward;
 mod presets;
 mod reach;

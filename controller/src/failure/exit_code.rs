@@ -13,6 +13,16 @@ impl Failure {
             Self::Platform(failure) => failure.exit_code(),
             Self::Table(failure) => failure.exit_code(),
             Self::Resumable { source, .. } => source.exit_code(),
+            Self::Misdescribed {
+                explanation,
+                source,
+            } => {
+                if explanation.names_a_cause() {
+                    2
+                } else {
+                    source.exit_code()
+                }
+            }
             Self::Volumetric(failure) => failure.exit_code(),
             #[cfg(feature = "emulator")]
             Self::Emulator(failure) => failure.exit_code(),

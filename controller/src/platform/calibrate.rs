@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use compensator::platform::Pose;
+use compensator::platform::cause::Sighting;
 use compensator::screw::Stroke;
 use compensator::screw::{
     self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier, patent,
@@ -67,10 +68,16 @@ impl AlignmentPlatform<'_> {
             .ok_or(missing("compensation"))?;
         self.check_single_screws(&plan)?;
         let mut journal = self.journal_header(store, "calibrate", plan.runs, None, None)?;
-        let measured = self.measure_screws(&plan, &mut journal);
-        let (strokes, closure) = measured.inspect_err(|it| note_failure(&mut journal, it))?;
-        let stored = self.fit_and_store(store, &journal, &plan, &strokes);
-        let screws = stored.inspect_err(|it| note_failure(&mut journal, it))?;
+        let mut sightings = Vec::new();
+        let done = self
+            .measure_screws(&plan, &mut journal, &mut sightings)
+            .and_then(|(strokes, closure)| {
+                let screws = self.fit_and_store(store, &journal, &plan, &strokes)?;
+                Ok((screws, closure))
+            });
+        let (screws, closure) = done
+            .map_err(|it| self.explained(it, &sightings))
+            .inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
         Ok(PlatformCalibrated {
             screws,
@@ -97,6 +104,7 @@ impl AlignmentPlatform<'_> {
         &mut self,
         plan: &PlatformCalibrateConfig,
         journal: &mut Journal<PlatformLog>,
+        sightings: &mut Vec<Sighting>,
     ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
         let count = self.state.screws.len();
         let targets = targets(plan);
@@ -106,9 +114,12 @@ impl AlignmentPlatform<'_> {
         for (at, strokes) in all.iter_mut().enumerate() {
             for run in 1..=plan.runs {
                 for (stroke, approach) in round(&targets, plan) {
-                    self.go_to_strokes(&alone(at, stroke, count), Correction::Off)?;
+                    let commanded = alone(at, stroke, count);
+                    self.go_to_strokes(&commanded, Correction::Off)?;
                     let Some(approach) = approach else { continue };
-                    strokes.push(self.measure_stroke(at, run, approach, stroke, journal)?);
+                    let seen = self.camera_pose(self.config.exposures)?;
+                    sightings.push(Sighting { commanded, seen });
+                    strokes.push(self.stroke_seen(at, run, approach, stroke, seen, journal)?);
                     done += 1;
                     let observer = self.core.observer();
                     observer.progress(Stage::Calibrate, "platform", done, total);
@@ -125,15 +136,17 @@ impl AlignmentPlatform<'_> {
         Ok((all, closure))
     }
 
-    fn measure_stroke(
-        &mut self,
+    /// What the pose that was seen says of a stroke, written down.
+    fn stroke_seen(
+        &self,
         at: usize,
         run: u32,
         approach: Approach,
         stroke: Metres,
+        seen: Pose,
         journal: &mut Journal<PlatformLog>,
     ) -> Result<Stroke, Failure> {
-        let pose = self.measure_pose()?;
+        let pose = seen.since(self.state.datum.ok_or(PlatformFailure::NotZeroed)?);
         let measured = self.state.kinematics.strokes(pose)[at];
         let axis = self.state.screws[at].axis.clone();
         journal.write(&PlatformEntry::Stroke(StrokeEntry {

@@ -6,7 +6,6 @@ use drivers::device::PoseReading;
 use crate::failure::Failure;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
-use crate::platform::state::from_datum;
 
 impl AlignmentPlatform<'_> {
     /// Where the platform is, seen from where its screws' zeros put it.
@@ -17,7 +16,7 @@ impl AlignmentPlatform<'_> {
         let datum = self.state.datum;
         let datum = datum.ok_or(PlatformFailure::NotZeroed)?;
         let exposures = self.config.exposures;
-        Ok(from_datum(self.camera_pose(exposures)?, datum))
+        Ok(self.camera_pose(exposures)?.since(datum))
     }
 
     /// Where the camera sees the platform, in the machine's frame.

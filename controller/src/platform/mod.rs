@@ -7,9 +7,11 @@
 
 mod agreement;
 pub(crate) mod calibrate;
+mod causes;
 pub(crate) mod check;
 pub(crate) mod config;
 mod entries;
+mod explanation;
 mod failure;
 #[cfg(test)]
 mod golden;
@@ -39,6 +41,7 @@ pub(crate) use config::{
     AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
 };
 pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+pub(crate) use explanation::Explanation;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
 pub(crate) use record::ScrewMethodName;

@@ -2,7 +2,7 @@
 
 use compensator::platform::{Actuator, Platform, PlatformError, Point, Pose};
 use compensator::screw::{Engagement, ScrewCompensation, ScrewMemory};
-use units::portable::{hypot, sin_cos};
+use units::portable::hypot;
 use units::{Metres, Radians};
 
 use crate::config::MachineConfig;
@@ -104,21 +104,6 @@ pub(crate) fn kinematics(
     Platform::new(actuators, platform.condition_max)
 }
 
-/// The displacement from the pose `datum` to the pose `seen`, as a motion of the platform's own
-/// frame: what lay at p then lies at t + R(angle)·p now.
-pub(crate) fn from_datum(seen: Pose, datum: Pose) -> Pose {
-    let angle = seen.angle - datum.angle;
-    // What the camera says jumps by a turn where its angles begin again.
-    let angle = angle - angle.whole_turns();
-    let (sin, cos) = sin_cos(angle.value());
-    let (x, y) = (datum.x.value(), datum.y.value());
-    Pose {
-        x: seen.x - Metres(cos * x - sin * y),
-        y: seen.y - Metres(sin * x + cos * y),
-        angle,
-    }
-}
-
 /// What a travel of a screw without a calibration leaves of its engagement: known once it is
 /// longer than any lost motion may be.
 pub(crate) fn engaged_by(
@@ -165,37 +150,6 @@ mod tests {
             y: Metres::from_um(y_um),
             angle: Radians::from_arcsec(arcsec),
         }
-    }
-
-    #[test]
-    fn a_body_that_was_seen_off_its_origin_is_followed_as_the_platform_moves() {
-        // The body's mark 50 mm off: a turn of 0.1 rad alone moves it by far.
-        let datum = Pose {
-            x: Metres::from_mm(50.0),
-            y: Metres::ZERO,
-            angle: Radians(0.01),
-        };
-        let (sin, cos) = 0.1_f64.sin_cos();
-        let seen = Pose {
-            x: Metres::from_mm(50.0 * cos + 1.0),
-            y: Metres::from_mm(50.0 * sin - 2.0),
-            angle: Radians(0.11),
-        };
-        let moved = from_datum(seen, datum);
-        assert!((moved.x.mm() - 1.0).abs() < 1e-9 && (moved.y.mm() + 2.0).abs() < 1e-9);
-        assert!((moved.angle.value() - 0.1).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_body_seen_across_the_seam_of_the_cameras_angles_has_turned_by_little() {
-        let half = core::f64::consts::PI;
-        let at = |angle| Pose {
-            angle: Radians(angle),
-            ..Pose::default()
-        };
-        let moved = from_datum(at(-half + 0.001), at(half - 0.002));
-        assert!((moved.angle.value() - 0.003).abs() < 1e-12);
-        assert!(moved.x.abs() < Metres(1e-12) && moved.y.abs() < Metres(1e-12));
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod linear_zero;
 mod patience;
 mod pinned;
 mod platform;
+mod platform_causes;
 mod platform_knowledge;
 mod repeatable;
 mod rotary;

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use units::{Metres, Radians};
 use wire::in_sight::Cell;
 
-use super::{CameraConfig, Family};
+use super::{CameraConfig, CameraKeys, Family};
 use crate::config::judge::Judge;
 use crate::hardware::CHECKED;
 
@@ -93,5 +93,14 @@ impl Family for InSightConfig {
 
     fn driver(&self, common: &CameraConfig, patience: Patience) -> Box<dyn PoseInstrument> {
         Box::new(InSight::new(self.settings(common, patience)))
+    }
+
+    fn keys(&self) -> CameraKeys {
+        CameraKeys {
+            length_um_per_unit: self.length_um_per_unit,
+            angle_arcsec_per_unit: self.angle_arcsec_per_unit,
+            rotation: Radians::from_degrees(self.rotation_deg),
+            mirrored: self.mirrored,
+        }
     }
 }

@@ -8,6 +8,7 @@ use drivers::device::PoseInstrument;
 use machine::Patience;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use units::Radians;
 
 use super::bus::Wiring;
 use crate::config::judge::Judge;
@@ -34,6 +35,18 @@ pub(crate) trait Family {
 
     /// Its driver; the configuration has been checked.
     fn driver(&self, common: &CameraConfig, patience: Patience) -> Box<dyn PoseInstrument>;
+
+    /// What turns its numbers into poses.
+    fn keys(&self) -> CameraKeys;
+}
+
+/// What turns a camera's numbers into poses: the keys of this name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CameraKeys {
+    pub(crate) length_um_per_unit: f64,
+    pub(crate) angle_arcsec_per_unit: f64,
+    pub(crate) rotation: Radians,
+    pub(crate) mirrored: bool,
 }
 
 impl CameraDevice {
@@ -75,6 +88,11 @@ impl CameraConfig {
     /// How long one picture may take.
     pub(crate) fn inspection_timeout(&self) -> Duration {
         Duration::from_secs_f64(self.inspection_timeout_ms * 1e-3)
+    }
+
+    /// What turns its numbers into poses.
+    pub(crate) fn keys(&self) -> CameraKeys {
+        self.device.family().keys()
     }
 
     /// Judges what its keys must keep to together.
