@@ -15,6 +15,7 @@ use units::Metres;
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
+use crate::linear::PatternFinding;
 use crate::platform::{Explanation, PlatformFailure};
 use crate::rotary::RotaryFailure;
 use crate::store::StoreError;
@@ -67,6 +68,35 @@ pub enum Failure {
         axis: String,
         /// Step and values.
         source: Box<SearchFailure>,
+    },
+    /// The search failed, as the magnets are elsewhere.
+    #[error("axis {axis}: {finding}. {source}")]
+    PatternElsewhere {
+        /// Which axis.
+        axis: String,
+        /// Where they are, and what that says of the axis.
+        finding: Box<PatternFinding>,
+        /// Step and values.
+        source: Box<SearchFailure>,
+    },
+    /// The axis moved farther than its travel and met no limit switch.
+    #[error(
+        "axis {axis}: moved {:.3} mm by its encoder and met no limit switch, its soft limits are {:.3} mm \
+         apart: resolution is probably below `resolution_nm = {:.3}` in [axis.{axis}] (it is {}), or the switch \
+         is not connected. {source}",
+        moved.mm(), travel.mm(), resolution_nm * (*travel / *moved), units::Short(*resolution_nm)
+    )]
+    NoLimitSwitch {
+        /// Which axis.
+        axis: String,
+        /// By its encoder.
+        moved: Metres,
+        /// From one soft limit to the other.
+        travel: Metres,
+        /// One count as configured, nanometres.
+        resolution_nm: f64,
+        /// How long it looked.
+        source: Box<Failure>,
     },
     /// The settings of the Hall search cannot work.
     #[error("axis {axis}: {source}")]

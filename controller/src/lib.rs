@@ -50,6 +50,7 @@ pub mod emulated;
 mod failure;
 mod handle;
 mod hardware;
+mod homing;
 mod kinds;
 pub mod linear;
 pub mod platform;

@@ -259,8 +259,8 @@ fn an_encoder_whose_counts_are_taken_for_another_length_makes_no_zero() {
     for resolution in ["resolution_nm = 20.0 ", "resolution_nm = 25.4 "] {
         let scene = Scene::during(Phase::Zero).machine("resolution_nm = 10.0 ", resolution);
         let wanted = Wanted {
-            cause: |failure| matches!(failure, Failure::Search { .. }),
-            words: &["axis x", "hall zero"],
+            cause: |failure| matches!(failure, Failure::PatternElsewhere { .. }),
+            words: &["axis x", "resolution is probably", "hall zero"],
             within: WHOLE,
             rest: WHOLE,
         };

@@ -23,6 +23,9 @@
 //! sensors are recognised and named ([`diagnose`]); [`refine`] uses every sample of the search
 //! and states its standard uncertainty.
 //!
+//! A pattern that is not where the search looks for it is recognised in a pass over the travel ([`pattern`]),
+//! and its place and direction name a wrong scale or direction of the axis ([`mistake`]).
+//!
 //! Absent: motion itself (the search says where to move and when to stand), rotational degrees
 //! of freedom (zero two points), trending of the drift between zeroings.
 
@@ -35,6 +38,7 @@ mod search;
 mod sensor;
 mod series;
 mod settings;
+mod survey;
 
 pub use diagnose::{SensorFault, diagnose};
 pub use failure::{Reason, SearchFailure, Step};
@@ -47,6 +51,7 @@ pub use search::{Held, Outcome, Progress, Sample, Search};
 pub use sensor::Sensor;
 pub use series::{HallPoint, HallSeries, HallSeriesError};
 pub use settings::{Settings, SettingsError};
+pub use survey::{Mistake, Pattern, mistake, pattern};
 
 #[cfg(test)]
 mod rig;

@@ -28,6 +28,8 @@ impl Failure {
             Self::Emulator(failure) => failure.exit_code(),
             Self::Config(_)
             | Self::NotConfigured { .. }
+            | Self::PatternElsewhere { .. }
+            | Self::NoLimitSwitch { .. }
             | Self::Figures(_)
             | Self::Data(_)
             | Self::Series(_)

@@ -10,6 +10,7 @@ mod cross_check;
 mod datum;
 mod datum_in_use;
 pub(crate) mod entries;
+mod finding;
 #[cfg(test)]
 mod golden;
 mod kind;
@@ -22,6 +23,7 @@ mod run_plan;
 pub(crate) mod settings;
 mod sound;
 mod stage;
+mod survey;
 mod table_correction;
 mod travel;
 mod verify;
@@ -43,6 +45,7 @@ pub(crate) use config::{
 };
 pub(crate) use datum_in_use::Datum;
 pub(crate) use entries::{PointEntry, ZeroEntry};
+pub(crate) use finding::PatternFinding;
 pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;

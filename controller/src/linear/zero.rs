@@ -18,6 +18,7 @@ use units::{Approach, Metres, MetresPerSecond, Time, Volts};
 use crate::assemble;
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::homing;
 use crate::linear::ZeroConfig;
 use crate::linear::ZeroEntry;
 use crate::linear::stage::LinearStage;
@@ -127,18 +128,15 @@ impl LinearStage<'_> {
     }
 
     /// Coarse reference on the negative limit switch.
-    fn reference(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
+    pub(super) fn reference(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
+        let start = homing::place(&self.core, self.axis)?;
         let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
         let limit = self.config.reference_limit().unwrap_or_default();
         let position = Metres::from_mm(config.negative_limit_mm);
-        self.core.command(
-            self.axis,
-            AxisCommand::HomeNegativeLimit { position, speed },
-            "reference",
-            limit,
-        )?;
-        self.core.forget_approach(self.axis)?;
-        Ok(())
+        let command = AxisCommand::HomeNegativeLimit { position, speed };
+        let done = self.core.command(self.axis, command, "reference", limit);
+        done.map_err(|failure| homing::explained(&self.core, self.axis, start, failure.into()))?;
+        Ok(self.core.forget_approach(self.axis)?)
     }
 
     /// Runs the patent's search, one step a sample.
@@ -166,10 +164,7 @@ impl LinearStage<'_> {
                 Some(Progress::Failed(source)) => {
                     self.core
                         .command(self.axis, DriveCommand::Halt, "halt", STOP_LIMIT)?;
-                    return Err(Failure::Search {
-                        axis: self.axis.to_owned(),
-                        source,
-                    });
+                    return Err(self.explained_search(config, &settings, source));
                 }
                 Some(step) => self.obey(&step, &mut motion)?,
             }
@@ -222,7 +217,7 @@ impl LinearStage<'_> {
     }
 
     /// How often a position and voltages that belong to it are read.
-    fn sampling(&self, config: &ZeroConfig) -> Duration {
+    pub(super) fn sampling(&self, config: &ZeroConfig) -> Duration {
         let node = self.config.node();
         let bus = &node.expect("the check asks for a drive on CAN").bus;
         let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
@@ -232,7 +227,7 @@ impl LinearStage<'_> {
     }
 
     /// Goes to `end`; what was read on the way.
-    fn pass(
+    pub(super) fn pass(
         &mut self,
         config: &ZeroConfig,
         end: Metres,

@@ -10,6 +10,7 @@ use units::{Metres, MetresPerSecond};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::homing;
 use crate::platform::PlatformEntry;
 use crate::platform::PoseEntry;
 use crate::platform::handle::AlignmentPlatform;
@@ -78,9 +79,9 @@ impl AlignmentPlatform<'_> {
         let speed = MetresPerSecond(zero.search_speed_mm_per_s * 1e-3);
         let limit = Duration::from_secs_f64(zero.time_limit_s);
         let command = AxisCommand::HomeIndex { position, speed };
-        Ok(self
-            .core
-            .command(axis, command, "home on the index", limit)?)
+        let start = homing::place(&self.core, axis)?;
+        let done = self.core.command(axis, command, "home on the index", limit);
+        done.map_err(|failure| homing::explained(&self.core, axis, start, failure.into()))
     }
 
     /// All screws to their zero from below, so that all lean on the same flank as ever.

@@ -2,6 +2,7 @@
 //! of the tests on SocketCAN leaves this module out by its name.
 
 mod linear;
+mod linear_causes;
 mod linear_zero;
 mod patience;
 mod pinned;
