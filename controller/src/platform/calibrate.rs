@@ -90,14 +90,18 @@ impl AlignmentPlatform<'_> {
     /// Refused before the first of them moves, not in the middle of its run.
     fn check_single_screws(&self, plan: &PlatformCalibrateConfig) -> Result<(), Failure> {
         let count = self.state.screws.len();
-        let stops = round(&targets(plan), plan);
         for at in 0..count {
-            for (stroke, _) in &stops {
+            for (stroke, _) in &round(&self.targets(at, plan), plan) {
                 let strokes = alone(at, *stroke, count);
                 self.check_agreement(Pose::default(), &strokes, "; nothing was moved")?;
             }
         }
         Ok(())
+    }
+
+    /// The strokes that screw number `at` is calibrated at.
+    fn targets(&self, at: usize, plan: &PlatformCalibrateConfig) -> Vec<Metres> {
+        plan.strokes_of(&self.config.actuator[at]).targets()
     }
 
     fn measure_screws(
@@ -107,13 +111,14 @@ impl AlignmentPlatform<'_> {
         sightings: &mut Vec<Sighting>,
     ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
         let count = self.state.screws.len();
-        let targets = targets(plan);
-        let total = (count * targets.len() * 2) as u64 * u64::from(plan.runs);
+        let targets: Vec<_> = (0..count).map(|at| self.targets(at, plan)).collect();
+        let stops: usize = targets.iter().map(|it| 2 * it.len()).sum();
+        let total = stops as u64 * u64::from(plan.runs);
         let mut all = vec![Vec::new(); count];
         let mut done = 0;
         for (at, strokes) in all.iter_mut().enumerate() {
             for run in 1..=plan.runs {
-                for (stroke, approach) in round(&targets, plan) {
+                for (stroke, approach) in round(&targets[at], plan) {
                     let commanded = alone(at, stroke, count);
                     self.go_to_strokes(&commanded, Correction::Off)?;
                     let Some(approach) = approach else { continue };
@@ -319,14 +324,6 @@ impl AlignmentPlatform<'_> {
         }
         Ok(loaded)
     }
-}
-
-/// The strokes of a run, increasing.
-pub(crate) fn targets(plan: &PlatformCalibrateConfig) -> Vec<Metres> {
-    let steps = ((plan.last_mm - plan.first_mm) / plan.step_mm + 1e-9).floor() as u32;
-    (0..=steps)
-        .map(|step| Metres::from_mm(plan.first_mm + f64::from(step) * plan.step_mm))
-        .collect()
 }
 
 /// One of `count` screws at `stroke`, the others at zero.

@@ -6,7 +6,7 @@ use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::platform::config::{PlatformCalibrateConfig, PlatformConfig};
+use crate::platform::config::{PlatformCalibrateConfig, PlatformConfig, StrokesConfig};
 use crate::platform::kinematics;
 
 pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -17,7 +17,8 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_references(findings, config, platform);
     if let Some(run) = &platform.calibrate {
         let judge = &mut Judge::at("platform.calibrate".into(), findings);
-        check_calibrate(judge, config, platform, run);
+        check_calibrate(judge, platform, run);
+        check_travel(findings, config, platform, run);
     }
     if platform.calibrate.is_some() && platform.compensation.is_none() {
         Judge::at("platform".into(), findings).say(
@@ -110,17 +111,10 @@ fn check_references(
 
 fn check_calibrate(
     judge: &mut Judge<'_>,
-    config: &MachineConfig,
     platform: &PlatformConfig,
     run: &PlatformCalibrateConfig,
 ) {
-    judge.below(("first_mm", run.first_mm), ("last_mm", run.last_mm));
-    judge.within(
-        "step_mm",
-        run.step_mm,
-        1e-6,
-        (run.last_mm - run.first_mm).max(1e-6),
-    );
+    check_strokes(judge, run.strokes_of_all());
     let lost_motion_um = platform
         .compensation
         .as_ref()
@@ -131,12 +125,40 @@ fn check_calibrate(
         (lost_motion_um * 1e-3).max(1e-6),
         1e3,
     );
-    for actuator in &platform.actuator {
+}
+
+fn check_strokes(judge: &mut Judge<'_>, strokes: StrokesConfig) {
+    let StrokesConfig {
+        first_mm,
+        last_mm,
+        step_mm,
+    } = strokes;
+    judge.below(("first_mm", first_mm), ("last_mm", last_mm));
+    judge.within("step_mm", step_mm, 1e-6, (last_mm - first_mm).max(1e-6));
+}
+
+/// The strokes of each screw, its own or those of all, stay within its soft limits.
+fn check_travel(
+    findings: &mut Vec<Finding>,
+    config: &MachineConfig,
+    platform: &PlatformConfig,
+    run: &PlatformCalibrateConfig,
+) {
+    for (at, actuator) in platform.actuator.iter().enumerate() {
+        let place = match &actuator.strokes {
+            None => "platform.calibrate".to_owned(),
+            Some(_) => format!("platform.actuator[{at}].strokes"),
+        };
+        let judge = &mut Judge::at(place, findings);
+        let strokes = run.strokes_of(actuator);
+        if actuator.strokes.is_some() {
+            check_strokes(judge, strokes);
+        }
         let Some(axis) = config.axis.get(&actuator.axis) else {
             continue;
         };
-        let fits = run.first_mm - run.overrun_mm >= axis.motion.soft_min_mm
-            && run.last_mm + run.overrun_mm <= axis.motion.soft_max_mm;
+        let fits = strokes.first_mm - run.overrun_mm >= axis.motion.soft_min_mm
+            && strokes.last_mm + run.overrun_mm <= axis.motion.soft_max_mm;
         if !fits {
             judge.say(
                 "",

@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use units::Metres;
 
 /// An alignment platform on screws (system S1).
 ///
@@ -85,6 +86,32 @@ pub struct ActuatorConfig {
     /// The coordinate of the first index pulse off the negative limit switch.
     #[schemars(range(min = -10000.0, max = 10000.0), extend("x-range" = "below `soft_max_mm`"))]
     pub index_mm: f64,
+    /// Strokes of its own for `calibrate`, in place of those of all.
+    pub strokes: Option<StrokesConfig>,
+}
+
+/// The strokes that one screw is calibrated at, in place of those of `[platform.calibrate]`.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StrokesConfig {
+    /// The first stroke.
+    #[schemars(extend("x-range" = "within the soft limits"))]
+    pub first_mm: f64,
+    /// The last one.
+    #[schemars(extend("x-range" = "within the soft limits"))]
+    pub last_mm: f64,
+    /// From one to the next.
+    pub step_mm: f64,
+}
+
+impl StrokesConfig {
+    /// These strokes, increasing.
+    pub(crate) fn targets(self) -> Vec<Metres> {
+        let steps = ((self.last_mm - self.first_mm) / self.step_mm + 1e-9).floor() as u32;
+        (0..=steps)
+            .map(|step| Metres::from_mm(self.first_mm + f64::from(step) * self.step_mm))
+            .collect()
+    }
 }
 
 /// How the screws get their origin: the index pulse off the negative limit switch.
@@ -125,7 +152,7 @@ pub struct PlatformCalibrateConfig {
     /// All strokes with periodic terms where significant, or the means of the patent (over strokes
     /// reached in reverse).
     pub method: ScrewMethodName,
-    /// The first stroke of each screw.
+    /// The first stroke of each screw that has no `strokes` of its own.
     #[schemars(extend("x-range" = "within the soft limits"))]
     pub first_mm: f64,
     /// The last one.
@@ -150,6 +177,22 @@ pub struct PlatformCalibrateConfig {
     #[serde(default = "significance")]
     #[schemars(range(min = 1e-09, max = 0.5))]
     pub significance: f64,
+}
+
+impl PlatformCalibrateConfig {
+    /// The strokes of screws that have none of their own.
+    pub(crate) const fn strokes_of_all(&self) -> StrokesConfig {
+        StrokesConfig {
+            first_mm: self.first_mm,
+            last_mm: self.last_mm,
+            step_mm: self.step_mm,
+        }
+    }
+
+    /// What this screw is calibrated at: its own strokes, or those of all.
+    pub(crate) fn strokes_of(&self, actuator: &ActuatorConfig) -> StrokesConfig {
+        actuator.strokes.unwrap_or(self.strokes_of_all())
+    }
 }
 
 const fn harmonics_max() -> u32 {

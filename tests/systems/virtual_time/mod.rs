@@ -9,6 +9,7 @@ mod pinned;
 mod platform;
 mod platform_causes;
 mod platform_knowledge;
+mod platform_strokes;
 mod repeatable;
 mod rotary;
 mod rotary_table;

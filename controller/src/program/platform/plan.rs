@@ -9,7 +9,6 @@ use units::{Metres, Short};
 use crate::Failure;
 use crate::config::MachineConfig;
 use crate::platform::PlatformCalibrateConfig;
-use crate::platform::calibrate::targets;
 use crate::platform::config::{ActuatorConfig, ScrewMethodName as ScrewMethod};
 use crate::program::output::{Ended, Output};
 
@@ -162,7 +161,7 @@ pub(crate) fn notes(config: &MachineConfig) -> Vec<String> {
 
 fn doubt(actuator: &ActuatorConfig, run: &PlatformCalibrateConfig) -> Option<String> {
     let lead = Metres::from_mm(actuator.lead_mm);
-    let strokes = targets(run);
+    let strokes = run.strokes_of(actuator).targets();
     let doubt = match run.method {
         ScrewMethod::Patent => doubt_of_means(&strokes, lead),
         ScrewMethod::LeastSquares => doubt_of_least_squares(&strokes, lead, run.harmonics_max),
@@ -250,6 +249,20 @@ mod tests {
                 "{part}: {notes:?}"
             );
         }
+    }
+
+    #[test]
+    fn strokes_of_its_own_are_judged_for_the_screw_that_has_them() {
+        let w = "point_mm = [0.0, -80.0]\ndirection = [0.0, 1.0]\nlead_mm = 2.0\nindex_mm = -4.0\n";
+        let own = |step: &str| {
+            let ends = "first_mm = -2.0\nlast_mm = 2.0";
+            format!("{w}[platform.actuator.strokes]\n{ends}\nstep_mm = {step}\n")
+        };
+        check(&[(w, &own("0.23"))], &[]);
+        check(
+            &[(w, &own("0.5"))],
+            &["axis w: warning: 9 strokes at a lead of 2 mm cannot show the harmonics [2, 3]"],
+        );
     }
 
     #[test]
