@@ -114,6 +114,24 @@ pub enum Failure {
         /// Where, and what is calibrated.
         source: compensator::error_table::OutOfRange,
     },
+    /// An input that a job waits for did not show what was wanted.
+    #[error(
+        "axis {axis}: point {point} of the job: {wanted} was wanted within {} s; {}; the axis was stopped where it \
+         stood. Look at what drives the input; `within_s` says how long it is waited for",
+        units::Short(within.as_secs_f64()), advice::of_input(*seen)
+    )]
+    InputNotSeen {
+        /// Which axis.
+        axis: String,
+        /// Which point.
+        point: String,
+        /// The input and its level.
+        wanted: String,
+        /// What it showed last, if anything.
+        seen: Option<units::Volts>,
+        /// How long it was waited for.
+        within: core::time::Duration,
+    },
     /// A position of the error table does not fit its neighbours.
     #[error("axis {axis}: {source}{}", advice::of_stand_off(axis, source))]
     StandsOff {

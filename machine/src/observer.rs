@@ -11,6 +11,8 @@ pub enum Stage {
     Calibrate,
     /// Measuring to judge.
     Verify,
+    /// Going from point to point of a job.
+    Job,
 }
 
 impl Stage {
@@ -21,6 +23,7 @@ impl Stage {
             Self::Reference => "reference",
             Self::Calibrate => "calibrate",
             Self::Verify => "verify",
+            Self::Job => "run",
         }
     }
 }

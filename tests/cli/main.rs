@@ -6,6 +6,7 @@ mod demo;
 mod example;
 mod examples;
 mod interrupted;
+mod job;
 mod platform;
 mod programs;
 mod rotary;

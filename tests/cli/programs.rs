@@ -282,7 +282,15 @@ impl Bench {
     pub(crate) fn start(&self, words: &[&str]) -> Process {
         let mut command = self.command();
         command.arg(words[0]);
-        let uses_machine = ["scan", "zero", "calibrate", "verify", "move", "serve"];
+        let uses_machine = [
+            "scan",
+            "zero",
+            "calibrate",
+            "verify",
+            "move",
+            "run",
+            "serve",
+        ];
         if uses_machine.contains(&words[0]) {
             command.args(["--clock", LOCKSTEP]);
             let machine = self.shipped.machine;

@@ -24,10 +24,10 @@ impl<'a> Judge<'a> {
     }
 
     pub(crate) fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
-        let key = if key.is_empty() {
-            self.prefix.clone()
-        } else {
-            format!("{}.{key}", self.prefix)
+        let key = match (self.prefix.as_str(), key) {
+            (prefix, "") => prefix.to_owned(),
+            ("", key) => key.to_owned(),
+            (prefix, key) => format!("{prefix}.{key}"),
         };
         self.findings.push(Finding {
             key,

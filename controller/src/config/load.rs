@@ -3,6 +3,9 @@
 use std::path::Path;
 
 use machine::records::ConfigHash;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
@@ -64,30 +67,53 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
+    let config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
+    Ok(Loaded {
+        hash: hash_of(&config),
+        config,
+        patience: Patience::NONE,
+    })
+}
+
+/// Reads a text that is not a machine's by the declarations of `C`, and lets `judge` find what cannot be; `file` is
+/// its name in findings.
+///
+/// # Errors
+/// As [`parse`].
+pub(crate) fn read<C: DeserializeOwned + JsonSchema>(
+    text: &str,
+    file: &str,
+    judge: impl FnOnce(&C) -> Vec<Finding>,
+) -> Result<C, ConfigError> {
+    read_by(text, file, &schema::inline_of::<C>(), judge)
+}
+
+fn read_by<C: DeserializeOwned>(
+    text: &str,
+    file: &str,
+    schema: &Value,
+    judge: impl FnOnce(&C) -> Vec<Finding>,
+) -> Result<C, ConfigError> {
     let document: toml::Table = toml::from_str(text).map_err(|error| syntax(text, file, &error))?;
-    let mut findings = structure::judge(&document, schema::inline());
+    let mut findings = structure::judge(&document, schema);
     let is_readable = findings.iter().all(|(_, part)| *part == Part::Size);
-    let config: MachineConfig = match toml::from_str(text) {
+    let config: C = match toml::from_str(text) {
         Ok(config) if is_readable => config,
         // The schema is made of the same declarations: what it lets pass can be read.
         Err(error) if findings.is_empty() => return Err(syntax(text, file, &error)),
         Ok(_) | Err(_) => return Err(invalid(text, file, findings)),
     };
     let impossible: Vec<_> = findings.iter().map(|(it, _)| it.key.clone()).collect();
-    for finding in validate(&config) {
+    for finding in judge(&config) {
         // What is impossible by itself is told once, and not again of the section around it.
         if !impossible.iter().any(|key| is_within(key, &finding.key)) {
             findings.push((finding, Part::Value));
         }
     }
-    if !findings.is_empty() {
-        return Err(invalid(text, file, findings));
+    match findings.is_empty() {
+        true => Ok(config),
+        false => Err(invalid(text, file, findings)),
     }
-    Ok(Loaded {
-        hash: hash_of(&config),
-        config,
-        patience: Patience::NONE,
-    })
 }
 
 /// Whether `key` is `section` or stands in it.

@@ -31,5 +31,6 @@ pub(crate) use crate::hardware::drive::*;
 pub(crate) use crate::hardware::instrument::*;
 pub(crate) use crate::hardware::node::IdentityConfig;
 pub(crate) use axis::AxisConfig;
+pub(crate) use load::read;
 pub(crate) use machine::records::ConfigHash;
 pub(crate) use model::MachineSection;

@@ -5,14 +5,13 @@ use core::fmt::Write as _;
 use serde_json::Value;
 use units::Short;
 
-use super::schema::{self, DEVICE, type_of, without_null};
+use super::schema::{DEVICE, type_of, without_null};
 
 /// Every section with its keys, as Markdown.
-pub(crate) fn markdown() -> String {
-    let schema = schema::schema();
-    let reference = Reference { schema: &schema };
-    let mut text = reference.keys(&schema);
-    reference.sections("", &schema, &mut text);
+pub(crate) fn markdown(schema: &Value) -> String {
+    let reference = Reference { schema };
+    let mut text = reference.keys(schema);
+    reference.sections("", schema, &mut text);
     text
 }
 

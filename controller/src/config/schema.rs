@@ -13,6 +13,7 @@
 
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
@@ -23,21 +24,30 @@ pub(super) const DEVICE: &str = "device";
 
 /// The schema, each part where it is used; made once, because a program may read many files.
 pub(super) fn inline() -> &'static Value {
-    static INLINE: LazyLock<Value> = LazyLock::new(|| settings_of(true));
+    static INLINE: LazyLock<Value> = LazyLock::new(|| settings_of::<MachineConfig>(true));
     &INLINE
+}
+
+/// That of another file than a machine's.
+pub(super) fn inline_of<C: JsonSchema>() -> Value {
+    settings_of::<C>(true)
 }
 
 /// The schema as editors take it, each part once.
 #[cfg(test)]
 pub(crate) fn schema() -> Value {
-    settings_of(false)
+    settings_of::<MachineConfig>(false)
 }
 
-fn settings_of(inline: bool) -> Value {
+/// That of a job, each part once.
+#[cfg(test)]
+pub(crate) fn schema_of<C: JsonSchema>() -> Value {
+    settings_of::<C>(false)
+}
+
+fn settings_of<C: JsonSchema>(inline: bool) -> Value {
     let settings = SchemaSettings::draft2020_12().with(|it| it.inline_subschemas = inline);
-    let schema = settings
-        .into_generator()
-        .into_root_schema_for::<MachineConfig>();
+    let schema = settings.into_generator().into_root_schema_for::<C>();
     schema.to_value()
 }
 

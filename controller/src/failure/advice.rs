@@ -1,8 +1,8 @@
 //! Which key of the configuration would let a refused table pass, and whether that is wise.
 
 use compensator::error_table::{CompensationError, StandOff};
-use units::Metres;
 use units::portable::{log10, powi};
+use units::{Metres, Volts};
 
 /// What to do about a position that stands off its neighbours.
 pub(super) fn of_stand_off(axis: &str, refused: &StandOff) -> String {
@@ -75,6 +75,13 @@ pub(crate) fn rounded_up(value: f64) -> String {
     let decimals = (-log10(digit).round()).max(0.0) as usize;
     // A hair more, so that what is printed is never the limit itself.
     format!("{:.decimals$}", ((value * 1.001) / digit).ceil() * digit)
+}
+
+/// What an input showed last.
+pub(super) fn of_input(seen: Option<Volts>) -> String {
+    seen.map_or("it was never sampled there".into(), |it| {
+        format!("it showed {:.3} V last", it.value())
+    })
 }
 
 #[cfg(test)]

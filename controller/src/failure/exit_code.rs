@@ -57,6 +57,7 @@ impl Failure {
             | Self::ScaleMismatch { .. } => 3,
             Self::Open(_)
             | Self::FringeJump { .. }
+            | Self::InputNotSeen { .. }
             | Self::Search { .. }
             | Self::NoLines { .. }
             | Self::Correction { .. }

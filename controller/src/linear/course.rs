@@ -118,22 +118,36 @@ impl Course {
         (target, length): (Metres, Metres),
         correction: Correction,
     ) -> Result<Arrival, Failure> {
-        machine.check_soft_limits(axis, target)?;
         let speed = self.speed(machine, axis, correction)?;
+        let here = machine.reading(axis)?.map(|reading| reading.position);
+        let start = started(&machine.approach(axis)?, here);
+        let is_free = |place| Ok(machine.check_soft_limits(axis, place)?);
+        let (from, set_point) =
+            self.arrival((axis, &start), (target, length), correction, &is_free)?;
+        Ok(Arrival {
+            from,
+            set_point,
+            speed,
+        })
+    }
+
+    /// Where an approach over `length` to `target` begins, and where it ends, for an axis that was brought where it
+    /// is as `start` says; `is_free` refuses places that the axis must not go to.
+    pub(crate) fn arrival(
+        &self,
+        (axis, start): (&str, &ApproachTracker),
+        (target, length): (Metres, Metres),
+        correction: Correction,
+        is_free: &dyn Fn(Metres) -> Result<(), Failure>,
+    ) -> Result<(Metres, Metres), Failure> {
+        is_free(target)?;
         let from_side = |side: Approach| {
             let set_point = self.set_point_from(axis, target, side, correction)?;
             let from = set_point - length * side.sign();
-            let is_free = machine.check_soft_limits(axis, set_point);
-            is_free.and_then(|()| machine.check_soft_limits(axis, from))?;
-            Ok(Arrival {
-                from,
-                set_point,
-                speed,
-            })
+            is_free(set_point).and_then(|()| is_free(from))?;
+            Ok((from, set_point))
         };
-        let here = machine.reading(axis)?.map(|reading| reading.position);
-        let usual = started(&machine.approach(axis)?, here).approach_of(target);
-        let usual = usual.unwrap_or(Approach::Forward);
+        let usual = start.approach_of(target).unwrap_or(Approach::Forward);
         from_side(usual).or_else(|_: Failure| from_side(opposite(usual)))
     }
 
@@ -265,7 +279,7 @@ const fn opposite(side: Approach) -> Approach {
 }
 
 /// `tracker`, which with no motion remembered (after a zero) starts `here`.
-fn started(tracker: &ApproachTracker, here: Option<Metres>) -> ApproachTracker {
+pub(super) fn started(tracker: &ApproachTracker, here: Option<Metres>) -> ApproachTracker {
     let mut from = *tracker;
     if from == ApproachTracker::new()
         && let Some(here) = here
@@ -280,7 +294,7 @@ fn started(tracker: &ApproachTracker, here: Option<Metres>) -> ApproachTracker {
 /// Which side that is depends on the set-point itself: over less than the deviation, target and
 /// set-point may lie on different sides of where the axis is. With no motion remembered (after
 /// a zero), `here` says where it starts.
-fn set_point_of(
+pub(super) fn set_point_of(
     compensation: &Compensation,
     tracker: &ApproachTracker,
     here: Option<Metres>,

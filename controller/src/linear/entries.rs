@@ -56,3 +56,63 @@ pub struct ZeroEntry {
     /// Monotonic time of the machine, seconds.
     pub at_s: f64,
 }
+
+/// What a job is: the first line of its journal after the header.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JobEntry {
+    /// What its points are called, in order; where they are, the header says.
+    pub names: Vec<String>,
+    /// How often they are gone through.
+    pub repetitions: u32,
+    /// How long the axis stands before its place is read, seconds.
+    pub settle_s: f64,
+    /// Where the axis goes at the end, metres, where it is told to.
+    pub end_m: Option<f64>,
+}
+
+/// A point of a job that was reached, written before the next one is wanted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReachedEntry {
+    /// Which repetition, from 1.
+    pub repetition: u32,
+    /// Which point, from 1.
+    pub number: usize,
+    /// `+` or `-`.
+    pub approach: char,
+    /// Where it should be, metres.
+    pub target_m: f64,
+    /// The calibrated positions before and behind it, metres; `None` beyond the calibrated range.
+    pub interval_m: Option<[f64; 2]>,
+    /// What the drive was sent, metres.
+    pub set_point_m: f64,
+    /// What the encoder said, metres.
+    pub encoder_m: f64,
+    /// Where the point itself stands by encoder and calibration, metres.
+    pub place_m: Option<f64>,
+    /// Standard uncertainty of that, metres; `None` where none is stated.
+    pub u_m: Option<f64>,
+    /// The same expanded (k = 2), metres.
+    pub expanded_u_m: Option<f64>,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+/// The next point of a job was wanted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WentOnEntry {
+    /// Which repetition, from 1.
+    pub repetition: u32,
+    /// From which point, from 1.
+    pub number: usize,
+    /// `time`, `operator` or `input`.
+    pub by: String,
+    /// How long the axis stood there, seconds.
+    pub waited_s: f64,
+    /// What the input showed, volts, where one was waited for.
+    pub seen_v: Option<f64>,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}

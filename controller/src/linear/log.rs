@@ -1,10 +1,13 @@
 //! Journals of a linear axis: each line by itself, and against those before it.
 
-use machine::records::sound::{ERROR_U_M, Judged, PLACE_M, SECONDS, VOLTS, approach, is, number};
+use machine::records::sound::{
+    ERROR_U_M, Judged, PASSES_MAX, PLACE_M, SECONDS, VOLTS, approach, as_many, counted, is, number,
+    numbers, once, optional, unsound,
+};
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
 
-use crate::linear::{PointEntry, ZeroEntry};
+use crate::linear::{JobEntry, PointEntry, ReachedEntry, WentOnEntry, ZeroEntry};
 
 /// A line of such a journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,6 +19,12 @@ pub enum LinearEntry {
     Zero(ZeroEntry),
     /// A run is whole, and the place of its datum still reads what it should.
     Closed(ClosureEntry),
+    /// What a job is.
+    Job(JobEntry),
+    /// A point of it was reached.
+    Reached(ReachedEntry),
+    /// The next point of it was wanted.
+    WentOn(WentOnEntry),
 }
 
 /// What such a journal holds.
@@ -27,6 +36,12 @@ pub struct LinearLog {
     pub zeros: Vec<ZeroEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
+    /// The job that was done, if it was one.
+    pub job: Option<JobEntry>,
+    /// The points of it that were reached, in order.
+    pub reached: Vec<ReachedEntry>,
+    /// What made it go on from them.
+    pub went_on: Vec<WentOnEntry>,
 }
 
 impl Log for LinearLog {
@@ -39,6 +54,9 @@ impl Log for LinearLog {
             LinearEntry::Point(it) => point(header, it),
             LinearEntry::Zero(it) => zero(it),
             LinearEntry::Closed(it) => it.judge(header),
+            LinearEntry::Job(it) => job(self, header, it),
+            LinearEntry::Reached(it) => reached(self, header, it),
+            LinearEntry::WentOn(it) => went_on(self, header, it),
         }
     }
 
@@ -47,6 +65,9 @@ impl Log for LinearLog {
             LinearEntry::Point(it) => self.points.push(it),
             LinearEntry::Zero(it) => self.zeros.push(it),
             LinearEntry::Closed(it) => self.closures.push(it),
+            LinearEntry::Job(it) => self.job = Some(it),
+            LinearEntry::Reached(it) => self.reached.push(it),
+            LinearEntry::WentOn(it) => self.went_on.push(it),
         }
     }
 
@@ -92,6 +113,62 @@ fn zero(it: &ZeroEntry) -> Judged {
     number("patent_p0_m", it.patent_p0_m, &PLACE_M)?;
     number("peak_max_v", it.peak_max_v, &VOLTS)?;
     number("mid_v", it.mid_v, &VOLTS)?;
+    number("at_s", it.at_s, &SECONDS)
+}
+
+fn job(read: &LinearLog, header: &JournalHeader, it: &JobEntry) -> Judged {
+    once("job", read.job.is_none())?;
+    as_many(
+        "names",
+        it.names.len(),
+        header.targets_m.len(),
+        "the targets",
+    )?;
+    counted("repetitions", it.repetitions as usize, 1..=PASSES_MAX)?;
+    number("settle_s", it.settle_s, &SECONDS)?;
+    optional("end_m", it.end_m, &PLACE_M)
+}
+
+/// Whether a job was there, and has such a point.
+fn point_of_job(
+    read: &LinearLog,
+    header: &JournalHeader,
+    (repetition, number): (u32, usize),
+) -> Judged {
+    let missing = || unsound("entry", "a job before it", "none");
+    let job = read.job.as_ref().ok_or_else(missing)?;
+    header.judge_run(repetition)?;
+    counted("number", number, 1..=job.names.len())
+}
+
+fn reached(read: &LinearLog, header: &JournalHeader, it: &ReachedEntry) -> Judged {
+    point_of_job(read, header, (it.repetition, it.number))?;
+    approach("approach", it.approach)?;
+    for (key, seen) in [
+        ("target_m", it.target_m),
+        ("set_point_m", it.set_point_m),
+        ("encoder_m", it.encoder_m),
+    ] {
+        number(key, seen, &PLACE_M)?;
+    }
+    if let Some(interval) = &it.interval_m {
+        numbers("interval_m", interval, &PLACE_M)?;
+    }
+    optional("place_m", it.place_m, &PLACE_M)?;
+    optional("u_m", it.u_m, &ERROR_U_M)?;
+    optional("expanded_u_m", it.expanded_u_m, &ERROR_U_M)?;
+    number("at_s", it.at_s, &SECONDS)
+}
+
+fn went_on(read: &LinearLog, header: &JournalHeader, it: &WentOnEntry) -> Judged {
+    point_of_job(read, header, (it.repetition, it.number))?;
+    let is_known = ["time", "operator", "input"].contains(&it.by.as_str());
+    let expected = || "`time`, `operator` or `input`".to_owned();
+    is("by", is_known, expected, || {
+        format!("`{}`", it.by.escape_debug())
+    })?;
+    number("waited_s", it.waited_s, &SECONDS)?;
+    optional("seen_v", it.seen_v, &VOLTS)?;
     number("at_s", it.at_s, &SECONDS)
 }
 

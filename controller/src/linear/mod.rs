@@ -13,6 +13,7 @@ pub(crate) mod entries;
 mod finding;
 #[cfg(test)]
 mod golden;
+pub(crate) mod job;
 mod kind;
 mod log;
 pub(crate) mod measure;
@@ -32,6 +33,7 @@ mod zero;
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use calibrate::Calibrated;
 pub use course::{Corrected, Course, PlannedMove};
+pub use job::{Job, JobDone, JobOperator, JobPlan, Reached, parse_job};
 pub use log::LinearLog;
 pub use record::LinearContent;
 pub use run_plan::PlannedRun;
@@ -44,8 +46,10 @@ pub(crate) use config::{
     CalibrateConfig, CompensationConfig, EndPolicyName, InterpolationName, VerifyConfig, ZeroConfig,
 };
 pub(crate) use datum_in_use::Datum;
-pub(crate) use entries::{PointEntry, ZeroEntry};
+pub(crate) use entries::{JobEntry, PointEntry, ReachedEntry, WentOnEntry, ZeroEntry};
 pub(crate) use finding::PatternFinding;
+#[cfg(test)]
+pub(crate) use job::JobConfig;
 pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;

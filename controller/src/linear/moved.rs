@@ -1,5 +1,7 @@
 //! A move and what became of it: where the drive's encoder stands, and what corrected the move.
 
+use core::time::Duration;
+
 use compensator::budget::Combined;
 use units::{Approach, Metres};
 
@@ -16,6 +18,8 @@ pub struct Moved {
     pub set_point: Metres,
     /// Where the drive's encoder says that it stands, read after the move.
     pub encoder: Metres,
+    /// From which side it went there.
+    pub approach: Approach,
     /// What corrected the move.
     pub corrected: Corrected,
     /// Where the point itself stands by encoder and calibration; `None` without a calibration.
@@ -31,9 +35,17 @@ impl LinearStage<'_> {
     /// # Errors
     /// As [`Self::move_to`]; an axis that does not come to rest.
     pub fn move_and_read(&mut self, target: Metres) -> Result<Moved, Failure> {
+        self.move_and_settle(target, STAND)
+    }
+
+    /// The same once the axis has stood for `settle`.
+    ///
+    /// # Errors
+    /// As [`Self::move_and_read`].
+    pub fn move_and_settle(&mut self, target: Metres, settle: Duration) -> Result<Moved, Failure> {
         let corrected = self.memory.course.corrected(target);
         let set_point = self.move_to(target)?;
-        self.core.stand_still(self.axis, STAND)?;
+        self.core.stand_still(self.axis, settle)?;
         let reading = self.core.reading(self.axis)?;
         let encoder = reading.expect("an axis that moved has been read").position;
         let approach = self.core.approach(self.axis)?.approach();
@@ -42,6 +54,7 @@ impl LinearStage<'_> {
             target,
             set_point,
             encoder,
+            approach,
             corrected,
             place: self.memory.course.place(encoder, approach),
             uncertainty: self.uncertainty_at(target, approach),
@@ -50,4 +63,4 @@ impl LinearStage<'_> {
 }
 
 /// How long an axis stands before its place is read.
-const STAND: core::time::Duration = core::time::Duration::from_millis(20);
+const STAND: Duration = Duration::from_millis(20);

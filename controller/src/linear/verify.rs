@@ -72,7 +72,7 @@ impl LinearStage<'_> {
         let plan = match of {
             Stage::Calibrate => calibrate::run_plan(self.config.calibrate.as_ref()?),
             Stage::Verify => run_plan(self.config.verify.as_ref()?, 0.0),
-            Stage::Zero | Stage::Reference => return None,
+            Stage::Zero | Stage::Reference | Stage::Job => return None,
         };
         let settings = self.core.axis_settings(self.axis).ok()?;
         Some(plan.planned(settings.speed))

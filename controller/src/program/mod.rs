@@ -41,6 +41,7 @@ use wire::lockstep::path_of;
 use crate::Failure;
 use crate::ports::Pace;
 use kind::by_kind;
+use linear::job::JobOptions;
 use output::Output;
 use verbs::Verbs;
 
@@ -84,9 +85,13 @@ enum Command {
     Move(MoveArgs),
     /// Zero, then record the references of the detectors of three axes, for the calibration in use.
     Reference(MachineArgs),
-    /// Zero, then follow a path of three axes, corrected: columns time_s,x_mm,y_mm,z_mm.
+    /// Zero, then do a job of one axis (`JOB.toml`), or follow a path of three axes (`PATH.csv`), corrected.
     ///
-    /// Between the rows each axis follows the cubic spline through them, at rest at both ends, not
+    /// A job goes to its points one after the other and waits at each for a time, for the operator or for an input,
+    /// as its file says; each point is in the journal with its uncertainty. It is judged whole before anything
+    /// moves; --dry-run does only that.
+    ///
+    /// A path has the columns time_s,x_mm,y_mm,z_mm. Between the rows each axis follows the cubic spline through them, at rest at both ends, not
     /// straight lines: at a corner, or where the rows suddenly end, it swings out. How far at most, and
     /// where, is printed before anything moves. Everything that will be driven is judged first (soft
     /// limits, speed, acceleration, jerk, calibrated volume), not only the rows.
@@ -255,13 +260,19 @@ impl From<MemoryChoice> for crate::volumetric::MemoryName {
     }
 }
 
-/// A path, and on which machine.
+/// A job or a path, and on which machine.
 #[derive(Clone, Debug, Args)]
 struct RunArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// The path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
+    /// The job (`.toml`); or the path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
     path: Option<PathBuf>,
+    /// Judge the job and say what it would do; no port is opened, nothing moves.
+    #[arg(long)]
+    dry_run: bool,
+    /// Do not wait for the operator of a job.
+    #[arg(long)]
+    yes: bool,
     /// The first of several parts: what the detectors see during this part is not corrected but
     /// recorded as the second memory, so that all later parts are made like this one.
     #[arg(long)]
@@ -357,6 +368,27 @@ struct ServiceArgs {
     at: String,
 }
 
+/// The ending of its name says what is run.
+fn run(args: RunArgs, output: Output) -> output::Ended {
+    let (is_first, yes, dry_run) = (args.first_part, args.yes, args.dry_run);
+    let (machine, path) = args.settle();
+    let is_job = path
+        .extension()
+        .is_some_and(|it| it.eq_ignore_ascii_case("toml"));
+    let usage = |what: &str| {
+        Err(crate::Failure::Usage {
+            what: format!("{}: {what}", path.display()),
+            help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
+        })
+    };
+    match (is_job, is_first, yes || dry_run) {
+        (true, true, _) => usage("--first-part is for paths of three axes, and this is a job"),
+        (false, _, true) => usage("--dry-run and --yes are for jobs, and this is a path"),
+        (true, false, _) => linear::job::run(&machine, &path, JobOptions { dry_run, yes }, output),
+        (false, _, false) => volumetric::part::run(&machine, &path, is_first, output),
+    }
+}
+
 /// Runs the command line of this process; `keep` keeps a machine for `truestage serve`.
 pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
     let cli = Cli::parse();
@@ -376,11 +408,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
             })
         }
         Command::Reference(args) => volumetric::verbs::reference(&args, output),
-        Command::Run(args) => {
-            let is_first = args.first_part;
-            let (machine, path) = args.settle();
-            volumetric::part::run(&machine, &path, is_first, output)
-        }
+        Command::Run(args) => run(args, output),
         Command::Memory(MemoryCommand::Record(args)) => {
             volumetric::part::memory_record(&args, output)
         }

@@ -49,8 +49,8 @@ impl Terminal {
             (false, None) => {
                 return Err(Failure::Usage {
                     what:
-                        "somebody must turn the plate or set lines up, and there is no terminal to \
-                         ask at; nothing was moved"
+                        "somebody must do what is asked for meanwhile (turn a plate, set lines up, go on \
+                         with a job), and there is no terminal to ask at; nothing was moved"
                             .into(),
                     help:
                         "run it in a terminal, or with --yes if that is done without waiting for \
@@ -85,7 +85,23 @@ impl Terminal {
         Ok(())
     }
 
-    fn has_entered(&mut self) -> Result<bool, Failure> {
+    /// Asks for what a job waits for; the axis is held under power meanwhile. An emulated machine's hand has nothing
+    /// to do.
+    pub(crate) fn ask_to_go_on(&mut self, text: &str) -> Result<(), Failure> {
+        self.output.note(&format!("> {text}"));
+        let Answers::Keyboard(answers) = &self.answers else {
+            return Ok(());
+        };
+        // What was typed before is no answer to this: a hand may be in the machine.
+        tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
+        self.output.note(
+            "  the axis holds its place under power and moves as soon as you press Enter: be out of its way \
+             first; Ctrl-C stops it (what was reached is kept)",
+        );
+        Ok(())
+    }
+
+    pub(crate) fn has_entered(&mut self) -> Result<bool, Failure> {
         let Answers::Keyboard(answers) = &mut self.answers else {
             return Ok(true);
         };

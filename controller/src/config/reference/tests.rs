@@ -2,6 +2,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::*;
+use crate::config::schema;
+use crate::linear::JobConfig;
 
 const BEGIN: &str = "<!-- Written from the declarations in controller/src; `WRITE_REFERENCE=1 cargo test -p truestage --lib reference` writes it anew. -->\n";
 const END: &str = "<!-- The end of what is written from them. -->\n";
@@ -32,10 +34,20 @@ fn check(name: &str, expected: impl FnOnce(&str) -> String) {
 
 #[test]
 fn the_reference_of_all_keys_is_what_their_declarations_say() {
+    let written = [
+        markdown(&schema::schema()),
+        markdown(&schema::schema_of::<JobConfig>()),
+    ];
     check("README.md", |seen| {
-        let (before, rest) = seen.split_once(BEGIN).expect("it begins somewhere");
-        let (_, after) = rest.split_once(END).expect("it ends somewhere");
-        format!("{before}{BEGIN}\n{}\n{END}{after}", markdown())
+        let mut parts = seen.split(BEGIN);
+        let before = parts.next().expect("a text has a first part").to_owned();
+        let parts: Vec<_> = parts.collect();
+        assert_eq!(parts.len(), written.len(), "each begins somewhere");
+        let parts = parts.iter().zip(&written);
+        parts.fold(before, |text, (part, written)| {
+            let (_, after) = part.split_once(END).expect("it ends somewhere");
+            format!("{text}{BEGIN}\n{written}\n{END}{after}")
+        })
     });
 }
 
@@ -49,7 +61,7 @@ fn the_schema_for_editors_is_what_the_declarations_say() {
 
 #[test]
 fn every_key_says_what_it_means() {
-    let text = markdown();
+    let text = markdown(&schema::schema()) + &markdown(&schema::schema_of::<JobConfig>());
     for line in text.lines().filter(|it| it.starts_with("| `")) {
         let meaning = line.trim_end_matches(" |").rsplit(" | ").next();
         assert!(meaning.is_some_and(|it| it.len() > 3), "{line}");

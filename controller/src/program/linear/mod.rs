@@ -1,6 +1,7 @@
 //! Linear axes on the command line.
 
 pub(crate) mod demo;
+pub(crate) mod job;
 mod moved;
 mod page;
 mod report;

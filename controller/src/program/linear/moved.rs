@@ -53,7 +53,7 @@ pub(crate) fn value(axis: &str, moved: &Moved, calibration: Option<&str>) -> Val
 }
 
 /// How uncertain the place of the point is, or why nobody says it.
-fn uncertainty_of(moved: &Moved) -> String {
+pub(super) fn uncertainty_of(moved: &Moved) -> String {
     match (&moved.uncertainty, moved.corrected) {
         (Some(combined), _) => uncertainty::said(combined),
         (None, Corrected::Held { .. } | Corrected::Fading { .. }) => {
@@ -67,15 +67,20 @@ fn uncertainty_of(moved: &Moved) -> String {
 
 /// What of the move nobody measured.
 fn warning(moved: &Moved) -> Option<String> {
+    warning_of(moved.corrected, moved.target)
+}
+
+/// The same of a move to `target` that is not made yet.
+pub(super) fn warning_of(corrected: Corrected, target: Metres) -> Option<String> {
     let beyond = |first: Metres, last: Metres| {
         format!(
             "{} mm is BEYOND THE CALIBRATED RANGE of {} to {} mm",
-            Short(moved.target.mm()),
+            Short(target.mm()),
             Short(first.mm()),
             Short(last.mm())
         )
     };
-    match moved.corrected {
+    match corrected {
         Corrected::Within => None,
         Corrected::No => Some(
             "NOT CORRECTED: the axis has no calibration, so the drive went to the target by its \
@@ -105,6 +110,7 @@ fn warning(moved: &Moved) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use compensator::budget::Combined;
+    use units::Approach;
 
     use super::*;
 
@@ -118,6 +124,7 @@ mod tests {
             target: Metres::from_mm(61.0),
             set_point: Metres::from_mm(60.997_123),
             encoder: Metres::from_mm(60.997_111),
+            approach: Approach::Forward,
             corrected,
             place: (corrected != Corrected::No).then_some(Metres::from_mm(60.999_988)),
             uncertainty: is_known.then_some(combined),

@@ -42,6 +42,7 @@ pub(crate) fn html(path: &Path) -> Result<String, Failure> {
         sections,
         calibration: made.first().map(|(_, it)| &it.content),
         zeros: journal.log.zeros.clone(),
+        job: Some(&journal.log),
     };
     Ok(report::render(&page))
 }

@@ -1,6 +1,7 @@
 //! The page of a linear axis: facts, deviations, figures of ISO 230-2, its table and its zeros.
 
 mod deviations;
+mod job;
 mod uncertainty;
 
 use core::fmt::Write as _;
@@ -8,7 +9,7 @@ use core::fmt::Write as _;
 use compensator::iso230::Figures;
 use units::Metres;
 
-use crate::linear::{LinearContent, PointEntry, ZeroEntry};
+use crate::linear::{LinearContent, LinearLog, PointEntry, ZeroEntry};
 use crate::program::page::{document, escape, facts};
 use crate::program::text;
 
@@ -36,11 +37,16 @@ pub(crate) struct Page<'a> {
     pub(crate) calibration: Option<&'a LinearContent>,
     /// Zeros found, in order.
     pub(crate) zeros: Vec<ZeroEntry>,
+    /// The journal of a job.
+    pub(crate) job: Option<&'a LinearLog>,
 }
 
 /// The page as HTML.
 pub(crate) fn render(page: &Page<'_>) -> String {
     let mut html = facts(&page.facts);
+    if let Some((job, log)) = page.job.and_then(|it| Some((it.job.as_ref()?, it))) {
+        html += &job::html(job, log);
+    }
     if !page.sections.is_empty() {
         html += "<h2>ISO 230-2 figures</h2>";
         html += &figures(&page.sections);

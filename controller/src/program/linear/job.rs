@@ -1,0 +1,190 @@
+//! `truestage run JOB.toml`: a job of one axis.
+
+use std::path::Path;
+
+use machine::records::short;
+use serde_json::{Value, json};
+use units::{Metres, Short};
+
+use crate::linear::job::plan::PlannedPoint;
+use crate::linear::{Job, JobDone, JobOperator, JobPlan, Reached, parse_job};
+use crate::ports::Use;
+use crate::program::MachineArgs;
+use crate::program::data_file::read;
+use crate::program::json as to_json;
+use crate::program::linear::{moved, uncertainty};
+use crate::program::operator::Terminal;
+use crate::program::output::{Ended, Output};
+use crate::program::session::Session;
+use crate::{Failure, config, store_of};
+
+/// What is asked of a job besides doing it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JobOptions {
+    /// Judge it, and open nothing.
+    pub(crate) dry_run: bool,
+    /// Nobody is waited for.
+    pub(crate) yes: bool,
+}
+
+pub(crate) fn run(args: &MachineArgs, file: &Path, options: JobOptions, output: Output) -> Ended {
+    let text = read(file)?;
+    let loaded = config::load(&args.config)?;
+    let job = parse_job(&text, &file.display().to_string(), &loaded.config)?;
+    let plan = JobPlan::of(&job, &loaded, &store_of(&loaded.config.machine))?;
+    if options.dry_run {
+        return output.result(&planned_text(&job, &plan), &planned_value(&job, &plan));
+    }
+    let is_alone = options.yes || !job.needs_operator();
+    let terminal = Terminal::new(is_alone, args.hand(), output)?;
+    let mut beside = Beside { terminal, output };
+    let mut session = Session::open(args, "run", Use::Motion, output)?;
+    let store = session.store.clone();
+    let (done, counters) = session.machine.guarded(|machine| {
+        machine.start()?;
+        machine.linear(&job.axis)?.load_active(&store)?;
+        machine.linear(&job.axis)?.zero(&store)?;
+        let done = machine
+            .linear(&job.axis)?
+            .run_job(&store, &job, &mut beside)?;
+        machine.shut_down()?;
+        Ok((done, to_json::counters(&machine.devices().counters())))
+    })?;
+    let mut value = done_value(&job, &done);
+    value["counters"] = counters;
+    output.result(&done_text(&job, &done), &value)
+}
+
+/// The operator, who also sees each point as it is reached.
+struct Beside {
+    terminal: Terminal,
+    output: Output,
+}
+
+impl JobOperator for Beside {
+    fn ask(&mut self, text: &str) -> Result<(), Failure> {
+        self.terminal.ask_to_go_on(text)
+    }
+
+    fn is_done(&mut self) -> Result<bool, Failure> {
+        self.terminal.has_entered()
+    }
+
+    fn reached(&mut self, it: &Reached) {
+        self.output.note(&reached_text(it));
+    }
+}
+
+fn interval_text(interval: Option<(Metres, Metres)>) -> String {
+    interval.map_or("beyond the calibrated range".into(), |(from, to)| {
+        format!("interval {} to {} mm", Short(from.mm()), Short(to.mm()))
+    })
+}
+
+fn interval_value(interval: Option<(Metres, Metres)>) -> Value {
+    interval.map_or(Value::Null, |(from, to)| json!([from.mm(), to.mm()]))
+}
+
+fn reached_text(it: &Reached) -> String {
+    let (number, of) = it.number;
+    let place = it.moved.place.unwrap_or(it.moved.encoder);
+    let name = &it.name;
+    format!(
+        "  repetition {}, point {number} of {of} ({name}): at {:.6} mm, {}",
+        it.repetition,
+        place.mm(),
+        moved::uncertainty_of(&it.moved)
+    )
+}
+
+fn planned_text(job: &Job, plan: &JobPlan) -> String {
+    let head = format!(
+        "axis {}: {} points, {} repetition(s), corrected by calibration {}; nothing was opened, so who the drive \
+         is was not compared",
+        job.axis,
+        job.points.len(),
+        job.repetitions,
+        short(&plan.calibration)
+    );
+    let each = plan.points.iter().map(|it| {
+        let u = it.uncertainty.as_ref();
+        let u = u.map_or("U NOT STATED".into(), uncertainty::said);
+        let warning = moved::warning_of(it.corrected, it.target);
+        let warning = warning.map_or(String::new(), |it| format!("\n    {it}"));
+        format!(
+            "\n  {}: {:.6} mm, {}, approach {}, set-point {:.6} mm, {u}{warning}",
+            it.name,
+            it.target.mm(),
+            interval_text(it.interval),
+            it.approach.symbol(),
+            it.set_point.mm(),
+        )
+    });
+    head + &each.collect::<String>()
+}
+
+fn planned_value(job: &Job, plan: &JobPlan) -> Value {
+    let point = |it: &PlannedPoint| {
+        json!({
+            "name": it.name,
+            "target_mm": it.target.mm(),
+            "interval_mm": interval_value(it.interval),
+            "approach": it.approach.symbol().to_string(),
+            "set_point_mm": it.set_point.mm(),
+            "uncertainty": uncertainty::combined(it.uncertainty),
+            "warning": moved::warning_of(it.corrected, it.target),
+        })
+    };
+    json!({
+        "axis": job.axis,
+        "dry_run": true,
+        "calibration": plan.calibration,
+        "repetitions": job.repetitions,
+        "points": plan.points.iter().map(point).collect::<Vec<_>>(),
+    })
+}
+
+fn done_text(job: &Job, done: &JobDone) -> String {
+    let stated = done.reached.iter().filter_map(|it| it.moved.uncertainty);
+    let most =
+        stated.clone().reduce(
+            |a, b| match b.standard_uncertainty > a.standard_uncertainty {
+                true => b,
+                false => a,
+            },
+        );
+    let unstated = done.reached.len() - stated.count();
+    let mut text = format!(
+        "axis {}: {} points reached in {} repetition(s), corrected by calibration {}",
+        job.axis,
+        done.reached.len(),
+        job.repetitions,
+        short(&done.calibration)
+    );
+    if let Some(most) = most {
+        text += &format!("\n  at most {}", uncertainty::said(&most));
+    }
+    if unstated > 0 {
+        text += &format!("\n  at {unstated} of them the uncertainty is NOT STATED");
+    }
+    text + &format!("\n  each point in {}", done.journal.display())
+}
+
+fn done_value(job: &Job, done: &JobDone) -> Value {
+    let point = |it: &Reached| {
+        let mut value = moved::value(&job.axis, &it.moved, Some(&done.calibration));
+        value["repetition"] = json!(it.repetition);
+        value["number"] = json!(it.number.0);
+        value["name"] = json!(it.name);
+        value["approach"] = json!(it.moved.approach.symbol().to_string());
+        value["interval_mm"] = interval_value(it.interval);
+        value
+    };
+    json!({
+        "axis": job.axis,
+        "calibration": done.calibration,
+        "repetitions": job.repetitions,
+        "points": done.reached.iter().map(point).collect::<Vec<_>>(),
+        "journal": done.journal,
+    })
+}

@@ -1,0 +1,118 @@
+//! Jobs of one axis, as a user runs them.
+
+use std::fs;
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use tests::Edit;
+
+use crate::programs::{Bench, check_says, live_rigs, number, text};
+
+const JOB: &str = include_str!("../../configs/jobs/linear.toml");
+
+fn write(bench: &Bench, name: &str, job: &str) {
+    fs::write(bench.folder().join(name), job).expect("a file can be written");
+}
+
+#[test]
+fn a_job_is_judged_done_and_shown_from_process_to_process() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        write(&bench, "job.toml", JOB);
+        let words = ["run", "machine.toml", "job.toml"];
+        let uncalibrated = bench.run(&words).with_code(2);
+        assert!(text(&uncalibrated["error"]).contains("no active calibration"));
+        let id = bench.run(&["calibrate"]).with_code(0)["calibration"].clone();
+
+        // No bus is named: it is not needed.
+        let planned = bench.run_plainly(&["run", "machine.toml", "job.toml", "--dry-run"]);
+        let planned = planned.with_code(0);
+        assert_eq!(
+            (&planned["calibration"], &planned["dry_run"]),
+            (&id, &Value::from(true))
+        );
+        refused(&bench);
+
+        let done = bench
+            .run(&["run", "machine.toml", "job.toml", "--yes"])
+            .with_code(0);
+        let (planned, reached) = (points(&planned), points(&done));
+        assert_eq!((planned.len(), reached.len()), (6, 12));
+        for (planned, reached) in planned.iter().zip(reached) {
+            assert_eq!(planned["name"], reached["name"]);
+            assert_eq!(planned["set_point_mm"], reached["set_point_mm"]);
+            let off_um = (number(&reached["place_mm"]) - number(&reached["target_mm"])) * 1e3;
+            assert!(off_um.abs() < 0.2, "{reached}");
+            assert!(
+                number(&reached["uncertainty"]["expanded_um"]) > 0.01,
+                "{reached}"
+            );
+        }
+        let report = ["report", text(&done["journal"]), "--output", "page.html"];
+        bench.run(&report).with_code(0);
+        let html = fs::read_to_string(bench.folder().join("page.html"));
+        let html = html.expect("it was written");
+        check_says(
+            &html,
+            &[
+                "Job",
+                "12 of 12 points",
+                "hole 3",
+                "operator",
+                "input",
+                "30 to 36",
+            ],
+        );
+        interrupted(&bench);
+        assert_eq!(bench.stop(), Some(0));
+    }
+}
+
+fn points(value: &Value) -> &Vec<Value> {
+    value["points"].as_array().expect("a list of points")
+}
+
+fn refused(bench: &Bench) {
+    write(
+        bench,
+        "wrong.toml",
+        &JOB.edit("position_mm = 57.25", "position_mm = 99.0"),
+    );
+    let refused = bench
+        .run(&["run", "machine.toml", "wrong.toml"])
+        .with_code(2);
+    let said = text(&refused["error"]);
+    for part in [
+        "wrong.toml:28:",
+        "position_mm",
+        "99 mm is outside",
+        "-3 to 63 mm",
+    ] {
+        assert!(said.contains(part), "`{part}` is not in {said}");
+    }
+    let first = bench.run(&["run", "machine.toml", "job.toml", "--first-part"]);
+    assert!(text(&first.with_code(2)["error"]).contains("this is a job"));
+}
+
+/// Ctrl-C while the axis waits at a point for a time that does not end soon.
+fn interrupted(bench: &Bench) {
+    let journals = || {
+        fs::read_dir(bench.records().join("runs"))
+            .expect("there are runs")
+            .count()
+    };
+    write(
+        bench,
+        "long.toml",
+        &JOB.edit("after_s = 0.5", "after_s = 80000.0"),
+    );
+    let before = journals();
+    let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes"]);
+    // The zero has a journal of its own.
+    process.wait_until(|| journals() >= before + 2);
+    process.signal(Signal::SIGINT);
+    let ended = process.end();
+    assert!(ended.said.contains("stopped on request"), "{ended:?}");
+    ended.with_code(130);
+    bench.run(&["zero"]).with_code(0);
+}
