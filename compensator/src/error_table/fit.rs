@@ -30,8 +30,8 @@ pub struct FitOptions {
     pub scatter: NodeScatter,
     /// Standard uncertainty of the instrument itself, common to all its readings.
     pub u_instrument: Metres,
-    /// How many scatters from its node a point must be to be left out.
-    pub outlier_threshold: f64,
+    /// In which share of sound series a point may be left out.
+    pub outlier_false_alarms: f64,
     /// Largest share of points left out, 0 to 1.
     pub outlier_share_max: f64,
     /// The smallest scatter believed (the instrument's resolution).
@@ -43,13 +43,13 @@ pub struct FitOptions {
 }
 
 impl Default for FitOptions {
-    /// Pooled scatter, a perfect instrument of 1 nm resolution, points beyond 6 scatters left
-    /// out, at most 20 % of them; drift reported, not removed; no limit on closure.
+    /// Pooled scatter, a perfect instrument of 1 nm resolution, points left out in one of 10 000
+    /// sound series, at most 20 % of them; drift reported, not removed; no limit on closure.
     fn default() -> Self {
         Self {
             scatter: NodeScatter::Pooled,
             u_instrument: Metres::ZERO,
-            outlier_threshold: 6.0,
+            outlier_false_alarms: 1e-4,
             outlier_share_max: 0.2,
             scatter_floor: Metres(1e-9),
             remove_drift: false,
@@ -189,7 +189,7 @@ pub fn fit(series: &LinearSeries, options: &FitOptions) -> Result<ErrorTable, Fi
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn analyse(series: &LinearSeries, options: &FitOptions) -> Result<Fitted, FitError> {
-    let (bad, robust) = robust::find(series, options.outlier_threshold, options.scatter_floor);
+    let (bad, robust) = robust::find(series, options.outlier_false_alarms, options.scatter_floor);
     if robust.share > options.outlier_share_max {
         return Err(FitError::TooManyOutliers {
             share: robust.share,

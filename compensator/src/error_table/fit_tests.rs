@@ -120,19 +120,55 @@ fn five_percent_outliers_are_named_and_do_not_move_the_table() {
     }
 }
 
+/// Of `seeds` sound series of all sizes (2 to 41 positions, 2 to 10 runs, scatter 5 to 1000 nm, both sides or
+/// one), how many lose a point.
+fn sound_that_lose_a_point(seeds: core::ops::Range<u64>) -> usize {
+    let loses = |seed: &u64| {
+        let mut noise = Noise(0x0071_1E45 ^ (seed << 20));
+        let mut among =
+            |low: u32, high: u32| low + (noise.uniform() * f64::from(high - low + 1)) as u32;
+        let (positions, runs, sides) = (among(2, 41), among(2, 10), among(1, 2));
+        let scatter = 5e-9 * 200.0_f64.powf(noise.uniform());
+        let both = [Approach::Forward, Approach::Reverse];
+        let mut measurements = Vec::new();
+        for run in 1..=runs {
+            let offset = scatter * noise.normal();
+            for approach in &both[..sides as usize] {
+                let order: Vec<u32> = match approach {
+                    Approach::Forward => (0..positions).collect(),
+                    Approach::Reverse => (0..positions).rev().collect(),
+                };
+                measurements.extend(order.into_iter().map(|at| {
+                    let target = Metres::from_mm(3.0 * f64::from(at));
+                    Measurement {
+                        run,
+                        approach: *approach,
+                        target,
+                        measured: target + Metres(offset + scatter * noise.normal()),
+                    }
+                }));
+            }
+        }
+        let series = LinearSeries::new(measurements).unwrap();
+        analyse(&series, &FitOptions::default()).map_or(true, |it| !it.robust.outliers.is_empty())
+    };
+    seeds.filter(loses).count()
+}
+
+/// Of 300 series at 1e-4 each two lose a point once in 2 000 times.
 #[test]
-fn clean_data_lose_at_most_a_point_in_a_thousand() {
-    let mut lost = 0;
-    for seed in 0..40 {
-        let mut noise = Noise(1000 + seed);
-        let data = series(5, |_, _, _| 0.3 * noise.normal());
-        lost += analyse(&data, &FitOptions::default())
-            .unwrap()
-            .robust
-            .outliers
-            .len();
-    }
-    assert!(lost <= 8, "{lost} of 8400 points");
+fn sound_series_of_all_sizes_lose_no_point() {
+    let lost = sound_that_lose_a_point(50_000..50_300);
+    assert!(lost <= 1, "{lost} of 300");
+}
+
+/// Of 20 000 at 1e-4 each more than eight lose a point once in 4 000 times (binomial).
+#[test]
+#[ignore = "20 000 series"]
+fn sound_series_counted_over_many() {
+    let lost = sound_that_lose_a_point(0..20_000);
+    println!("{lost} of 20000 sound series lost a point");
+    assert!(lost <= 8, "{lost} of 20000");
 }
 
 #[test]

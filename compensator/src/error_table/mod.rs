@@ -22,6 +22,7 @@
 mod compensation;
 mod curve;
 mod fit;
+mod outliers;
 mod robust;
 mod series;
 mod slip;

@@ -4,14 +4,23 @@
 //! its run is taken out (two sweeps of Tukey's median polish), in units of the scatter of all
 //! points together (median absolute deviation). A node must have been measured at least three
 //! times for its points to be judged: of two that disagree, nobody can say which is wrong.
+//!
+//! What stands out so is only suspected: of few points the median says little of their scatter. Suspects are left
+//! out where least squares (a mean for each node, an offset for each run) prove it against the scatter of the
+//! others (`outliers.rs`).
 
 use units::{Approach, Metres};
+
+use super::outliers::Additive;
 
 use crate::error_table::LinearSeries;
 use crate::uncertainty::{median, robust_sigma};
 
 /// Sweeps of the median polish; it has settled after two when outliers are few.
 const SWEEPS: usize = 2;
+
+/// From so many scatters on a point is suspected. Whether it is left out is decided by a test.
+const SUSPECTED: f64 = 6.0;
 
 /// Name of one measured point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,10 +100,15 @@ fn centre(residuals: &mut [f64], group: &[usize]) {
     }
 }
 
-/// Names the measurements more than `threshold` scatters from their node, by index.
+/// Names the measurements that are further from their node than noise brings any of a series in a share
+/// `false_alarms` of sound ones, by index.
 ///
 /// `floor` is the smallest scatter believed, so that noiseless data have no outliers by rounding.
-pub(super) fn find(series: &LinearSeries, threshold: f64, floor: Metres) -> (Vec<usize>, Robust) {
+pub(super) fn find(
+    series: &LinearSeries,
+    false_alarms: f64,
+    floor: Metres,
+) -> (Vec<usize>, Robust) {
     let Polished { residuals, repeats } = polish(series);
     let judged: Vec<usize> = (0..residuals.len()).filter(|&i| repeats[i] >= 3).collect();
     // The median of n points takes their scatter with it; n/(n − 1) gives back most of that.
@@ -104,11 +118,12 @@ pub(super) fn find(series: &LinearSeries, threshold: f64, floor: Metres) -> (Vec
         .filter(|r| *r != 0.0)
         .collect();
     let sigma = robust_sigma(&widened).unwrap_or(0.0).max(floor.value());
-    let bad: Vec<usize> = judged
+    let suspects: Vec<usize> = judged
         .iter()
         .copied()
-        .filter(|&i| residuals[i].abs() > threshold * sigma)
+        .filter(|&i| residuals[i].abs() > SUSPECTED * sigma)
         .collect();
+    let bad = Additive::new(series).proven(suspects, false_alarms);
     let outliers = bad
         .iter()
         .map(|&i| {
