@@ -48,7 +48,7 @@ impl Drawn {
         let emulated = vec![
             ("misalignment_mrad = 0.2", laser),
             (
-                "scale_expansion_ppm_per_k = 8.0",
+                "scale_expansion_ppm_per_k = 12.0",
                 format!("scale_expansion_ppm_per_k = {per_kelvin_ppm}"),
             ),
             (

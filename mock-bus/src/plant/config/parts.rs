@@ -70,7 +70,7 @@ impl Default for EncoderConfig {
     fn default() -> Self {
         Self {
             resolution_nm: 10.0,
-            scale_expansion_ppm_per_k: 8.0,
+            scale_expansion_ppm_per_k: 12.0,
         }
     }
 }
