@@ -102,6 +102,7 @@ pub mod for_tests {
     pub use crate::volumetric::entries::OpticsName;
     pub use crate::volumetric::first_part::FirstPartCorrection;
     pub use crate::volumetric::line::{Line, LineReading, LineReadout};
+    pub use crate::volumetric::memory_import::import as import_memory;
     pub use crate::volumetric::record::BendRecord;
     pub use crate::volumetric::settings::{beam_detector, beam_drift, roll_optics};
 }

@@ -109,6 +109,40 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
     check_says(&left, &["Line as left", "correction x, y, z (µm)", "°C"]);
 }
 
+/// Nothing moves and nobody is asked: the machine was shut down.
+#[test]
+fn a_designed_shape_is_imported_from_a_file_and_one_that_cannot_be_is_refused_with_its_row() {
+    let runs = runs();
+    let import = |rows: &str| {
+        let csv = format!("axis,along,position_mm,displacement_um\n{rows}");
+        fs::write(runs.folder().join("shape.csv"), csv).expect("there is room");
+        runs.run(&["memory", "import", "machine.toml", "shape.csv"])
+    };
+    let refused = [
+        ("x,z,0,0\nx,z,900,0\n", "shape.csv:3: x = 900 mm is outside"),
+        ("x,z,0,0\nx,z,250,15000\n", "beyond displacement_max_um"),
+        ("x,x,0,0\nx,x,250,15\n", "across x, not along it"),
+    ];
+    for (rows, why) in refused {
+        check_error(&import(rows).with_code(2), &[why]);
+    }
+    let words = [
+        "memory",
+        "import",
+        "machine.toml",
+        "shape.csv",
+        "--memory",
+        "second",
+    ];
+    check_error(&runs.run(&words).with_code(2), &["run --first-part"]);
+    let kept = import("x,z,0,0\nx,z,250,15\nx,z,500,0\n").with_code(0);
+    assert_eq!(kept["axes"][0]["to_mm"], 500.0, "{kept}");
+    let list = runs.run(&["cal", "list"]).with_code(0);
+    let list = list["calibrations"].as_array().expect("a list");
+    let is_kept = |it: &&serde_json::Value| it["kind"] == "state_memory" && it["active"] == true;
+    assert_eq!(list.iter().filter(is_kept).count(), 1, "{list:?}");
+}
+
 /// The readings of a run as a file that somebody else might have made.
 fn csv_of(journal: &str) -> String {
     let read = read_journal::<VolumeLog>(Path::new(journal)).expect("it can be read");

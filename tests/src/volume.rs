@@ -6,18 +6,17 @@ use core::time::Duration;
 
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
-use compensator::volumetric::online::StateMap;
 use compensator::volumetric::{Axis, Point};
 use machine::engine::Observed;
 use machine::records::{CalibrationRecord, RecordHead};
 use mock_bus::plant::VolumetricTruth;
 use truestage::engine::Live;
-use truestage::volumetric::{GeometryContent, MemoryName, StateMemoryContent, WorkVolume};
+use truestage::volumetric::{GeometryContent, WorkVolume};
 use truestage::volumetric::{Mover, VolumetricCorrection, VolumetricState};
 use units::{Celsius, Metres, Radians, Time};
 
 use crate::{Bench, VOLUMETRIC, random};
-use truestage::for_tests::{BendRecord, Edit, with_rare_heartbeats};
+use truestage::for_tests::{BendRecord, Edit, import_memory, with_rare_heartbeats};
 
 pub use frame::Frame;
 
@@ -327,37 +326,24 @@ impl Volume {
         })
     }
 
-    /// Stores by design that the x guide bows upwards by so much in its middle, as the first
-    /// memory.
+    /// Imports, as the first memory, a design by which the x guide bows upwards by so much in its middle.
     ///
     /// # Panics
     /// When it cannot be stored.
     pub fn remember_bow(&self, height: Metres) {
-        let travel = TRAVEL_MM[0];
-        let nodes: Vec<Metres> = (0..=20)
-            .map(|it| Metres::from_mm(f64::from(it) * 25.0))
-            .collect();
-        let bow = |node: &Metres| {
-            let share = node.mm() / travel;
-            height * (4.0 * share * (1.0 - share))
+        let row = |node: u32| {
+            let share = f64::from(node) / 20.0;
+            let up = height.um() * 4.0 * share * (1.0 - share);
+            format!("x,z,{},{up}\n", TRAVEL_MM[0] * share)
         };
-        let up: Vec<Metres> = nodes.iter().map(bow).collect();
-        let none = vec![Metres(0.0); nodes.len()];
-        let function = |values: &[Metres]| Function::new(&nodes, values, Shape::Spline);
-        let functions = [function(&none), function(&up)].map(|it| it.expect("sound"));
-        let mut map = StateMap::default();
-        map.of[0] = Some(functions);
-        let store = &self.bench.store;
-        let references = store.active(REFERENCES).expect("it can be read");
-        let references = references.current.expect("they were taken");
-        let content = StateMemoryContent::new(MemoryName::First, &references, &map);
+        let rows: String = (0..=20).map(row).collect();
+        let csv = format!("axis,along,position_mm,displacement_um\n{rows}");
         let head = RecordHead {
             axis: FIRST_MEMORY.into(),
             ..self.bench.machine.this_machine("x")
         };
-        let id = store.save(&CalibrationRecord { head, content });
-        let activated = store.activate(FIRST_MEMORY, &id.expect("there is room"));
-        activated.expect("it was just stored");
+        let (config, store) = (&self.bench.loaded.config, &self.bench.store);
+        good(import_memory(config, store, head, (&csv, "bow.csv")));
     }
 
     /// What its three axes do.

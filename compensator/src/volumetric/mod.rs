@@ -25,9 +25,11 @@ pub mod model;
 pub mod online;
 mod point;
 mod series;
+mod state_series;
 
 pub use point::{Axis, Point, Volume, VolumeError};
 pub use series::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
+pub use state_series::{StateFault, StatePoint, StateSeries};
 
 use units::Metres;
 

@@ -230,8 +230,24 @@ enum MemoryCommand {
     /// on all parts are made with it. Nothing is corrected while it is recorded, so it is not the state
     /// in which an earlier part was made; `run --first-part` records that.
     Record(MemoryArgs),
+    /// Keep a designed shape, from a file, as the state in which the machine was built (first). Nothing
+    /// moves, and the machine may be off.
+    Import(ImportArgs),
     /// Forget a recorded state; parts are no longer made with it. Nothing moves.
     Clear(MemoryArgs),
+}
+
+/// A designed shape, and of which machine.
+#[derive(Clone, Debug, Args)]
+struct ImportArgs {
+    /// The machine's configuration.
+    config: PathBuf,
+    /// Columns axis,along,position_mm,displacement_um: by how much the slide of an axis is to be displaced
+    /// along a direction across it, counted from the references of the detectors in use.
+    file: PathBuf,
+    /// Only the first: the second is the state of a part.
+    #[arg(long, value_enum, default_value_t = MemoryChoice::First)]
+    memory: MemoryChoice,
 }
 
 /// Which memory, of which machine.
@@ -411,6 +427,9 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Run(args) => run(args, output),
         Command::Memory(MemoryCommand::Record(args)) => {
             volumetric::part::memory_record(&args, output)
+        }
+        Command::Memory(MemoryCommand::Import(args)) => {
+            volumetric::part::memory_import(&args, output)
         }
         Command::Memory(MemoryCommand::Clear(args)) => {
             volumetric::part::memory_clear(&args, output)

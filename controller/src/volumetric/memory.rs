@@ -171,7 +171,7 @@ impl WorkVolume<'_> {
 }
 
 /// The second memory in use, when it counts beyond another first memory than is in use.
-fn foreign_second(store: &Store) -> Result<Option<String>, Failure> {
+pub(super) fn foreign_second(store: &Store) -> Result<Option<String>, Failure> {
     let current = |memory| store.active(memory_pointer(memory)).map(|it| it.current);
     let Some(second) = current(MemoryName::Second)? else {
         return Ok(None);

@@ -32,6 +32,7 @@ mod limits;
 pub(crate) mod line;
 mod log;
 mod memory;
+pub(crate) mod memory_import;
 mod moves;
 mod path_refusal;
 pub(crate) mod record;
@@ -70,6 +71,8 @@ pub(crate) use entries::{metres, point};
 pub(crate) use kind::KIND;
 pub(crate) use log::VolumeEntry;
 pub(crate) use memory::Remembered;
+#[cfg(feature = "program")]
+pub(crate) use memory_import::import;
 pub(crate) use path_refusal::PathRefusal;
 pub(crate) use record::{AXES, error_name};
 pub(crate) use record::{

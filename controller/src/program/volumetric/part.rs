@@ -9,16 +9,17 @@ use machine::records::short;
 use serde_json::{Value, json};
 use units::Metres;
 
+use crate::config;
 use crate::ports::Use;
-use crate::program::data_file::read;
+use crate::program::data_file::{read, volume_head_of};
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
-use crate::program::{MachineArgs, MemoryArgs};
+use crate::program::{ImportArgs, MachineArgs, MemoryArgs};
 use crate::volumetric::MemoryName;
 use crate::volumetric::first_part::FirstPart;
-use crate::volumetric::{GEOMETRY, Mover, PathRefusal, Remembered};
-use crate::{Failure, Machine, Store};
+use crate::volumetric::{GEOMETRY, Mover, PathRefusal, Remembered, import, memory_pointer};
+use crate::{Failure, Machine, Store, store_of};
 
 /// How a path was followed.
 struct Followed {
@@ -279,6 +280,27 @@ fn kept_value(kept: &Remembered) -> Value {
     json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "foreign_second": kept.foreign})
 }
 
+pub(crate) fn memory_import(args: &ImportArgs, output: Output) -> Ended {
+    if MemoryName::from(args.memory) == MemoryName::Second {
+        return Err(Failure::Usage {
+            what: "a second memory is the state that a first part was made in".into(),
+            help: "record it with `truestage run --first-part` or `truestage memory record`".into(),
+        });
+    }
+    let loaded = config::load(&args.config)?;
+    let text = read(&args.file)?;
+    let head = volume_head_of(&loaded, memory_pointer(MemoryName::First), &args.file)?;
+    let store = store_of(&loaded.config.machine);
+    let file = args.file.display().to_string();
+    let kept = import(&loaded.config, &store, head, (&text, &file))?;
+    let text = format!(
+        "{} keeps the designed shape: all parts from now on are made with it\n{}",
+        short(&kept.id),
+        kept_text(&kept)
+    );
+    output.result(&text, &kept_value(&kept))
+}
+
 pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
     let mut session = Session::open(&args.machine, "memory", Use::Motion, output)?;
@@ -301,7 +323,6 @@ pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
 mod tests {
     use core::time::Duration;
 
-    use crate::config;
     use drivers::transport::{SendError, Transport};
     use units::Time;
     use wire::{Arrival, Payload, Port};

@@ -1,0 +1,94 @@
+//! A designed shape as first memory, from a file: nothing has to be recorded, and nothing moves.
+//!
+//! It counts from the references in use, like everything that detectors see. What their machine was built
+//! with before these were taken is in the references, and no displacement.
+
+use compensator::volumetric::{StatePoint, StateSeries};
+use units::Metres;
+
+use crate::config::MachineConfig;
+use crate::failure::Failure;
+use crate::store::{CalibrationRecord, RecordHead, Store};
+use crate::volumetric::memory::foreign_second;
+use crate::volumetric::reference::measured_geometry;
+use crate::volumetric::{
+    AXES, BeamReferencesContent, MemoryName, REFERENCES, Remembered, StateMemoryContent,
+    VolumetricConfig, VolumetricFailure, memory_pointer,
+};
+
+/// Stores what `text`, the file called `name`, says and activates it.
+///
+/// # Errors
+/// When there are no references of the errors in use to count from, the file is no shape, or the shape is
+/// none that this machine can keep: with the row.
+pub fn import(
+    machine: &MachineConfig,
+    store: &Store,
+    head: RecordHead,
+    (text, name): (&str, &str),
+) -> Result<Remembered, Failure> {
+    let config = machine.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
+    let series = StateSeries::from_csv(text, name)?;
+    let references = references(store, &series)?;
+    for point in series.points() {
+        judge(config, name, point)?;
+    }
+    let (map, covers) = series.map().map_err(VolumetricFailure::from)?;
+    let content = StateMemoryContent::new(MemoryName::First, &references, &map);
+    let id = store.save(&CalibrationRecord { head, content })?;
+    store.activate(memory_pointer(MemoryName::First), &id)?;
+    Ok(Remembered {
+        id,
+        map,
+        covers,
+        foreign: foreign_second(store)?,
+    })
+}
+
+/// The name of the references in use, which watch every axis of the shape.
+fn references(store: &Store, series: &StateSeries) -> Result<String, Failure> {
+    let geometry = measured_geometry(store)?;
+    let axis = series.points()[0].axis;
+    let none = || VolumetricFailure::NoReference { axis };
+    let id = store.active(REFERENCES)?.current.ok_or_else(none)?;
+    let content = store.load::<BeamReferencesContent>(&id)?.content;
+    if content.geometry != geometry {
+        return Err(none().into());
+    }
+    let is_watched = |it: &&StatePoint| {
+        let letter = AXES[it.axis.index()];
+        content.beams.iter().any(|beam| beam.axis == letter)
+    };
+    match series.points().iter().find(|it| !is_watched(it)) {
+        Some(it) => Err(VolumetricFailure::NoReference { axis: it.axis }.into()),
+        None => Ok(id),
+    }
+}
+
+/// Whether the machine may be there, and be displaced by so much.
+fn judge(config: &VolumetricConfig, name: &str, it: &StatePoint) -> Result<(), Failure> {
+    let k = it.axis.index();
+    let (low_mm, high_mm) = (config.low_mm[k], config.high_mm[k]);
+    let is_inside = it.at >= Metres::from_mm(low_mm) && it.at <= Metres::from_mm(high_mm);
+    let refused = |what: String, help: String| {
+        let what = format!("{name}:{}: {what}; nothing was stored", it.row);
+        Err(Failure::Usage { what, help })
+    };
+    if !is_inside {
+        let (axis, mm) = (it.axis, units::Short(it.at.mm()));
+        return refused(
+            format!("{axis} = {mm} mm is outside the work volume, {low_mm} to {high_mm} mm"),
+            "are positions millimetres from the machine's zero?".into(),
+        );
+    }
+    let limit_um = config.compensation.displacement_max_um;
+    if it.displacement.abs() > Metres::from_um(limit_um) {
+        let um = units::Short(it.displacement.um());
+        return refused(
+            format!("a displacement of {um} um is beyond displacement_max_um, {limit_um}"),
+            "are displacements micrometres? Otherwise permit more in [volumetric.compensation]"
+                .into(),
+        );
+    }
+    Ok(())
+}
