@@ -60,7 +60,7 @@ fn a_job_is_judged_done_and_shown_from_process_to_process() {
                 "hole 3",
                 "operator",
                 "input",
-                "30 to 36",
+                "33 to 36",
             ],
         );
         interrupted(&bench);

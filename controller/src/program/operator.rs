@@ -49,7 +49,7 @@ impl Terminal {
             (false, None) => {
                 return Err(Failure::Usage {
                     what:
-                        "somebody must do what is asked for meanwhile (turn a plate, set lines up, go on \
+                        "somebody must do what is asked for meanwhile (turn the plate, set lines up, go on \
                          with a job), and there is no terminal to ask at; nothing was moved"
                             .into(),
                     help:

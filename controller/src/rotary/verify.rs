@@ -56,6 +56,7 @@ impl RotaryFigures {
     }
 
     /// As a journal has them.
+    #[cfg(feature = "program")]
     pub(crate) fn of_record(radians: &[Option<f64>]) -> Self {
         Self::of(radians.iter().map(|it| it.map(Radians)).collect())
     }
