@@ -10,6 +10,8 @@ pub mod replay;
 mod sync_grid;
 
 #[cfg(feature = "live")]
+pub mod awake;
+#[cfg(feature = "live")]
 pub mod clock;
 #[cfg(feature = "live")]
 pub mod live;

@@ -3,7 +3,7 @@
 #![expect(
     unsafe_code,
     reason = "serialport gives its descriptor away only as a number, and nix has neither \
-              sched_setscheduler nor TIOCSBRK"
+              sched_setscheduler, setpriority nor TIOCSBRK"
 )]
 
 use nix::errno::Errno;
@@ -43,6 +43,17 @@ pub(super) fn schedule_ordinary() {
     let parameter = libc::sched_param { sched_priority: 0 };
     // SAFETY: as above. Giving up a priority is never refused.
     let _ = unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameter) };
+}
+
+/// Lets the calling thread compute almost only where nobody else wants to (nice 19).
+///
+/// # Errors
+/// When the system does not permit it.
+pub(super) fn give_way() -> Result<(), Errno> {
+    // Source: setpriority(2): on Linux the value belongs to a thread; 0 is the calling one.
+    // SAFETY: nothing is passed by reference.
+    let result = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 19) };
+    Errno::result(result).map(drop)
 }
 
 /// Holds a serial line low, or lets go of it. `tcsendbreak` would wait until the end.

@@ -13,6 +13,7 @@ use std::io::IsTerminal;
 use std::time::Instant;
 
 use clap::Args;
+use drivers::transport::awake::KeptAwake;
 use machine::records::Lease;
 
 use self::emulation::Emulation;
@@ -54,6 +55,8 @@ fn on_stand(
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = demo.files;
     let emulated = emulation(args, description, &loaded)?;
+    // Only with a shared clock do the two ends do nothing but wait for each other.
+    let _awake = (args.speed.is_none() && !args.in_process).then(KeptAwake::new);
     let (transport, patience) = emulated.connect(&loaded.config)?;
     loaded.patience = patience;
     let mut machine = Machine::new(&loaded, transport);
