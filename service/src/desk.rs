@@ -1,5 +1,7 @@
 //! Where clients come: orders go to the machine's thread, and what it publishes is read.
 
+mod calibrations;
+
 use core::time::Duration;
 use std::fs::File;
 use std::io::Read;
@@ -8,13 +10,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Instant;
 
+use machine::records::Store;
 use tokio::sync::oneshot;
 
 use crate::keeper::utc_now;
 use crate::ledger::{Asked, Ledger, LedgerError};
 use crate::order::{Answer, Answered, Letter, Order};
 use crate::problem::{Code, Problem};
-use crate::request::{Caller, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
 use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView, RunView};
 
@@ -33,6 +36,7 @@ struct Shared {
     board: Board,
     fixed: Arc<Fixed>,
     ledger: Mutex<Ledger>,
+    store: Store,
 }
 
 /// An answer that will come.
@@ -61,11 +65,13 @@ impl Desk {
         board: Board,
         fixed: Arc<Fixed>,
         ledger: Ledger,
+        store: Store,
     ) -> Self {
         let shared = Shared {
             board,
             fixed,
             ledger: Mutex::new(ledger),
+            store,
         };
         Self {
             letters,
@@ -233,6 +239,24 @@ impl Desk {
             .collect()
     }
 
+    /// Begins a jog, renews it, or (at a speed of 0) ends it; returns the name of the motion that it is. It stops
+    /// 200 ms after it was renewed last, and at the soft limit.
+    ///
+    /// # Errors
+    /// When the axis is in use by anything else, switched off or not zeroed; nothing has moved then.
+    pub fn jog(&self, caller: &Caller, request: &JogRequest) -> Result<String, Problem> {
+        let order = self.jog_order(request);
+        named(self.give(caller, order)?.wait()?)
+    }
+
+    /// Not in the ledger: what is renewed many times a second is not written to a disk.
+    pub(crate) fn jog_order(&self, request: &JogRequest) -> Order {
+        Order::Jog {
+            id: self.ledger().next_id('j'),
+            request: request.clone(),
+        }
+    }
+
     /// The dead-man of motion `id` still holds.
     ///
     /// # Errors
@@ -339,7 +363,7 @@ impl Desk {
         let order = Self::lease_order(request)?;
         match self.give(caller, order)?.wait()? {
             Answer::Leased(leased) => Ok(leased),
-            Answer::Done => Err(ended()),
+            Answer::Done | Answer::Named(_) => Err(ended()),
         }
     }
 
@@ -391,6 +415,14 @@ impl Desk {
     /// What the devices counted: device, what, how often.
     pub fn counters(&self) -> Vec<(String, &'static str, u64)> {
         Vec::clone(&self.snapshot().counters)
+    }
+}
+
+/// What an answer is about.
+pub(crate) fn named(answer: Answer) -> Result<String, Problem> {
+    match answer {
+        Answer::Named(name) => Ok(name),
+        Answer::Done | Answer::Leased(_) => Err(ended()),
     }
 }
 

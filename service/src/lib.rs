@@ -27,10 +27,10 @@ pub use ledger::LedgerError;
 pub use problem::{Code, Problem, ProblemBody};
 pub use quantity::{Length, Quantity, QuantityIn, Speed};
 pub use request::{
-    Caller, IfMoving, LeaseRequest, MoveRequest, RunKind, RunRequest, StopMode, Target,
+    Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, RunKind, RunRequest, StopMode, Target,
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{
-    AxisState, AxisView, Cause, Event, LeaseView, Leased, LegView, MachineState, MachineView,
-    MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
+    AxisState, AxisView, CalibrationView, Cause, Event, LeaseView, Leased, LegView, MachineState,
+    MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
 };

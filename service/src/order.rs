@@ -3,7 +3,7 @@
 use tokio::sync::oneshot;
 
 use crate::problem::Problem;
-use crate::request::{Caller, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode};
 use crate::view::Leased;
 
 /// What is asked of the machine's thread.
@@ -11,6 +11,8 @@ use crate::view::Leased;
 pub(crate) enum Order {
     /// A motion under the name that it is to have.
     Move { id: String, request: MoveRequest },
+    /// A jog under the name that it is to have, or one more proof that somebody holds the key.
+    Jog { id: String, request: JogRequest },
     /// The dead-man of a motion still holds.
     Renew { motion: String },
     /// Everything stops.
@@ -30,10 +32,21 @@ pub(crate) enum Order {
         request: LeaseRequest,
         token: String,
     },
+    /// Another calibration is used from now on.
+    Calibration(Choice),
     /// The lease goes back.
     Release,
     /// The service ends.
     End,
+}
+
+/// Which calibration is used.
+#[derive(Clone, Debug)]
+pub(crate) enum Choice {
+    /// This one, by the beginning of its name.
+    Activate(String),
+    /// The one that this axis used before.
+    Rollback(String),
 }
 
 impl Order {
@@ -42,12 +55,14 @@ impl Order {
         match self {
             Self::Stop { .. } | Self::Lease { .. } | Self::Release | Self::End => false,
             Self::Move { .. }
+            | Self::Jog { .. }
             | Self::Renew { .. }
             | Self::Reset
             | Self::Power { .. }
             | Self::Plan { .. }
             | Self::Start { .. }
-            | Self::Abort { .. } => true,
+            | Self::Abort { .. }
+            | Self::Calibration(_) => true,
         }
     }
 }
@@ -57,6 +72,8 @@ impl Order {
 pub(crate) enum Answer {
     /// It is done, or goes on under its name.
     Done,
+    /// The motion that a jog is, or the axis whose calibration was chosen.
+    Named(String),
     /// The lease.
     Leased(Leased),
 }

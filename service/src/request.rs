@@ -65,6 +65,17 @@ impl MoveRequest {
     }
 }
 
+/// One axis runs as long as somebody holds the key.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JogRequest {
+    /// Which axis.
+    pub axis: String,
+    /// How fast, and with its sign which way; 0 ends the jog. At most the usual speed of its configuration.
+    #[schema(value_type = QuantityIn, example = "-2mm/s")]
+    pub speed: Speed,
+}
+
 /// What happens when an axis of a new motion is in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

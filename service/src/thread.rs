@@ -19,7 +19,7 @@ use wire::cia402::PowerState;
 use crate::desk::Desk;
 use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
-use crate::order::{Answer, Letter, Reply};
+use crate::order::{Answer, Choice, Letter, Reply};
 use crate::problem::Problem;
 use crate::request::RunKind;
 use crate::scribe::Scribe;
@@ -82,10 +82,10 @@ impl Service {
             .name("machine".into())
             .spawn(move || keep(open, inbox, input, &told))?;
         match ready.recv() {
-            Ok((fixed, root)) => {
-                let folder = root.join("service");
+            Ok((fixed, store)) => {
+                let folder = store.root().join("service");
                 let ledger = Ledger::open(&folder)?;
-                let desk = Desk::new(letters, Board::new(output), fixed, ledger);
+                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store);
                 Ok(Self {
                     scribe: Scribe::start(desk.clone(), folder)?,
                     desk,
@@ -121,7 +121,7 @@ impl Service {
     }
 }
 
-type Told = Sender<(Arc<Fixed>, std::path::PathBuf)>;
+type Told = Sender<(Arc<Fixed>, Store)>;
 
 /// All that the machine's thread does.
 fn keep(
@@ -149,7 +149,7 @@ fn keep(
     kept.load_courses();
     kept.keeper.borrow_mut().set_mode(Mode::Idle);
     // Whoever started it may have gone.
-    let _ = told.send((fixed, kept.store.root().to_owned()));
+    let _ = told.send((fixed, kept.store.clone()));
     let ended = kept.live();
     kept.keeper.borrow_mut().dismiss();
     drop(held);
@@ -179,6 +179,10 @@ impl Kept {
             match job {
                 None => {}
                 Some(Job::Run(id)) => self.run(&id),
+                Some(Job::Choose(choice, by, reply)) => {
+                    let chosen = self.choose(&choice, &by);
+                    answer(reply, chosen);
+                }
                 Some(Job::Reset(reply)) => {
                     let reset = self.reset();
                     answer(reply, reset);
@@ -249,6 +253,35 @@ impl Kept {
             }
         }
         Ok(())
+    }
+
+    /// Another calibration is used from now on; nothing moves.
+    fn choose(&mut self, choice: &Choice, by: &str) -> Result<Answer, Problem> {
+        let (axis, id) = self.chosen_by(choice).map_err(Problem::from)?;
+        self.keeper.borrow().require_own_calibration(&axis)?;
+        let machine = &mut self.machine;
+        let used = machine.linear(&axis).and_then(|mut stage| match choice {
+            Choice::Activate(_) => stage.activate(&self.store, &id).map(|()| id),
+            Choice::Rollback(_) => stage.rollback(&self.store),
+        });
+        let id = used.map_err(Problem::from)?;
+        let course = machine.linear(&axis).map(|it| it.course());
+        let course = course.map_err(Problem::from)?;
+        let mut keeper = self.keeper.borrow_mut();
+        keeper.set_course(&axis, course, Some(&id));
+        keeper.chosen(machine, &axis, &id, by);
+        Ok(Answer::Named(axis))
+    }
+
+    /// Of which axis, and which one when that is said.
+    fn chosen_by(&self, choice: &Choice) -> Result<(String, String), Failure> {
+        match choice {
+            Choice::Rollback(axis) => Ok((axis.clone(), String::new())),
+            Choice::Activate(prefix) => {
+                let id = self.store.resolve(prefix)?;
+                Ok((self.store.glance(&id)?.head.axis, id))
+            }
+        }
     }
 
     /// Uses the active calibration of each axis, and says where one cannot be used.

@@ -274,6 +274,25 @@ pub struct RunView {
     pub result: serde_json::Value,
 }
 
+/// A calibration that is stored.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct CalibrationView {
+    /// Its name: the BLAKE3 of what it says.
+    pub id: String,
+    /// Of which axis.
+    pub axis: String,
+    /// What it is: `linear`, `rotary`, …
+    pub kind: String,
+    /// When it was made, UTC, RFC 3339.
+    pub created: String,
+    /// The journal that it was made from.
+    pub source: String,
+    /// What it says, in a line.
+    pub summary: String,
+    /// Whether it is in use.
+    pub active: bool,
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Event {
@@ -283,7 +302,8 @@ pub struct Event {
     pub at: String,
     /// When by the machine's clock, in seconds.
     pub clock_s: f64,
-    /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`, `warning`.
+    /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`,
+    /// `calibration`, `warning`.
     pub kind: String,
     /// Of which axis, motion or run; empty for the machine.
     pub of: String,

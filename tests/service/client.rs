@@ -4,8 +4,8 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use service::{
-    AxisView, Caller, Desk, Event, LeaseRequest, Leased, MachineView, MotionView, MoveRequest,
-    Problem, RunKind, RunRequest, RunState, RunView, StopMode,
+    AxisView, CalibrationView, Caller, Desk, Event, JogRequest, LeaseRequest, Leased, MachineView,
+    MotionView, MoveRequest, Problem, RunKind, RunRequest, RunState, RunView, StopMode,
 };
 
 use crate::stage::{Gate, Stage};
@@ -15,6 +15,8 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Somebody who asks the service.
 pub(crate) trait Client {
+    /// How.
+    fn interface(&self) -> &'static str;
     fn begin(
         &self,
         who: &Caller,
@@ -22,6 +24,7 @@ pub(crate) trait Client {
         key: Option<&str>,
     ) -> Result<String, Problem>;
     fn motion(&self, id: &str, wait: Duration) -> Result<MotionView, Problem>;
+    fn jog(&self, who: &Caller, request: &JogRequest) -> Result<String, Problem>;
     fn renew(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn stop(&self, who: &Caller, mode: StopMode) -> Result<(), Problem>;
     fn reset(&self, who: &Caller) -> Result<(), Problem>;
@@ -32,6 +35,9 @@ pub(crate) trait Client {
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem>;
     fn lease(&self, who: &Caller, request: &LeaseRequest) -> Result<Leased, Problem>;
     fn release(&self, who: &Caller) -> Result<(), Problem>;
+    fn calibrations(&self) -> Vec<CalibrationView>;
+    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem>;
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem>;
     fn axis(&self, name: &str) -> Result<AxisView, Problem>;
     fn machine(&self) -> MachineView;
     fn events(&self, after: u64) -> Vec<Event>;
@@ -61,6 +67,10 @@ impl InProcess {
 }
 
 impl Client for InProcess {
+    fn interface(&self) -> &'static str {
+        "the library"
+    }
+
     fn begin(
         &self,
         who: &Caller,
@@ -74,6 +84,11 @@ impl Client for InProcess {
     fn motion(&self, id: &str, wait: Duration) -> Result<MotionView, Problem> {
         let _passing = self.gate.pass();
         self.desk.wait_motion(id, wait)
+    }
+
+    fn jog(&self, who: &Caller, request: &JogRequest) -> Result<String, Problem> {
+        let _passing = self.gate.pass();
+        self.desk.jog(who, request)
     }
 
     fn renew(&self, who: &Caller, id: &str) -> Result<(), Problem> {
@@ -127,6 +142,20 @@ impl Client for InProcess {
     fn release(&self, who: &Caller) -> Result<(), Problem> {
         let _passing = self.gate.pass();
         self.desk.release(who)
+    }
+
+    fn calibrations(&self) -> Vec<CalibrationView> {
+        self.desk.calibrations().expect("they can be read")
+    }
+
+    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let _passing = self.gate.pass();
+        self.desk.activate(who, id).map(|_| ())
+    }
+
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem> {
+        let _passing = self.gate.pass();
+        self.desk.rollback(who, axis).map(|_| ())
     }
 
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {

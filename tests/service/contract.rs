@@ -1,5 +1,7 @@
 //! The contract of a motion, line by line, on every interface.
 
+mod calibrations;
+mod jogs;
 mod machine;
 mod motions;
 mod repeated;
@@ -9,7 +11,7 @@ use core::time::Duration;
 use std::path::Path;
 
 use service::{Caller, Code, Length, MotionState, MotionView, MoveRequest, Problem, Speed};
-use tests::{Edit, LINEAR, VOLUMETRIC};
+use tests::{Edit, LINEAR, Rig, VOLUMETRIC};
 use units::{Metres, MetresPerSecond};
 
 use crate::client::{Client, InProcess, PATIENCE};
@@ -25,28 +27,34 @@ pub(crate) struct Bed<'b> {
     pub(crate) client: &'b dyn Client,
 }
 
-/// Every interface that there is.
-fn interfaces(stage: &Stage) -> Vec<(&'static str, Box<dyn Client>)> {
-    vec![
-        ("in process", Box::new(InProcess::of(stage))),
-        ("HTTP", Box::new(Http::of(stage))),
-    ]
-}
-
-/// How many of them.
-const INTERFACES: usize = 2;
-
 /// A linear stage that gives a slow move all the time that it wants.
 fn patient(text: String) -> String {
     text.edit("move_timeout_s = 10.0", "move_timeout_s = 10000.0")
 }
 
-fn each(new: impl Fn(&Path) -> Stage, body: impl Fn(&Bed<'_>)) {
-    for number in 0..INTERFACES {
+/// Makes somebody who asks a service.
+type Meet = fn(&Stage) -> Box<dyn Client>;
+
+/// Each bus of this run over HTTP, and once by the library.
+fn meetings() -> Vec<(Rig, Meet)> {
+    let over_http: Meet = |stage| Box::new(Http::of(stage));
+    let by_the_library: Meet = |stage| Box::new(InProcess::of(stage));
+    let mut meetings: Vec<_> = tests::rigs()
+        .into_iter()
+        .map(|it| (it, over_http))
+        .collect();
+    if meetings.iter().any(|it| it.0 == Rig::InProcess) {
+        meetings.push((Rig::InProcess, by_the_library));
+    }
+    meetings
+}
+
+fn each(new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
+    for (rig, meet) in meetings() {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let stage = new(folder.path());
-        let (name, client) = interfaces(&stage).swap_remove(number);
-        println!("interface: {name}");
+        let stage = new(rig, folder.path());
+        let client = meet(&stage);
+        println!("{rig:?}, {}", client.interface());
         let client = &*client;
         body(&Bed {
             stage: &stage,
@@ -66,12 +74,13 @@ fn with_zeroed_stage(body: impl Fn(&Bed<'_>)) {
 
 /// A linear stage as it is after its start, on each interface.
 fn with_stage(body: impl Fn(&Bed<'_>)) {
-    each(|folder| Stage::new(LINEAR, SEED, folder, patient), body);
+    let new = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, patient);
+    each(new, body);
 }
 
 /// Three axes that have their zero, on each interface.
 fn with_three_axes(body: impl Fn(&Bed<'_>)) {
-    let new = |folder: &Path| Stage::new(VOLUMETRIC, SEED, folder, |text| text);
+    let new = |rig, folder: &Path| Stage::new(rig, (VOLUMETRIC, SEED), folder, |text| text);
     each(new, |bed| {
         bed.client.zero(&anna(), None);
         body(bed);

@@ -14,7 +14,8 @@ use crate::stage::Stage;
 
 fn on_a_stage(body: impl FnOnce(&Stage, &Http)) {
     let folder = tempfile::tempdir().unwrap();
-    let stage = Stage::new(LINEAR, 51, folder.path(), |text| text);
+    let rig = tests::rigs()[0];
+    let stage = Stage::new(rig, (LINEAR, 51), folder.path(), |text| text);
     let http = Http::of(&stage);
     body(&stage, &http);
     drop(http);

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use service::{
-    AxisView, Caller, Edge, Event, LeaseRequest, Leased, Listen, MachineView, MotionView,
-    MoveRequest, Problem, RunRequest, RunView, StopMode,
+    AxisView, CalibrationView, Caller, Edge, Event, JogRequest, LeaseRequest, Leased, Listen,
+    MachineView, MotionView, MoveRequest, Problem, RunRequest, RunView, StopMode,
 };
 
 use crate::client::Client;
@@ -161,6 +161,10 @@ fn seconds(wait: Duration) -> f64 {
 }
 
 impl Client for Http {
+    fn interface(&self) -> &'static str {
+        "HTTP"
+    }
+
     fn begin(
         &self,
         who: &Caller,
@@ -174,6 +178,11 @@ impl Client for Http {
 
     fn motion(&self, id: &str, wait: Duration) -> Result<MotionView, Problem> {
         self.get(&format!("/v1/motions/{id}?wait_s={}", seconds(wait)))
+    }
+
+    fn jog(&self, who: &Caller, request: &JogRequest) -> Result<String, Problem> {
+        let answer = self.post(who, "/v1/jog", "", &json!(request));
+        Ok(answer.read::<MotionView>()?.id)
     }
 
     fn renew(&self, who: &Caller, id: &str) -> Result<(), Problem> {
@@ -224,6 +233,25 @@ impl Client for Http {
         let lease = who.lease.clone().unwrap_or_default();
         let head = format!("DELETE /v1/lease HTTP/1.1\r\ntruestage-lease: {lease}");
         self.ask(&head, b"").read::<Value>().map(|_| ())
+    }
+
+    fn calibrations(&self) -> Vec<CalibrationView> {
+        self.get("/v1/calibrations").expect("they can be read")
+    }
+
+    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let answer = self.post(
+            who,
+            &format!("/v1/calibrations/{id}/activate"),
+            "",
+            &json!({}),
+        );
+        answer.read::<AxisView>().map(|_| ())
+    }
+
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem> {
+        let answer = self.post(who, "/v1/calibrations/rollback", "", &json!({"axis": axis}));
+        answer.read::<AxisView>().map(|_| ())
     }
 
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {

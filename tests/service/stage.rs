@@ -1,45 +1,87 @@
-//! A service on an emulated machine in virtual time, which passes only while somebody asks or waits.
+//! A service on an emulated machine in virtual time or in lockstep, which passes only while somebody asks or waits.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use core::time::Duration;
 
-use drivers::transport::in_process::InProcess;
 use drivers::transport::{SendError, Transport};
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::simulation::Simulation;
 use service::{Desk, Opened, Service};
-use tests::{Shipped, shipped_config};
-use truestage::Machine;
-use truestage::emulated::Emulated;
+use tests::{Rig, Shipped, shipped_config};
+use truestage::config::Loaded;
+use truestage::emulated::{Emulated, EmulatedOnPtys};
+use truestage::{Failure, Machine, ports};
 use units::Time;
 use wire::{Arrival, Payload, Port};
+
+/// While a request is on its way and its time is used up, a tick passes each time: the wall has to go on for a
+/// second before a dead-man of 200 ms strikes.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+const TRICKLE: Duration = Duration::from_millis(2);
 
 /// Time passes while it is open.
 #[derive(Debug, Default)]
 pub(crate) struct Gate {
-    open: Mutex<u32>,
+    doors: Mutex<Doors>,
     opened: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Doors {
+    /// How many keep it open.
+    open: u32,
+    /// So much time passes at most each time that somebody opens it.
+    allowance: Option<Duration>,
+    /// Somebody has opened it since the machine's thread looked last.
+    is_fresh: bool,
+    /// When the allowance is used up.
+    until: Option<Time>,
+}
+
+impl Doors {
+    /// Whether the time may go on from `now`.
+    fn let_pass(&mut self, now: Time) -> bool {
+        if core::mem::take(&mut self.is_fresh) {
+            self.until = self.allowance.map(|it| now + it);
+        }
+        self.open > 0 && self.until.is_none_or(|until| now < until)
+    }
 }
 
 impl Gate {
     /// Time passes until this is dropped.
     pub(crate) fn pass(self: &Arc<Self>) -> Passing {
-        *self.open.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        let mut doors = self.doors();
+        doors.open += 1;
+        doors.is_fresh = true;
         self.opened.notify_all();
         Passing(Arc::clone(self))
     }
 
-    fn wait(&self) {
-        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-        while *open == 0 {
-            open = self
-                .opened
-                .wait(open)
-                .unwrap_or_else(PoisonError::into_inner);
+    /// From now on `allowance` passes for each request, and hardly more while its answer is on its way: whoever
+    /// asks many times a second does so by the machine's clock, on a busy computer too.
+    pub(crate) fn limit(&self, allowance: Option<Duration>) {
+        self.doors().allowance = allowance;
+    }
+
+    fn wait(&self, now: Time) {
+        let mut doors = self.doors();
+        while !doors.let_pass(now) {
+            let waited = self.opened.wait_timeout(doors, LOOK_EVERY);
+            let timed_out;
+            (doors, timed_out) = waited.unwrap_or_else(PoisonError::into_inner);
+            if timed_out.timed_out() && doors.open > 0 {
+                // The request has not come in yet; it is taken at the end of a tick.
+                doors.until = Some(now + TRICKLE);
+            }
         }
+    }
+
+    fn doors(&self) -> MutexGuard<'_, Doors> {
+        self.doors.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -49,18 +91,19 @@ pub(crate) struct Passing(Arc<Gate>);
 
 impl Drop for Passing {
     fn drop(&mut self) {
-        *self.0.open.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+        self.0.doors().open -= 1;
     }
 }
 
 type Meddling = Box<dyn FnOnce(&mut Simulation) + Send>;
+type OpenedTransport = (Box<dyn Transport>, Option<(Emulated, Receiver<Meddling>)>);
 
 /// A transport to the emulated machine that waits at the gate.
 struct Gated {
-    inner: InProcess<Emulated>,
-    emulated: Emulated,
+    inner: Box<dyn Transport>,
     gate: Arc<Gate>,
-    meddling: Receiver<Meddling>,
+    /// In this process it is this thread that meddles.
+    meddling: Option<(Emulated, Receiver<Meddling>)>,
 }
 
 impl Transport for Gated {
@@ -73,9 +116,11 @@ impl Transport for Gated {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        self.gate.wait();
-        for meddle in self.meddling.try_iter() {
-            meddle(&mut self.emulated.simulation_mut());
+        self.gate.wait(self.inner.now());
+        if let Some((emulated, meddling)) = &self.meddling {
+            for meddle in meddling.try_iter() {
+                meddle(&mut emulated.simulation_mut());
+            }
         }
         self.inner.receive(until)
     }
@@ -89,35 +134,81 @@ impl Transport for Gated {
     }
 }
 
+/// Where the emulated machine is.
+enum Place {
+    /// In the machine's thread.
+    InProcess(Sender<Meddling>),
+    /// In a thread of its own, behind terminals.
+    Running(EmulatedOnPtys),
+}
+
 /// A service that keeps an emulated machine.
 pub(crate) struct Stage {
     pub(crate) desk: Desk,
     pub(crate) gate: Arc<Gate>,
-    meddling: Sender<Meddling>,
+    place: Place,
     service: Option<Service>,
 }
 
 impl Stage {
-    /// The machine `shipped` with `seed`, its records below `folder`, after `change` of its configuration.
+    /// The machine `shipped` with `seed` on `rig`, its records below `folder`, after `change` of its
+    /// configuration.
     pub(crate) fn new(
-        shipped: Shipped,
-        seed: u64,
+        rig: Rig,
+        (shipped, seed): (Shipped, u64),
         folder: &Path,
         change: impl Fn(String) -> String,
     ) -> Self {
         let loaded = shipped_config(&shipped, folder, change);
-        let gate = Arc::new(Gate::default());
+        let text = shipped.emulated;
+        let emulated = match rig {
+            Rig::InProcess => return Self::in_process(loaded, text, seed),
+            Rig::Pty => EmulatedOnPtys::in_lockstep(text, seed),
+            Rig::Vcan => EmulatedOnPtys::in_lockstep_on_socketcan(text, seed, "vcan0"),
+        };
+        Self::on_ptys(
+            loaded,
+            emulated.unwrap_or_else(|error| panic!("{rig:?}: {error}")),
+        )
+    }
+
+    fn in_process(loaded: Loaded, text: &'static str, seed: u64) -> Self {
         let (meddling, received) = channel();
+        let open = move |loaded: &Loaded| {
+            let emulated = Emulated::new(text, seed, &loaded.config)?;
+            let transport: Box<dyn Transport> = Box::new(emulated.transport());
+            Ok((transport, Some((emulated, received))))
+        };
+        Self::start(loaded, open, Place::InProcess(meddling))
+    }
+
+    fn on_ptys(mut loaded: Loaded, emulated: EmulatedOnPtys) -> Self {
+        let overrides = emulated.overrides(&loaded.config);
+        let overrides = overrides.expect("its ports were matched");
+        let pace = emulated.pace("a test").expect("the emulator runs");
+        loaded.patience = pace.patience();
+        let open = move |loaded: &Loaded| {
+            let live = ports::open(&loaded.config, &overrides, ports::Use::Measurement, pace)?;
+            let transport: Box<dyn Transport> = Box::new(live);
+            Ok((transport, None))
+        };
+        Self::start(loaded, open, Place::Running(emulated))
+    }
+
+    fn start<O>(loaded: Loaded, open: O, place: Place) -> Self
+    where
+        O: FnOnce(&Loaded) -> Result<OpenedTransport, Failure> + Send + 'static,
+    {
+        let gate = Arc::new(Gate::default());
         let inner_gate = Arc::clone(&gate);
         let store = truestage::store_of(&loaded.config.machine);
         let passing = gate.pass();
         let service = Service::start(move || {
-            let emulated = Emulated::new(shipped.emulated, seed, &loaded.config)?;
+            let (inner, meddling) = open(&loaded)?;
             let transport = Gated {
-                inner: emulated.transport(),
-                emulated,
+                inner,
                 gate: inner_gate,
-                meddling: received,
+                meddling,
             };
             Ok(Opened {
                 machine: Machine::new(&loaded, Box::new(transport)),
@@ -130,7 +221,7 @@ impl Stage {
         Self {
             desk: service.desk(),
             gate,
-            meddling,
+            place,
             service: Some(service),
         }
     }
@@ -140,12 +231,19 @@ impl Stage {
         &self,
         work: impl FnOnce(&mut Simulation) -> R + Send + 'static,
     ) -> R {
+        let meddling = match &self.place {
+            Place::InProcess(meddling) => meddling,
+            Place::Running(emulated) => {
+                let result = emulated.running().with(work);
+                return result.unwrap_or_else(|error| panic!("{error}"));
+            }
+        };
         let (send, received) = channel();
         let meddle: Meddling = Box::new(move |simulation| {
             // The test waits for it.
             let _ = send.send(work(simulation));
         });
-        self.meddling.send(meddle).expect("the machine is there");
+        meddling.send(meddle).expect("the machine is there");
         let _passing = self.gate.pass();
         received.recv().expect("the machine ticks")
     }

@@ -108,16 +108,41 @@ impl LinearStage<'_> {
         let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
-        let record = store.load::<LinearContent>(&id)?;
+        self.load(store, &id)?;
+        Ok(Some(id))
+    }
+
+    /// Uses calibration `id` from now on, now and after the next start; nothing moves, and the one used before
+    /// stays in the history.
+    ///
+    /// # Errors
+    /// As [`LinearStage::load_active`]; the calibration used before is used still.
+    pub fn activate(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
+        self.load(store, id)?;
+        Ok(store.activate(self.axis, id)?)
+    }
+
+    /// Uses the calibration that was used before; returns its name.
+    ///
+    /// # Errors
+    /// When there is none; as [`LinearStage::activate`].
+    pub fn rollback(&mut self, store: &Store) -> Result<String, Failure> {
+        let earlier = store.earlier(self.axis)?;
+        self.load(store, &earlier)?;
+        Ok(store.rollback(self.axis)?)
+    }
+
+    fn load(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
+        let record = store.load::<LinearContent>(id)?;
         record.head.belongs_to(
-            &id,
+            id,
             &self.core.this_machine(self.axis),
             self.core.config_hash,
         )?;
-        let compensation = self.prepare(record.content.table(&id)?)?;
-        let budget = record.content.axis_budget(&id)?;
+        let compensation = self.prepare(record.content.table(id)?)?;
+        let budget = record.content.axis_budget(id)?;
         self.use_calibration(compensation, budget, record.content.approach_m.map(Metres));
-        Ok(Some(id))
+        Ok(())
     }
 
     fn fit_table(&self, plan: &RunPlan, measured: &Measured) -> Result<Fitted, Failure> {

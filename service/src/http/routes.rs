@@ -1,5 +1,6 @@
 //! The resources.
 
+mod calibrations;
 mod machine;
 mod motions;
 mod runs;
@@ -40,6 +41,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
         (name = "machine", description = "The machine and its axes"),
         (name = "motions", description = "Motions; their end is a level"),
         (name = "runs", description = "Procedures: plan, start, abort"),
+        (name = "calibrations", description = "What corrects motions: activate, roll back"),
         (name = "events", description = "What happens"),
         (name = "service", description = "The service itself")
     )
@@ -60,6 +62,10 @@ pub(super) fn described() -> (Router<State>, OpenApi) {
         .routes(routes!(motions::motions, motions::begin))
         .routes(routes!(motions::motion))
         .routes(routes!(motions::renew))
+        .routes(routes!(motions::jog))
+        .routes(routes!(calibrations::calibrations))
+        .routes(routes!(calibrations::activate))
+        .routes(routes!(calibrations::rollback))
         .routes(routes!(runs::runs, runs::plan))
         .routes(routes!(runs::run))
         .routes(routes!(runs::start))

@@ -20,7 +20,7 @@ use machine::{Attendant, Failure, Machine, Observer, Stage};
 use serde_json::json;
 use triple_buffer::Input;
 
-use crate::order::{Answered, Letter, Reply};
+use crate::order::{Answered, Choice, Letter, Reply};
 use crate::snapshot::Snapshot;
 use crate::view::Cause;
 use events::Events;
@@ -57,6 +57,8 @@ pub(crate) enum Mode {
 pub(crate) enum Job {
     /// A run, under its name.
     Run(Arc<str>),
+    /// Another calibration, for somebody who waits.
+    Choose(Choice, String, Reply),
     /// A reset, for somebody who waits.
     Reset(Reply),
     /// The end.

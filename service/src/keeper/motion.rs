@@ -1,6 +1,7 @@
 //! Motions: state machines that every tick carries on. Their end is a level.
 
 mod accept;
+mod jog;
 mod shown;
 
 use core::time::Duration;
@@ -70,6 +71,8 @@ pub(super) struct Motion {
     speed: Option<MetresPerSecond>,
     uncorrected: bool,
     dead_man: Option<(Duration, Time)>,
+    /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
+    jog: Option<MetresPerSecond>,
     legs: Vec<Leg>,
     phase: Phase,
 }
@@ -153,9 +156,12 @@ impl Keeper {
         for (leg, speed) in motion.legs.iter_mut().zip(speeds) {
             let seat = &mut self.seats[leg.at];
             let limit = machine.patience().of(seat.settings.move_timeout + SETTLING);
-            leg.deadline = machine.now() + limit + seat.in_position;
+            let id = Arc::clone(&motion.id);
+            (leg.deadline, seat.task) = match motion.jog {
+                None => (machine.now() + limit + seat.in_position, Task::Motion(id)),
+                Some(_) => (Time::NEVER, Task::Jog(id)),
+            };
             leg.phase = LegPhase::Moving;
-            seat.task = Task::Motion(Arc::clone(&motion.id));
             seat.target = Some(leg.target);
             seat.set_point = leg.set_point;
             let set_point = leg.set_point.unwrap_or(leg.target);

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use machine::{Machine, Moving};
 
-use super::seat::Task;
+use super::seat::{MovedBy, Task};
 use super::stop::stopped_problem;
 use super::{Job, Keeper, Mode};
-use crate::order::{Answer, Answered, Letter, Order, Reply};
+use crate::order::{Answer, Answered, Choice, Letter, Order, Reply};
 use crate::problem::{Code, Problem};
 
 impl Keeper {
@@ -39,6 +39,7 @@ impl Keeper {
             Order::Move { id, request } => self
                 .accept_motion(machine, &id, by, &request)
                 .map(|()| Answer::Done),
+            Order::Jog { id, request } => self.jog(machine, &id, by, &request).map(Answer::Named),
             Order::Renew { motion } => self.renew(machine.now(), &motion).map(|()| Answer::Done),
             Order::Plan { id, request } => {
                 let planned = self.plan_run(&id, by, &request);
@@ -51,6 +52,7 @@ impl Keeper {
             Order::Start { run } => self.start_run(machine, &run).map(|()| Answer::Done),
             Order::Abort { run } => self.abort_run(machine, &run, by).map(|()| Answer::Done),
             Order::Power { axis, on } => return self.power(machine, &axis, on, reply),
+            Order::Calibration(choice) => return self.take_choice(choice, by, reply),
             Order::Reset => return self.take_reset(reply),
             Order::End => return self.take_end(machine, by, reply),
         };
@@ -133,6 +135,44 @@ impl Keeper {
                 self.answer_later(reply, Err(Problem::new(Code::AxisBusy, what, help)));
             }
         }
+    }
+
+    fn take_choice(&mut self, choice: Choice, by: &str, reply: Reply) {
+        let is_idle = self.job.is_none() && self.mode != Mode::Procedure;
+        let allowed = self.require_running().and_then(|()| match is_idle {
+            true => Ok(()),
+            false => Err(Problem::new(
+                Code::AxisBusy,
+                "a run is under way",
+                "wait for its end or abort it",
+            )),
+        });
+        match allowed {
+            Ok(()) => self.job = Some(Job::Choose(choice, by.to_owned(), reply)),
+            Err(problem) => self.answer_later(reply, Err(problem)),
+        }
+    }
+
+    /// Refuses an axis whose calibration cannot be chosen by itself, or is in use.
+    pub(crate) fn require_own_calibration(&self, axis: &str) -> Result<(), Problem> {
+        let at = self.place(axis)?;
+        if self.seats[at].moved_by == MovedBy::Itself {
+            return self.require_free(at);
+        }
+        let what = format!("axis {axis} is not calibrated by itself");
+        let help = "use `truestage cal` while the service is not running";
+        Err(Problem::new(Code::NotOffered, what, help))
+    }
+
+    /// The axis uses this calibration from now on.
+    pub(crate) fn chosen(&mut self, machine: &Machine, axis: &str, id: &str, by: &str) {
+        let data = serde_json::json!({"id": id, "by": by});
+        self.events.push("calibration", axis, data);
+        if let Ok(at) = self.place(axis) {
+            // It was that of a stop by the calibration before.
+            self.seats[at].standard_uncertainty = None;
+        }
+        self.publish(machine);
     }
 
     fn take_end(&mut self, machine: &mut Machine, by: &str, reply: Reply) {

@@ -30,6 +30,8 @@ pub(super) enum Task {
     Free,
     /// The motion of this name.
     Motion(Arc<str>),
+    /// The jog of this name.
+    Jog(Arc<str>),
     /// The run of this name.
     Run(Arc<str>, RunKind),
     /// It is being switched on or off for somebody who waits.
@@ -74,7 +76,7 @@ impl Seat {
     /// Whether the motion or run `id` has it.
     pub(super) fn is_of(&self, id: &str) -> bool {
         match &self.task {
-            Task::Motion(of) | Task::Run(of, _) => **of == *id,
+            Task::Motion(of) | Task::Jog(of) | Task::Run(of, _) => **of == *id,
             Task::Free | Task::Power(_) | Task::Stopping => false,
         }
     }
@@ -84,6 +86,7 @@ impl Seat {
         match &self.task {
             Task::Free => "nobody".into(),
             Task::Motion(id) => format!("motion {id}"),
+            Task::Jog(id) => format!("jog {id}"),
             Task::Run(id, _) => format!("run {id}"),
             Task::Power(_) => "a change of its power".into(),
             Task::Stopping => "a stop that has not ended".into(),
@@ -125,6 +128,7 @@ impl Seat {
         match &self.task {
             _ if is_faulted => AxisState::ErrorStop,
             Task::Stopping => AxisState::Stopping,
+            Task::Jog(_) => AxisState::ContinuousMotion,
             Task::Run(_, RunKind::Zero) => AxisState::Homing,
             Task::Run(..) | Task::Motion(_) => AxisState::DiscreteMotion,
             Task::Free | Task::Power(_) => match power {
@@ -159,7 +163,7 @@ impl Seat {
             homed,
             calibration: self.calibration.clone(),
             used_by: match &self.task {
-                Task::Motion(id) | Task::Run(id, _) => Some(Arc::clone(id)),
+                Task::Motion(id) | Task::Jog(id) | Task::Run(id, _) => Some(Arc::clone(id)),
                 Task::Free | Task::Power(_) | Task::Stopping => None,
             },
             last_cause: self.last_cause.clone(),

@@ -3,7 +3,7 @@
 use service::{Code, MotionState};
 use tests::LINEAR;
 
-use super::{Bed, INTERFACES, SEED, anna, interfaces, patient, slowly, to, with_zeroed_stage};
+use super::{Bed, SEED, anna, meetings, patient, slowly, to, with_zeroed_stage};
 use crate::stage::Stage;
 
 #[test]
@@ -38,10 +38,10 @@ fn the_same_request_moves_once_and_another_one_with_its_key_is_refused() {
 
 #[test]
 fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_not_move() {
-    for number in 0..INTERFACES {
+    for (rig, meet) in meetings() {
         let folder = tempfile::tempdir().unwrap();
-        let stage = Stage::new(LINEAR, SEED, folder.path(), patient);
-        let (_, client) = interfaces(&stage).swap_remove(number);
+        let stage = Stage::new(rig, (LINEAR, SEED), folder.path(), patient);
+        let client = meet(&stage);
         client.zero(&anna(), None);
         let first = client.begin(&anna(), &to("x", 10.0), Some("key")).unwrap();
         let before = Bed {
@@ -52,8 +52,8 @@ fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_n
         drop(client);
         stage.end();
 
-        let stage = Stage::new(LINEAR, SEED, folder.path(), patient);
-        let (_, client) = interfaces(&stage).swap_remove(number);
+        let stage = Stage::new(rig, (LINEAR, SEED), folder.path(), patient);
+        let client = meet(&stage);
         let bed = Bed {
             stage: &stage,
             client: &*client,
@@ -73,10 +73,10 @@ fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_n
 /// What a killed service leaves: the line that was synced before the order was given, and no end.
 #[test]
 fn after_a_crash_a_motion_without_an_end_has_failed_and_does_not_move_again() {
-    for number in 0..INTERFACES {
+    for (rig, meet) in meetings() {
         let (folder, crashed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let stage = Stage::new(LINEAR, SEED, folder.path(), patient);
-        let (_, client) = interfaces(&stage).swap_remove(number);
+        let stage = Stage::new(rig, (LINEAR, SEED), folder.path(), patient);
+        let client = meet(&stage);
         client.zero(&anna(), None);
         let first = client
             .begin(&anna(), &slowly("x", 30.0), Some("key"))
@@ -97,8 +97,8 @@ fn after_a_crash_a_motion_without_an_end_has_failed_and_does_not_move_again() {
         drop(client);
         stage.end();
 
-        let stage = Stage::new(LINEAR, SEED, crashed.path(), patient);
-        let (_, client) = interfaces(&stage).swap_remove(number);
+        let stage = Stage::new(rig, (LINEAR, SEED), crashed.path(), patient);
+        let client = meet(&stage);
         let bed = Bed {
             stage: &stage,
             client: &*client,

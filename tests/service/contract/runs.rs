@@ -18,7 +18,7 @@ fn short(text: String) -> String {
 #[test]
 fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
     each(
-        |folder| Stage::new(LINEAR, SEED, folder, short),
+        |rig, folder| Stage::new(rig, (LINEAR, SEED), folder, short),
         |bed| {
             bed.client.zero(&anna(), Some("x"));
             let plan = RunRequest {

@@ -8,10 +8,10 @@ use axum::response::IntoResponse;
 use super::super::guard::{Body, By, plain};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
-use crate::desk::Noted;
+use crate::desk::{Noted, named};
 use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
-use crate::request::MoveRequest;
+use crate::request::{JogRequest, MoveRequest};
 use crate::view::MotionView;
 
 /// So long an Idempotency-Key may be.
@@ -98,6 +98,26 @@ pub(super) async fn motion(
     let id = plain(&id);
     let asked = query(wait)?.until(|| state.desk.motion(&id), |it| it.state.is_end());
     Ok(Json(asked.await?))
+}
+
+/// Begins a jog, renews it, or ends it with a speed of 0. Ask again within 200 ms, or the axis stops; it stops at
+/// the soft limit as well.
+#[utoipa::path(
+    post, path = "/jog", tag = "motions", request_body = JogRequest,
+    responses(
+        (status = 200, description = "The motion that it is", body = MotionView),
+        (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn jog(
+    Of(state): Of<State>,
+    By(caller): By,
+    Body(request): Body<JogRequest>,
+) -> Result<Json<MotionView>, Problem> {
+    let order = state.desk.jog_order(&request);
+    let id = named(obey(&state.desk, &caller, order).await?)?;
+    Ok(Json(state.desk.motion(&id)?))
 }
 
 /// The dead-man of a motion still holds.

@@ -30,14 +30,19 @@ impl Keeper {
         let mut motion = self.motion_of(machine.now(), id, by, request)?;
         self.plan_legs(machine, &mut motion)?;
         self.clear_the_way(machine, &motion, request.if_moving)?;
-        self.events
-            .push("motion", id, json!({"state": "queued", "by": by}));
-        self.motions.active.push(motion);
-        self.motions.published = None;
+        self.queue(motion);
         Ok(())
     }
 
-    fn motion_of(
+    /// It begins as soon as its axes are free.
+    pub(super) fn queue(&mut self, motion: Motion) {
+        let data = json!({"state": "queued", "by": motion.by});
+        self.events.push("motion", &motion.id, data);
+        self.motions.active.push(motion);
+        self.motions.published = None;
+    }
+
+    pub(super) fn motion_of(
         &self,
         now: Time,
         id: &str,
@@ -74,6 +79,7 @@ impl Keeper {
             speed: speed_of(request)?,
             uncorrected: request.uncorrected,
             dead_man: dead_man.map(|it| (it, now + it)),
+            jog: None,
             legs,
             phase: Phase::Queued,
         })
@@ -122,7 +128,7 @@ impl Keeper {
     }
 
     /// Another motion may wait for an axis that is free.
-    fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
+    pub(super) fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
         let mut others = self.motions.active.iter();
         let other = others.find(|it| it.axes().any(|at| motion.axes().any(|own| own == at)));
         other.map_or(Ok(()), |other| {
