@@ -139,7 +139,7 @@ enum Place {
     /// In the machine's thread.
     InProcess(Sender<Meddling>),
     /// In a thread of its own, behind terminals.
-    Running(EmulatedOnPtys),
+    Running(Box<EmulatedOnPtys>),
 }
 
 /// A service that keeps an emulated machine.
@@ -192,7 +192,7 @@ impl Stage {
             let transport: Box<dyn Transport> = Box::new(live);
             Ok((transport, None))
         };
-        Self::start(loaded, open, Place::Running(emulated))
+        Self::start(loaded, open, Place::Running(Box::new(emulated)))
     }
 
     fn start<O>(loaded: Loaded, open: O, place: Place) -> Self
