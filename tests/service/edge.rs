@@ -152,6 +152,9 @@ fn a_stream_of_events_goes_on_where_it_was_broken_off() {
             newest,
         );
         assert_eq!(rest, whole[2..]);
+        // A service that was started again counts from 1.
+        let of_before = "GET /v1/events HTTP/1.1\r\nlast-event-id: 1000000";
+        assert_eq!(http.stream(of_before, newest), whole);
         let axes = http.stream("GET /v1/events?after=0&kinds=axis HTTP/1.1", {
             let last = whole.iter().rfind(|it| it.kind == "axis");
             last.unwrap().id
@@ -160,6 +163,23 @@ fn a_stream_of_events_goes_on_where_it_was_broken_off() {
             axes.len() >= 2 && axes.iter().all(|it| it.kind == "axis"),
             "{axes:?}"
         );
+    });
+}
+
+#[test]
+fn the_page_comes_with_a_policy_that_lets_nothing_in_from_elsewhere() {
+    on_a_stage(|_, http| {
+        for (path, kind) in [
+            ("/", "text/html"),
+            ("/page.css", "text/css"),
+            ("/page.js", "text/javascript"),
+        ] {
+            let answer = http.ask(&format!("GET {path} HTTP/1.1"), b"");
+            assert_eq!(answer.status, 200, "{path}");
+            let policy = "content-security-policy: default-src 'self'";
+            assert!(answer.head.contains(policy), "{answer:?}");
+            assert!(answer.head.contains(kind), "{answer:?}");
+        }
     });
 }
 

@@ -16,7 +16,7 @@ use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
 use crate::linear::positions::positions;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::settings;
-use crate::linear::stage::LinearStage;
+use crate::linear::stage::{LinearStage, Usable};
 use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
 use crate::store::{CalibrationRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store};
 use machine::Stage;
@@ -86,7 +86,11 @@ impl LinearStage<'_> {
         let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
         let id = store.save(&record)?;
         store.activate(self.axis, &id)?;
-        self.use_calibration(compensation, Some(budget.clone()), self.approach_length());
+        self.use_calibration(Usable {
+            compensation,
+            budget: Some(budget.clone()),
+            approach: self.approach_length(),
+        });
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -108,7 +112,8 @@ impl LinearStage<'_> {
         let Some(id) = store.active(self.axis)?.current else {
             return Ok(None);
         };
-        self.load(store, &id)?;
+        let usable = self.usable(store, &id)?;
+        self.use_calibration(usable);
         Ok(Some(id))
     }
 
@@ -118,8 +123,10 @@ impl LinearStage<'_> {
     /// # Errors
     /// As [`LinearStage::load_active`]; the calibration used before is used still.
     pub fn activate(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
-        self.load(store, id)?;
-        Ok(store.activate(self.axis, id)?)
+        let usable = self.usable(store, id)?;
+        store.activate(self.axis, id)?;
+        self.use_calibration(usable);
+        Ok(())
     }
 
     /// Uses the calibration that was used before; returns its name.
@@ -128,21 +135,24 @@ impl LinearStage<'_> {
     /// When there is none; as [`LinearStage::activate`].
     pub fn rollback(&mut self, store: &Store) -> Result<String, Failure> {
         let earlier = store.earlier(self.axis)?;
-        self.load(store, &earlier)?;
-        Ok(store.rollback(self.axis)?)
+        let usable = self.usable(store, &earlier)?;
+        store.rollback(self.axis)?;
+        self.use_calibration(usable);
+        Ok(earlier)
     }
 
-    fn load(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
+    fn usable(&self, store: &Store, id: &str) -> Result<Usable, Failure> {
         let record = store.load::<LinearContent>(id)?;
         record.head.belongs_to(
             id,
             &self.core.this_machine(self.axis),
             self.core.config_hash,
         )?;
-        let compensation = self.prepare(record.content.table(id)?)?;
-        let budget = record.content.axis_budget(id)?;
-        self.use_calibration(compensation, budget, record.content.approach_m.map(Metres));
-        Ok(())
+        Ok(Usable {
+            compensation: self.prepare(record.content.table(id)?)?,
+            budget: record.content.axis_budget(id)?,
+            approach: record.content.approach_m.map(Metres),
+        })
     }
 
     fn fit_table(&self, plan: &RunPlan, measured: &Measured) -> Result<Fitted, Failure> {

@@ -52,14 +52,17 @@ impl LinearStage<'_> {
     }
 
     /// Uses a calibration for every move from now on.
-    pub(crate) fn use_calibration(
-        &mut self,
-        compensation: Compensation,
-        budget: Option<AxisBudget>,
-        approach: Option<Metres>,
-    ) {
-        self.memory.course.compensation = Some(compensation);
-        self.memory.course.budget = budget;
-        self.memory.course.approach = approach;
+    pub(crate) fn use_calibration(&mut self, calibration: Usable) {
+        self.memory.course.compensation = Some(calibration.compensation);
+        self.memory.course.budget = calibration.budget;
+        self.memory.course.approach = calibration.approach;
     }
+}
+
+/// A calibration that was found to belong to the stage and to keep its limits.
+pub(crate) struct Usable {
+    pub(crate) compensation: Compensation,
+    pub(crate) budget: Option<AxisBudget>,
+    /// Over which distance its positions were approached, where that was always the same.
+    pub(crate) approach: Option<Metres>,
 }

@@ -69,7 +69,13 @@ pub(super) async fn events(
     })?;
     let resumed = headers.get("last-event-id").and_then(|it| it.to_str().ok());
     let resumed = resumed.and_then(|it| it.parse().ok()).or(wanted.after);
-    let newest = resumed.unwrap_or_else(|| shared.desk.snapshot().newest_event());
+    let known = shared.desk.snapshot().newest_event();
+    let newest = match resumed {
+        None => known,
+        Some(heard) if heard <= known => heard,
+        // Heard from a service that has been started again since: everything is new.
+        Some(_) => 0,
+    };
     let every = wanted.sample_ms.map(|it| Duration::from_millis(it.max(5)));
     let following = Following {
         desk: shared.desk,

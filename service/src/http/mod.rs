@@ -8,6 +8,7 @@ mod door;
 mod events;
 mod guard;
 mod metrics;
+mod page;
 mod routes;
 mod state;
 

@@ -18,6 +18,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::guard::{Guarded, guard};
+use super::page::page;
 use super::state::State;
 use super::{events, metrics};
 use crate::desk::Desk;
@@ -86,6 +87,7 @@ pub(super) fn router(desk: Desk, is_tcp: bool) -> Router {
             "/openapi.json",
             get(async move || Json(description.clone())),
         )
+        .merge(page())
         .fallback(async |uri: Uri| {
             let what = format!("there is no {}", super::guard::plain(uri.path()));
             Problem::new(Code::NotFound, what, "GET /openapi.json says what there is")

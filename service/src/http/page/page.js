@@ -1,0 +1,263 @@
+// One page of one machine: what it shows comes from the stream of events, what it asks goes where every
+// client asks. Everything from outside is set as text, never as markup.
+"use strict";
+
+const LEASE_S = 10;
+const RENEW_MS = 3000;
+// The service stops a jog 200 ms after the last word.
+const JOG_MS = 60;
+const EVENTS_SHOWN = 60;
+
+const byId = (id) => document.getElementById(id);
+let token = null;
+let renewing = null;
+let axes = [];
+const plans = new Map();
+
+async function ask(method, path, body) {
+  const headers = { "content-type": "application/json", "truestage-client": "page" };
+  if (token) headers["truestage-lease"] = token;
+  const answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+  const value = await answer.json();
+  if (!answer.ok) throw new Error(value.detail);
+  return value;
+}
+
+// What goes wrong is said in one place.
+function told(promise) {
+  byId("problem").textContent = "";
+  return promise.catch((error) => { byId("problem").textContent = error.message; });
+}
+
+const unit = (it) => it.unit.replace("um", "µm");
+const number = (it, digits) => (it ? `${it.value.toFixed(digits)} ${unit(it)}` : "–");
+
+function showMachine(machine) {
+  byId("name").textContent = `${machine.name} · ${machine.stage_serial}`;
+  document.title = `${machine.name} – truestage`;
+  const cause = machine.cause ? `: ${machine.cause.cause}` : "";
+  byId("state").textContent = machine.state.replace("_", " ") + cause;
+  byId("state").className = machine.state === "error_stop" ? "failed" : "";
+  const other = machine.lease && !token;
+  byId("take").textContent = other ? `Take control from ${machine.lease.name}` : "Take control";
+  byId("take").dataset.force = other ? "yes" : "";
+}
+
+function showControl() {
+  const mine = token !== null;
+  byId("control-text").textContent = mine
+    ? "This page commands the machine; STOP works for everybody."
+    : "Read-only. STOP works all the same.";
+  byId("take").hidden = mine;
+  byId("give").hidden = !mine;
+  for (const it of document.querySelectorAll(".command")) it.disabled = !mine;
+}
+
+async function take() {
+  const force = byId("take").dataset.force === "yes";
+  const leased = await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S, force });
+  token = leased.token;
+  clearInterval(renewing);
+  renewing = setInterval(renew, RENEW_MS);
+  showControl();
+}
+
+async function renew() {
+  try {
+    await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S });
+  } catch (error) {
+    lose();
+    byId("problem").textContent = `control was lost: ${error.message}`;
+  }
+}
+
+function lose() {
+  token = null;
+  clearInterval(renewing);
+  showControl();
+}
+
+async function give() {
+  await ask("DELETE", "/v1/lease");
+  lose();
+}
+
+function card(axis) {
+  const id = `axis-${axis.name}`;
+  const known = byId(id);
+  if (known) return known;
+  const made = byId("axis-card").content.cloneNode(true).querySelector("article");
+  made.id = id;
+  made.querySelector(".go").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const target = made.querySelector(".go input").value.trim();
+    told(ask("POST", "/v1/motions", { targets: { [axis.name]: target } }));
+  });
+  for (const button of made.querySelectorAll(".jog")) holdToJog(button, axis.name, made.querySelector(".speed"));
+  made.querySelector(".power").addEventListener("click", (event) => {
+    told(ask("POST", `/v1/axes/${encodeURIComponent(axis.name)}/${event.target.dataset.verb}`));
+  });
+  byId("axes").append(made);
+  byId("axis").append(new Option(axis.name, axis.name));
+  showControl();
+  return made;
+}
+
+// As long as the button or a key on it is held, and not longer: the service stops it when nothing comes.
+function holdToJog(button, axis, speed) {
+  let held = null;
+  const say = () => {
+    const wanted = speed.value.trim().replace(/^[-+]/, "");
+    return ask("POST", "/v1/jog", { axis, speed: button.dataset.way + wanted }).catch((error) => {
+      release();
+      byId("problem").textContent = error.message;
+    });
+  };
+  const hold = () => {
+    if (held !== null || button.disabled) return;
+    byId("problem").textContent = "";
+    held = setInterval(say, JOG_MS);
+    say();
+  };
+  const release = () => {
+    if (held === null) return;
+    clearInterval(held);
+    held = null;
+    ask("POST", "/v1/jog", { axis, speed: "0mm/s" }).catch(() => {});
+  };
+  button.addEventListener("pointerdown", (event) => { button.setPointerCapture(event.pointerId); hold(); });
+  for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, release);
+  button.addEventListener("keydown", (event) => {
+    if (event.key === " " || event.key === "Enter") { event.preventDefault(); hold(); }
+  });
+  button.addEventListener("keyup", release);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) release(); });
+}
+
+function showAxes(list) {
+  axes = list;
+  for (const axis of list) {
+    const shown = card(axis);
+    shown.querySelector("h3").textContent = `${axis.name} · ${axis.state}${axis.used_by ? ` · ${axis.used_by}` : ""}`;
+    shown.querySelector(".position").textContent = number(axis.position || axis.encoder, 6);
+    // Coverage factor 2, as everywhere else.
+    const u = axis.standard_uncertainty;
+    shown.querySelector(".uncertainty").textContent = u ? `± ${(2 * u.value).toFixed(3)} ${unit(u)} (k = 2)` : "";
+    const bar = shown.querySelector("meter");
+    const [low, high] = [axis.soft_min.value, axis.soft_max.value];
+    bar.value = axis.encoder ? (axis.encoder.value - low) / (high - low) : 0;
+    bar.title = `${low} to ${high} ${axis.soft_min.unit}`;
+    const facts = {
+      zero: axis.homed ? "found" : "not found yet",
+      calibration: axis.calibration ? axis.calibration.slice(0, 8) : "none",
+      correction: axis.corrected && axis.position && axis.encoder
+        ? `${((axis.position.value - axis.encoder.value) * 1e3).toFixed(3)} µm` : "–",
+      encoder: number(axis.encoder, 6),
+      target: number(axis.target, 6),
+      limits: bar.title,
+      ...(axis.last_cause ? { "last cause": axis.last_cause.cause } : {}),
+    };
+    const rows = Object.entries(facts).flatMap(([name, text]) => {
+      const [term, value] = [document.createElement("dt"), document.createElement("dd")];
+      [term.textContent, value.textContent] = [name, text];
+      return [term, value];
+    });
+    shown.querySelector("dl").replaceChildren(...rows);
+    const off = axis.state === "Disabled";
+    const power = shown.querySelector(".power");
+    power.textContent = off ? "Enable" : "Disable";
+    power.dataset.verb = off ? "enable" : "disable";
+  }
+}
+
+function element(name, text, kind) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+
+function button(text, act) {
+  const made = element("button", text, "command");
+  made.disabled = token === null;
+  made.addEventListener("click", () => told(act()));
+  return made;
+}
+
+// A run only ever goes on: what was asked for before an event came may arrive after it.
+const ORDER = ["planned", "running", "stopping", "done", "stopped", "failed"];
+
+function showRun(run) {
+  const known = plans.get(run.id);
+  if (known && ORDER.indexOf(run.state) < Math.min(ORDER.indexOf(known.state), 3)) return;
+  plans.set(run.id, run);
+  const shown = byId(`run-${run.id}`) || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
+  shown.id = `run-${run.id}`;
+  const { points, travel, seconds_at_least: seconds } = run.plan;
+  const parts = [element("h3", `${run.kind} ${run.axes.join(", ")} · ${run.id}`), element("p", run.state, run.state)];
+  if (points) parts.push(element("p", `${points} points, ${number(travel, 0)}, ${seconds.toFixed(0)} s at least`));
+  if (run.steps && run.state === "running") {
+    const bar = document.createElement("progress");
+    [bar.max, bar.value] = [run.steps, run.steps_done];
+    parts.push(bar);
+  }
+  if (run.cause) parts.push(element("p", run.cause.cause, "failed"));
+  if (run.stopped) parts.push(element("p", `stopped by ${run.stopped.by}`));
+  if (run.result) {
+    const rows = Object.entries(run.result).filter(([, it]) => it !== null).flatMap(([name, it]) =>
+      [element("dt", name.replaceAll("_", " ")), element("dd", typeof it === "number" ? it.toPrecision(6) : String(it))]);
+    const list = document.createElement("dl");
+    list.append(...rows);
+    parts.push(list);
+  }
+  const doing = document.createElement("p");
+  if (run.state === "planned") doing.append(button("Start", () => ask("POST", `/v1/runs/${run.id}/start`)));
+  if (run.state === "planned" || run.state === "running") doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
+  shown.replaceChildren(...parts, doing);
+}
+
+function showEvent(event) {
+  const text = event.data.text || event.data.state || event.data.stage || event.data.by || event.data.id || "";
+  const line = element("li", `${event.at.slice(11, 23)} ${event.kind} ${event.of} ${text}`);
+  const list = byId("events");
+  list.prepend(line);
+  while (list.children.length > EVENTS_SHOWN) list.lastChild.remove();
+}
+
+async function showAll() {
+  showMachine(await ask("GET", "/v1/machine"));
+  showAxes(await ask("GET", "/v1/axes"));
+  for (const run of await ask("GET", "/v1/runs")) showRun(run);
+  showControl();
+}
+
+function follow(after) {
+  // The browser connects again by itself, with the number of the last event that it has heard.
+  const stream = new EventSource(`/v1/events?sample_ms=100&after=${after}`);
+  stream.addEventListener("open", () => told(showAll()));
+  stream.addEventListener("error", () => { byId("state").textContent = "connection lost; trying again …"; });
+  stream.addEventListener("sample", (message) => showAxes(JSON.parse(message.data)));
+  for (const kind of ["machine", "axis", "position", "motion", "run", "stop", "lease", "calibration", "warning"]) {
+    stream.addEventListener(kind, async (message) => {
+      const event = JSON.parse(message.data);
+      showEvent(event);
+      if (kind === "machine" || kind === "lease") showMachine(await ask("GET", "/v1/machine"));
+      if (kind === "run") showRun(event.data.id ? event.data : { ...plans.get(event.of), ...event.data });
+    });
+  }
+}
+
+byId("stop").addEventListener("click", () => told(ask("POST", "/v1/stop", {})));
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") told(ask("POST", "/v1/stop", {})); });
+byId("take").addEventListener("click", () => told(take()));
+byId("give").addEventListener("click", () => told(give()));
+byId("reset").addEventListener("click", () => told(ask("POST", "/v1/reset")));
+byId("plan").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const request = { kind: byId("kind").value };
+  if (byId("axis").value) request.axis = byId("axis").value;
+  told(ask("POST", "/v1/runs", request).then(showRun));
+});
+
+showControl();
+told(showAll().then(() => ask("GET", "/v1/machine")).then((machine) => follow(Math.max(0, machine.newest_event - EVENTS_SHOWN))));
