@@ -257,12 +257,12 @@ impl Kept {
 
     /// Another calibration is used from now on; nothing moves.
     fn choose(&mut self, choice: &Choice, by: &str) -> Result<Answer, Problem> {
-        let (axis, id) = self.chosen_by(choice).map_err(Problem::from)?;
+        let (axis, named) = self.chosen_by(choice).map_err(Problem::from)?;
         self.keeper.borrow().require_own_calibration(&axis)?;
         let machine = &mut self.machine;
-        let used = machine.linear(&axis).and_then(|mut stage| match choice {
-            Choice::Activate(_) => stage.activate(&self.store, &id).map(|()| id),
-            Choice::Rollback(_) => stage.rollback(&self.store),
+        let used = machine.linear(&axis).and_then(|mut stage| match named {
+            Some(id) => stage.activate(&self.store, &id).map(|()| id),
+            None => stage.rollback(&self.store),
         });
         let id = used.map_err(Problem::from)?;
         let course = machine.linear(&axis).map(|it| it.course());
@@ -274,12 +274,12 @@ impl Kept {
     }
 
     /// Of which axis, and which one when that is said.
-    fn chosen_by(&self, choice: &Choice) -> Result<(String, String), Failure> {
+    fn chosen_by(&self, choice: &Choice) -> Result<(String, Option<String>), Failure> {
         match choice {
-            Choice::Rollback(axis) => Ok((axis.clone(), String::new())),
+            Choice::Rollback(axis) => Ok((axis.clone(), None)),
             Choice::Activate(prefix) => {
                 let id = self.store.resolve(prefix)?;
-                Ok((self.store.glance(&id)?.head.axis, id))
+                Ok((self.store.glance(&id)?.head.axis, Some(id)))
             }
         }
     }

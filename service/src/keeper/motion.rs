@@ -12,9 +12,9 @@ use machine::{Failure, Machine, Moving};
 use serde_json::json;
 use units::{Metres, MetresPerSecond, Time};
 
+use super::Keeper;
 use super::seat::{Seat, Task};
-use super::stop::cause_of;
-use super::{Keeper, utc_now};
+use super::stop::{cause_of, stopped_by};
 use crate::problem::{Code, Problem};
 use crate::view::{Cause, MotionView, Stopped};
 
@@ -286,7 +286,7 @@ impl Keeper {
             let motion = &self.motions.active[number];
             if motion.dead_man.is_some_and(|(_, until)| now >= until) {
                 let by = format!("the dead-man of {}", motion.by);
-                let stopped = Stopped { by, at: utc_now() };
+                let stopped = stopped_by(by);
                 self.stop_motion(machine, number, End::Stopped(stopped));
             }
         }

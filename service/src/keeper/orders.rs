@@ -90,6 +90,16 @@ impl Keeper {
         }
     }
 
+    /// Refuses what needs the machine's thread for itself.
+    pub(super) fn require_no_run(&self) -> Result<(), Problem> {
+        if self.mode != Mode::Procedure && self.job.is_none() {
+            return Ok(());
+        }
+        let what = "another run is under way";
+        let help = "wait for its end or abort it";
+        Err(Problem::new(Code::AxisBusy, what, help))
+    }
+
     /// Refuses an axis that somebody has.
     pub(super) fn require_free(&self, at: usize) -> Result<(), Problem> {
         let seat = &self.seats[at];
@@ -138,16 +148,8 @@ impl Keeper {
     }
 
     fn take_choice(&mut self, choice: Choice, by: &str, reply: Reply) {
-        let is_idle = self.job.is_none() && self.mode != Mode::Procedure;
-        let allowed = self.require_running().and_then(|()| match is_idle {
-            true => Ok(()),
-            false => Err(Problem::new(
-                Code::AxisBusy,
-                "a run is under way",
-                "wait for its end or abort it",
-            )),
-        });
-        match allowed {
+        let allowed = self.require_running();
+        match allowed.and_then(|()| self.require_no_run()) {
             Ok(()) => self.job = Some(Job::Choose(choice, by.to_owned(), reply)),
             Err(problem) => self.answer_later(reply, Err(problem)),
         }

@@ -7,7 +7,8 @@ use machine::{Machine, Stage};
 use serde_json::{Value, json};
 
 use super::seat::{MovedBy, Seat, Task as SeatTask};
-use super::{Job, Keeper, Mode, utc_now};
+use super::stop::stopped_by;
+use super::{Job, Keeper, Mode};
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped};
@@ -178,11 +179,7 @@ impl Keeper {
             let what = format!("run {id} was started before");
             return Err(Problem::new(Code::RunState, what, "plan another one"));
         }
-        if self.mode == Mode::Procedure || self.job.is_some() {
-            let what = "another run is under way";
-            let help = "wait for its end or abort it";
-            return Err(Problem::new(Code::AxisBusy, what, help));
-        }
+        self.require_no_run()?;
         for at in &axes {
             self.require_free(*at)?;
             if kind != RunKind::Zero {
@@ -206,10 +203,7 @@ impl Keeper {
         by: &str,
     ) -> Result<(), Problem> {
         let run = self.runs.find(id)?;
-        let stopped = Stopped {
-            by: by.to_owned(),
-            at: utc_now(),
-        };
+        let stopped = stopped_by(by);
         match run.view.state {
             RunState::Planned => self.change_run(id, |view| {
                 view.state = RunState::Stopped;

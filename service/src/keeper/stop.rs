@@ -15,10 +15,7 @@ use crate::view::{Cause, Stopped};
 impl Keeper {
     /// Stops everything: whatever is under way ends as stopped by `by` when its axes stand.
     pub(super) fn stop(&mut self, machine: &mut Machine, mode: StopMode, by: &str) {
-        let stopped = Stopped {
-            by: by.to_owned(),
-            at: utc_now(),
-        };
+        let stopped = stopped_by(by);
         self.events
             .push("stop", "", json!({"by": by, "mode": mode}));
         self.stop_motions(machine, &stopped);
@@ -93,10 +90,7 @@ impl Keeper {
     pub(crate) fn stop_all_for(&mut self, by: &str) {
         self.events
             .push("stop", "", json!({"by": by, "mode": StopMode::Quick}));
-        let stopped = Stopped {
-            by: by.to_owned(),
-            at: utc_now(),
-        };
+        let stopped = stopped_by(by);
         self.end_motions_as(&stopped);
         self.end_runs_as(&stopped);
     }
@@ -139,6 +133,14 @@ pub(crate) fn cause_of(failure: &truestage::Failure) -> Cause {
         code: code_of(failure),
         cause: failure.to_string(),
         exit_code: failure.exit_code(),
+    }
+}
+
+/// That `who` stopped something, now.
+pub(super) fn stopped_by(who: impl Into<String>) -> Stopped {
+    Stopped {
+        by: who.into(),
+        at: utc_now(),
     }
 }
 

@@ -11,7 +11,6 @@ const EVENTS_SHOWN = 60;
 const byId = (id) => document.getElementById(id);
 let token = null;
 let renewing = null;
-let axes = [];
 const plans = new Map();
 
 async function ask(method, path, body) {
@@ -107,12 +106,15 @@ function card(axis) {
 // As long as the button or a key on it is held, and not longer: the service stops it when nothing comes.
 function holdToJog(button, axis, speed) {
   let held = null;
+  let said = null;
+  // One word at a time: one that overtook the word to end would begin another jog.
   const say = () => {
+    if (said !== null) return;
     const wanted = speed.value.trim().replace(/^[-+]/, "");
-    return ask("POST", "/v1/jog", { axis, speed: button.dataset.way + wanted }).catch((error) => {
+    said = ask("POST", "/v1/jog", { axis, speed: button.dataset.way + wanted }).catch((error) => {
       release();
       byId("problem").textContent = error.message;
-    });
+    }).finally(() => { said = null; });
   };
   const hold = () => {
     if (held !== null || button.disabled) return;
@@ -124,7 +126,7 @@ function holdToJog(button, axis, speed) {
     if (held === null) return;
     clearInterval(held);
     held = null;
-    ask("POST", "/v1/jog", { axis, speed: "0mm/s" }).catch(() => {});
+    Promise.resolve(said).then(() => ask("POST", "/v1/jog", { axis, speed: "0mm/s" })).catch(() => {});
   };
   button.addEventListener("pointerdown", (event) => { button.setPointerCapture(event.pointerId); hold(); });
   for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, release);
@@ -136,7 +138,6 @@ function holdToJog(button, axis, speed) {
 }
 
 function showAxes(list) {
-  axes = list;
   for (const axis of list) {
     const shown = card(axis);
     shown.querySelector("h3").textContent = `${axis.name} · ${axis.state}${axis.used_by ? ` · ${axis.used_by}` : ""}`;

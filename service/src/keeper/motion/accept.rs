@@ -8,11 +8,11 @@ use truestage::linear::{Corrected, Course, PlannedMove};
 use units::{Metres, MetresPerSecond, Time};
 
 use super::super::seat::{MovedBy, Seat, Task};
+use super::super::stop::stopped_by;
 use super::super::{Keeper, utc_now};
 use super::{End, Leg, LegPhase, Motion, Phase};
 use crate::problem::{Code, Problem};
 use crate::request::{IfMoving, MoveRequest};
-use crate::view::Stopped;
 
 /// So many may wait or be under way.
 const ACTIVE_MAX: usize = 64;
@@ -147,7 +147,7 @@ impl Keeper {
             let other = &self.motions.active[number];
             if other.axes().any(|at| motion.axes().any(|own| own == at)) {
                 let by = format!("{} (superseded by {})", motion.by, motion.id);
-                let stopped = Stopped { by, at: utc_now() };
+                let stopped = stopped_by(by);
                 self.stop_motion(machine, number, End::Stopped(stopped));
             }
         }

@@ -5,12 +5,12 @@ use core::time::Duration;
 use machine::Machine;
 use units::MetresPerSecond;
 
-use super::super::{Keeper, utc_now};
+use super::super::Keeper;
+use super::super::stop::stopped_by;
 use super::{End, Motion, Phase};
 use crate::problem::{Code, Problem};
-use crate::quantity::Length;
+use crate::quantity::Speed;
 use crate::request::{JogRequest, MoveRequest};
-use crate::view::Stopped;
 
 /// A jog that was not renewed for so long stops.
 const DEAD_MAN: Duration = Duration::from_millis(200);
@@ -75,8 +75,7 @@ impl Keeper {
             false => settings.soft_min,
         };
         let request = MoveRequest {
-            targets: [(request.axis.clone(), Length(target))].into(),
-            speed: Some(crate::quantity::Speed(MetresPerSecond(speed.value().abs()))),
+            speed: Some(Speed(MetresPerSecond(speed.value().abs()))),
             uncorrected: true,
             ..MoveRequest::of(&request.axis, target)
         };
@@ -109,10 +108,7 @@ impl Keeper {
     }
 
     fn stop_jog(&mut self, machine: &mut Machine, number: usize, by: &str) {
-        let stopped = Stopped {
-            by: by.to_owned(),
-            at: utc_now(),
-        };
+        let stopped = stopped_by(by);
         self.stop_motion(machine, number, End::Stopped(stopped));
     }
 }
