@@ -82,7 +82,7 @@ impl Client for InProcess {
     }
 
     fn motion(&self, id: &str, wait: Duration) -> Result<MotionView, Problem> {
-        let _passing = self.gate.pass();
+        let _passing = self.gate.pass_for(wait);
         self.desk.wait_motion(id, wait)
     }
 
@@ -130,7 +130,7 @@ impl Client for InProcess {
     }
 
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem> {
-        let _passing = self.gate.pass();
+        let _passing = self.gate.pass_for(wait);
         self.desk.wait_run(id, wait)
     }
 

@@ -136,8 +136,8 @@ impl Bed<'_> {
     /// Waits until the axis is under way.
     fn under_way(&self, id: &str) {
         for _ in 0..1000 {
-            let view = self.client.motion(id, Duration::from_millis(2));
-            let view = view.expect("it was begun");
+            self.let_time_pass(0.01);
+            let view = self.now(id);
             let encoder = self.client.axis("x").expect("there is x").encoder;
             let moves = encoder.is_some_and(|it| it.value.abs() > 1e-3);
             if view.state == MotionState::Moving && moves {
@@ -153,9 +153,12 @@ impl Bed<'_> {
         view.encoder.expect("it was read").value
     }
 
-    /// Lets time pass: a question about a motion does.
-    fn let_time_pass(&self, id: &str) {
-        let _ = self.client.motion(id, Duration::from_millis(20));
+    /// Lets `seconds` pass by the machine's clock: each question does a little.
+    fn let_time_pass(&self, seconds: f64) {
+        let until = self.client.machine().clock_s + seconds;
+        while self.client.machine().clock_s < until {
+            self.stage.simulation(|_| ());
+        }
     }
 }
 

@@ -89,7 +89,12 @@ impl Http {
 
     /// One request and its answer.
     pub(crate) fn ask(&self, head: &str, body: &[u8]) -> Answer {
-        let _passing = self.gate.pass();
+        self.ask_and_wait(head, body, Duration::ZERO)
+    }
+
+    /// One request and its answer, which may be held back for `wait`.
+    fn ask_and_wait(&self, head: &str, body: &[u8], wait: Duration) -> Answer {
+        let _passing = self.gate.pass_for(wait);
         let mut bytes = Vec::new();
         let mut stream = self.send(head, body);
         stream.read_to_end(&mut bytes).expect("an answer");
@@ -121,6 +126,15 @@ impl Http {
 
     fn get<T: serde::de::DeserializeOwned>(&self, path: &str) -> Result<T, Problem> {
         self.ask(&format!("GET {path} HTTP/1.1"), b"").read()
+    }
+
+    fn wait<T: serde::de::DeserializeOwned>(
+        &self,
+        path: &str,
+        wait: Duration,
+    ) -> Result<T, Problem> {
+        let head = format!("GET {path}?wait_s={} HTTP/1.1", wait.as_secs_f64());
+        self.ask_and_wait(&head, b"", wait).read()
     }
 
     /// The events of a stream up to number `last`.
@@ -156,10 +170,6 @@ fn unchunked(mut bytes: &[u8]) -> Vec<u8> {
     whole
 }
 
-fn seconds(wait: Duration) -> f64 {
-    wait.as_secs_f64()
-}
-
 impl Client for Http {
     fn interface(&self) -> &'static str {
         "HTTP"
@@ -177,7 +187,7 @@ impl Client for Http {
     }
 
     fn motion(&self, id: &str, wait: Duration) -> Result<MotionView, Problem> {
-        self.get(&format!("/v1/motions/{id}?wait_s={}", seconds(wait)))
+        self.wait(&format!("/v1/motions/{id}"), wait)
     }
 
     fn jog(&self, who: &Caller, request: &JogRequest) -> Result<String, Problem> {
@@ -222,7 +232,7 @@ impl Client for Http {
     }
 
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem> {
-        self.get(&format!("/v1/runs/{id}?wait_s={}", seconds(wait)))
+        self.wait(&format!("/v1/runs/{id}"), wait)
     }
 
     fn lease(&self, who: &Caller, request: &LeaseRequest) -> Result<Leased, Problem> {

@@ -17,57 +17,99 @@ use truestage::{Failure, Machine, ports};
 use units::Time;
 use wire::{Arrival, Payload, Port};
 
+/// So much passes at most for a request that does not wait: nothing that ends by itself within it is asked of a
+/// service here, and a drive is switched on within a few of them.
+const ALLOWANCE: Duration = Duration::from_millis(50);
 /// While a request is on its way and its time is used up, a tick passes each time: the wall has to go on for a
 /// second before a dead-man of 200 ms strikes.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 const TRICKLE: Duration = Duration::from_millis(2);
 
-/// Time passes while it is open.
+/// Time passes while it is open. How much passes for a request is counted by the machine's clock: a computer that
+/// holds up the one who asked does not let the machine run on meanwhile.
 #[derive(Debug, Default)]
 pub(crate) struct Gate {
     doors: Mutex<Doors>,
     opened: Condvar,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Doors {
     /// How many keep it open.
     open: u32,
-    /// So much time passes at most each time that somebody opens it.
-    allowance: Option<Duration>,
+    /// How many of them wait for what takes its time.
+    waiting: u32,
+    /// So much time passes at most each time that somebody else opens it.
+    allowance: Duration,
     /// Somebody has opened it since the machine's thread looked last.
     is_fresh: bool,
     /// When the allowance is used up.
     until: Option<Time>,
 }
 
+impl Default for Doors {
+    fn default() -> Self {
+        Self {
+            open: 0,
+            waiting: 0,
+            allowance: ALLOWANCE,
+            is_fresh: false,
+            until: None,
+        }
+    }
+}
+
 impl Doors {
     /// Whether the time may go on from `now`.
     fn let_pass(&mut self, now: Time) -> bool {
         if core::mem::take(&mut self.is_fresh) {
-            self.until = self.allowance.map(|it| now + it);
+            self.until = Some(now + self.allowance);
         }
-        self.open > 0 && self.until.is_none_or(|until| now < until)
+        let is_within = self.until.is_some_and(|until| now < until);
+        self.open > 0 && (self.waiting > 0 || is_within)
     }
 }
 
 impl Gate {
-    /// Time passes until this is dropped.
+    /// A little time passes for a request, and hardly more while its answer is on its way.
     pub(crate) fn pass(self: &Arc<Self>) -> Passing {
-        let mut doors = self.doors();
-        doors.open += 1;
-        doors.is_fresh = true;
-        self.opened.notify_all();
-        Passing(Arc::clone(self))
+        self.open(false)
     }
 
-    /// From now on `allowance` passes for each request, and hardly more while its answer is on its way: whoever
-    /// asks many times a second does so by the machine's clock, on a busy computer too.
-    pub(crate) fn limit(&self, allowance: Option<Duration>) {
+    /// Time passes until this is dropped: somebody waits for an end.
+    pub(crate) fn wait_for_an_end(self: &Arc<Self>) -> Passing {
+        self.open(true)
+    }
+
+    /// For a request that may wait so long.
+    pub(crate) fn pass_for(self: &Arc<Self>, wait: Duration) -> Passing {
+        self.open(!wait.is_zero())
+    }
+
+    fn open(self: &Arc<Self>, waits: bool) -> Passing {
+        let mut doors = self.doors();
+        doors.open += 1;
+        doors.waiting += u32::from(waits);
+        doors.is_fresh = true;
+        self.opened.notify_all();
+        Passing {
+            gate: Arc::clone(self),
+            waits,
+        }
+    }
+
+    /// From now on at most `allowance` passes for each request: whoever asks many times a second does so by the
+    /// machine's clock.
+    pub(crate) fn limit(&self, allowance: Duration) {
         self.doors().allowance = allowance;
     }
 
-    fn wait(&self, now: Time) {
+    /// As before a limit.
+    pub(crate) fn lift_limit(&self) {
+        self.limit(ALLOWANCE);
+    }
+
+    fn hold(&self, now: Time) {
         let mut doors = self.doors();
         while !doors.let_pass(now) {
             let waited = self.opened.wait_timeout(doors, LOOK_EVERY);
@@ -87,11 +129,16 @@ impl Gate {
 
 /// Keeps time passing.
 #[derive(Debug)]
-pub(crate) struct Passing(Arc<Gate>);
+pub(crate) struct Passing {
+    gate: Arc<Gate>,
+    waits: bool,
+}
 
 impl Drop for Passing {
     fn drop(&mut self) {
-        self.0.doors().open -= 1;
+        let mut doors = self.gate.doors();
+        doors.open -= 1;
+        doors.waiting -= u32::from(self.waits);
     }
 }
 
@@ -116,7 +163,7 @@ impl Transport for Gated {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        self.gate.wait(self.inner.now());
+        self.gate.hold(self.inner.now());
         if let Some((emulated, meddling)) = &self.meddling {
             for meddle in meddling.try_iter() {
                 meddle(&mut emulated.simulation_mut());
@@ -202,7 +249,7 @@ impl Stage {
         let gate = Arc::new(Gate::default());
         let inner_gate = Arc::clone(&gate);
         let store = truestage::store_of(&loaded.config.machine);
-        let passing = gate.pass();
+        let passing = gate.wait_for_an_end();
         let service = Service::start(move || {
             let (inner, meddling) = open(&loaded)?;
             let transport = Gated {
@@ -279,7 +326,7 @@ impl Stage {
 
     fn close(&mut self) {
         if let Some(service) = self.service.take() {
-            let _passing = self.gate.pass();
+            let _passing = self.gate.wait_for_an_end();
             let _ = self.desk.end(&service::Caller::named("the test"));
             let ended = service.wait();
             if !std::thread::panicking() {

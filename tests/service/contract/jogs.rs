@@ -25,7 +25,7 @@ impl Bed<'_> {
 
     /// Renews a jog for so long by the machine's clock.
     fn keeps_jogging(&self, mm_per_s: f64, seconds: f64) -> String {
-        self.stage.gate.limit(Some(OFTEN));
+        self.stage.gate.limit(OFTEN);
         let begun = self.client.machine().clock_s;
         let mut id = self.jogs(mm_per_s);
         while self.client.machine().clock_s - begun < seconds {
@@ -35,7 +35,7 @@ impl Bed<'_> {
     }
 
     fn lets_go(&self) {
-        self.stage.gate.limit(None);
+        self.stage.gate.lift_limit();
     }
 }
 
@@ -71,10 +71,10 @@ fn a_speed_of_zero_ends_a_jog_and_the_other_way_begins_another_one() {
         let first = bed.keeps_jogging(2.0, 0.3);
         let back = bed.keeps_jogging(-2.0, 0.3);
         assert_ne!(first, back);
-        let view = bed.ended(&first);
-        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
         assert_eq!(bed.jogs(0.0), back);
         bed.lets_go();
+        let view = bed.ended(&first);
+        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
         let view = bed.ended(&back);
         assert_eq!(view.stopped.unwrap().by, "anna");
         let nothing = bed.client.jog(&anna(), &jog(0.0)).unwrap_err();

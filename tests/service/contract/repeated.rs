@@ -62,7 +62,7 @@ fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_n
         let again = client.begin(&anna(), &to("x", 10.0), Some("key")).unwrap();
         assert_eq!(again, first);
         assert_eq!(bed.ended(&again), before);
-        bed.let_time_pass(&again);
+        bed.let_time_pass(1.0);
         assert!(bed.encoder_mm("x").abs() < 0.05, "it moved again");
         let other = bed.begin(&to("x", 3.0));
         assert_ne!(other, first, "names are never given twice");
@@ -111,7 +111,7 @@ fn after_a_crash_a_motion_without_an_end_has_failed_and_does_not_move_again() {
         let view = bed.ended(&again);
         assert_eq!(view.state, MotionState::Failed);
         assert_eq!(view.cause.unwrap().code, Code::ServiceRestarted);
-        bed.let_time_pass(&again);
+        bed.let_time_pass(1.0);
         assert!(bed.encoder_mm("x").abs() < 0.05, "it moved again");
     }
 }

@@ -1,5 +1,7 @@
 //! Runs: planned, started, answered meanwhile, stopped.
 
+use core::time::Duration;
+
 use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
 use tests::{Edit, LINEAR};
 
@@ -75,10 +77,8 @@ fn while_a_run_is_under_way_everything_is_answered_and_its_axis_is_refused() {
             .client
             .plan(&bert(), &RunRequest::of(RunKind::Zero, None));
         assert_eq!(second.unwrap_err().code, Code::AxisBusy);
-        let run = bed
-            .client
-            .run(&id, core::time::Duration::from_millis(5))
-            .unwrap();
+        bed.let_time_pass(0.2);
+        let run = bed.client.run(&id, Duration::ZERO).unwrap();
         assert_eq!(run.state, RunState::Running);
         assert_eq!(bed.client.axis("x").unwrap().state, AxisState::Homing);
         let run = bed.client.run(&id, PATIENCE).unwrap();
@@ -94,7 +94,7 @@ fn a_stop_by_anybody_ends_a_run_at_once_and_names_who() {
                 .client
                 .plan(&anna(), &RunRequest::of(RunKind::Zero, None));
             let id = id.unwrap();
-            let _ = bed.client.run(&id, core::time::Duration::from_millis(5));
+            bed.let_time_pass(0.2);
             bed.client.stop(&bert(), mode).unwrap();
             let run = bed.client.run(&id, PATIENCE).unwrap();
             assert_eq!(run.state, RunState::Stopped, "{run:?}");
