@@ -422,4 +422,14 @@ impl Layered for Failure {
             other => other,
         }
     }
+
+    fn depends_on_time(&self) -> bool {
+        matches!(
+            self,
+            Self::Search { .. }
+                | Self::InputNotSeen { .. }
+                | Self::StandsOff { .. }
+                | Self::Platform(PlatformFailure::NotAligned { .. })
+        )
+    }
 }

@@ -213,6 +213,11 @@ pub trait Layered: From<Failure> {
     /// Lets `explain` say more of it when it is the machine's own; others stay as they are.
     #[must_use]
     fn map_machine(self, explain: impl FnOnce(Failure) -> Failure) -> Self;
+
+    /// Whether it judges what an axis did in a time: a computer that did not look meanwhile may have made it do so.
+    fn depends_on_time(&self) -> bool {
+        false
+    }
 }
 
 impl Layered for Failure {

@@ -1,7 +1,9 @@
 //! Notices when the computer keeps the program from looking at its buses in time, so that what
 //! goes wrong shortly afterwards is not blamed on the machine alone.
 
+use core::fmt;
 use core::time::Duration;
+use std::collections::VecDeque;
 
 use units::Time;
 
@@ -13,19 +15,47 @@ const PAUSE_MIN: Duration = Duration::from_millis(20);
 /// What went wrong later than this after a pause had another cause: every supervision has struck
 /// by then.
 const REMEMBERED: Duration = Duration::from_secs(3);
+/// A procedure watches what moves for some seconds before it judges: pauses within them may have spoilt that.
+const RECENT: Duration = Duration::from_secs(10);
+/// Pauses that sum up to less are not worth a word beside another cause.
+const LOST_MIN: Duration = Duration::from_millis(50);
 
 /// When the program should have looked, and when it did.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct HostWatch {
     due: Option<Time>,
-    /// The last pause: its end and its length, by the machine's clock.
-    pause: Option<(Time, Duration)>,
+    /// The recent pauses, the newest last: end and length, by the machine's clock.
+    pauses: VecDeque<(Time, Duration)>,
+}
+
+/// How long the program was kept from its buses in the last seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LostTime {
+    pauses: u32,
+    total: Duration,
+    longest: Duration,
+}
+
+impl fmt::Display for LostTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "in the last {} s before what failed this program was kept from its buses for {:.3} s (pauses: {}, the \
+             longest {:.3} s): the busy computer may be the cause, not the machine. Allow the program SCHED_FIFO \
+             (`ulimit -r`) or give the computer less to do",
+            RECENT.as_secs(),
+            self.total.as_secs_f64(),
+            self.pauses,
+            self.longest.as_secs_f64()
+        )
+    }
 }
 
 impl HostWatch {
-    /// The program waits now, until `due` at the latest.
-    pub(crate) const fn waits(&mut self, due: Time) {
-        self.due = Some(due);
+    /// The program waits from `now`, until `due` at the latest. What was due before is not late once more: the
+    /// backlog of a pause is taken arrival by arrival.
+    pub(crate) fn waits(&mut self, now: Time, due: Time) {
+        self.due = Some(due.max(now));
     }
 
     /// The program looks at its buses.
@@ -33,14 +63,28 @@ impl HostWatch {
         if let Some(due) = self.due.take()
             && now.since(due) >= PAUSE_MIN
         {
-            self.pause = Some((now, now.since(due)));
+            self.pauses.push_back((now, now.since(due)));
+            while self.pauses.front().is_some_and(|it| !is_recent(*it, now)) {
+                self.pauses.pop_front();
+            }
         }
+    }
+
+    /// The time that was lost recently, when it is worth a word.
+    pub(crate) fn lost(&self, now: Time) -> Option<LostTime> {
+        let mut lost = LostTime::default();
+        for (_, pause) in self.pauses.iter().filter(|it| is_recent(**it, now)) {
+            lost.pauses += 1;
+            lost.total += *pause;
+            lost.longest = lost.longest.max(*pause);
+        }
+        (lost.total >= LOST_MIN).then_some(lost)
     }
 
     /// The failure, or, when it may come from a pause shortly before, that.
     pub(crate) fn explain(&self, now: Time, failure: Failure) -> Failure {
-        match self.pause {
-            Some((end, pause)) if now.since(end) <= REMEMBERED && may_come_of(&failure) => {
+        match self.pauses.back() {
+            Some(&(end, pause)) if now.since(end) <= REMEMBERED && may_come_of(&failure) => {
                 Failure::HeldUp {
                     pause,
                     ago: now.since(end),
@@ -50,6 +94,10 @@ impl HostWatch {
             _ => failure,
         }
     }
+}
+
+fn is_recent((end, _): (Time, Duration), now: Time) -> bool {
+    now.since(end) <= RECENT
 }
 
 /// Whether it can happen to a sound machine that was not served in time.
@@ -79,7 +127,7 @@ mod tests {
 
     fn after(late_ms: u64, failed_ms: u64, failure: Failure) -> String {
         let mut watch = HostWatch::default();
-        watch.waits(Time(100 * MS));
+        watch.waits(Time(0), Time(100 * MS));
         watch.looks(Time((100 + late_ms) * MS));
         watch.explain(Time(failed_ms * MS), failure).to_string()
     }
@@ -96,6 +144,25 @@ mod tests {
             failure: Box::new(overdue()),
         };
         assert_eq!(failure.exit_code(), overdue().exit_code());
+    }
+
+    #[test]
+    fn pauses_of_the_last_seconds_are_summed_and_short_ones_are_not_worth_a_word() {
+        let mut watch = HostWatch::default();
+        let pause = |watch: &mut HostWatch, begin_ms: u64, length_ms: u64| {
+            watch.waits(Time(0), Time(begin_ms * MS));
+            watch.looks(Time((begin_ms + length_ms) * MS));
+        };
+        pause(&mut watch, 100, 400);
+        pause(&mut watch, 11_000, 30);
+        pause(&mut watch, 12_000, 19);
+        assert_eq!(watch.lost(Time(13_000 * MS)), None);
+        pause(&mut watch, 13_000, 70);
+        let said = watch.lost(Time(14_000 * MS)).unwrap().to_string();
+        for part in ["0.100 s", "pauses: 2", "longest 0.070 s"] {
+            assert!(said.contains(part), "{said}");
+        }
+        assert_eq!(watch.lost(Time(24_000 * MS)), None);
     }
 
     #[test]

@@ -79,9 +79,15 @@ impl Machine {
     }
 
     /// The failure that has just happened, or its cause: a sender that fills a bus, or this
-    /// computer, which was held up.
-    pub fn explain<F: Layered>(&self, failure: F) -> F {
+    /// computer, which was held up. Where a procedure judged something else while the computer was
+    /// held up, the observer is told so.
+    pub fn explain<F: Layered>(&mut self, failure: F) -> F {
         let now = self.now();
+        if failure.depends_on_time()
+            && let Some(lost) = self.host_watch.lost(now)
+        {
+            self.notices.warn(lost.to_string());
+        }
         failure.map_machine(|failure| {
             let failure = self.bus_watch.explain(now, failure);
             self.host_watch.explain(now, failure)

@@ -26,7 +26,7 @@ impl Machine {
         let beats = self.heartbeats.iter().map(|(_, beat)| beat.poll_timeout());
         let next = beats.fold(self.devices.next_deadline(), Time::min);
         let deadline = until.min(next).min(again);
-        self.host_watch.waits(deadline);
+        self.host_watch.waits(self.transport.now(), deadline);
         let arrival = self.transport.receive(deadline);
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only

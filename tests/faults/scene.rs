@@ -409,7 +409,7 @@ fn perform(
 }
 
 /// Writes down the warnings.
-struct Listener(Rc<RefCell<Vec<String>>>);
+pub struct Listener(pub Rc<RefCell<Vec<String>>>);
 
 impl Observer for Listener {
     fn progress(&mut self, _: Stage, _: &str, _: u64, _: u64) {}

@@ -5,15 +5,18 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
+use drivers::transport::{SendError, Transport};
 use mock_bus::fault::Fault;
 use mock_bus::simulation::Simulation;
 use tests::{Bench, Edit};
 use truestage::Failure;
 use units::{Metres, Time};
 use wire::cia402::PowerState;
+use wire::{Arrival, Payload, Port};
 
 use crate::scene::{
-    PERIOD, Phase, STOPPING, Scene, WATCH_MASTER, Wanted, check, check_harmless, power_state,
+    Listener, PERIOD, Phase, STOPPING, Scene, WATCH_MASTER, Wanted, check, check_harmless,
+    power_state,
 };
 use crate::witness::{Testimony, Witnessed};
 
@@ -151,6 +154,69 @@ fn a_controller_that_was_stopped_for_a_fifth_of_a_second_says_that_it_was_held_u
         let scene = Scene::during(phase).after_ms(after_ms);
         check(scene.held_up(HELD_UP, |_, _| {}), &wanted);
     }
+}
+
+/// A transport that hears nothing for `pause`, once, in the middle of a start.
+struct Late<T> {
+    inner: T,
+    pause: Duration,
+}
+
+impl<T: Transport> Transport for Late<T> {
+    fn now(&self) -> Time {
+        self.inner.now()
+    }
+
+    fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
+        self.inner.send(port, payload)
+    }
+
+    fn receive(&mut self, until: Time) -> Option<Arrival> {
+        if self.inner.now() >= Time::ZERO + STARTING {
+            let pause = core::mem::take(&mut self.pause);
+            self.inner.sleep_until(self.inner.now() + pause);
+        }
+        self.inner.receive(until)
+    }
+
+    fn sleep_until(&mut self, until: Time) {
+        self.inner.sleep_until(until);
+    }
+
+    fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
+        self.inner.set_sync(port, period)
+    }
+}
+
+const STARTING: Duration = Duration::from_millis(20);
+
+/// Nothing was supervised then; what is judged by time may have been spoilt by it.
+#[test]
+fn a_search_that_fails_after_a_pause_is_told_with_the_pause() {
+    let search = |pause: Duration| {
+        let mut bench = Bench::wrapped(
+            1,
+            |text| text.edit("time_limit_s = 60.0", "time_limit_s = 1.0"),
+            |text| text,
+            |inner| Box::new(Late { inner, pause }),
+        );
+        let warnings = Rc::new(RefCell::new(Vec::new()));
+        let listener = Listener(Rc::clone(&warnings));
+        bench.machine.observe(Box::new(listener));
+        let zeroed = bench.machine.guarded(|machine| {
+            machine.start()?;
+            machine.linear("x")?.zero(&bench.store)
+        });
+        assert!(matches!(zeroed, Err(Failure::Search { .. })), "{zeroed:?}");
+        warnings.take().join("\n")
+    };
+    let warned = search(Duration::from_secs(1));
+    assert!(
+        warned.contains("kept from its buses for 0.") && warned.contains("pauses: 1,"),
+        "{warned}"
+    );
+    let warned = search(Duration::ZERO);
+    assert!(!warned.contains("kept from"), "{warned}");
 }
 
 #[test]
