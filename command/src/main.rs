@@ -12,7 +12,13 @@ fn main() -> ExitCode {
 
 /// Keeps a machine until somebody ends it.
 fn serve(serving: Serving) -> Result<(), Failure> {
-    let Serving { listen, open, told } = serving;
+    let Serving {
+        listen,
+        open,
+        teller,
+        announce,
+        told,
+    } = serving;
     let places = listen.iter().map(|place| place.parse::<Listen>());
     let places: Vec<_> = places
         .collect::<Result<_, _>>()
@@ -23,6 +29,7 @@ fn serve(serving: Serving) -> Result<(), Failure> {
             machine,
             store,
             held,
+            teller: Some(teller),
         })
     });
     let service = service.map_err(|failure| match failure {
@@ -31,8 +38,14 @@ fn serve(serving: Serving) -> Result<(), Failure> {
     })?;
     match Edge::open(service.desk(), &places) {
         Ok(edge) => {
-            for place in edge.places() {
+            let places: Vec<_> = edge.places().iter().map(ToString::to_string).collect();
+            for place in &places {
                 told(&format!("listening at {place}"));
+            }
+            if let Err(error) = announce(&places) {
+                told(&format!(
+                    "the lease cannot say where that is ({error}); give `truestage status` and `stop` --at"
+                ));
             }
             let ended = service.wait();
             drop(edge);

@@ -390,6 +390,14 @@ pub enum Failure {
         /// What to do.
         help: String,
     },
+    /// The service that keeps the machine refused, or what it did failed.
+    #[error("{said}")]
+    Kept {
+        /// Its words.
+        said: String,
+        /// What it would have been here.
+        exit_code: u8,
+    },
     /// The emulated machine cannot be brought up.
     #[cfg(feature = "emulator")]
     #[error("emulated machine: {0}")]

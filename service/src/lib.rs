@@ -14,6 +14,7 @@ mod keeper;
 mod ledger;
 mod order;
 mod problem;
+mod procedures;
 mod quantity;
 mod request;
 mod scribe;
@@ -32,5 +33,5 @@ pub use request::{
 pub use thread::{Opened, Service, StartError};
 pub use view::{
     AxisState, AxisView, CalibrationView, Cause, Event, LeaseView, Leased, LegView, MachineState,
-    MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
+    MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped, ToldView,
 };

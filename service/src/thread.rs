@@ -10,10 +10,10 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{self, JoinHandle};
 
 use machine::attend;
-use serde_json::{Value, json};
+use serde_json::json;
 use triple_buffer::Input;
-use truestage::linear::VerifyOptions;
-use truestage::{CalibrateOptions, Failure, Machine, Store};
+use truestage::linear::Teller;
+use truestage::{Failure, Machine, Store};
 use wire::cia402::PowerState;
 
 use crate::desk::Desk;
@@ -21,6 +21,7 @@ use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fix
 use crate::ledger::{Ledger, LedgerError};
 use crate::order::{Answer, Choice, Letter, Reply};
 use crate::problem::Problem;
+use crate::procedures::{self, Found};
 use crate::request::RunKind;
 use crate::scribe::Scribe;
 use crate::snapshot::{Board, Fixed, Snapshot};
@@ -40,6 +41,9 @@ pub struct Opened {
     pub store: Store,
     /// Its lease among programs, and whatever else; dropped when the service has ended.
     pub held: Box<dyn Any>,
+    /// Says what runs and motions gave as the command line does; without one they have only the service's own
+    /// figures.
+    pub teller: Option<Teller>,
 }
 
 /// A service that could not begin.
@@ -134,9 +138,10 @@ fn keep(
         mut machine,
         store,
         held,
+        teller,
     } = open()?;
     let fixed = Arc::new(fixed(&machine)?);
-    let keeper = Keeper::new(inbox, input, seats(&mut machine)?);
+    let keeper = Keeper::new(inbox, input, seats(&mut machine)?, teller);
     machine.observe(Box::new(keeper.note_taker()));
     let keeper = Rc::new(RefCell::new(keeper));
     attend(&mut machine, Box::new(Attending(Rc::clone(&keeper))));
@@ -144,6 +149,7 @@ fn keep(
         machine,
         store,
         keeper,
+        teller,
     };
     kept.machine.guarded(Machine::start)?;
     kept.load_courses();
@@ -161,6 +167,7 @@ struct Kept {
     machine: Machine,
     store: Store,
     keeper: Rc<RefCell<Keeper>>,
+    teller: Option<Teller>,
 }
 
 impl Kept {
@@ -322,9 +329,9 @@ impl Kept {
         match result {
             // The next tick ends the service.
             Err(_) if self.machine.stop_request().is_requested() => {}
-            Ok(result) => {
+            Ok((result, told)) => {
                 self.load_courses();
-                self.keeper.borrow_mut().run_done(id, result);
+                self.keeper.borrow_mut().run_done(id, result, told);
             }
             Err(failure) if was_stopped && is_stop(&failure) => {}
             Err(failure) if stops_the_machine(&failure) => self.failed(failure),
@@ -337,76 +344,17 @@ impl Kept {
         }
     }
 
-    fn perform(&mut self, task: &RunTask) -> Result<Value, Failure> {
-        let (machine, store) = (&mut self.machine, &self.store);
+    fn perform(&mut self, task: &RunTask) -> Result<Found, Failure> {
+        let (machine, store, teller) = (&mut self.machine, &self.store, self.teller);
         let Some(axis) = &task.axis else {
             machine.volumetric()?.zero()?;
-            return Ok(json!({}));
+            return Ok((json!({}), None));
         };
         if task.request.kind != RunKind::Zero {
             machine.enable(axis)?;
         }
-        match task.request.kind {
-            RunKind::Zero => zero(machine, store, axis),
-            RunKind::Calibrate => calibrate(machine, store, axis, task.request.accept_drift),
-            RunKind::Verify => verify(machine, store, axis, !task.request.uncompensated),
-        }
+        procedures::perform(machine, store, axis, &task.request, teller)
     }
-}
-
-fn zero(machine: &mut Machine, store: &Store, axis: &str) -> Result<Value, Failure> {
-    let zeroed = machine.linear(axis)?.zero(store)?;
-    let estimate = &zeroed.estimate;
-    Ok(json!({
-        "origin_um": estimate.origin.um(),
-        "standard_uncertainty_um": estimate.standard_uncertainty.um(),
-        "points": estimate.points,
-        "journal": zeroed.journal,
-    }))
-}
-
-fn calibrate(
-    machine: &mut Machine,
-    store: &Store,
-    axis: &str,
-    accept_drift: bool,
-) -> Result<Value, Failure> {
-    let options = CalibrateOptions {
-        resume: None,
-        accept_drift,
-    };
-    let made = machine.linear(axis)?.calibrate(store, &options)?;
-    Ok(json!({
-        "calibration": made.id,
-        "largest_deviation_um": made.fitted.table.largest().um(),
-        "positions": made.fitted.table.nodes().len(),
-        "closure_um": made.measured.closure.map(|it| it.um()),
-        "journal": made.journal,
-    }))
-}
-
-fn verify(
-    machine: &mut Machine,
-    store: &Store,
-    axis: &str,
-    compensated: bool,
-) -> Result<Value, Failure> {
-    let calibration = match compensated {
-        true => machine.linear(axis)?.load_active(store)?,
-        false => None,
-    };
-    let options = VerifyOptions {
-        compensated,
-        calibration,
-        resume: None,
-    };
-    let verified = machine.linear(axis)?.verify(store, &options)?;
-    Ok(json!({
-        "accuracy_um": verified.figures.accuracy.bidirectional.um(),
-        "tolerance_um": verified.tolerance.um(),
-        "within_tolerance": verified.is_within_tolerance(),
-        "journal": verified.journal,
-    }))
 }
 
 /// Whether it is what ends a procedure that was asked to end.

@@ -203,6 +203,8 @@ pub struct LegView {
     pub encoder: Option<Quantity>,
     /// Standard uncertainty of that position; null where nobody knows it.
     pub standard_uncertainty: Option<Quantity>,
+    /// How it ended, as the command line prints it, when it is done.
+    pub told: Option<ToldView>,
 }
 
 /// How far a run is.
@@ -272,6 +274,25 @@ pub struct RunView {
     /// What it found.
     #[schema(value_type = Object)]
     pub result: serde_json::Value,
+    /// The same, as the command line prints it.
+    pub told: Option<ToldView>,
+}
+
+/// What something gave, as the command line prints it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ToldView {
+    /// For people.
+    pub text: String,
+    /// For programs: what `--json` prints.
+    #[schema(value_type = Object)]
+    pub value: serde_json::Value,
+}
+
+impl From<truestage::linear::Told> for ToldView {
+    fn from(told: truestage::linear::Told) -> Self {
+        let truestage::linear::Told { text, value } = told;
+        Self { text, value }
+    }
 }
 
 /// A calibration that is stored.

@@ -3,12 +3,13 @@
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::process::Command;
 
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::Edit;
 
-use crate::programs::{Bench, Process, live_rigs, number};
+use crate::programs::{Bench, Process, live_rigs, number, program};
 
 /// Below the machine's folder.
 const SOCKET: &str = "truestage.sock";
@@ -47,12 +48,6 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
         });
         let service = keep(&bench);
         let folder = bench.folder();
-        let refused = bench.run(&["move", "machine.toml", "x=1mm"]);
-        let refused = refused.with_code(3);
-        assert!(
-            refused["error"].to_string().contains("truestage serve"),
-            "{refused}"
-        );
         let (status, run) = ask(
             folder,
             "POST /v1/runs",
@@ -101,5 +96,93 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
         assert!(!folder.join(SOCKET).exists());
         // The machine is free again.
         bench.run(&["zero", "machine.toml"]).with_code(0);
+    }
+}
+
+/// What a verb prints for people.
+fn say(bench: &Bench, words: &[&str]) -> String {
+    let mut command = Command::new(program("truestage"));
+    let output = command.current_dir(bench.folder()).args(words).output();
+    let output = output.expect("it can be started");
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The names of what an object says.
+fn names(value: &Value) -> Vec<String> {
+    let members = value.as_object().expect("an object");
+    let mut names: Vec<_> = members.keys().cloned().collect();
+    names.sort();
+    names
+}
+
+/// The same verbs, with and without a service that keeps the machine, say the same.
+#[test]
+fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
+    let verbs: [&[&str]; 5] = [
+        &["zero", "machine.toml"],
+        &["verify", "machine.toml", "--uncompensated"],
+        &["calibrate", "machine.toml"],
+        &["verify", "machine.toml"],
+        &["move", "machine.toml", "x=12.5mm"],
+    ];
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let here: Vec<_> = verbs.map(|verb| bench.run(verb).with_code(0)).into();
+        let service = keep(&bench);
+        for (verb, here) in verbs.iter().zip(&here) {
+            let there = bench.run(verb).with_code(0);
+            assert_eq!(names(&there), names(here), "{verb:?}: {there}");
+        }
+        let moved = bench.run(&["move", "machine.toml", "x=20mm"]).with_code(0);
+        let moved = &moved["moves"][0];
+        assert_eq!(names(moved), names(&here[4]["moves"][0]), "{moved}");
+        assert!((number(&moved["place_mm"]) - 20.0).abs() < 0.001, "{moved}");
+        assert_eq!(moved["corrected"], "yes");
+        let texts = [
+            &["zero", "machine.toml"][..],
+            &["move", "machine.toml", "x=1mm"],
+        ];
+        for (verb, said) in texts.iter().zip(["zero found", "the point stands at"]) {
+            let told = say(&bench, verb);
+            assert!(told.contains(said), "{told}");
+        }
+        // What it refuses ends as it would end here, and nothing moves.
+        let beyond = bench.run(&["move", "machine.toml", "x=999mm"]).with_code(3);
+        assert!(
+            beyond["error"].to_string().contains("soft limit"),
+            "{beyond}"
+        );
+        let resumed = bench.run(&["calibrate", "machine.toml", "--resume"]);
+        let resumed = resumed.with_code(2);
+        assert!(
+            resumed["error"].to_string().contains("--resume"),
+            "{resumed}"
+        );
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+/// Ctrl-C ends what was asked for, not the service.
+#[test]
+fn a_signal_to_the_client_stops_its_run_and_leaves_the_machine_kept() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let service = keep(&bench);
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        let mut client = bench.start(&["calibrate", "machine.toml"]);
+        client.wait_until(|| {
+            let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+            axis["used_by"].is_string()
+        });
+        client.signal(Signal::SIGINT);
+        let ended = client.end();
+        assert_eq!(ended.code, Some(130), "{ended:?}");
+        let status = bench.run(&["status"]).with_code(0);
+        assert_eq!(status["machine"]["state"], "running", "{status}");
+        assert_eq!(status["axes"][0]["state"], "Standstill", "{status}");
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
     }
 }

@@ -261,6 +261,7 @@ impl Stage {
                 machine: Machine::new(&loaded, Box::new(transport)),
                 store,
                 held: Box::new(()),
+                teller: None,
             })
         });
         drop(passing);

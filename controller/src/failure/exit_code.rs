@@ -13,6 +13,7 @@ impl Failure {
             Self::Platform(failure) => failure.exit_code(),
             Self::Table(failure) => failure.exit_code(),
             Self::Resumable { source, .. } => source.exit_code(),
+            Self::Kept { exit_code, .. } => *exit_code,
             Self::Misdescribed {
                 explanation,
                 source,
@@ -88,7 +89,14 @@ mod tests {
     fn the_exit_code_says_whose_turn_it_is() {
         let id = || "abc".to_owned();
         check(StoreError::Unknown { id: id() }.into(), 2);
-        check(StoreError::Leased { owner: id() }.into(), 3);
+        check(
+            StoreError::Leased {
+                owner: id(),
+                places: Vec::new(),
+            }
+            .into(),
+            3,
+        );
         check(
             Failure::Machine(machine::Failure::NotZeroed { axis: id() }),
             3,

@@ -1,22 +1,13 @@
 //! `truestage status` and `truestage stop`: questions to a service that keeps a machine.
 
 use std::fmt::Write as _;
-use std::io::{self, Read, Write};
-use std::net::TcpStream;
-use std::os::unix::net::UnixStream;
-use std::time::Duration;
 
 use machine::records::short;
 use serde_json::{Value, json};
 
-use crate::Failure;
 use crate::program::ServiceArgs;
+use crate::program::exchange::{ask, plain};
 use crate::program::output::{Ended, Output};
-
-/// The longest that an answer may take: a service answers within a tick.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// More than any answer has, in bytes.
-const ANSWER_MAX: u64 = 16 << 20;
 
 /// What the machine and its axes are.
 pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
@@ -32,70 +23,6 @@ pub(crate) fn stop(args: &ServiceArgs, quick: bool, output: Output) -> Ended {
     let body = json!({"mode": mode}).to_string();
     let answer = ask(&args.at, "POST", "/v1/stop", &body)?;
     output.result(&format!("a {mode} stop is under way"), &answer)
-}
-
-trait Stream: Read + Write {}
-
-impl<S: Read + Write> Stream for S {}
-
-fn connect(at: &str) -> io::Result<Box<dyn Stream>> {
-    match at.split_once(':') {
-        Some(("unix", path)) => {
-            let stream = UnixStream::connect(path)?;
-            stream.set_read_timeout(Some(PATIENCE))?;
-            Ok(Box::new(stream))
-        }
-        Some(("tcp", address)) => {
-            let stream = TcpStream::connect(address)?;
-            stream.set_read_timeout(Some(PATIENCE))?;
-            Ok(Box::new(stream))
-        }
-        _ => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "write unix:PATH or tcp:127.0.0.1:PORT",
-        )),
-    }
-}
-
-/// One request over HTTP, and the JSON of its answer.
-fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
-    let said = exchange(at, method, path, body);
-    let said = said.map_err(|error| Failure::Usage {
-        what: format!("no service answers at {at}: {error}"),
-        help: "start one with `truestage serve`, or say where it is with --at".into(),
-    })?;
-    let (head, body) = said.split_once("\r\n\r\n").unwrap_or((&said, ""));
-    let status = head.split(' ').nth(1).unwrap_or_default();
-    let answer: Value = serde_json::from_str(body).unwrap_or_default();
-    if status.starts_with('2') {
-        return Ok(answer);
-    }
-    let of = |name: &str| answer[name].as_str().unwrap_or_default().to_owned();
-    Err(Failure::Usage {
-        what: format!(
-            "the service at {at} answered {status}: {}",
-            plain(&of("cause"))
-        ),
-        help: plain(&of("help")),
-    })
-}
-
-fn exchange(at: &str, method: &str, path: &str, body: &str) -> io::Result<String> {
-    let mut stream = connect(at)?;
-    let host = at.strip_prefix("tcp:").unwrap_or("localhost");
-    let length = body.len();
-    write!(
-        stream,
-        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\ncontent-length: {length}\r\n\r\n{body}"
-    )?;
-    let mut said = String::new();
-    stream.take(ANSWER_MAX).read_to_string(&mut said)?;
-    Ok(said)
-}
-
-/// Nothing that a terminal would obey.
-fn plain(text: &str) -> String {
-    text.chars().filter(|it| !it.is_control()).collect()
 }
 
 fn text_of(machine: &Value, axes: &Value) -> String {
@@ -171,18 +98,5 @@ mod tests {
              (corrected, u = 0.123 µm), calibration 0123456789ab, in use by m1-2\n\
              axis y: Disabled at -1.000000 mm (by its encoder), NOT ZEROED"
         );
-    }
-
-    #[test]
-    fn a_service_that_is_not_there_is_told_with_what_to_do() {
-        for at in ["unix:/nowhere/at/all", "nonsense"] {
-            let failure = ask(at, "GET", "/v1/machine", "").unwrap_err();
-            assert_eq!(failure.exit_code(), 2);
-            let said = failure.to_string();
-            assert!(
-                said.contains(at) && said.contains("truestage serve"),
-                "{said}"
-            );
-        }
     }
 }

@@ -6,7 +6,9 @@ mod check;
 mod data;
 mod data_file;
 mod demo;
+mod exchange;
 mod json;
+mod kept;
 mod kind;
 mod linear;
 mod made_from;
@@ -414,14 +416,25 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Check { config } => check::run(&config, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => reset::run(&args, output),
-        Command::Zero(args) => args.by_kind(|kind| (kind.zero)(&args, output)),
-        Command::Calibrate(args) => args.axis.by_kind(|kind| (kind.calibrate)(&args, output)),
-        Command::Verify(args) => args.axis.by_kind(|kind| (kind.verify)(&args, output)),
+        Command::Zero(args) => {
+            kept::or_by_its_service(args.by_kind(|kind| (kind.zero)(&args, output)), |service| {
+                service.zero(&args, output)
+            })
+        }
+        Command::Calibrate(args) => kept::or_by_its_service(
+            args.axis.by_kind(|kind| (kind.calibrate)(&args, output)),
+            |service| service.calibrate(&args, output),
+        ),
+        Command::Verify(args) => kept::or_by_its_service(
+            args.axis.by_kind(|kind| (kind.verify)(&args, output)),
+            |service| service.verify(&args, output),
+        ),
         Command::Move(args) => {
             let args = args.settle();
-            by_kind(&args.machine, args.named(), |kind| {
+            let here = by_kind(&args.machine, args.named(), |kind| {
                 (kind.move_to)(&args, output)
-            })
+            });
+            kept::or_by_its_service(here, |service| service.move_to(&args, output))
         }
         Command::Reference(args) => volumetric::verbs::reference(&args, output),
         Command::Run(args) => run(args, output),

@@ -5,10 +5,17 @@ use std::io::Write;
 use serde_json::{Value, json};
 
 use crate::Failure;
+use crate::linear::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
 /// it), or with no result.
 pub(crate) type Ended = Result<Option<Failure>, Failure>;
+
+/// A result for programs, with what the devices counted on the way.
+pub(crate) fn with_counters(mut value: Value, counters: Value) -> Value {
+    value["counters"] = counters;
+    value
+}
 
 /// How results are printed.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +37,11 @@ impl Output {
     pub(crate) fn result(self, text: &str, value: &Value) -> Ended {
         self.print(text, value);
         Ok(None)
+    }
+
+    /// The result, with what the devices counted on the way.
+    pub(crate) fn told(self, told: Told, counters: Value) -> Ended {
+        self.result(&told.text, &with_counters(told.value, counters))
     }
 
     /// A result that is a failure all the same: with `--json` still one object, the failure in

@@ -9,7 +9,7 @@ use crate::linear::{Calibrated, Verified};
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::PlatformVerified;
 use crate::program::kind::KINDS;
-use crate::program::linear::verbs as linear;
+use crate::program::linear::told as linear;
 use crate::program::platform::verbs as platform;
 use crate::program::report;
 use crate::program::rotary::verbs as rotary;

@@ -1,15 +1,23 @@
 //! `truestage serve`: a machine for whoever keeps it, opened on the thread that does.
 
 use std::any::Any;
+use std::io;
+use std::path;
+use std::sync::{Arc, OnceLock, Weak};
 
+use crate::linear::Teller;
 use crate::ports::Use;
+use crate::program::linear::told::TELLER;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::{MachineArgs, ServeArgs};
-use crate::{Failure, Machine, Store};
+use crate::{Failure, Lease, Machine, Store};
 
 /// A machine, where its records are, and what must be held as long as it is used.
 type Opening = dyn FnOnce() -> Result<(Machine, Store, Box<dyn Any>), Failure> + Send;
+
+/// Tells whoever finds the machine in use where its keeper listens.
+type Announcing = dyn Fn(&[String]) -> io::Result<()>;
 
 /// What `truestage serve` is asked for: a machine that is to be kept for others.
 pub struct Serving {
@@ -17,6 +25,10 @@ pub struct Serving {
     pub listen: Vec<String>,
     /// Opens it; called once, on the thread that keeps it.
     pub open: Box<Opening>,
+    /// Says what it gave, as the command line does.
+    pub teller: Teller,
+    /// Writes down where it is found, for whoever finds the machine in use.
+    pub announce: Box<Announcing>,
     /// Tells whoever started it something.
     pub told: Box<dyn Fn(&str)>,
 }
@@ -28,19 +40,41 @@ pub(crate) fn run(
     serve: fn(Serving) -> Result<(), Failure>,
 ) -> Ended {
     let ServeArgs { machine, listen } = args;
+    let taken: Arc<OnceLock<Weak<Lease>>> = Arc::default();
+    let lease = Arc::clone(&taken);
     serve(Serving {
         listen,
-        open: Box::new(move || open(&machine, output)),
+        open: Box::new(move || {
+            let (machine, store, own) = open(&machine, output)?;
+            let own = Arc::new(own);
+            // It is opened once.
+            let _ = lease.set(Arc::downgrade(&own));
+            Ok((machine, store, Box::new(own)))
+        }),
+        teller: TELLER,
+        announce: Box::new(move |places| announce(&taken, places)),
         told: Box::new(move |text| output.note(text)),
     })?;
     Ok(None)
 }
 
-fn open(args: &MachineArgs, output: Output) -> Result<(Machine, Store, Box<dyn Any>), Failure> {
+/// Whoever finds the machine in use may be in another folder.
+fn announce(taken: &OnceLock<Weak<Lease>>, places: &[String]) -> io::Result<()> {
+    let Some(lease) = taken.get().and_then(Weak::upgrade) else {
+        return Ok(());
+    };
+    let places = places.iter().map(|it| match it.strip_prefix("unix:") {
+        Some(path) => Ok(format!("unix:{}", path::absolute(path)?.display())),
+        None => Ok(it.clone()),
+    });
+    lease.announce(&places.collect::<io::Result<Vec<_>>>()?)
+}
+
+fn open(args: &MachineArgs, output: Output) -> Result<(Machine, Store, Lease), Failure> {
     let Session {
         machine,
         store,
         lease,
     } = Session::open(args, "serve", Use::Measurement, output)?;
-    Ok((machine, store, Box::new(lease)))
+    Ok((machine, store, lease))
 }

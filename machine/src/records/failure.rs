@@ -103,6 +103,8 @@ pub enum StoreError {
     Leased {
         /// Who.
         owner: String,
+        /// Where the owner can be asked, when it lets others ask.
+        places: Vec<String>,
     },
     /// No calibration has this name.
     #[error("no calibration `{id}`; `truestage cal list` shows what there is")]

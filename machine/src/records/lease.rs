@@ -1,7 +1,7 @@
 //! A machine is used by one program at a time.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{Read, Seek, Write};
+use std::io::{self, Read, Seek, Write};
 
 use nix::fcntl::{Flock, FlockArg};
 
@@ -18,15 +18,18 @@ use super::{Store, StoreError, io_error};
 /// let store = Store::new(folder.path(), "stage", &[]);
 /// let lease = Lease::take(&store, "calibrate")?;
 /// let second = Lease::take(&store, "move");
-/// assert!(matches!(second, Err(StoreError::Leased { owner }) if owner.contains("calibrate")));
+/// assert!(matches!(second, Err(StoreError::Leased { owner, .. }) if owner.contains("calibrate")));
 /// drop(lease);
 /// Lease::take(&store, "move")?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
 pub struct Lease {
-    _lock: Flock<File>,
+    lock: Flock<File>,
 }
+
+/// What stands before each place in the lease of a program that lets others ask.
+const PLACE: &str = "listening at ";
 
 impl Lease {
     /// Takes the lease of the machine whose store this is, for `verb`.
@@ -49,17 +52,32 @@ impl Lease {
                 lock.set_len(0).map_err(io_error("write", &path))?;
                 lock.write_all(owner.as_bytes())
                     .map_err(io_error("write", &path))?;
-                Ok(Self { _lock: lock })
+                Ok(Self { lock })
             }
             Err((mut file, _)) => {
-                let mut owner = String::new();
+                let mut said = String::new();
                 // Who holds it is a courtesy; that it is held is the fact.
-                let _ = file.rewind().and_then(|()| file.read_to_string(&mut owner));
+                let _ = file.rewind().and_then(|()| file.read_to_string(&mut said));
+                let (owner, places) = said.split_once('\n').unwrap_or((&said, ""));
+                let places = places.lines().filter_map(|it| it.strip_prefix(PLACE));
                 Err(StoreError::Leased {
                     owner: owner.trim().to_owned(),
+                    places: places.map(str::to_owned).collect(),
                 })
             }
         }
+    }
+
+    /// Tells whoever finds the machine in use where its owner can be asked.
+    ///
+    /// # Errors
+    /// When the lock file cannot be written.
+    pub fn announce(&self, places: &[String]) -> io::Result<()> {
+        let mut file: &File = &self.lock;
+        for place in places {
+            writeln!(file, "{PLACE}{place}")?;
+        }
+        Ok(())
     }
 }
 
@@ -78,6 +96,28 @@ mod tests {
         fs::write(&ordinary, b"x").unwrap();
         let mode = |path| fs::metadata(path).unwrap().mode();
         assert_eq!(mode(store.root().join("lease")), mode(ordinary));
+    }
+
+    #[test]
+    fn a_second_program_is_told_where_the_owner_can_be_asked() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path(), "m", &[]);
+        let lease = Lease::take(&store, "serve").unwrap();
+        let of_second = || match Lease::take(&store, "move").unwrap_err() {
+            StoreError::Leased { owner, places } => (owner, places),
+            other => panic!("{other}"),
+        };
+        assert!(of_second().1.is_empty(), "it does not listen yet");
+        lease
+            .announce(&["unix:/run/a b".into(), "tcp:[::1]:8470".into()])
+            .unwrap();
+        let (owner, places) = of_second();
+        assert!(owner.starts_with("truestage serve, process "), "{owner}");
+        assert_eq!(places, ["unix:/run/a b", "tcp:[::1]:8470"]);
+        drop(lease);
+        // What it said is gone with it.
+        let _second = Lease::take(&store, "calibrate").unwrap();
+        assert!(of_second().1.is_empty());
     }
 
     #[test]

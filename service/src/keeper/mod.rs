@@ -19,6 +19,7 @@ use std::sync::mpsc::Receiver;
 use machine::{Attendant, Failure, Machine, Observer, Stage};
 use serde_json::json;
 use triple_buffer::Input;
+use truestage::linear::Teller;
 
 use crate::order::{Answered, Choice, Letter, Reply};
 use crate::snapshot::Snapshot;
@@ -108,10 +109,17 @@ pub(crate) struct Keeper {
     answers: Vec<(Reply, Answered)>,
     output: Input<Snapshot>,
     ticks: u64,
+    /// Who says what motions gave.
+    teller: Option<Teller>,
 }
 
 impl Keeper {
-    pub(crate) fn new(inbox: Receiver<Letter>, output: Input<Snapshot>, seats: Vec<Seat>) -> Self {
+    pub(crate) fn new(
+        inbox: Receiver<Letter>,
+        output: Input<Snapshot>,
+        seats: Vec<Seat>,
+        teller: Option<Teller>,
+    ) -> Self {
         Self {
             inbox,
             seats,
@@ -126,6 +134,7 @@ impl Keeper {
             answers: Vec::new(),
             output,
             ticks: 0,
+            teller,
         }
     }
 

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use machine::{Failure, Machine, Moving};
 use serde_json::json;
+use truestage::linear::Corrected;
 use units::{Metres, MetresPerSecond, Time};
 
 use super::Keeper;
@@ -57,7 +58,7 @@ struct Leg {
     at: usize,
     target: Metres,
     set_point: Option<Metres>,
-    corrected: &'static str,
+    corrected: Corrected,
     deadline: Time,
     phase: LegPhase,
 }
@@ -305,7 +306,13 @@ impl Keeper {
         for leg in &motion.legs {
             self.settle(machine, leg);
         }
-        let view = Arc::new(shown::ended(&motion, &self.seats, machine, end));
+        let view = Arc::new(shown::ended(
+            &motion,
+            &self.seats,
+            machine,
+            self.teller,
+            end,
+        ));
         for (axis, leg) in &view.axes {
             let data = json!({"position": leg.position, "encoder": leg.encoder,
                               "standard_uncertainty": leg.standard_uncertainty, "motion": view.id});

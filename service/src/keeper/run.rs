@@ -11,7 +11,7 @@ use super::stop::stopped_by;
 use super::{Job, Keeper, Mode};
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
-use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped};
+use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
 
 /// So many runs are kept in the snapshot.
 const KEPT: usize = 64;
@@ -97,6 +97,7 @@ impl Keeper {
             stopped: None,
             cause: None,
             result: Value::Null,
+            told: None,
         };
         self.events.push("run", id, json!(view));
         self.runs.kept.push_back(Run {
@@ -294,12 +295,13 @@ impl Keeper {
     }
 
     /// The run `id` has its result.
-    pub(crate) fn run_done(&mut self, id: &str, result: Value) {
+    pub(crate) fn run_done(&mut self, id: &str, result: Value, told: Option<ToldView>) {
         self.free_axes_of(id);
         self.change_run(id, |view| {
             view.state = RunState::Done;
             view.steps_done = view.steps;
             view.result = result;
+            view.told = told;
         });
     }
 

@@ -8,6 +8,7 @@ mod report;
 mod shown;
 #[cfg(test)]
 mod stored_tests;
+pub(crate) mod told;
 mod uncertainty;
 pub(crate) mod verbs;
 

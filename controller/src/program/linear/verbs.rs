@@ -4,17 +4,17 @@ use std::path::PathBuf;
 
 use machine::records::Store;
 use serde_json::{Value, json};
-use units::{Metres, Short};
+use units::Metres;
 
-use crate::linear::{Calibrated, Verified, VerifyOptions};
+use crate::linear::VerifyOptions;
 use crate::ports::Use;
-use crate::program::linear::{moved, uncertainty};
-use crate::program::output::{Ended, Output};
+use crate::program::json as to_json;
+use crate::program::linear::{moved, told};
+use crate::program::output::{Ended, Output, with_counters};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_target;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
-use crate::program::{json as to_json, text};
 use crate::run::CalibrateOptions;
 use crate::{Failure, Machine};
 
@@ -75,39 +75,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
         machine.shut_down()?;
         Ok((zeroed, to_json::counters(&machine.devices().counters())))
     })?;
-    let estimate = &zeroed.estimate;
-    let lost_motion = estimate.passes.map_or(String::new(), |it| {
-        format!(
-            "\nlost motion {:.3} µm between forward and reverse",
-            it.lost_motion.um()
-        )
-    });
-    let text = format!(
-        "axis {axis}: zero found, standard uncertainty {:.1} nm ({} samples); the coarse \
-         reference was off by {:.3} µm{lost_motion}\nrecorded in {}",
-        estimate.standard_uncertainty.nm(),
-        estimate.points,
-        estimate.origin.um(),
-        zeroed.journal.display()
-    );
-    let drift = zeroed.previous.map(|before| {
-        let now = zeroed.entry;
-        (
-            (now.peak_max_v - before.peak_max_v) * 1e3,
-            (now.mid_v - before.mid_v) * 1e3,
-        )
-    });
-    let since = drift.map_or(String::new(), |(peak, mid)| {
-        format!("\nsince the zero before: peak sensor {peak:+.1} mV, slope sensor {mid:+.1} mV")
-    });
-    let value = json!({
-        "axis": axis,
-        "zero": to_json::zero(estimate),
-        "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
-        "journal": zeroed.journal,
-        "counters": counters,
-    });
-    output.result(&(text + &since), &value)
+    output.told(told::zeroed(&axis, &zeroed), counters)
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
@@ -125,58 +93,11 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             machine.linear(axis)?.calibrate(store, &options)
         },
     )?;
-    let mut value = calibrated_value(&calibrated);
-    value["counters"] = counters;
-    output.result(&calibrated_text(&calibrated), &value)
-}
-
-pub(crate) fn calibrated_text(calibrated: &Calibrated) -> String {
-    let fitted = &calibrated.fitted;
-    let mut text = format!(
-        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, {}\n  {}\n  \
-         points in {}",
-        &calibrated.id[..12],
-        fitted.table.nodes().len(),
-        fitted.table.largest().um(),
-        text::closure(calibrated.measured.closure),
-        calibrated.path.display(),
-        calibrated.journal.display()
-    );
-    text += &format!("\n  {}", text::noticed(calibrated.noticed));
-    let content = &calibrated.record.content;
-    text += &format!("\n  {}", uncertainty::sentence(content));
-    for point in &fitted.robust.outliers {
-        text += &format!(
-            "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
-            point.run,
-            point.approach.symbol(),
-            Short(point.target.mm()),
-            point.residual.um()
-        );
-    }
-    text
-}
-
-pub(crate) fn calibrated_value(calibrated: &Calibrated) -> Value {
-    let mut fit = to_json::fitted(&calibrated.fitted);
-    // Closure means what the datum's place shows; from run to run the whole table moves.
-    fit["drift_um"] = json!(calibrated.fitted.drift.closure.map(to_json::um));
-    fit["drift_um_u"] = json!(calibrated.fitted.drift.u_closure.map(to_json::um));
-    let budget = calibrated.record.content.budget.as_ref();
-    json!({
-        "calibration": calibrated.id,
-        "path": calibrated.path,
-        "journal": calibrated.journal,
-        "closure_um": calibrated.measured.closure.map(to_json::um),
-        "fit": fit,
-        "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
-        "uncertainty": budget.map(uncertainty::value),
-    })
+    output.told(told::calibrated(&calibrated), counters)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
-    let name = if compensated { "as_left" } else { "as_found" };
     let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
         let verified = machine.linear(axis)?.verify(
             store,
@@ -196,41 +117,14 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         args.resume.as_ref(),
         run,
     )?;
-    let text = verified_text(name, &verified);
-    let within = verified.is_within_tolerance();
-    let mut value = verified_value(name, &verified);
-    value["axis"] = json!(axis);
-    value["counters"] = counters;
-    if compensated && !within {
+    let told = told::verified(&axis, &verified, compensated);
+    if compensated && !verified.is_within_tolerance() {
         let seen = verified.figures.accuracy.bidirectional;
         let limit = verified.tolerance;
-        return output.bad_result(&text, value, Failure::OutOfTolerance { axis, seen, limit });
+        let failure = Failure::OutOfTolerance { axis, seen, limit };
+        return output.bad_result(&told.text, with_counters(told.value, counters), failure);
     }
-    output.result(&text, &value)
-}
-
-/// `name` is `as_found` or `as_left`.
-pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
-    let title = name.replace('_', " ");
-    let mut text = text::figures_table(&[(&title, &verified.figures)]);
-    let uncertain = uncertainty::of_targets(&verified.uncertainty);
-    text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
-    text += &format!(
-        "\ndatum after the runs: {}",
-        text::closure(verified.measured.closure)
-    );
-    text + &format!("\npoints in {}", verified.journal.display())
-}
-
-pub(crate) fn verified_value(name: &str, verified: &Verified) -> Value {
-    json!({
-        name: to_json::figures(&verified.figures),
-        "closure_um": verified.measured.closure.map(to_json::um),
-        "tolerance_um": to_json::um(verified.tolerance),
-        "within_tolerance": verified.is_within_tolerance(),
-        "uncertainty": uncertainty::targets(&verified.uncertainty),
-        "journal": verified.journal,
-    })
+    output.told(told, counters)
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {

@@ -63,7 +63,7 @@ impl Keeper {
                 at: self.place(axis)?,
                 target: target.0,
                 set_point: None,
-                corrected: "no",
+                corrected: Corrected::No,
                 deadline: Time::NEVER,
                 phase: LegPhase::Waiting,
             })
@@ -96,7 +96,7 @@ impl Keeper {
             let seat = &self.seats[leg.at];
             let planned = plan_leg(machine, seat, leg.target, uncorrected)?;
             leg.set_point = Some(planned.set_point);
-            leg.corrected = word_of(planned.corrected);
+            leg.corrected = planned.corrected;
             Ok(wanted.map_or(planned.speed, |it| it.min(planned.speed)))
         });
         planned.collect()
@@ -195,13 +195,4 @@ fn plan_leg(
     }
     let what = format!("axis {axis} is switched off; nothing was moved");
     Err(Problem::new(Code::AxisDisabled, what, "enable it first"))
-}
-
-const fn word_of(corrected: Corrected) -> &'static str {
-    match corrected {
-        Corrected::No => "no",
-        Corrected::Within => "yes",
-        Corrected::Held { .. } => "held",
-        Corrected::Fading { .. } => "fading",
-    }
 }

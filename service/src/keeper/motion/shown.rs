@@ -1,12 +1,13 @@
 //! Motions as they are shown.
 
 use machine::Machine;
+use truestage::linear::{Corrected, Moved, Teller};
 use units::Metres;
 
 use super::super::seat::Seat;
-use super::{End, Motion, Phase};
+use super::{End, Leg, Motion, Phase};
 use crate::quantity::Quantity;
-use crate::view::{LegView, MotionState, MotionView};
+use crate::view::{LegView, MotionState, MotionView, ToldView};
 
 /// A motion that is under way.
 pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
@@ -14,10 +15,11 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         let view = LegView {
             target: Quantity::mm(leg.target),
             set_point: leg.set_point.map(Quantity::mm),
-            corrected: leg.corrected.to_owned(),
+            corrected: word_of(leg.corrected).to_owned(),
             position: None,
             encoder: None,
             standard_uncertainty: None,
+            told: None,
         };
         (seats[leg.at].name.to_string(), view)
     });
@@ -37,7 +39,13 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
 }
 
 /// A motion that has ended, with where its axes stand.
-pub(super) fn ended(motion: &Motion, seats: &[Seat], machine: &Machine, end: End) -> MotionView {
+pub(super) fn ended(
+    motion: &Motion,
+    seats: &[Seat],
+    machine: &Machine,
+    teller: Option<Teller>,
+    end: End,
+) -> MotionView {
     let mut view = view(motion, seats);
     for leg in &motion.legs {
         let seat = &seats[leg.at];
@@ -49,6 +57,10 @@ pub(super) fn ended(motion: &Motion, seats: &[Seat], machine: &Machine, end: End
         shown.position = place.map(Quantity::mm);
         shown.encoder = sample.encoder.map(Quantity::mm);
         shown.standard_uncertainty = sample.standard_uncertainty.map(Quantity::um);
+        shown.told = match (&end, teller) {
+            (End::Done, Some(teller)) => told(leg, seat, machine, teller),
+            _ => None,
+        };
     }
     (view.state, view.stopped, view.cause) = match end {
         End::Done => (MotionState::Done, None, None),
@@ -57,4 +69,38 @@ pub(super) fn ended(motion: &Motion, seats: &[Seat], machine: &Machine, end: End
         End::TimedOut(cause) => (MotionState::TimedOut, None, Some(cause)),
     };
     view
+}
+
+/// What the command line says of a move to where an axis stands now.
+fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: Teller) -> Option<ToldView> {
+    let encoder = machine.reading(&seat.name).ok().flatten()?.position;
+    let approach = seat.approach(machine);
+    let is_corrected = leg.corrected != Corrected::No;
+    let moved = Moved {
+        target: leg.target,
+        set_point: leg.set_point?,
+        encoder,
+        approach,
+        corrected: leg.corrected,
+        place: seat
+            .course
+            .place(encoder, approach)
+            .filter(|_| is_corrected),
+        uncertainty: seat
+            .course
+            .uncertainty_at(encoder, approach)
+            .filter(|_| is_corrected),
+    };
+    let calibration = seat.calibration.as_deref().filter(|_| is_corrected);
+    let told = (teller.moved)(&seat.name, &moved, calibration);
+    Some(ToldView::from(told))
+}
+
+const fn word_of(corrected: Corrected) -> &'static str {
+    match corrected {
+        Corrected::No => "no",
+        Corrected::Within => "yes",
+        Corrected::Held { .. } => "held",
+        Corrected::Fading { .. } => "fading",
+    }
 }

@@ -1,0 +1,228 @@
+//! The verbs of the cycle on a machine that a service keeps: asked of the service, told as if they were done here.
+//!
+//! A verb first tries to take the machine. Whoever has it says in its lease where it can be asked; what is wrong
+//! with the command line itself has been refused by then.
+
+use std::time::Duration;
+
+use machine::records::StoreError;
+use serde_json::{Value, json};
+use units::Metres;
+
+use crate::program::exchange::{ask, plain};
+use crate::program::output::{Ended, Output};
+use crate::program::progress::Bars;
+use crate::program::session::stop_on_signals;
+use crate::program::targets::axis_target;
+use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use crate::{Failure, Observer as _, Stage, StopRequest};
+
+/// How long an answer is held back: Ctrl-C is looked for so often.
+const WAIT: Duration = Duration::from_millis(200);
+
+/// Where the service is.
+pub(crate) struct Service {
+    at: String,
+}
+
+/// How `here` ended; when the machine is in use by a service, how it ends there.
+pub(crate) fn or_by_its_service(here: Ended, there: impl FnOnce(&Service) -> Ended) -> Ended {
+    match here {
+        Err(Failure::Store(StoreError::Leased { owner, places })) => match places.first() {
+            Some(place) => there(&Service { at: place.clone() }),
+            None => Err(StoreError::Leased { owner, places }.into()),
+        },
+        ended => ended,
+    }
+}
+
+impl Service {
+    pub(crate) fn zero(&self, args: &AxisArgs, output: Output) -> Ended {
+        refuse(args.machine.record.is_some(), "--record")?;
+        let stop = stop_request()?;
+        let run = self.run(&zero_of(args.axis.as_deref()), Stage::Zero, &stop, output)?;
+        tell(&run, output)
+    }
+
+    pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
+        refuse(args.axis.machine.record.is_some(), "--record")?;
+        refuse(args.resume.is_some(), "--resume")?;
+        refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
+        let stop = stop_request()?;
+        let axis = args.axis.axis.as_deref();
+        self.zero_first(axis, &stop, output)?;
+        let request = json!({"kind": "calibrate", "axis": axis, "accept_drift": args.accept_drift});
+        let run = self.run(&request, Stage::Calibrate, &stop, output)?;
+        tell(&run, output)
+    }
+
+    pub(crate) fn verify(&self, args: &VerifyArgs, output: Output) -> Ended {
+        refuse(args.axis.machine.record.is_some(), "--record")?;
+        refuse(args.resume.is_some(), "--resume")?;
+        let stop = stop_request()?;
+        let axis = args.axis.axis.as_deref();
+        self.zero_first(axis, &stop, output)?;
+        let request = json!({"kind": "verify", "axis": axis, "uncompensated": args.uncompensated});
+        let run = self.run(&request, Stage::Verify, &stop, output)?;
+        let um = |name: &str| Metres::from_um(run["result"][name].as_f64().unwrap_or(f64::NAN));
+        if args.uncompensated || run["result"]["within_tolerance"] == true {
+            return tell(&run, output);
+        }
+        let failure = Failure::OutOfTolerance {
+            axis: plain(run["axes"][0].as_str().unwrap_or_default()),
+            seen: um("accuracy_um"),
+            limit: um("tolerance_um"),
+        };
+        let (text, value) = words_of(&run);
+        output.bad_result(&text, value, failure)
+    }
+
+    pub(crate) fn move_to(&self, args: &MoveArgs, output: Output) -> Ended {
+        refuse(args.machine.record.is_some(), "--record")?;
+        let stop = stop_request()?;
+        let mut targets = serde_json::Map::new();
+        for text in &args.targets {
+            let (axis, target) = axis_target(text)?;
+            self.zero_first(Some(&axis), &stop, output)?;
+            targets.insert(axis, json!({"value": target.mm(), "unit": "mm"}));
+        }
+        let motion = self.motion(&json!({"targets": targets}), &stop)?;
+        let legs = motion["axes"].as_object().into_iter().flatten();
+        let (texts, values): (Vec<_>, Vec<_>) = legs.map(|(_, leg)| words_of(leg)).unzip();
+        output.result(&texts.join("\n"), &json!({"moves": values}))
+    }
+
+    /// A kept machine has its zero, unless it was just started or reset.
+    fn zero_first(
+        &self,
+        axis: Option<&str>,
+        stop: &StopRequest,
+        output: Output,
+    ) -> Result<(), Failure> {
+        let axes = ask(&self.at, "GET", "/v1/axes", "")?;
+        let mut axes = axes.as_array().into_iter().flatten();
+        let is_meant = |it: &&Value| axis.is_none_or(|axis| it["name"] == axis);
+        match axes.find(is_meant) {
+            Some(found) if found["homed"] == true => Ok(()),
+            // What it says of an axis that is not there is said by the run.
+            _ => self
+                .run(&zero_of(axis), Stage::Zero, stop, output)
+                .map(drop),
+        }
+    }
+
+    /// Begins a run and waits for its end.
+    fn run(
+        &self,
+        request: &Value,
+        stage: Stage,
+        stop: &StopRequest,
+        output: Output,
+    ) -> Result<Value, Failure> {
+        let mut request = request.clone();
+        request["start"] = json!(true);
+        let begun = ask(&self.at, "POST", "/v1/runs", &request.to_string())?;
+        let id = plain(begun["id"].as_str().unwrap_or_default());
+        let mut bars = Bars::new(output.is_json());
+        let abort = format!("/v1/runs/{id}/abort");
+        self.end_of(&format!("/v1/runs/{id}"), &abort, stop, |run| {
+            let of = |name: &str| run[name].as_u64().unwrap_or(0);
+            let axis = plain(run["axes"][0].as_str().unwrap_or_default());
+            if of("steps") > 0 {
+                bars.progress(stage, &axis, of("steps_done"), of("steps"));
+            }
+        })
+    }
+
+    fn motion(&self, request: &Value, stop: &StopRequest) -> Result<Value, Failure> {
+        let begun = ask(&self.at, "POST", "/v1/motions", &request.to_string())?;
+        let id = plain(begun["id"].as_str().unwrap_or_default());
+        self.end_of(&format!("/v1/motions/{id}"), "/v1/stop", stop, |_| ())
+    }
+
+    /// Waits for the end of what is at `path`; when this program is asked to stop, `ender` is asked to end it.
+    fn end_of(
+        &self,
+        path: &str,
+        ender: &str,
+        stop: &StopRequest,
+        mut meanwhile: impl FnMut(&Value),
+    ) -> Result<Value, Failure> {
+        let mut is_ending = false;
+        loop {
+            if stop.is_requested() && !is_ending {
+                is_ending = true;
+                ask(&self.at, "POST", ender, "{}")?;
+            }
+            let wait_s = WAIT.as_secs_f64();
+            let seen = ask(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
+            meanwhile(&seen);
+            match seen["state"].as_str() {
+                Some("done") => return Ok(seen),
+                Some("stopped") if is_ending => return Err(stop.failure().into()),
+                Some("stopped") => return Err(stopped(&seen)),
+                Some("failed" | "timed_out") => return Err(failed(&seen)),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn stop_request() -> Result<StopRequest, Failure> {
+    let stop = StopRequest::default();
+    stop_on_signals(&stop)?;
+    Ok(stop)
+}
+
+fn zero_of(axis: Option<&str>) -> Value {
+    json!({"kind": "zero", "axis": axis})
+}
+
+/// # Errors
+/// When an option is given that only a program which opens the machine itself can heed.
+fn refuse(is_given: bool, option: &str) -> Result<(), Failure> {
+    if !is_given {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: format!(
+            "{option}: this machine is kept by `truestage serve`, which does not offer it"
+        ),
+        help: "leave it out, or end the service first".into(),
+    })
+}
+
+fn stopped(seen: &Value) -> Failure {
+    let by = plain(seen["stopped"]["by"].as_str().unwrap_or("somebody"));
+    Failure::Kept {
+        said: format!("stopped by {by}; the axes stand"),
+        exit_code: machine::Failure::Interrupted.exit_code(),
+    }
+}
+
+fn failed(seen: &Value) -> Failure {
+    let cause = &seen["cause"];
+    let exit_code = cause["exit_code"].as_u64();
+    Failure::Kept {
+        said: plain(
+            cause["cause"]
+                .as_str()
+                .unwrap_or("the service says no cause"),
+        ),
+        exit_code: exit_code.and_then(|it| u8::try_from(it).ok()).unwrap_or(4),
+    }
+}
+
+/// What a run or an axis of a motion gave, as the command line says it, or in the service's own figures.
+fn words_of(ended: &Value) -> (String, Value) {
+    let told = &ended["told"];
+    match told["text"].as_str() {
+        Some(text) => (plain(text), told["value"].clone()),
+        None => ("done".into(), ended["result"].clone()),
+    }
+}
+
+fn tell(ended: &Value, output: Output) -> Ended {
+    let (text, value) = words_of(ended);
+    output.result(&text, &value)
+}

@@ -1,0 +1,147 @@
+//! The results of linear axes as they are printed: text for people, one object for programs.
+
+use serde_json::{Value, json};
+use units::Short;
+
+use crate::linear::{Calibrated, Moved, Teller, Told, Verified, Zeroed};
+use crate::program::linear::{moved as of_move, uncertainty};
+use crate::program::{json as to_json, text};
+
+/// For whoever keeps a machine.
+pub(crate) const TELLER: Teller = Teller {
+    zeroed,
+    calibrated,
+    verified,
+    moved,
+    counters: |machine| to_json::counters(&machine.devices().counters()),
+};
+
+pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
+    let estimate = &zeroed.estimate;
+    let lost_motion = estimate.passes.map_or(String::new(), |it| {
+        format!(
+            "\nlost motion {:.3} µm between forward and reverse",
+            it.lost_motion.um()
+        )
+    });
+    let text = format!(
+        "axis {axis}: zero found, standard uncertainty {:.1} nm ({} samples); the coarse \
+         reference was off by {:.3} µm{lost_motion}\nrecorded in {}",
+        estimate.standard_uncertainty.nm(),
+        estimate.points,
+        estimate.origin.um(),
+        zeroed.journal.display()
+    );
+    let drift = zeroed.previous.as_ref().map(|before| {
+        let now = zeroed.entry;
+        (
+            (now.peak_max_v - before.peak_max_v) * 1e3,
+            (now.mid_v - before.mid_v) * 1e3,
+        )
+    });
+    let since = drift.map_or(String::new(), |(peak, mid)| {
+        format!("\nsince the zero before: peak sensor {peak:+.1} mV, slope sensor {mid:+.1} mV")
+    });
+    let value = json!({
+        "axis": axis,
+        "zero": to_json::zero(estimate),
+        "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
+        "journal": zeroed.journal,
+    });
+    Told {
+        text: text + &since,
+        value,
+    }
+}
+
+pub(crate) fn calibrated(calibrated: &Calibrated) -> Told {
+    Told {
+        text: calibrated_text(calibrated),
+        value: calibrated_value(calibrated),
+    }
+}
+
+pub(crate) fn calibrated_text(calibrated: &Calibrated) -> String {
+    let fitted = &calibrated.fitted;
+    let mut text = format!(
+        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, {}\n  {}\n  \
+         points in {}",
+        &calibrated.id[..12],
+        fitted.table.nodes().len(),
+        fitted.table.largest().um(),
+        text::closure(calibrated.measured.closure),
+        calibrated.path.display(),
+        calibrated.journal.display()
+    );
+    text += &format!("\n  {}", text::noticed(calibrated.noticed));
+    let content = &calibrated.record.content;
+    text += &format!("\n  {}", uncertainty::sentence(content));
+    for point in &fitted.robust.outliers {
+        text += &format!(
+            "\n  left out: run {}, approach {}, {} mm, off by {:.2} µm",
+            point.run,
+            point.approach.symbol(),
+            Short(point.target.mm()),
+            point.residual.um()
+        );
+    }
+    text
+}
+
+pub(crate) fn calibrated_value(calibrated: &Calibrated) -> Value {
+    let mut fit = to_json::fitted(&calibrated.fitted);
+    // Closure means what the datum's place shows; from run to run the whole table moves.
+    fit["drift_um"] = json!(calibrated.fitted.drift.closure.map(to_json::um));
+    fit["drift_um_u"] = json!(calibrated.fitted.drift.u_closure.map(to_json::um));
+    let budget = calibrated.record.content.budget.as_ref();
+    json!({
+        "calibration": calibrated.id,
+        "path": calibrated.path,
+        "journal": calibrated.journal,
+        "closure_um": calibrated.measured.closure.map(to_json::um),
+        "fit": fit,
+        "wrong_position_noticed_um": calibrated.noticed.map(to_json::um),
+        "uncertainty": budget.map(uncertainty::value),
+    })
+}
+
+pub(crate) fn verified(axis: &str, verified: &Verified, compensated: bool) -> Told {
+    let name = if compensated { "as_left" } else { "as_found" };
+    let mut value = verified_value(name, verified);
+    value["axis"] = json!(axis);
+    Told {
+        text: verified_text(name, verified),
+        value,
+    }
+}
+
+fn moved(axis: &str, moved: &Moved, calibration: Option<&str>) -> Told {
+    Told {
+        text: of_move::text(axis, moved, calibration),
+        value: of_move::value(axis, moved, calibration),
+    }
+}
+
+/// `name` is `as_found` or `as_left`.
+pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
+    let title = name.replace('_', " ");
+    let mut text = text::figures_table(&[(&title, &verified.figures)]);
+    let uncertain = uncertainty::of_targets(&verified.uncertainty);
+    text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
+    text += &format!(
+        "\ndatum after the runs: {}",
+        text::closure(verified.measured.closure)
+    );
+    text + &format!("\npoints in {}", verified.journal.display())
+}
+
+pub(crate) fn verified_value(name: &str, verified: &Verified) -> Value {
+    json!({
+        name: to_json::figures(&verified.figures),
+        "closure_um": verified.measured.closure.map(to_json::um),
+        "tolerance_um": to_json::um(verified.tolerance),
+        "within_tolerance": verified.is_within_tolerance(),
+        "uncertainty": uncertainty::targets(&verified.uncertainty),
+        "journal": verified.journal,
+    })
+}
