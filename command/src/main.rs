@@ -1,9 +1,10 @@
 //! The command `truestage`: the command line of the library, with the service that `truestage serve` keeps a
 //! machine by. It is the only package that knows both.
 
+use std::io;
 use std::process::ExitCode;
 
-use service::{Edge, Listen, Opened, Service, StartError};
+use service::{Edge, Listen, Manager, Opened, Service, StartError};
 use truestage::{Failure, Serving};
 
 fn main() -> ExitCode {
@@ -23,6 +24,9 @@ fn serve(serving: Serving) -> Result<(), Failure> {
     let places: Vec<_> = places
         .collect::<Result<_, _>>()
         .map_err(|it| refused("--listen", &it))?;
+    let manager = Manager::of_environment();
+    let say = |text: &str| manager.iter().for_each(|it| it.say(text));
+    say("starting the machine");
     let service = Service::start(move || {
         let (machine, store, held) = open()?;
         Ok(Opened {
@@ -32,9 +36,12 @@ fn serve(serving: Serving) -> Result<(), Failure> {
             teller: Some(teller),
         })
     });
-    let service = service.map_err(|failure| match failure {
-        StartError::Machine(failure) => failure,
-        other => refused("truestage serve", &other),
+    let mut service = service.map_err(|failure| {
+        say(&failure.to_string());
+        match failure {
+            StartError::Machine(failure) => failure,
+            other => refused("truestage serve", &other),
+        }
     })?;
     match Edge::open(service.desk(), &places) {
         Ok(edge) => {
@@ -46,6 +53,9 @@ fn serve(serving: Serving) -> Result<(), Failure> {
                 told(&format!(
                     "the lease cannot say where that is ({error}); give `truestage status` and `stop` --at"
                 ));
+            }
+            if let Some(Err(error)) = manager.map(|it| service.report_to(it)) {
+                told(&untold(&error));
             }
             let ended = service.wait();
             drop(edge);
@@ -60,6 +70,14 @@ fn serve(serving: Serving) -> Result<(), Failure> {
             Err(refused("--listen", &error))
         }
     }
+}
+
+/// The machine is there for whoever asks it, whatever its manager thinks.
+fn untold(error: &io::Error) -> String {
+    format!(
+        "the service manager was not told that the service is ready: {error}; NOTIFY_SOCKET names its socket, and \
+         systemd ends a service that it does not hear of (NotifyAccess=main allows it)"
+    )
 }
 
 fn refused(what: &str, why: &dyn std::error::Error) -> Failure {

@@ -107,6 +107,10 @@ impl Desk {
         ledger.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    pub(crate) fn fixed(&self) -> &Fixed {
+        &self.shared.fixed
+    }
+
     pub(crate) fn snapshot(&self) -> Snapshot {
         self.shared.board.newest()
     }

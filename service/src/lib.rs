@@ -12,6 +12,7 @@ mod desk;
 mod http;
 mod keeper;
 mod ledger;
+mod manager;
 mod order;
 mod problem;
 mod procedures;
@@ -25,6 +26,7 @@ mod view;
 pub use desk::Desk;
 pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
+pub use manager::Manager;
 pub use problem::{Code, Problem, ProblemBody};
 pub use quantity::{Length, Quantity, QuantityIn, Speed};
 pub use request::{

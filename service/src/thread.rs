@@ -19,6 +19,7 @@ use wire::cia402::PowerState;
 use crate::desk::Desk;
 use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
+use crate::manager::{Manager, Watch};
 use crate::order::{Answer, Choice, Letter, Reply};
 use crate::problem::Problem;
 use crate::procedures::{self, Found};
@@ -67,6 +68,7 @@ pub enum StartError {
 pub struct Service {
     desk: Desk,
     scribe: Scribe,
+    watch: Option<Watch>,
     thread: JoinHandle<Result<(), Failure>>,
 }
 
@@ -93,6 +95,7 @@ impl Service {
                 Ok(Self {
                     scribe: Scribe::start(desk.clone(), folder)?,
                     desk,
+                    watch: None,
                     thread,
                 })
             }
@@ -109,12 +112,25 @@ impl Service {
         self.desk.clone()
     }
 
+    /// Tells `manager` that the service is ready, and from now on that its machine's thread ticks and that it
+    /// ends.
+    ///
+    /// # Errors
+    /// When the manager cannot be told: nothing is told later either, and the service goes on.
+    pub fn report_to(&mut self, manager: Manager) -> io::Result<()> {
+        self.watch = Some(manager.watch(self.desk())?);
+        Ok(())
+    }
+
     /// Waits for the end of the service: asked for, by a signal, or because its thread failed.
     ///
     /// # Errors
     /// What ended it, when that was not asked for.
     pub fn wait(self) -> Result<(), Failure> {
         let ended = self.thread.join();
+        if let Some(watch) = self.watch {
+            watch.finish();
+        }
         self.scribe.finish();
         ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
@@ -202,7 +218,8 @@ impl Kept {
     /// Something failed: every drive is stopped, and what was under way ends with the cause.
     fn failed(&mut self, failure: Failure) {
         if self.keeper.borrow().mode() == Mode::Safe {
-            // It is safe already: a bus that is gone says so again and again.
+            // It is safe already: a bus that is gone says so again and again. This thread still lives.
+            self.keeper.borrow_mut().publish_again(&self.machine);
             thread::sleep(GONE);
             return;
         }

@@ -280,7 +280,13 @@ impl Bench {
 
     /// Starts a verb in the machine's folder; verbs that use the machine are told where it is.
     pub(crate) fn start(&self, words: &[&str]) -> Process {
+        self.start_within(words, &[])
+    }
+
+    /// The same, with these variables in its environment.
+    pub(crate) fn start_within(&self, words: &[&str], variables: &[(&str, &str)]) -> Process {
         let mut command = self.command();
+        command.envs(variables.iter().copied());
         command.arg(words[0]);
         let uses_machine = [
             "scan",
@@ -310,6 +316,11 @@ impl Bench {
     /// The same, and waits for its end.
     pub(crate) fn run(&self, words: &[&str]) -> Ended {
         self.start(words).end()
+    }
+
+    /// Sends the emulator a signal; time stands still while it is stopped.
+    pub(crate) fn signal_emulator(&self, signal: Signal) {
+        self.mock.signal(signal);
     }
 
     /// Asks the emulator to end, and says how it did.

@@ -50,6 +50,12 @@ impl Keeper {
         self.output.publish();
     }
 
+    /// Publishes although the tick has failed before anybody could attend to it.
+    pub(crate) fn publish_again(&mut self, machine: &Machine) {
+        self.ticks += 1;
+        self.publish(machine);
+    }
+
     fn tell_states(&mut self, machine: &Machine) {
         let is_faulted = self.fault.is_some();
         for seat in &mut self.seats {
