@@ -28,7 +28,7 @@ pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
 pub use manager::Manager;
 pub use problem::{Code, Problem, ProblemBody};
-pub use quantity::{Length, Quantity, QuantityIn, Speed};
+pub use quantity::{Length, Quantity, Speed};
 pub use request::{
     Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, RunKind, RunRequest, StopMode, Target,
 };

@@ -18,6 +18,8 @@ pub enum Code {
     NoSuchMotion,
     /// There is no such run.
     NoSuchRun,
+    /// There is no such calibration, or none before.
+    NoSuchCalibration,
     /// There is no such resource.
     NotFound,
     /// The resource knows no such method.
@@ -84,7 +86,11 @@ impl Code {
         match self {
             Self::BadRequest | Self::BadQuantity => 400,
             Self::Forbidden => 403,
-            Self::NoSuchAxis | Self::NoSuchMotion | Self::NoSuchRun | Self::NotFound => 404,
+            Self::NoSuchAxis
+            | Self::NoSuchMotion
+            | Self::NoSuchRun
+            | Self::NoSuchCalibration
+            | Self::NotFound => 404,
             Self::MethodNotAllowed => 405,
             Self::TooLarge => 413,
             Self::SoftLimit
@@ -145,6 +151,7 @@ impl Code {
             | Self::NoSuchAxis
             | Self::NoSuchMotion
             | Self::NoSuchRun
+            | Self::NoSuchCalibration
             | Self::NotFound
             | Self::MethodNotAllowed
             | Self::KeyReused
@@ -275,12 +282,34 @@ pub(crate) fn code_of(failure: &Failure) -> Code {
         Failure::OutOfCalibration { .. }
         | Failure::Compensation { .. }
         | Failure::StandsOff { .. } => Code::Calibration,
-        Failure::Store(_) | Failure::File { .. } => Code::Storage,
+        Failure::Store(failure) => code_of_store(failure),
+        Failure::File { .. } => Code::Storage,
         other => match other.exit_code() {
             2 => Code::Configuration,
             5 => Code::OutOfTolerance,
             _ => Code::Device,
         },
+    }
+}
+
+/// Whether the disk is to blame, or what was asked for.
+const fn code_of_store(failure: &machine::records::StoreError) -> Code {
+    use machine::records::StoreError as Of;
+    match failure {
+        Of::Unknown { .. } | Of::NoEarlier { .. } => Code::NoSuchCalibration,
+        Of::Ambiguous { .. }
+        | Of::Foreign { .. }
+        | Of::OtherKind { .. }
+        | Of::Model { .. }
+        | Of::Part { .. } => Code::Calibration,
+        Of::Io { .. }
+        | Of::Damaged { .. }
+        | Of::Format { .. }
+        | Of::Unsound { .. }
+        | Of::Newer { .. }
+        | Of::Leased { .. }
+        | Of::AlreadyComplete { .. }
+        | Of::NotResumable { .. } => Code::Storage,
     }
 }
 

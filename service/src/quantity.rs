@@ -7,6 +7,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use units::{Metres, MetresPerSecond, text};
 use utoipa::ToSchema;
 
+mod form;
+
+pub(crate) use form::{LengthIn, SpeedIn, TravelSpeedIn, targets};
+
 /// A value and its unit, as it comes out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Quantity {
@@ -43,20 +47,12 @@ impl Quantity {
     }
 }
 
-/// A quantity as it goes in: a text with a unit (`"12.5mm"`, `"20mm/s"`), or value and unit. A bare number is refused.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
-#[serde(untagged)]
-pub enum QuantityIn {
-    /// A text with a unit.
-    Text(String),
-    /// Value and unit.
-    Object(Quantity),
-}
-
 /// A quantity that is written with its unit.
 trait Written: Sized {
     /// What is expected, with examples.
     const EXPECTED: &'static str;
+    /// The units that it may have.
+    const UNITS: &'static [&'static str];
 
     fn from_text(text: &str) -> Option<Self>;
 }
@@ -68,6 +64,7 @@ pub struct Length(pub Metres);
 impl Written for Length {
     const EXPECTED: &'static str = "a length with its unit (m, mm, um or nm): \"12.5mm\" or \
                                     {\"value\": 12.5, \"unit\": \"mm\"}";
+    const UNITS: &'static [&'static str] = &["m", "mm", "um", "nm"];
 
     fn from_text(text: &str) -> Option<Self> {
         text::length(text).map(Self)
@@ -81,6 +78,7 @@ pub struct Speed(pub MetresPerSecond);
 impl Written for Speed {
     const EXPECTED: &'static str = "a speed with its unit (m/s, mm/s or um/s): \"20mm/s\" or \
                                     {\"value\": 20, \"unit\": \"mm/s\"}";
+    const UNITS: &'static [&'static str] = &["m/s", "mm/s", "um/s"];
 
     fn from_text(text: &str) -> Option<Self> {
         text::speed(text).map(Self)
@@ -97,7 +95,9 @@ impl<'de, W: Written> Visitor<'de> for Reader<W> {
     }
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<W, E> {
-        W::from_text(text).ok_or_else(|| E::invalid_value(de::Unexpected::Str(text), &self))
+        let read = Some(text).filter(|it| form::is_written(it, W::UNITS));
+        let read = read.and_then(W::from_text);
+        read.ok_or_else(|| E::invalid_value(de::Unexpected::Str(text), &self))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<W, A::Error> {
@@ -109,7 +109,9 @@ impl<'de, W: Written> Visitor<'de> for Reader<W> {
         }
         let object = Object::deserialize(de::value::MapAccessDeserializer::new(map))?;
         let text = format!("{}{}", object.value, object.unit);
-        self.visit_str(&text)
+        let read = Some(&text).filter(|_| W::UNITS.contains(&&*object.unit));
+        let read = read.and_then(|it| W::from_text(it));
+        read.ok_or_else(|| de::Error::invalid_value(de::Unexpected::Str(&text), &self))
     }
 }
 
@@ -154,6 +156,12 @@ mod tests {
             r#"{"value": 3, "unit": "deg"}"#,
             r#"{"value": 3}"#,
             r#"{"value": 3, "unit": "mm", "more": 1}"#,
+            r#"{"value": 3, "unit": "0mm"}"#,
+            "\" 1mm\"",
+            "\"1  mm\"",
+            "\".5mm\"",
+            "\"infmm\"",
+            "\"1e999mm\"",
         ] {
             assert!(read(text).is_err(), "{text}");
         }

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::quantity::{Length, QuantityIn, Speed};
+mod whole;
+
+use crate::quantity::{Length, Speed, SpeedIn, TravelSpeedIn};
 
 /// Who asks, and by which right.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -34,11 +36,11 @@ pub type Target = BTreeMap<String, Length>;
 #[serde(deny_unknown_fields)]
 pub struct MoveRequest {
     /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time.
-    #[schema(value_type = BTreeMap<String, QuantityIn>, example = json!({"x": "12.5mm"}))]
+    #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
     /// How fast each may be at most; the usual speed of its configuration when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<QuantityIn>)]
+    #[schema(value_type = Option<TravelSpeedIn>)]
     pub speed: Option<Speed>,
     /// What happens when one of the axes is in use.
     #[serde(default)]
@@ -47,7 +49,11 @@ pub struct MoveRequest {
     #[serde(default)]
     pub uncorrected: bool,
     /// A dead-man: the motion stops unless it is renewed within this time, again and again, in milliseconds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "whole::maybe",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[schema(minimum = 50, maximum = 60000)]
     pub dead_man_ms: Option<u32>,
 }
@@ -72,7 +78,7 @@ pub struct JogRequest {
     /// Which axis.
     pub axis: String,
     /// How fast, and with its sign which way; 0 ends the jog. At most the usual speed of its configuration.
-    #[schema(value_type = QuantityIn, example = "-2mm/s")]
+    #[schema(value_type = SpeedIn, example = "-2mm/s")]
     pub speed: Speed,
 }
 
@@ -149,11 +155,11 @@ impl RunRequest {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaseRequest {
-    /// Who: a name for people.
-    #[schema(max_length = 64)]
+    /// Who: a name for people. What a terminal or a page might obey is left out of it.
+    #[schema(min_length = 1, max_length = 64)]
     pub name: String,
     /// For how long, in seconds, unless it is renewed.
-    #[serde(default = "lease_seconds")]
+    #[serde(default = "lease_seconds", deserialize_with = "whole::read")]
     #[schema(minimum = 1, maximum = 3600)]
     pub seconds: u32,
     /// Takes it from whoever has it, who is told.

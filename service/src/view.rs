@@ -271,8 +271,8 @@ pub struct RunView {
     pub stopped: Option<Stopped>,
     /// Why it has no result.
     pub cause: Option<Cause>,
-    /// What it found.
-    #[schema(value_type = Object)]
+    /// What it found; null before its end, and when it has no result.
+    #[schema(value_type = Option<Object>)]
     pub result: serde_json::Value,
     /// The same, as the command line prints it.
     pub told: Option<ToldView>,

@@ -1,11 +1,13 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
-//! as our driver's server, python-can as the reader of our recordings; and GTC, which computes uncertainties.
+//! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
+//! schemathesis and openapi-python-client, which judge the HTTP interface.
 
 mod analog;
 mod budget;
 mod csp;
 mod drive;
 mod emulated;
+mod http;
 mod local_node;
 mod peer;
 mod recording;

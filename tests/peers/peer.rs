@@ -123,6 +123,13 @@ impl Drop for Peer {
     }
 }
 
+/// Whether the Python of the peers has these packages.
+pub(crate) fn can_import(packages: &str) -> bool {
+    let mut python = Command::new(interpreter());
+    let ended = python.arg("-c").arg(format!("import {packages}")).output();
+    ended.is_ok_and(|it| it.status.success())
+}
+
 /// Python with the packages of `requirements.txt`.
 fn interpreter() -> PathBuf {
     if let Some(named) = std::env::var_os("TRUESTAGE_PEERS_PYTHON") {

@@ -12,7 +12,7 @@ use crate::client::Client;
 use crate::http::Http;
 use crate::stage::Stage;
 
-fn on_a_stage(body: impl FnOnce(&Stage, &Http)) {
+pub(crate) fn on_a_stage(body: impl FnOnce(&Stage, &Http)) {
     let folder = tempfile::tempdir().unwrap();
     let rig = tests::rigs()[0];
     let stage = Stage::new(rig, (LINEAR, 51), folder.path(), |text| text);

@@ -5,3 +5,4 @@ mod contract;
 mod edge;
 mod http;
 mod stage;
+mod strangers;

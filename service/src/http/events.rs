@@ -24,10 +24,14 @@ const STREAMS: usize = 16;
 /// How often a stream looks.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
+/// Between two samples of every axis.
+const SAMPLE_MS: core::ops::RangeInclusive<u64> = 5..=60_000;
+
 static FREE: LazyLock<Arc<Semaphore>> = LazyLock::new(|| Arc::new(Semaphore::new(STREAMS)));
 
 /// What of it is sent.
 #[derive(Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Wanted {
     /// Only these kinds, with commas between: `motion,run,axis`.
@@ -76,7 +80,7 @@ pub(super) async fn events(
         // Heard from a service that has been started again since: everything is new.
         Some(_) => 0,
     };
-    let every = wanted.sample_ms.map(|it| Duration::from_millis(it.max(5)));
+    let every = sampled(wanted.sample_ms)?;
     let following = Following {
         desk: shared.desk,
         kinds: wanted
@@ -92,6 +96,18 @@ pub(super) async fn events(
         Some((Ok(sent), following))
     });
     Ok(Sse::new(stream).keep_alive(KeepAlive::new()))
+}
+
+/// How often the axes are told, when they are.
+fn sampled(sample_ms: Option<u64>) -> Result<Option<Duration>, Problem> {
+    match sample_ms {
+        Some(it) if !SAMPLE_MS.contains(&it) => {
+            let what = format!("sample_ms = {it} is no time between samples");
+            let help = format!("give {} to {}", SAMPLE_MS.start(), SAMPLE_MS.end());
+            Err(Problem::new(Code::BadRequest, what, help))
+        }
+        other => Ok(other.map(Duration::from_millis)),
+    }
 }
 
 impl Following {

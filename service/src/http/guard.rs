@@ -2,13 +2,14 @@
 
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Request, State};
+use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
 use serde::de::DeserializeOwned;
+use utoipa::IntoParams;
 
 use super::door::Peer;
 use crate::problem::{Code, Problem};
@@ -19,7 +20,9 @@ const BODY_MAX: usize = 64 << 10;
 /// So much of a larger one is heard, so that its answer is heard, too.
 const HEARD_MAX: usize = 1 << 20;
 /// So long a name of a client may be.
-const NAME_MAX: usize = 64;
+pub(super) const NAME_MAX: usize = 64;
+/// What whoever sent a wrong body is told.
+const HELP: &str = "GET /openapi.json says what is expected";
 /// Who a client says that it is, for people.
 const CLIENT: &str = "truestage-client";
 /// What proves the lease.
@@ -126,6 +129,33 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
     }
 }
 
+/// The same for the description.
+#[derive(Debug, IntoParams)]
+#[into_params(parameter_in = Header)]
+#[expect(dead_code, reason = "the description alone reads it")]
+pub(super) struct Asks {
+    /// Who asks, for people: events and ends of motions say it. Where the connection comes from when left out.
+    #[param(rename = "Truestage-Client")]
+    client: Option<String>,
+    /// The token of the lease; without it orders are refused while somebody else has the lease.
+    #[param(rename = "Truestage-Lease")]
+    lease: Option<String>,
+}
+
+/// The name in a path, plain.
+#[derive(Clone, Debug)]
+pub(super) struct Named(pub(super) String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Named {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let named = Path::<String>::from_request_parts(parts, state).await;
+        let named = named.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""));
+        named.map(|it| Self(plain(&it.0)))
+    }
+}
+
 /// A name without anything that a terminal, a log or a page would obey.
 pub(super) fn plain(text: &str) -> String {
     let is_plain = |it: &char| it.is_alphanumeric() || " .-_@:/".contains(*it);
@@ -144,6 +174,11 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
         let bytes = bytes.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
         // What may be left out may be left out as a whole.
         let bytes = if bytes.is_empty() { &b"{}"[..] } else { &bytes };
+        // A list of the values in their order would be taken for an object, too.
+        if bytes.trim_ascii_start().first() == Some(&b'[') {
+            let what = "a list where an object is expected";
+            return Err(Problem::new(Code::BadRequest, what, HELP));
+        }
         let read = serde_json::from_slice(bytes);
         read.map(Self).map_err(|it| {
             let said = it.to_string();
@@ -151,7 +186,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
                 true => Code::BadQuantity,
                 false => Code::BadRequest,
             };
-            Problem::new(code, said, "GET /openapi.json says what is expected")
+            Problem::new(code, said, HELP)
         })
     }
 }

@@ -12,7 +12,8 @@ use axum::middleware::from_fn_with_state;
 use axum::routing::get;
 use axum::{Json, Router};
 use serde::{Deserialize, Serialize};
-use utoipa::openapi::OpenApi;
+use utoipa::openapi::schema::{Schema, SchemaType, Type};
+use utoipa::openapi::{OpenApi, RefOr, Required};
 use utoipa::{IntoParams, OpenApi as _, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -38,6 +39,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
         description = "One machine, kept zeroed, enabled and supervised. Not a safety function: wire STO.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
+    components(schemas(crate::quantity::LengthIn)),
     tags(
         (name = "machine", description = "The machine and its axes"),
         (name = "motions", description = "Motions; their end is a level"),
@@ -51,6 +53,12 @@ struct Described;
 
 /// The resources and what they are.
 pub(super) fn described() -> (Router<State>, OpenApi) {
+    let (router, mut description) = routed();
+    precise(&mut description);
+    (router, description)
+}
+
+fn routed() -> (Router<State>, OpenApi) {
     let v1 = OpenApiRouter::new()
         .routes(routes!(machine::machine))
         .routes(routes!(machine::axes))
@@ -77,6 +85,36 @@ pub(super) fn described() -> (Router<State>, OpenApi) {
         .routes(routes!(metrics::metrics))
         .nest("/v1", v1)
         .split_for_parts()
+}
+
+/// What declarations cannot say: a parameter is left out and never null, and a stop needs no body.
+fn precise(description: &mut OpenApi) {
+    for item in description.paths.paths.values_mut() {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().flatten() {
+            for parameter in operation.parameters.iter_mut().flatten() {
+                if let RefOr::T(parameter) = parameter {
+                    parameter.schema.iter_mut().for_each(without_null);
+                }
+            }
+            if operation.operation_id.as_deref() == Some("stop")
+                && let Some(RefOr::T(body)) = &mut operation.request_body
+            {
+                body.required = Some(Required::False);
+            }
+        }
+    }
+}
+
+fn without_null(schema: &mut RefOr<Schema>) {
+    if let RefOr::T(Schema::Object(object)) = schema
+        && let SchemaType::Array(types) = &mut object.schema_type
+    {
+        types.retain(|it| *it != Type::Null);
+        if let [only] = &types[..] {
+            object.schema_type = SchemaType::Type(only.clone());
+        }
+    }
 }
 
 /// All that is served to `desk`'s clients.
@@ -123,6 +161,7 @@ async fn healthz(axum::extract::State(state): axum::extract::State<State>) -> Js
 
 /// How long an answer may be held back.
 #[derive(Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Wait {
     /// Seconds to wait for the end; 300 at most. At once when left out.
@@ -138,11 +177,13 @@ impl Wait {
         has_ended: impl Fn(&T) -> bool,
     ) -> Result<T, Problem> {
         let wait_s = self.wait_s.unwrap_or_default();
-        let limit = Duration::try_from_secs_f64(wait_s).map_err(|_| {
+        // Written so that NaN is refused too.
+        if !(0.0..=WAIT_MAX.as_secs_f64()).contains(&wait_s) {
             let what = format!("wait_s = {wait_s} is no time to wait");
-            Problem::new(Code::BadRequest, what, "give seconds from 0 to 300")
-        })?;
-        let limit = tokio::time::Instant::now() + limit.min(WAIT_MAX);
+            let help = "give seconds from 0 to 300";
+            return Err(Problem::new(Code::BadRequest, what, help));
+        }
+        let limit = tokio::time::Instant::now() + Duration::from_secs_f64(wait_s);
         loop {
             let asked = ask()?;
             if has_ended(&asked) || tokio::time::Instant::now() >= limit {

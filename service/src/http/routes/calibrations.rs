@@ -1,11 +1,11 @@
 //! Calibrations.
 
 use axum::Json;
-use axum::extract::{Path, State as Of};
+use axum::extract::State as Of;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::super::guard::{Body, By, plain};
+use super::super::guard::{Asks, Body, By, Named, plain};
 use super::super::state::State;
 use super::obey;
 use crate::desk::{Desk, named};
@@ -34,7 +34,7 @@ pub(super) async fn calibrations(
 /// Uses a calibration from now on. Nothing moves; the next motion is corrected by it.
 #[utoipa::path(
     post, path = "/calibrations/{id}/activate", tag = "calibrations",
-    params(("id" = String, Path, description = "Its name, or the beginning of it")),
+    params(Asks, ("id" = String, Path, description = "Its name, or the beginning of it")),
     responses(
         (status = 200, description = "Its axis, which uses it", body = AxisView),
         (status = "4XX", description = "Refused; the one before is used still", body = ProblemBody, content_type = "application/problem+json"),
@@ -44,9 +44,9 @@ pub(super) async fn calibrations(
 pub(super) async fn activate(
     Of(state): Of<State>,
     By(caller): By,
-    Path(id): Path<String>,
+    Named(id): Named,
 ) -> Result<Json<AxisView>, Problem> {
-    choose(&state.desk, &caller, Choice::Activate(plain(&id))).await
+    choose(&state.desk, &caller, Choice::Activate(id)).await
 }
 
 /// Which axis goes back.
@@ -59,7 +59,7 @@ pub(super) struct RollbackRequest {
 
 /// Uses the calibration that an axis used before. Nothing moves.
 #[utoipa::path(
-    post, path = "/calibrations/rollback", tag = "calibrations", request_body = RollbackRequest,
+    post, path = "/calibrations/rollback", tag = "calibrations", request_body = RollbackRequest, params(Asks),
     responses(
         (status = 200, description = "The axis, which uses the earlier one", body = AxisView),
         (status = "4XX", description = "Refused; the one before is used still", body = ProblemBody, content_type = "application/problem+json"),

@@ -1,11 +1,11 @@
 //! The machine as a whole, and its axes.
 
 use axum::Json;
-use axum::extract::{Path, State as Of};
+use axum::extract::State as Of;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::super::guard::{Body, By};
+use super::super::guard::{Asks, Body, By, NAME_MAX, Named, plain};
 use super::super::state::State;
 use super::obey;
 use crate::desk::Desk;
@@ -42,14 +42,14 @@ pub(super) async fn axes(Of(state): Of<State>) -> Json<Vec<AxisView>> {
 )]
 pub(super) async fn axis(
     Of(state): Of<State>,
-    Path(axis): Path<String>,
+    Named(axis): Named,
 ) -> Result<Json<AxisView>, Problem> {
-    Ok(Json(state.desk.axis(&super::super::guard::plain(&axis))?))
+    Ok(Json(state.desk.axis(&axis)?))
 }
 
 /// Switches an axis on.
 #[utoipa::path(
-    post, path = "/axes/{axis}/enable", tag = "machine", params(("axis" = String, Path, description = "Its name")),
+    post, path = "/axes/{axis}/enable", tag = "machine", params(Asks, ("axis" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "It is on", body = AxisView),
         (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
@@ -59,14 +59,14 @@ pub(super) async fn axis(
 pub(super) async fn enable(
     Of(state): Of<State>,
     By(caller): By,
-    Path(axis): Path<String>,
+    Named(axis): Named,
 ) -> Result<Json<AxisView>, Problem> {
     power(&state.desk, caller, axis, true).await
 }
 
 /// Switches an axis off.
 #[utoipa::path(
-    post, path = "/axes/{axis}/disable", tag = "machine", params(("axis" = String, Path, description = "Its name")),
+    post, path = "/axes/{axis}/disable", tag = "machine", params(Asks, ("axis" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "It is off", body = AxisView),
         (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
@@ -76,7 +76,7 @@ pub(super) async fn enable(
 pub(super) async fn disable(
     Of(state): Of<State>,
     By(caller): By,
-    Path(axis): Path<String>,
+    Named(axis): Named,
 ) -> Result<Json<AxisView>, Problem> {
     power(&state.desk, caller, axis, false).await
 }
@@ -87,7 +87,6 @@ async fn power(
     axis: String,
     on: bool,
 ) -> Result<Json<AxisView>, Problem> {
-    let axis = super::super::guard::plain(&axis);
     let order = Order::Power {
         axis: axis.clone(),
         on,
@@ -116,7 +115,7 @@ const DONE: Json<Done> = Json(Done { done: true });
 
 /// Stops everything. Taken from anybody, whoever has the lease.
 #[utoipa::path(
-    post, path = "/stop", tag = "machine", request_body = StopRequest,
+    post, path = "/stop", tag = "machine", request_body(content = StopRequest, description = "May be left out"), params(Asks),
     responses(
         (status = 200, description = "The stop is under way; motions and runs say when it has ended", body = Done),
         (status = "4XX", description = "Not understood", body = ProblemBody, content_type = "application/problem+json"),
@@ -135,7 +134,7 @@ pub(super) async fn stop(
 
 /// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again.
 #[utoipa::path(
-    post, path = "/reset", tag = "machine",
+    post, path = "/reset", tag = "machine", params(Asks),
     responses(
         (status = 200, description = "It runs", body = MachineView),
         (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
@@ -152,7 +151,7 @@ pub(super) async fn reset(
 
 /// Asks for the right to command, or renews it with the header `Truestage-Lease`.
 #[utoipa::path(
-    post, path = "/lease", tag = "machine", request_body = LeaseRequest,
+    post, path = "/lease", tag = "machine", request_body = LeaseRequest, params(Asks),
     responses(
         (status = 200, description = "The lease; its token goes with every order, in `Truestage-Lease`", body = Leased),
         (status = "4XX", description = "Somebody else has it", body = ProblemBody, content_type = "application/problem+json"),
@@ -164,11 +163,17 @@ pub(super) async fn lease(
     By(caller): By,
     Body(mut request): Body<LeaseRequest>,
 ) -> Result<Json<Leased>, Problem> {
-    request.name = super::super::guard::plain(&request.name);
-    if request.name.is_empty() || !(1..=3600).contains(&request.seconds) {
-        let what = "a lease needs a name, and 1 to 3600 seconds";
+    let length = request.name.chars().count();
+    if !(1..=NAME_MAX).contains(&length) || !(1..=3600).contains(&request.seconds) {
+        let what = format!(
+            "a lease of {} s by a name of {length} characters; expected 1 to 3600 s and 1 to {NAME_MAX} characters",
+            request.seconds
+        );
         return Err(Problem::new(Code::BadRequest, what, ""));
     }
+    request.name = Some(plain(&request.name))
+        .filter(|it| !it.is_empty())
+        .unwrap_or_else(|| caller.name.clone());
     let order = Desk::lease_order(&request)?;
     match obey(&state.desk, &caller, order).await? {
         Answer::Leased(leased) => Ok(Json(leased)),
@@ -178,7 +183,7 @@ pub(super) async fn lease(
 
 /// Gives the lease back.
 #[utoipa::path(
-    delete, path = "/lease", tag = "machine",
+    delete, path = "/lease", tag = "machine", params(Asks),
     responses(
         (status = 200, description = "Nobody has it", body = Done),
         (status = "4XX", description = "Somebody else has it", body = ProblemBody, content_type = "application/problem+json"),

@@ -1,11 +1,11 @@
 //! Motions.
 
 use axum::Json;
-use axum::extract::{Path, State as Of};
+use axum::extract::State as Of;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::super::guard::{Body, By, plain};
+use super::super::guard::{Asks, Body, By, Named};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
 use crate::desk::{Noted, named};
@@ -29,7 +29,7 @@ pub(super) async fn motions(Of(state): Of<State>) -> Json<Vec<MotionView>> {
 /// Begins a motion. With an Idempotency-Key the same request never moves twice, not even after a restart.
 #[utoipa::path(
     post, path = "/motions", tag = "motions", request_body = MoveRequest,
-    params(("Idempotency-Key" = Option<String>, Header, description = "A key of the client's own for this motion")),
+    params(Asks, ("Idempotency-Key" = Option<String>, Header, description = "A key of the client's own for this motion: visible ASCII", min_length = 1, max_length = 256, pattern = "^[!-~]*$")),
     responses(
         (status = 201, description = "It was accepted", body = MotionView, headers(("Location" = String, description = "Where it is asked for"))),
         (status = 200, description = "It was accepted before, with this key", body = MotionView),
@@ -73,13 +73,19 @@ fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
         return Ok(None);
     };
     match key.to_str() {
-        Ok(key) if !key.is_empty() && key.len() <= KEY_MAX => Ok(Some(key.to_owned())),
+        Ok(key) if (1..=KEY_MAX).contains(&key.len()) && is_visible(key) => {
+            Ok(Some(key.to_owned()))
+        }
         _ => Err(Problem::new(
             Code::BadRequest,
-            format!("an Idempotency-Key has 1 to {KEY_MAX} visible characters"),
+            format!("an Idempotency-Key has 1 to {KEY_MAX} visible characters of ASCII"),
             "a random number is a good one",
         )),
     }
+}
+
+fn is_visible(key: &str) -> bool {
+    key.bytes().all(|it| it.is_ascii_graphic())
 }
 
 /// A motion, once it has ended or the time to wait is over.
@@ -92,10 +98,9 @@ fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
 )]
 pub(super) async fn motion(
     Of(state): Of<State>,
-    Path(id): Path<String>,
+    Named(id): Named,
     wait: MaybeQuery<Wait>,
 ) -> Result<Json<MotionView>, Problem> {
-    let id = plain(&id);
     let asked = query(wait)?.until(|| state.desk.motion(&id), |it| it.state.is_end());
     Ok(Json(asked.await?))
 }
@@ -103,7 +108,7 @@ pub(super) async fn motion(
 /// Begins a jog, renews it, or ends it with a speed of 0. Ask again within 200 ms, or the axis stops; it stops at
 /// the soft limit as well.
 #[utoipa::path(
-    post, path = "/jog", tag = "motions", request_body = JogRequest,
+    post, path = "/jog", tag = "motions", request_body = JogRequest, params(Asks),
     responses(
         (status = 200, description = "The motion that it is", body = MotionView),
         (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
@@ -122,7 +127,7 @@ pub(super) async fn jog(
 
 /// The dead-man of a motion still holds.
 #[utoipa::path(
-    post, path = "/motions/{id}/renew", tag = "motions", params(("id" = String, Path, description = "Its name")),
+    post, path = "/motions/{id}/renew", tag = "motions", params(Asks, ("id" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "Renewed", body = MotionView),
         (status = "4XX", description = "It is not under way", body = ProblemBody, content_type = "application/problem+json"),
@@ -132,12 +137,9 @@ pub(super) async fn jog(
 pub(super) async fn renew(
     Of(state): Of<State>,
     By(caller): By,
-    Path(id): Path<String>,
+    Named(id): Named,
 ) -> Result<Json<MotionView>, Problem> {
-    let motion = plain(&id);
-    let order = Order::Renew {
-        motion: motion.clone(),
-    };
+    let order = Order::Renew { motion: id.clone() };
     obey(&state.desk, &caller, order).await?;
-    Ok(Json(state.desk.motion(&motion)?))
+    Ok(Json(state.desk.motion(&id)?))
 }

@@ -1,11 +1,11 @@
 //! Runs.
 
 use axum::Json;
-use axum::extract::{Path, State as Of};
+use axum::extract::State as Of;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::super::guard::{Body, By, plain};
+use super::super::guard::{Asks, Body, By, Named};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
 use crate::order::Order;
@@ -24,7 +24,7 @@ pub(super) async fn runs(Of(state): Of<State>) -> Json<Vec<RunView>> {
 
 /// Plans a run, and starts it when `start` says so.
 #[utoipa::path(
-    post, path = "/runs", tag = "runs", request_body = RunRequest,
+    post, path = "/runs", tag = "runs", request_body = RunRequest, params(Asks),
     responses(
         (status = 201, description = "Planned, or started", body = RunView, headers(("Location" = String, description = "Where it is asked for"))),
         (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
@@ -56,17 +56,16 @@ pub(super) async fn plan(
 )]
 pub(super) async fn run(
     Of(state): Of<State>,
-    Path(id): Path<String>,
+    Named(id): Named,
     wait: MaybeQuery<Wait>,
 ) -> Result<Json<RunView>, Problem> {
-    let id = plain(&id);
     let asked = query(wait)?.until(|| state.desk.run(&id), |it| it.state.is_end());
     Ok(Json(asked.await?))
 }
 
 /// Begins a planned run.
 #[utoipa::path(
-    post, path = "/runs/{id}/start", tag = "runs", params(("id" = String, Path, description = "Its name")),
+    post, path = "/runs/{id}/start", tag = "runs", params(Asks, ("id" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "It begins", body = RunView),
         (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
@@ -76,16 +75,15 @@ pub(super) async fn run(
 pub(super) async fn start(
     Of(state): Of<State>,
     By(caller): By,
-    Path(id): Path<String>,
+    Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
-    let id = plain(&id);
     obey(&state.desk, &caller, Order::Start { run: id.clone() }).await?;
     Ok(Json(state.desk.run(&id)?))
 }
 
 /// Ends a run: its axes slow down, and what was measured is kept.
 #[utoipa::path(
-    post, path = "/runs/{id}/abort", tag = "runs", params(("id" = String, Path, description = "Its name")),
+    post, path = "/runs/{id}/abort", tag = "runs", params(Asks, ("id" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "It ends", body = RunView),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
@@ -95,9 +93,8 @@ pub(super) async fn start(
 pub(super) async fn abort(
     Of(state): Of<State>,
     By(caller): By,
-    Path(id): Path<String>,
+    Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
-    let id = plain(&id);
     obey(&state.desk, &caller, Order::Abort { run: id.clone() }).await?;
     Ok(Json(state.desk.run(&id)?))
 }

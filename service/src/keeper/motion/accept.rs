@@ -16,6 +16,8 @@ use crate::request::{IfMoving, MoveRequest};
 
 /// So many may wait or be under way.
 const ACTIVE_MAX: usize = 64;
+/// So often a dead-man may want to be renewed.
+const DEAD_MAN_MS: core::ops::RangeInclusive<u32> = 50..=60_000;
 
 impl Keeper {
     /// Takes the motion `id`, or refuses it; nothing has moved then.
@@ -69,9 +71,7 @@ impl Keeper {
             })
         });
         let legs: Vec<_> = legs.collect::<Result<_, Problem>>()?;
-        let dead_man = request
-            .dead_man_ms
-            .map(|it| Duration::from_millis(it.into()));
+        let dead_man = dead_man_of(request)?;
         Ok(Motion {
             id: id.into(),
             by: by.to_owned(),
@@ -151,6 +151,17 @@ impl Keeper {
                 self.stop_motion(machine, number, End::Stopped(stopped));
             }
         }
+    }
+}
+
+fn dead_man_of(request: &MoveRequest) -> Result<Option<Duration>, Problem> {
+    match request.dead_man_ms {
+        Some(it) if !DEAD_MAN_MS.contains(&it) => Err(Problem::new(
+            Code::BadRequest,
+            format!("dead_man_ms = {it} is no time for a dead-man"),
+            format!("give {} to {}", DEAD_MAN_MS.start(), DEAD_MAN_MS.end()),
+        )),
+        other => Ok(other.map(|it| Duration::from_millis(it.into()))),
     }
 }
 
