@@ -53,6 +53,12 @@ trait Written: Sized {
     const EXPECTED: &'static str;
     /// The units that it may have.
     const UNITS: &'static [&'static str];
+    /// As people type them in a text besides.
+    const TYPED: &'static [&'static str];
+
+    fn units_of_text() -> Vec<&'static str> {
+        [Self::UNITS, Self::TYPED].concat()
+    }
 
     fn from_text(text: &str) -> Option<Self>;
 }
@@ -65,6 +71,7 @@ impl Written for Length {
     const EXPECTED: &'static str = "a length with its unit (m, mm, um or nm): \"12.5mm\" or \
                                     {\"value\": 12.5, \"unit\": \"mm\"}";
     const UNITS: &'static [&'static str] = &["m", "mm", "um", "nm"];
+    const TYPED: &'static [&'static str] = &["µm"];
 
     fn from_text(text: &str) -> Option<Self> {
         text::length(text).map(Self)
@@ -79,6 +86,7 @@ impl Written for Speed {
     const EXPECTED: &'static str = "a speed with its unit (m/s, mm/s or um/s): \"20mm/s\" or \
                                     {\"value\": 20, \"unit\": \"mm/s\"}";
     const UNITS: &'static [&'static str] = &["m/s", "mm/s", "um/s"];
+    const TYPED: &'static [&'static str] = &["µm/s"];
 
     fn from_text(text: &str) -> Option<Self> {
         text::speed(text).map(Self)
@@ -95,7 +103,7 @@ impl<'de, W: Written> Visitor<'de> for Reader<W> {
     }
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<W, E> {
-        let read = Some(text).filter(|it| form::is_written(it, W::UNITS));
+        let read = Some(text).filter(|it| form::is_written(it, &W::units_of_text()));
         let read = read.and_then(W::from_text);
         read.ok_or_else(|| E::invalid_value(de::Unexpected::Str(text), &self))
     }
@@ -145,6 +153,7 @@ mod tests {
     fn a_quantity_has_a_unit_or_is_refused_with_an_example() {
         let read = |text: &str| serde_json::from_str::<Length>(text).map(|it| it.0.mm());
         assert_eq!(read("\"12.5mm\"").unwrap(), 12.5);
+        assert_eq!(read("\"250 µm\"").unwrap(), 0.25);
         assert_eq!(read(r#"{"value": 3, "unit": "mm"}"#).unwrap(), 3.0);
         for text in [
             "12.5",

@@ -64,17 +64,17 @@ fn positive_number() -> String {
 }
 
 /// What a text or an object with value and unit looks like in the description.
-fn described(
+fn described<W: Written>(
     name: &str,
     what: &str,
     sign_and_digits: &str,
-    units: &[&str],
     is_positive: bool,
 ) -> Schema {
+    let units = W::UNITS;
     let text = ObjectBuilder::new()
         .schema_type(Type::String)
         .description(Some("A number and its unit"))
-        .pattern(Some(pattern(sign_and_digits, units)))
+        .pattern(Some(pattern(sign_and_digits, &W::units_of_text())))
         .build();
     let value = ObjectBuilder::new()
         .schema_type(Type::Number)
@@ -143,15 +143,15 @@ macro_rules! described {
 described!(
     /// A [`Length`] in the description.
     LengthIn,
-    described("Length", "A length", &any_number(), Length::UNITS, false)
+    described::<Length>("Length", "A length", &any_number(), false)
 );
 described!(
     /// A [`Speed`] with its direction in the description.
     SpeedIn,
-    described("Speed", "A speed, with its sign", &any_number(), Speed::UNITS, false)
+    described::<Speed>("Speed", "A speed, with its sign", &any_number(), false)
 );
 described!(
     /// A [`Speed`] that is positive in the description.
     TravelSpeedIn,
-    described("TravelSpeed","A speed that is not 0", &positive_number(), Speed::UNITS, true)
+    described::<Speed>("TravelSpeed", "A speed that is not 0", &positive_number(), true)
 );
