@@ -9,7 +9,8 @@ use core::time::Duration;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
+use std::sync::mpsc::{self, Receiver};
+use std::thread::{self, Thread};
 use std::time::Instant;
 
 use sd_notify::NotifyState;
@@ -18,6 +19,8 @@ use crate::desk::Desk;
 use crate::snapshot::{Fixed, Snapshot};
 use crate::view::MachineState;
 
+/// A manager that reads nothing holds the thread that tells up for no longer at the end.
+const LAST_WORD: Duration = Duration::from_secs(1);
 /// The longest time between two looks at what the machine's thread has published.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
@@ -60,7 +63,9 @@ impl Manager {
 #[derive(Debug)]
 pub(crate) struct Watch {
     over: Arc<AtomicBool>,
-    thread: JoinHandle<()>,
+    thread: Thread,
+    /// Closed when the thread has ended.
+    ended: Receiver<()>,
 }
 
 impl Watch {
@@ -68,9 +73,11 @@ impl Watch {
         let over = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&over);
         let begin = Instant::now();
+        let (open, ended) = mpsc::channel();
         let thread = thread::Builder::new()
             .name("manager".into())
             .spawn(move || {
+                let _open = open;
                 let Manager { tell, watchdog } = manager;
                 let every = look_every(watchdog);
                 loop {
@@ -89,14 +96,20 @@ impl Watch {
                     thread::park_timeout(every);
                 }
             })?;
-        Ok(Self { over, thread })
+        let thread = thread.thread().clone();
+        Ok(Self {
+            over,
+            thread,
+            ended,
+        })
     }
 
     /// The machine's thread has ended.
     pub(crate) fn finish(self) {
         self.over.store(true, Ordering::Release);
-        self.thread.thread().unpark();
-        let _ = self.thread.join();
+        self.thread.unpark();
+        // Nothing is ever sent: either the thread has ended, or it is left behind.
+        let _ = self.ended.recv_timeout(LAST_WORD);
     }
 }
 

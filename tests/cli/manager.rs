@@ -36,14 +36,14 @@ impl Heard {
         }
     }
 
-    /// The message with the line `wanted`, and how many came before.
+    /// The message with a line that begins with `wanted`, and how many came before.
     #[track_caller]
     fn until(&self, wanted: &str) -> (String, usize) {
         for before in 0..10_000 {
             let Some(message) = self.within(PATIENCE) else {
                 break;
             };
-            if message.lines().any(|line| line == wanted) {
+            if message.lines().any(|line| line.starts_with(wanted)) {
                 return (message, before);
             }
         }
@@ -100,6 +100,25 @@ fn a_machine_thread_that_hangs_is_not_kept_alive_by_the_others() {
         heard.silence();
         bench.signal_emulator(Signal::SIGCONT);
         heard.until("WATCHDOG=1");
+    }
+}
+
+/// It waits for a reset. At its end nobody reads what it tells any more, which is no reason to stay.
+#[test]
+fn a_service_whose_machine_is_gone_says_why_and_lives_until_it_is_ended() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let heard = Heard::at(&bench);
+        let service = keep(&bench, &heard);
+        bench.signal_emulator(Signal::SIGKILL);
+        heard.until("STATUS=stopped by a failure, reset it: ");
+        for _ in 0..3 {
+            heard.until("WATCHDOG=1");
+        }
+        service.signal(Signal::SIGTERM);
+        heard.until("STOPPING=1");
+        let ended = service.end();
+        assert_eq!(ended.code, Some(0), "{ended:?}");
     }
 }
 
