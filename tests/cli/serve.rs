@@ -33,8 +33,10 @@ fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
 
 fn keep(bench: &Bench) -> Process {
     let mut service = bench.start(&["serve", "machine.toml", "--listen", "unix:truestage.sock"]);
-    let socket = bench.folder().join(SOCKET);
-    service.wait_until(|| UnixStream::connect(&socket).is_ok());
+    // The last that it does before it only listens: other programs find it by this.
+    let lease = bench.records().join("lease");
+    let says_where = || std::fs::read_to_string(&lease).is_ok_and(|it| it.contains("listening at"));
+    service.wait_until(says_where);
     service
 }
 
