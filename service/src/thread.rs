@@ -169,7 +169,11 @@ fn keep(
     };
     kept.machine.guarded(Machine::start)?;
     kept.load_courses();
-    kept.keeper.borrow_mut().set_mode(Mode::Idle);
+    let mut keeper = kept.keeper.borrow_mut();
+    keeper.set_mode(Mode::Idle);
+    // Whoever is told that the machine is there sees it so.
+    keeper.publish_now(&kept.machine);
+    drop(keeper);
     // Whoever started it may have gone.
     let _ = told.send((fixed, kept.store.clone()));
     let ended = kept.live();
@@ -219,7 +223,7 @@ impl Kept {
     fn failed(&mut self, failure: Failure) {
         if self.keeper.borrow().mode() == Mode::Safe {
             // It is safe already: a bus that is gone says so again and again. This thread still lives.
-            self.keeper.borrow_mut().publish_again(&self.machine);
+            self.keeper.borrow_mut().publish_now(&self.machine);
             thread::sleep(GONE);
             return;
         }

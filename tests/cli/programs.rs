@@ -3,10 +3,12 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::fd::AsFd;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use nix::fcntl::OFlag;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -248,6 +250,24 @@ impl Bench {
         let start = format!("{name}=");
         let found = self.ports.iter().find_map(|it| it.strip_prefix(&start));
         found.expect("mock-bus names all its ports")
+    }
+
+    /// Opens each terminal of the emulated machine, so that its name stays its own.
+    pub(crate) fn hold_terminals(&self) -> Vec<fs::File> {
+        let paths = self
+            .ports
+            .iter()
+            .filter_map(|it| it.split_once("/dev/pts/"));
+        let open = |number: &str| {
+            let path = format!("/dev/pts/{number}");
+            // It must not become the terminal of this process.
+            let mut options = fs::OpenOptions::new();
+            options.read(true).custom_flags(OFlag::O_NOCTTY.bits());
+            options
+                .open(&path)
+                .unwrap_or_else(|error| panic!("{path}: {error}"))
+        };
+        paths.map(|(_, number)| open(number)).collect()
     }
 
     /// Writes the shipped configuration, with fewer measurements and after `change`.

@@ -50,8 +50,8 @@ impl Keeper {
         self.output.publish();
     }
 
-    /// Publishes although the tick has failed before anybody could attend to it.
-    pub(crate) fn publish_again(&mut self, machine: &Machine) {
+    /// Publishes although no tick that was attended to has ended.
+    pub(crate) fn publish_now(&mut self, machine: &Machine) {
         self.ticks += 1;
         self.publish(machine);
     }
