@@ -22,11 +22,12 @@ impl Machine {
     /// could not be sent, or an [`Attendant`](crate::Attendant) ends what runs. The axes still move then: see [`Machine::guarded`].
     pub fn tick(&mut self, until: Time) -> Result<(), Failure> {
         self.send_pending()?;
-        let again = self.outbox.poll_timeout(self.transport.now());
+        let begun = self.transport.now();
+        let again = self.outbox.poll_timeout(begun);
         let beats = self.heartbeats.iter().map(|(_, beat)| beat.poll_timeout());
         let next = beats.fold(self.devices.next_deadline(), Time::min);
         let deadline = until.min(next).min(again);
-        self.host_watch.waits(self.transport.now(), deadline);
+        self.host_watch.waits(begun, deadline);
         let arrival = self.transport.receive(deadline);
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only

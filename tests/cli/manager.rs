@@ -72,19 +72,25 @@ fn keep(bench: &Bench, heard: &Heard) -> Process {
     service
 }
 
+/// It is alive for its manager, and ends in order when it is told to.
+#[track_caller]
+fn check_lives_and_ends(service: Process, heard: &Heard) {
+    for _ in 0..3 {
+        heard.until("WATCHDOG=1");
+    }
+    service.signal(Signal::SIGTERM);
+    heard.until("STOPPING=1");
+    let ended = service.end();
+    assert_eq!(ended.code, Some(0), "{ended:?}");
+}
+
 #[test]
 fn a_service_manager_hears_that_it_is_ready_that_it_lives_and_that_it_ends() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let heard = Heard::at(&bench);
         let service = keep(&bench, &heard);
-        for _ in 0..3 {
-            heard.until("WATCHDOG=1");
-        }
-        service.signal(Signal::SIGTERM);
-        heard.until("STOPPING=1");
-        let ended = service.end();
-        assert_eq!(ended.code, Some(0), "{ended:?}");
+        check_lives_and_ends(service, &heard);
     }
 }
 
@@ -115,13 +121,7 @@ fn a_service_whose_machine_is_gone_says_why_and_lives_until_it_is_ended() {
         let service = keep(&bench, &heard);
         bench.signal_emulator(Signal::SIGKILL);
         heard.until("STATUS=stopped by a failure, reset it: ");
-        for _ in 0..3 {
-            heard.until("WATCHDOG=1");
-        }
-        service.signal(Signal::SIGTERM);
-        heard.until("STOPPING=1");
-        let ended = service.end();
-        assert_eq!(ended.code, Some(0), "{ended:?}");
+        check_lives_and_ends(service, &heard);
     }
 }
 

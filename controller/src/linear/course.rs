@@ -51,6 +51,18 @@ pub enum Corrected {
     },
 }
 
+impl Corrected {
+    /// For programs: `no`, `yes`, `held` or `fading`.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::No => "no",
+            Self::Within => "yes",
+            Self::Held { .. } => "held",
+            Self::Fading { .. } => "fading",
+        }
+    }
+}
+
 /// A move that ends with an approach of a given length.
 pub(crate) struct Arrival {
     /// Where the approach begins.

@@ -56,8 +56,7 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
 /// The problem that the service answered with, in its words.
 fn refusal(at: &str, status: &str, answer: &Value) -> Failure {
     let of = |name: &str| plain(answer[name].as_str().unwrap_or_default());
-    let exit_code = answer["exit_code"].as_u64();
-    match exit_code.and_then(|it| u8::try_from(it).ok()) {
+    match exit_code_of(answer) {
         Some(exit_code) => Failure::Kept {
             said: of("detail"),
             exit_code,
@@ -67,6 +66,13 @@ fn refusal(at: &str, status: &str, answer: &Value) -> Failure {
             help: "say with --at where `truestage serve` listens".into(),
         },
     }
+}
+
+/// What a problem or a cause would have ended a verb with.
+pub(crate) fn exit_code_of(said: &Value) -> Option<u8> {
+    said["exit_code"]
+        .as_u64()
+        .and_then(|it| u8::try_from(it).ok())
 }
 
 fn exchange(at: &str, method: &str, path: &str, body: &str) -> io::Result<String> {

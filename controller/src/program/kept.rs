@@ -9,7 +9,7 @@ use machine::records::StoreError;
 use serde_json::{Value, json};
 use units::Metres;
 
-use crate::program::exchange::{ask, plain};
+use crate::program::exchange::{ask, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
@@ -39,31 +39,22 @@ pub(crate) fn or_by_its_service(here: Ended, there: impl FnOnce(&Service) -> End
 impl Service {
     pub(crate) fn zero(&self, args: &AxisArgs, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
-        let stop = stop_request()?;
-        let run = self.run(&zero_of(args.axis.as_deref()), Stage::Zero, &stop, output)?;
+        let run = self.zero_run(args.axis.as_deref(), &stop_request()?, output)?;
         tell(&run, output)
     }
 
     pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
-        refuse(args.axis.machine.record.is_some(), "--record")?;
-        refuse(args.resume.is_some(), "--resume")?;
         refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
-        let stop = stop_request()?;
-        let axis = args.axis.axis.as_deref();
-        self.zero_first(axis, &stop, output)?;
-        let request = json!({"kind": "calibrate", "axis": axis, "accept_drift": args.accept_drift});
-        let run = self.run(&request, Stage::Calibrate, &stop, output)?;
+        let stop = self.prepare(&args.axis, args.resume.is_some(), output)?;
+        let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});
+        let run = self.run(Stage::Calibrate, request, &stop, output)?;
         tell(&run, output)
     }
 
     pub(crate) fn verify(&self, args: &VerifyArgs, output: Output) -> Ended {
-        refuse(args.axis.machine.record.is_some(), "--record")?;
-        refuse(args.resume.is_some(), "--resume")?;
-        let stop = stop_request()?;
-        let axis = args.axis.axis.as_deref();
-        self.zero_first(axis, &stop, output)?;
-        let request = json!({"kind": "verify", "axis": axis, "uncompensated": args.uncompensated});
-        let run = self.run(&request, Stage::Verify, &stop, output)?;
+        let stop = self.prepare(&args.axis, args.resume.is_some(), output)?;
+        let request = json!({"axis": args.axis.axis, "uncompensated": args.uncompensated});
+        let run = self.run(Stage::Verify, request, &stop, output)?;
         let um = |name: &str| Metres::from_um(run["result"][name].as_f64().unwrap_or(f64::NAN));
         if args.uncompensated || run["result"]["within_tolerance"] == true {
             return tell(&run, output);
@@ -92,6 +83,20 @@ impl Service {
         output.result(&texts.join("\n"), &json!({"moves": values}))
     }
 
+    /// What comes before a run that measures: options that are not offered are refused, and the axis has its zero.
+    fn prepare(
+        &self,
+        args: &AxisArgs,
+        resumes: bool,
+        output: Output,
+    ) -> Result<StopRequest, Failure> {
+        refuse(args.machine.record.is_some(), "--record")?;
+        refuse(resumes, "--resume")?;
+        let stop = stop_request()?;
+        self.zero_first(args.axis.as_deref(), &stop, output)?;
+        Ok(stop)
+    }
+
     /// A kept machine has its zero, unless it was just started or reset.
     fn zero_first(
         &self,
@@ -105,24 +110,30 @@ impl Service {
         match axes.find(is_meant) {
             Some(found) if found["homed"] == true => Ok(()),
             // What it says of an axis that is not there is said by the run.
-            _ => self
-                .run(&zero_of(axis), Stage::Zero, stop, output)
-                .map(drop),
+            _ => self.zero_run(axis, stop, output).map(drop),
         }
     }
 
-    /// Begins a run and waits for its end.
-    fn run(
+    fn zero_run(
         &self,
-        request: &Value,
-        stage: Stage,
+        axis: Option<&str>,
         stop: &StopRequest,
         output: Output,
     ) -> Result<Value, Failure> {
-        let mut request = request.clone();
+        self.run(Stage::Zero, json!({"axis": axis}), stop, output)
+    }
+
+    /// Begins a run and waits for its end; the service names runs as people name their stages.
+    fn run(
+        &self,
+        stage: Stage,
+        mut request: Value,
+        stop: &StopRequest,
+        output: Output,
+    ) -> Result<Value, Failure> {
+        request["kind"] = json!(stage.text());
         request["start"] = json!(true);
-        let begun = ask(&self.at, "POST", "/v1/runs", &request.to_string())?;
-        let id = plain(begun["id"].as_str().unwrap_or_default());
+        let id = self.begin("/v1/runs", &request)?;
         let mut bars = Bars::new(output.is_json());
         let abort = format!("/v1/runs/{id}/abort");
         self.end_of(&format!("/v1/runs/{id}"), &abort, stop, |run| {
@@ -135,9 +146,14 @@ impl Service {
     }
 
     fn motion(&self, request: &Value, stop: &StopRequest) -> Result<Value, Failure> {
-        let begun = ask(&self.at, "POST", "/v1/motions", &request.to_string())?;
-        let id = plain(begun["id"].as_str().unwrap_or_default());
+        let id = self.begin("/v1/motions", request)?;
         self.end_of(&format!("/v1/motions/{id}"), "/v1/stop", stop, |_| ())
+    }
+
+    /// The name of what was begun.
+    fn begin(&self, path: &str, request: &Value) -> Result<String, Failure> {
+        let begun = ask(&self.at, "POST", path, &request.to_string())?;
+        Ok(plain(begun["id"].as_str().unwrap_or_default()))
     }
 
     /// Waits for the end of what is at `path`; when this program is asked to stop, `ender` is asked to end it.
@@ -174,10 +190,6 @@ fn stop_request() -> Result<StopRequest, Failure> {
     Ok(stop)
 }
 
-fn zero_of(axis: Option<&str>) -> Value {
-    json!({"kind": "zero", "axis": axis})
-}
-
 /// # Errors
 /// When an option is given that only a program which opens the machine itself can heed.
 fn refuse(is_given: bool, option: &str) -> Result<(), Failure> {
@@ -202,14 +214,13 @@ fn stopped(seen: &Value) -> Failure {
 
 fn failed(seen: &Value) -> Failure {
     let cause = &seen["cause"];
-    let exit_code = cause["exit_code"].as_u64();
     Failure::Kept {
         said: plain(
             cause["cause"]
                 .as_str()
                 .unwrap_or("the service says no cause"),
         ),
-        exit_code: exit_code.and_then(|it| u8::try_from(it).ok()).unwrap_or(4),
+        exit_code: exit_code_of(cause).unwrap_or(4),
     }
 }
 

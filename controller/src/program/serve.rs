@@ -7,10 +7,10 @@ use std::sync::{Arc, OnceLock, Weak};
 
 use crate::linear::Teller;
 use crate::ports::Use;
+use crate::program::ServeArgs;
 use crate::program::linear::told::TELLER;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
-use crate::program::{MachineArgs, ServeArgs};
 use crate::{Failure, Lease, Machine, Store};
 
 /// A machine, where its records are, and what must be held as long as it is used.
@@ -45,11 +45,11 @@ pub(crate) fn run(
     serve(Serving {
         listen,
         open: Box::new(move || {
-            let (machine, store, own) = open(&machine, output)?;
-            let own = Arc::new(own);
+            let session = Session::open(&machine, "serve", Use::Measurement, output)?;
+            let own = Arc::new(session.lease);
             // It is opened once.
             let _ = lease.set(Arc::downgrade(&own));
-            Ok((machine, store, Box::new(own)))
+            Ok((session.machine, session.store, Box::new(own)))
         }),
         teller: TELLER,
         announce: Box::new(move |places| announce(&taken, places)),
@@ -68,13 +68,4 @@ fn announce(taken: &OnceLock<Weak<Lease>>, places: &[String]) -> io::Result<()> 
         None => Ok(it.clone()),
     });
     lease.announce(&places.collect::<io::Result<Vec<_>>>()?)
-}
-
-fn open(args: &MachineArgs, output: Output) -> Result<(Machine, Store, Lease), Failure> {
-    let Session {
-        machine,
-        store,
-        lease,
-    } = Session::open(args, "serve", Use::Measurement, output)?;
-    Ok((machine, store, lease))
 }

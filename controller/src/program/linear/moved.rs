@@ -32,11 +32,11 @@ pub(crate) fn text(axis: &str, moved: &Moved, calibration: Option<&str>) -> Stri
 
 /// The same for programs.
 pub(crate) fn value(axis: &str, moved: &Moved, calibration: Option<&str>) -> Value {
-    let (corrected, range) = match moved.corrected {
-        Corrected::No => ("no", None),
-        Corrected::Within => ("yes", None),
-        Corrected::Held { first, last } => ("held", Some((first, last))),
-        Corrected::Fading { first, last, .. } => ("fading", Some((first, last))),
+    let range = match moved.corrected {
+        Corrected::No | Corrected::Within => None,
+        Corrected::Held { first, last } | Corrected::Fading { first, last, .. } => {
+            Some((first, last))
+        }
     };
     json!({
         "axis": axis,
@@ -46,7 +46,7 @@ pub(crate) fn value(axis: &str, moved: &Moved, calibration: Option<&str>) -> Val
         "place_mm": moved.place.map(Metres::mm),
         "uncertainty": uncertainty::combined(moved.uncertainty),
         "calibration": calibration,
-        "corrected": corrected,
+        "corrected": moved.corrected.word(),
         "beyond_calibrated_mm": range.map(|(first, last)| [first.mm(), last.mm()]),
         "warning": warning(moved),
     })

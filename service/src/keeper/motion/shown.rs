@@ -15,7 +15,7 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         let view = LegView {
             target: Quantity::mm(leg.target),
             set_point: leg.set_point.map(Quantity::mm),
-            corrected: word_of(leg.corrected).to_owned(),
+            corrected: leg.corrected.word().to_owned(),
             position: None,
             encoder: None,
             standard_uncertainty: None,
@@ -94,13 +94,4 @@ fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: Teller) -> Option<Tol
     let calibration = seat.calibration.as_deref().filter(|_| is_corrected);
     let told = (teller.moved)(&seat.name, &moved, calibration);
     Some(ToldView::from(told))
-}
-
-const fn word_of(corrected: Corrected) -> &'static str {
-    match corrected {
-        Corrected::No => "no",
-        Corrected::Within => "yes",
-        Corrected::Held { .. } => "held",
-        Corrected::Fading { .. } => "fading",
-    }
 }
