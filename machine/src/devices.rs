@@ -8,7 +8,7 @@ use drivers::device::{
     PoseInstrument, RotaryAxis, ServoDrive,
 };
 use units::{Radians, Time};
-use wire::{Payload, Port};
+use wire::{Payload, Port, Ports};
 
 use crate::failure::Failure;
 use crate::parts::Camera;
@@ -74,6 +74,26 @@ impl Devices {
     pub(crate) fn next_deadline(&self) -> Time {
         let deadlines = self.named().map(|(_, device)| device.poll_timeout());
         deadlines.fold(Time::NEVER, Time::min)
+    }
+
+    /// The lines on which nobody waits for anything just now.
+    pub(crate) fn unhurried_ports(&self) -> Ports {
+        let (mut unhurried, mut awaited) = (Ports::NONE, Ports::NONE);
+        for unit in &self.instruments {
+            let ports = if unit.device.is_unhurried() {
+                &mut unhurried
+            } else {
+                &mut awaited
+            };
+            ports.insert(unit.port);
+        }
+        let analogs = self.analogs.iter().map(|it| it.port);
+        let cameras = self.cameras.iter().map(|it| it.unit.port);
+        let axes = self.axes.iter().map(|it| it.port);
+        let rotaries = self.rotaries.iter().map(|it| it.port);
+        let others = axes.chain(rotaries).chain(analogs).chain(cameras);
+        others.for_each(|port| awaited.insert(port));
+        unhurried.without(awaited)
     }
 
     /// Every device with its name.

@@ -28,7 +28,8 @@ impl Machine {
         let next = beats.fold(self.devices.next_deadline(), Time::min);
         let deadline = until.min(next).min(again);
         self.host_watch.waits(begun, deadline);
-        let arrival = self.transport.receive(deadline);
+        let unhurried = self.devices.unhurried_ports();
+        let arrival = self.transport.receive_unhurried(deadline, unhurried);
         // What has arrived is older than the clock when this thread was held up: deadlines are
         // judged at the time of what was heard, so that nothing counts as missing that only
         // waits behind this arrival.

@@ -15,7 +15,7 @@ use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::{Failure, Machine, ports};
 use units::Time;
-use wire::{Arrival, Payload, Port};
+use wire::{Arrival, Payload, Port, Ports};
 
 /// So much passes at most for a request that does not wait: nothing that ends by itself within it is asked of a
 /// service here, and a drive is switched on within a few of them.
@@ -163,13 +163,17 @@ impl Transport for Gated {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
+        self.receive_unhurried(until, Ports::NONE)
+    }
+
+    fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
         self.gate.hold(self.inner.now());
         if let Some((emulated, meddling)) = &self.meddling {
             for meddle in meddling.try_iter() {
                 meddle(&mut emulated.simulation_mut());
             }
         }
-        self.inner.receive(until)
+        self.inner.receive_unhurried(until, unhurried)
     }
 
     fn sleep_until(&mut self, until: Time) {

@@ -30,6 +30,51 @@ pub enum LineControl {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Port(pub u8);
 
+/// Some of a machine's ports. Those from number 64 on are in no set.
+///
+/// # Example
+///
+/// ```
+/// use wire::{Port, Ports};
+///
+/// let mut ports = Ports::NONE;
+/// ports.insert(Port(2));
+/// assert!(ports.contains(Port(2)) && !ports.contains(Port(0)));
+/// assert_eq!(ports.iter().collect::<Vec<_>>(), [Port(2)]);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ports(u64);
+
+impl Ports {
+    /// None of them.
+    pub const NONE: Self = Self(0);
+
+    const fn bit(port: Port) -> u64 {
+        if port.0 < 64 { 1 << port.0 } else { 0 }
+    }
+
+    /// With `port`, too.
+    pub const fn insert(&mut self, port: Port) {
+        self.0 |= Self::bit(port);
+    }
+
+    /// Those that are not among `others`.
+    #[must_use]
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
+    /// Whether `port` is one of them.
+    pub const fn contains(self, port: Port) -> bool {
+        self.0 & Self::bit(port) != 0
+    }
+
+    /// Each of them.
+    pub fn iter(self) -> impl Iterator<Item = Port> {
+        (0..64).map(Port).filter(move |port| self.contains(*port))
+    }
+}
+
 /// What came in on a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
@@ -63,4 +108,12 @@ pub struct Arrival {
     pub at: Time,
     /// What.
     pub input: Input,
+}
+
+impl Arrival {
+    /// Whether it can be handed on later, with its time, when what comes on `unhurried` can: bytes can,
+    /// the state of a port cannot.
+    pub fn can_wait(&self, unhurried: Ports) -> bool {
+        matches!(self.input, Input::Payload(Payload::Bytes(_))) && unhurried.contains(self.port)
+    }
 }

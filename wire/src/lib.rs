@@ -35,4 +35,4 @@ pub mod nd287;
 pub mod slcan;
 pub mod umd2;
 
-pub use bus::{Arrival, Input, LineControl, LinkState, Payload, Port};
+pub use bus::{Arrival, Input, LineControl, LinkState, Payload, Port, Ports};

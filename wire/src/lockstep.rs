@@ -20,14 +20,17 @@
 //!
 //! An `ENTRY` is `ID:UNITS` (frames on SocketCAN, bytes on a serial line), `ID:baud=RATE` and
 //! `ID:break=0|1` for what is done to a line, or, from the emulator, `ID:look` for a port whose
-//! state has changed. Entries stand in the order in which they happened.
+//! state has changed. Entries stand in the order in which they happened. `ID:later` behind `UNTIL` says
+//! that bytes on that line end no wait: they come with the next `go`, as `ID:UNITS@TIME`. From a
+//! participant that is what it has sent already and counts as sent at that time only, a SYNC, unless
+//! `ID:recall` comes before it.
 
 use core::fmt;
 use std::path::PathBuf;
 
 use units::Time;
 
-use super::{LineControl, Port};
+use super::{LineControl, Port, Ports};
 
 /// The version of these lines.
 pub const VERSION: u32 = 1;
@@ -58,6 +61,16 @@ pub fn path_of(clock: &str) -> Result<PathBuf, &'static str> {
 pub enum Passed {
     /// So many frames (SocketCAN) or bytes (terminals).
     Units(usize),
+    /// So many, at another time than now: from the emulator bytes that came earlier and ended no wait, from a
+    /// participant what is sent only then.
+    At {
+        /// Frames or bytes.
+        units: usize,
+        /// When.
+        at: Time,
+    },
+    /// What was to be sent later on this port is not sent.
+    Recall,
     /// Done to the line, not sent over it.
     Control(LineControl),
     /// The port's state has changed: look at it.
@@ -80,10 +93,11 @@ pub struct Entry {
 /// ```
 /// use units::Time;
 /// use wire::lockstep::{Entry, Passed, Request};
-/// use wire::Port;
+/// use wire::{Port, Ports};
 ///
 /// let frame = Entry { port: Port(0), passed: Passed::Units(1) };
-/// let idle = Request::Idle { until: Time(1_500_000), sent: vec![frame] };
+/// let (until, unhurried) = (Time(1_500_000), Ports::NONE);
+/// let idle = Request::Idle { until, unhurried, sent: vec![frame] };
 /// assert_eq!(idle.to_string(), "idle 1500000 0:1");
 /// assert_eq!(Request::parse("idle 1500000 0:1"), Ok(idle));
 /// assert!(Request::parse("idle 5 0").is_err(), "what passed is not said");
@@ -115,6 +129,8 @@ pub enum Request {
     Idle {
         /// At the latest until then.
         until: Time,
+        /// What comes on these ends no wait.
+        unhurried: Ports,
         /// What it has sent since it last said so.
         sent: Vec<Entry>,
     },
@@ -206,8 +222,19 @@ impl Request {
                 port: parse_port(rest).ok_or_else(wrong)?,
             },
             "idle" => {
-                let (until, sent) = parse_time_and_entries(rest).ok_or_else(wrong)?;
-                Self::Idle { until, sent }
+                let mut words = rest.split(' ').peekable();
+                let until = words.next().and_then(parse_time).ok_or_else(wrong)?;
+                let mut unhurried = Ports::NONE;
+                while let Some(port) = words.peek().and_then(|word| word.strip_suffix(":later")) {
+                    unhurried.insert(parse_port(port).ok_or_else(wrong)?);
+                    words.next();
+                }
+                let sent = words.map(parse_entry).collect::<Option<_>>();
+                Self::Idle {
+                    until,
+                    unhurried,
+                    sent: sent.ok_or_else(wrong)?,
+                }
             }
             "on" if rest == "any" => Self::On { cpu: None },
             "on" => Self::On {
@@ -228,7 +255,16 @@ impl fmt::Display for Request {
             Self::Hello { version, pid, name } => write!(f, "hello {version} {pid} {name}"),
             Self::Attach { port, endpoint } => write!(f, "attach {} {endpoint}", port.0),
             Self::Detach { port } => write!(f, "detach {}", port.0),
-            Self::Idle { until, sent } => write_time_and_entries(f, "idle", *until, sent),
+            Self::Idle {
+                until,
+                unhurried,
+                sent,
+            } => {
+                write_time(f, "idle", *until)?;
+                let mut ports = unhurried.iter();
+                ports.try_for_each(|port| write!(f, " {}:later", port.0))?;
+                write_entries(f, sent)
+            }
             Self::On { cpu: None } => f.write_str("on any"),
             Self::On { cpu: Some(cpu) } => write!(f, "on {cpu}"),
             Self::Do { words } => write!(f, "do {words}"),
@@ -249,8 +285,13 @@ impl Reply {
             "welcome" => Self::Welcome(parse_time(rest).ok_or_else(wrong)?),
             "attached" => Self::Attached,
             "go" => {
-                let (now, sent) = parse_time_and_entries(rest).ok_or_else(wrong)?;
-                Self::Go { now, sent }
+                let mut words = rest.split(' ');
+                let now = words.next().and_then(parse_time).ok_or_else(wrong)?;
+                let sent = words.map(parse_entry).collect::<Option<_>>();
+                Self::Go {
+                    now,
+                    sent: sent.ok_or_else(wrong)?,
+                }
             }
             "done" => Self::Done(rest.to_owned()),
             "refused" => Self::Refused(rest.to_owned()),
@@ -264,7 +305,10 @@ impl fmt::Display for Reply {
         match self {
             Self::Welcome(now) => write!(f, "welcome {}", now.nanos()),
             Self::Attached => f.write_str("attached"),
-            Self::Go { now, sent } => write_time_and_entries(f, "go", *now, sent),
+            Self::Go { now, sent } => {
+                write_time(f, "go", *now)?;
+                write_entries(f, sent)
+            }
             Self::Done(text) => write!(f, "done {text}"),
             Self::Refused(text) => write!(f, "refused {text}"),
         }
@@ -282,13 +326,6 @@ fn parse_time(text: &str) -> Option<Time> {
     }
 }
 
-fn parse_time_and_entries(text: &str) -> Option<(Time, Vec<Entry>)> {
-    let mut words = text.split(' ');
-    let time = parse_time(words.next()?)?;
-    let entries: Option<Vec<_>> = words.map(parse_entry).collect();
-    Some((time, entries?))
-}
-
 fn parse_entry(text: &str) -> Option<Entry> {
     let (port, passed) = text.split_once(':')?;
     let passed = match passed.split_once('=') {
@@ -297,7 +334,8 @@ fn parse_entry(text: &str) -> Option<Entry> {
         Some(("break", "1")) => Passed::Control(LineControl::Break(true)),
         Some(_) => return None,
         None if passed == "look" => Passed::Look,
-        None => Passed::Units(passed.parse().ok()?),
+        None if passed == "recall" => Passed::Recall,
+        None => parse_units(passed)?,
     };
     Some(Entry {
         port: parse_port(port)?,
@@ -305,16 +343,22 @@ fn parse_entry(text: &str) -> Option<Entry> {
     })
 }
 
-fn write_time_and_entries(
-    f: &mut fmt::Formatter<'_>,
-    word: &str,
-    time: Time,
-    entries: &[Entry],
-) -> fmt::Result {
+fn parse_units(text: &str) -> Option<Passed> {
+    let Some((units, at)) = text.split_once('@') else {
+        return text.parse().ok().map(Passed::Units);
+    };
+    let (units, at) = (units.parse().ok()?, Time(at.parse().ok()?));
+    Some(Passed::At { units, at })
+}
+
+fn write_time(f: &mut fmt::Formatter<'_>, word: &str, time: Time) -> fmt::Result {
     match time {
-        Time::NEVER => write!(f, "{word} never")?,
-        time => write!(f, "{word} {}", time.nanos())?,
+        Time::NEVER => write!(f, "{word} never"),
+        time => write!(f, "{word} {}", time.nanos()),
     }
+}
+
+fn write_entries(f: &mut fmt::Formatter<'_>, entries: &[Entry]) -> fmt::Result {
     entries.iter().try_for_each(|entry| write!(f, " {entry}"))
 }
 
@@ -323,9 +367,11 @@ impl fmt::Display for Entry {
         let port = self.port.0;
         match self.passed {
             Passed::Units(units) => write!(f, "{port}:{units}"),
+            Passed::At { units, at } => write!(f, "{port}:{units}@{}", at.nanos()),
             Passed::Control(LineControl::Baud(rate)) => write!(f, "{port}:baud={rate}"),
             Passed::Control(LineControl::Break(on)) => write!(f, "{port}:break={}", u8::from(on)),
             Passed::Look => write!(f, "{port}:look"),
+            Passed::Recall => write!(f, "{port}:recall"),
         }
     }
 }
@@ -376,6 +422,7 @@ mod tests {
             "idle 1500000 0:22 1:baud=9600 1:break=1 1:4",
             &Request::Idle {
                 until: Time(1_500_000),
+                unhurried: Ports::NONE,
                 sent: vec![
                     entry(0, Passed::Units(22)),
                     entry(1, Passed::Control(LineControl::Baud(9600))),
@@ -385,11 +432,28 @@ mod tests {
             },
         );
         let until = Time::NEVER;
+        let (units, at) = (6, Time(5_000_000));
+        let mut unhurried = Ports::NONE;
         check_request(
             "idle never",
             &Request::Idle {
                 until,
+                unhurried,
                 sent: vec![],
+            },
+        );
+        unhurried.insert(Port(1));
+        unhurried.insert(Port(3));
+        check_request(
+            "idle never 1:later 3:later 0:22 0:recall 0:6@5000000",
+            &Request::Idle {
+                until,
+                unhurried,
+                sent: vec![
+                    entry(0, Passed::Units(22)),
+                    entry(0, Passed::Recall),
+                    entry(0, Passed::At { units, at }),
+                ],
             },
         );
         check_request(
@@ -414,6 +478,15 @@ mod tests {
                 sent: vec![entry(0, Passed::Units(27)), entry(2, Passed::Look)],
             },
         );
+        let (units, at) = (232, Time(5_300));
+        let early = entry(1, Passed::At { units, at });
+        check_reply(
+            "go 135100 1:232@5300 0:27",
+            &Reply::Go {
+                now: Time(135_100),
+                sent: vec![early, entry(0, Passed::Units(27))],
+            },
+        );
         check_reply("done {\"x\":1}", &Reply::Done("{\"x\":1}".to_owned()));
         check_reply("refused no port", &Reply::Refused("no port".to_owned()));
     }
@@ -430,6 +503,9 @@ mod tests {
             "idle 5  0:1",
             "idle 5 300:1",
             "idle 5 0:break=2",
+            "idle 5 0:1 1:later",
+            "go 5 1:later",
+            "go 5 1:4@",
             "go",
             "attach 0",
             "detach x",

@@ -306,6 +306,12 @@ pub trait DisplacementInstrument: Device {
 
     /// What the instrument's own sensors say about its environment.
     fn environment(&self) -> Environment;
+
+    /// Whether nobody waits for what it says at the moment: its readings may be handed over some
+    /// milliseconds late, with the times at which they came.
+    fn is_unhurried(&self) -> bool {
+        false
+    }
 }
 
 /// A displacement, not yet corrected for the medium or for temperature.

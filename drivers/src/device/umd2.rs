@@ -480,6 +480,12 @@ impl DisplacementInstrument for Umd2 {
         }
         self.weather.at(self.heard)
     }
+
+    /// It streams without end, and only a start or an average waits for its lines.
+    fn is_unhurried(&self) -> bool {
+        !matches!(self.state, State::Starting { .. })
+            && !matches!(self.averaging, Averaging::Running(_))
+    }
 }
 
 #[cfg(test)]

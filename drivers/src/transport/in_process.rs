@@ -1,9 +1,10 @@
 //! A world in this process, in virtual time: no wall clock, the same result every run.
 
 use core::time::Duration;
+use std::collections::VecDeque;
 use units::Time;
 use wire::canopen::sync::emit_sync;
-use wire::{Arrival, Payload, Port};
+use wire::{Arrival, Payload, Port, Ports};
 
 use super::sync_grid::SyncGrid;
 use super::{SendError, Transport};
@@ -91,6 +92,8 @@ pub struct InProcess<W> {
     world: W,
     now: Time,
     syncs: SyncGrid,
+    /// What could wait, in order, and behind it at most one that could not.
+    kept: VecDeque<Arrival>,
 }
 
 impl<W: World> InProcess<W> {
@@ -100,6 +103,7 @@ impl<W: World> InProcess<W> {
             world,
             now: Time::ZERO,
             syncs: SyncGrid::new(),
+            kept: VecDeque::new(),
         }
     }
 
@@ -126,6 +130,16 @@ impl<W: World> InProcess<W> {
             let _ = world.deliver(at, port, &Payload::Frame(emit_sync(None)));
         });
     }
+
+    /// What has arrived by now: the first thing, once there is something that cannot wait.
+    fn arrived(&mut self, unhurried: Ports) -> Option<Arrival> {
+        let mut is_due = self.kept.iter().any(|it| !it.can_wait(unhurried));
+        while !is_due && let Some(arrival) = self.world.collect() {
+            is_due = !arrival.can_wait(unhurried);
+            self.kept.push_back(arrival);
+        }
+        is_due.then(|| self.kept.pop_front())?
+    }
 }
 
 impl<W: World> Transport for InProcess<W> {
@@ -137,13 +151,17 @@ impl<W: World> Transport for InProcess<W> {
         self.world.deliver(self.now, port, payload)
     }
 
+    fn receive(&mut self, until: Time) -> Option<Arrival> {
+        self.receive_unhurried(until, Ports::NONE)
+    }
+
     /// # Panics
     /// When the world asks for the same moment without end.
-    fn receive(&mut self, until: Time) -> Option<Arrival> {
+    fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
         let mut rounds = 0;
         self.now = self.now.max(self.world.now());
         loop {
-            if let Some(arrival) = self.world.collect() {
+            if let Some(arrival) = self.arrived(unhurried) {
                 return Some(arrival);
             }
             let to = until.min(self.syncs.next()).max(self.now);
@@ -153,7 +171,7 @@ impl<W: World> Transport for InProcess<W> {
             self.send_due_syncs();
             if self.now >= until {
                 self.world.advance(self.now);
-                return self.world.collect();
+                return self.arrived(Ports::NONE);
             }
             rounds = if self.now == before { rounds + 1 } else { 0 };
             assert!(rounds < ROUNDS_MAX, "the world hangs at {}", self.now);
@@ -262,5 +280,56 @@ mod tests {
     fn a_period_of_zero_is_refused() {
         let mut bus = InProcess::new(Echo::default());
         assert!(bus.set_sync(Port(0), Some(Duration::ZERO)).is_err());
+    }
+
+    /// Says these at their times.
+    struct Talker(Time, VecDeque<Arrival>);
+
+    impl World for Talker {
+        fn next_event(&self) -> Time {
+            self.1.front().map_or(Time::NEVER, |it| it.at)
+        }
+
+        fn advance(&mut self, to: Time) {
+            self.0 = to;
+        }
+
+        fn deliver(&mut self, _: Time, port: Port, _: &Payload) -> Result<(), SendError> {
+            Err(SendError::WrongKind { port })
+        }
+
+        fn collect(&mut self) -> Option<Arrival> {
+            self.1.pop_front_if(|it| it.at <= self.0)
+        }
+    }
+
+    fn says(port: u8, at_ms: u64, payload: Payload) -> Arrival {
+        let (port, at, input) = (Port(port), Time(at_ms * MS), Input::Payload(payload));
+        Arrival { port, at, input }
+    }
+
+    #[test]
+    fn bytes_that_nobody_waits_for_come_with_what_somebody_does_in_order() {
+        let bytes = |at_ms| says(1, at_ms, Payload::Bytes(vec![b'x']));
+        let frame = says(0, 5, Payload::Frame(CanFrame::standard(0x181, &[])));
+        let all = [bytes(1), bytes(3), frame.clone(), bytes(6), bytes(20)];
+        let mut bus = InProcess::new(Talker(Time::ZERO, all.into()));
+        let mut unhurried = Ports::NONE;
+        unhurried.insert(Port(1));
+        let mut next = |until: u64| {
+            let arrival = bus.receive_unhurried(Time(until * MS), unhurried);
+            (arrival, bus.now())
+        };
+        assert_eq!(next(10), (Some(bytes(1)), Time(5 * MS)));
+        assert_eq!(next(10), (Some(bytes(3)), Time(5 * MS)));
+        assert_eq!(next(10), (Some(frame), Time(5 * MS)));
+        assert_eq!(
+            next(10),
+            (Some(bytes(6)), Time(10 * MS)),
+            "the wait is over"
+        );
+        assert_eq!(next(12), (None, Time(12 * MS)));
+        let at_once = bus.receive(Time(30 * MS));
+        assert_eq!((at_once, bus.now()), (Some(bytes(20)), Time(20 * MS)));
     }
 }

@@ -17,7 +17,7 @@ use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use std::collections::BTreeMap;
 use units::Time;
-use wire::{Arrival, Input, Payload, Port};
+use wire::{Arrival, Input, Payload, Port, Ports};
 
 use self::in_lockstep::InLockstep;
 pub use self::opening::LiveBuilder;
@@ -170,7 +170,7 @@ impl Transport for Live {
     /// or a millisecond.
     fn receive(&mut self, until: Time) -> Option<Arrival> {
         if self.keeps_step() {
-            return self.receive_in_lockstep(until);
+            return self.receive_in_lockstep(until, Ports::NONE);
         }
         let mut fresh = false;
         loop {
@@ -198,9 +198,16 @@ impl Transport for Live {
         }
     }
 
+    fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
+        if self.keeps_step() {
+            return self.receive_in_lockstep(until, unhurried);
+        }
+        self.receive(until)
+    }
+
     fn sleep_until(&mut self, until: Time) {
         while self.keeps_step() && self.now() < until {
-            self.step(until);
+            self.step(until, Ports::NONE);
         }
         let deadline = monotonic() + self.clock.until(until);
         while monotonic() < deadline {

@@ -16,8 +16,8 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use units::Time;
-use wire::Port;
 use wire::lockstep::{Entry, LINE_MAX, Reply, Request, Unintelligible, VERSION};
+use wire::{Port, Ports};
 
 /// Why the shared clock cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -206,10 +206,19 @@ impl Participant {
         }
     }
 
-    /// Has sent `sent` and waits, until `until` at the latest; [`Participant::go`] tells what
-    /// came of it.
-    pub(super) fn idle(&self, until: Time, sent: Vec<Entry>) -> Result<(), LockstepError> {
-        let said = self.channel().say(&Request::Idle { until, sent });
+    /// Has sent `sent` and waits, until `until` at the latest and whatever comes on `unhurried` ports;
+    /// [`Participant::go`] tells what came of it.
+    pub(super) fn idle(
+        &self,
+        until: Time,
+        unhurried: Ports,
+        sent: Vec<Entry>,
+    ) -> Result<(), LockstepError> {
+        let said = self.channel().say(&Request::Idle {
+            until,
+            unhurried,
+            sent,
+        });
         self.noted(said)
     }
 

@@ -40,7 +40,7 @@ pub mod sync_thread;
 
 use core::time::Duration;
 use units::Time;
-use wire::{Arrival, LinkState, Payload, Port};
+use wire::{Arrival, LinkState, Payload, Port, Ports};
 
 /// Why something could not be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -89,6 +89,15 @@ pub trait Transport {
     /// Waits until something arrives or the clock reaches `until`; in simulation, lets
     /// virtual time pass instead. Arrivals that wait already are returned at once.
     fn receive(&mut self, until: Time) -> Option<Arrival>;
+
+    /// As [`Transport::receive`], but bytes on the `unhurried` ports need not end the wait: they may be kept
+    /// until something else comes or the wait is over, and are handed over then, with the time at which they
+    /// came. Where time is simulated that spares most rounds of a stream to which nobody listens; in real time
+    /// they are handed over at once.
+    fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
+        let _ = unhurried;
+        self.receive(until)
+    }
 
     /// Waits until the clock has reached `until`, as exactly as it can, and listens to nothing:
     /// what arrives meanwhile waits for [`Transport::receive`]. For the moment of a SYNC; in

@@ -25,7 +25,7 @@ use std::io;
 use units::Time;
 use wire::LineControl;
 use wire::candump::{Content, Direction, Record};
-use wire::{Arrival, Input, LinkState, Payload, Port};
+use wire::{Arrival, Input, LinkState, Payload, Port, Ports};
 
 use super::{SendError, Transport};
 
@@ -195,7 +195,11 @@ impl<T: Transport, W: io::Write> Transport for Recorder<T, W> {
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
-        let mut arrival = self.inner.receive(rounded(until))?;
+        self.receive_unhurried(until, Ports::NONE)
+    }
+
+    fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
+        let mut arrival = self.inner.receive_unhurried(rounded(until), unhurried)?;
         arrival.at = rounded(arrival.at);
         self.arrival(&arrival);
         Some(arrival)

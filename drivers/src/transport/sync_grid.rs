@@ -39,6 +39,16 @@ impl SyncGrid {
         next.unwrap_or(Time::NEVER)
     }
 
+    /// The ports whose SYNC is due at `at`, their next one. They are sent then: the grid goes on.
+    pub(super) fn take(&mut self, at: Time) -> Vec<Port> {
+        let due = self.0.iter_mut().filter(|(_, it)| it.next == at);
+        due.map(|(port, producer)| {
+            producer.next += producer.period;
+            *port
+        })
+        .collect()
+    }
+
     /// Hands each SYNC that is due at `now` to `send`, with its moment; those that a held-up
     /// host has missed are left out.
     pub(super) fn send_due(&mut self, now: Time, mut send: impl FnMut(Port, Time)) {
@@ -50,5 +60,25 @@ impl SyncGrid {
                 producer.next += producer.period;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_ahead_is_not_due_once_more() {
+        let (fast, slow) = (Duration::from_millis(5), Duration::from_millis(10));
+        let mut grid = SyncGrid::new();
+        grid.set(Time::ZERO, Port(0), Some(fast));
+        grid.set(Time::ZERO, Port(1), Some(slow));
+        assert_eq!(grid.take(Time(5_000_000)), [Port(0)]);
+        assert_eq!(grid.take(Time(5_000_000)), []);
+        assert_eq!(grid.next(), Time(10_000_000));
+        assert_eq!(grid.take(Time(10_000_000)), [Port(0), Port(1)]);
+        let mut sent = Vec::new();
+        grid.send_due(Time(15_000_000), |port, at| sent.push((port, at)));
+        assert_eq!(sent, [(Port(0), Time(15_000_000))]);
     }
 }

@@ -177,46 +177,64 @@ impl Endpoint {
         }
     }
 
-    /// Takes in exactly what a participant says that it has sent.
+    /// Reads exactly what a participant says that it has sent.
     ///
     /// # Errors
     /// When it does not come, or the port fails.
+    pub(super) fn read(&mut self, units: usize) -> io::Result<Vec<Payload>> {
+        match &mut self.kind {
+            Kind::Serial(Some(pty), _) | Kind::Slcan(Some(pty), _) => {
+                Ok(vec![Payload::Bytes(pty.receive_exactly(units)?)])
+            }
+            Kind::Vcan(vcan) => {
+                let mut frames = Vec::new();
+                for _ in 0..units {
+                    frames.extend(vcan.receive_one()?.map(Payload::Frame));
+                }
+                Ok(frames)
+            }
+            Kind::Serial(None, _) | Kind::Slcan(None, _) => Ok(Vec::new()),
+        }
+    }
+
+    /// What was done to the line reaches the machine at `now`.
+    pub(super) fn control(&mut self, control: LineControl, now: Time, machine: &mut Simulation) {
+        if let Kind::Serial(Some(pty), rate) = &mut self.kind {
+            if let LineControl::Baud(said) = control {
+                *rate = pty.client_rate().unwrap_or(said);
+            }
+            let _ = machine.deliver(now, self.port, &Payload::Control(control));
+        }
+    }
+
+    /// What was read reaches the machine at `now`; what an adapter says to that.
+    ///
+    /// # Errors
+    /// When the port fails.
     pub(super) fn take_in(
         &mut self,
-        passed: Passed,
+        sent: &[Payload],
         now: Time,
         machine: &mut Simulation,
     ) -> io::Result<Answered> {
         let port = self.port;
         let mut answered = Answered::default();
-        match (&mut self.kind, passed) {
-            (Kind::Serial(Some(pty), _), Passed::Units(count)) => {
-                let bytes = pty.receive_exactly(count)?;
+        for payload in sent {
+            match (&mut self.kind, payload) {
+                (Kind::Slcan(Some(pty), adapter), Payload::Bytes(bytes)) => {
+                    for byte in bytes {
+                        if let Some(reply) = answer(adapter, *byte, now, port, machine) {
+                            answered.note(&reply);
+                            pty.send(&reply)?;
+                        }
+                    }
+                }
+                (Kind::Slcan(None, _), _) => {}
                 // A line that is down swallows what is said into it.
-                let _ = machine.deliver(now, port, &Payload::Bytes(bytes));
-            }
-            (Kind::Serial(Some(pty), rate), Passed::Control(control)) => {
-                if let LineControl::Baud(said) = control {
-                    *rate = pty.client_rate().unwrap_or(said);
-                }
-                let _ = machine.deliver(now, port, &Payload::Control(control));
-            }
-            (Kind::Slcan(Some(pty), adapter), Passed::Units(count)) => {
-                for byte in pty.receive_exactly(count)? {
-                    if let Some(reply) = answer(adapter, byte, now, port, machine) {
-                        answered.note(&reply);
-                        pty.send(&reply)?;
-                    }
+                (Kind::Serial(..) | Kind::Slcan(..) | Kind::Vcan(_), _) => {
+                    let _ = machine.deliver(now, port, payload);
                 }
             }
-            (Kind::Vcan(vcan), Passed::Units(count)) => {
-                for _ in 0..count {
-                    if let Some(frame) = vcan.receive_one()? {
-                        let _ = machine.deliver(now, port, &Payload::Frame(frame));
-                    }
-                }
-            }
-            _ => {}
         }
         Ok(answered)
     }

@@ -10,6 +10,8 @@
 //! While there is no participant, time stands still. A participant that ends without signing off
 //! (unless that is permitted), hangs, or computes without end is named, and the machine ends.
 
+mod attendance;
+
 use core::time::Duration;
 use std::io::{self, Read};
 use std::os::fd::AsFd;
@@ -17,14 +19,15 @@ use std::sync::mpsc::TryRecvError;
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
+use nix::sched::{CpuSet, sched_getaffinity};
 use nix::unistd::Pid;
 use units::Time;
 use wire::Port;
-use wire::lockstep::{Entry, Passed, Reply, Request, VERSION};
+use wire::lockstep::{Entry, Passed, Reply, Request};
 
+use super::endpoint::Answered;
 use super::endpoint::Endpoint;
-use super::peer::{Doing, Heard};
+use super::peer::{Ahead, Doing, Heard};
 use super::{Job, Site};
 
 /// The machine lives no further at once, so that whoever asks for something meanwhile is
@@ -102,23 +105,53 @@ impl Lockstep {
         let is_awaited = self.take_in()?;
         self.refuse_strangers()?;
         if !is_awaited {
-            let waits = self
-                .site
-                .visitors
-                .peers
-                .iter()
-                .filter_map(|peer| match peer.doing {
-                    Doing::Idle { until, .. } => Some(until),
-                    Doing::Nothing | Doing::Working(_) => None,
-                });
-            let until = waits.min().unwrap_or(Time::NEVER);
-            let stride = self.site.machine.now() + STRIDE;
-            self.site.machine.advance_until_delivery(until.min(stride));
-            self.hand_out()?;
+            self.live_on()?;
         }
-        // All that was sent at this moment, in one piece.
+        // All that was sent since somebody went on last, in one piece.
         self.flush()?;
         Ok(self.wake())
+    }
+
+    /// The machine lives until somebody goes on.
+    fn live_on(&mut self) -> io::Result<()> {
+        let waits = self
+            .site
+            .visitors
+            .peers
+            .iter()
+            .filter_map(|peer| match peer.doing {
+                Doing::Idle { until, .. } => Some(until),
+                Doing::Nothing | Doing::Working(_) => None,
+            });
+        let until = waits.min().unwrap_or(Time::NEVER);
+        let until = until.min(self.site.machine.now() + STRIDE);
+        loop {
+            let peers = self.site.visitors.peers.iter();
+            let ahead = peers.flat_map(|peer| peer.ahead.iter().map(|it| it.at));
+            let next = ahead.fold(until, Time::min);
+            self.site.machine.advance_until_delivery(next);
+            self.hand_out()?;
+            self.take_in_due()?;
+            let mut peers = self.site.visitors.peers.iter();
+            if self.site.machine.now() >= until || peers.any(|it| it.is_due) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// What was sent ahead of its time, which has come, reaches the machine.
+    fn take_in_due(&mut self) -> io::Result<()> {
+        let now = self.site.machine.now();
+        for who in 0..self.site.visitors.peers.len() {
+            let ahead = &mut self.site.visitors.peers[who].ahead;
+            let due: Vec<_> = ahead.extract_if(.., |it| it.at <= now).collect();
+            for it in due {
+                let machine = &mut self.site.machine;
+                let answered = self.site.endpoints[it.place].take_in(&it.sent, now, machine)?;
+                self.pass_answer(who, it.place, it.port, answered);
+            }
+        }
+        Ok(())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -148,28 +181,66 @@ impl Lockstep {
             return Ok(false);
         };
         let now = self.site.machine.now();
-        let answered =
-            self.site.endpoints[place].take_in(entry.passed, now, &mut self.site.machine)?;
+        let endpoint = &mut self.site.endpoints[place];
+        match entry.passed {
+            Passed::Units(units) => {
+                let sent = endpoint.read(units)?;
+                let answered = endpoint.take_in(&sent, now, &mut self.site.machine)?;
+                self.pass_answer(who, place, entry.port, answered);
+                self.tell_sharers(who, place, units);
+                Ok(answered.is_awaited)
+            }
+            Passed::At { units, at } => {
+                let (sent, port) = (endpoint.read(units)?, entry.port);
+                self.site.visitors.peers[who].ahead.push(Ahead {
+                    at,
+                    place,
+                    port,
+                    sent,
+                });
+                // It lies before them already: who shares the interface hears it when it was sent.
+                self.tell_sharers(who, place, units);
+                Ok(false)
+            }
+            Passed::Recall => {
+                let ahead = &mut self.site.visitors.peers[who].ahead;
+                ahead.retain(|it| it.place != place);
+                Ok(false)
+            }
+            Passed::Control(control) => {
+                endpoint.control(control, now, &mut self.site.machine);
+                Ok(false)
+            }
+            Passed::Look => Ok(false),
+        }
+    }
+
+    /// What an adapter says to what it was sent does not end a wait by itself: mostly that it was sent.
+    fn pass_answer(&mut self, who: usize, place: usize, port: Port, answered: Answered) {
         if answered.units > 0 {
             let passed = Passed::Units(answered.units);
-            let port = entry.port;
             let joins = self.site.endpoints[place].is_adapter();
-            self.site.visitors.peers[who].pass(Entry { port, passed }, joins);
+            let peer = &mut self.site.visitors.peers[who];
+            peer.pass(Entry { port, passed }, joins);
+            peer.is_due |= answered.is_awaited;
         }
+    }
+
+    fn tell_sharers(&mut self, who: usize, place: usize, units: usize) {
         if self.site.endpoints[place].is_shared() {
-            self.tell_others(Some(who), place, entry.passed);
+            self.tell_others(Some(who), place, Passed::Units(units));
         }
-        Ok(answered.is_awaited)
     }
 
     /// Whoever has the port open hears it too, except who has sent it.
     fn tell_others(&mut self, sender: Option<usize>, place: usize, passed: Passed) {
         let joins = self.site.endpoints[place].is_adapter();
+        let now = self.site.machine.now();
         for (who, peer) in self.site.visitors.peers.iter_mut().enumerate() {
             if let Some(&port) = peer.ports.get(&place)
                 && Some(who) != sender
             {
-                peer.pass(Entry { port, passed }, joins);
+                peer.hand(now, Entry { port, passed }, joins);
             }
         }
     }
@@ -216,10 +287,8 @@ impl Lockstep {
             let Doing::Idle { until, .. } = peer.doing else {
                 continue;
             };
-            if until <= now || !peer.passed.is_empty() {
-                let sent = core::mem::take(&mut peer.passed);
-                peer.set_working();
-                peer.say(&Reply::Go { now, sent });
+            if until <= now || peer.is_due {
+                peer.wake(now);
                 any = true;
             }
         }
@@ -335,8 +404,16 @@ impl Lockstep {
                 self.detach(who, Some(port));
                 return;
             }
-            Request::Idle { until, sent } => {
-                self.site.visitors.peers[who].doing = Doing::Idle { until, sent };
+            Request::Idle {
+                until,
+                unhurried,
+                sent,
+            } => {
+                self.site.visitors.peers[who].doing = Doing::Idle {
+                    until,
+                    unhurried,
+                    sent,
+                };
                 return;
             }
             Request::On { cpu } => {
@@ -352,86 +429,5 @@ impl Lockstep {
             Request::Bye => return,
         };
         self.site.visitors.peers[who].say(&reply);
-    }
-
-    fn welcome(&mut self, who: usize, version: u32, pid: u32, name: String) -> Reply {
-        if version != VERSION {
-            return Reply::Refused(format!(
-                "the program uses version {version} of the lockstep clock, this machine version \
-                 {VERSION}"
-            ));
-        }
-        self.site.visitors.peers[who].join(name, pid);
-        Reply::Welcome(self.site.machine.now())
-    }
-
-    /// It has closed a port, or (with `None`) all of them.
-    fn detach(&mut self, who: usize, port: Option<Port>) {
-        let endpoints = &mut self.site.endpoints;
-        self.site.visitors.peers[who].ports.retain(|place, known| {
-            let stays = port.is_some_and(|port| *known != port);
-            if !stays {
-                // What cannot be tidied up now shows when the next one opens it.
-                let _ = endpoints[*place].attend(false);
-            }
-            stays
-        });
-    }
-
-    /// Computes where the only participant does: each only waits for the other.
-    fn follow(&self, cpu: Option<u32>) {
-        let joined = self.site.visitors.peers.iter();
-        let alone = joined
-            .filter(|peer| !matches!(peer.doing, Doing::Nothing))
-            .count()
-            == 1;
-        let (Some(allowed), wanted) = (self.allowed, cpu.filter(|_| alone)) else {
-            return;
-        };
-        let mut set = CpuSet::new();
-        match wanted {
-            Some(cpu) if set.set(cpu as usize).is_ok() => {}
-            _ => set = allowed,
-        }
-        // A refusal costs speed only.
-        let _ = sched_setaffinity(OWN, &set);
-    }
-
-    /// Who has that port open. One that was killed while it waits for the time is not heard before that comes:
-    /// it is let go now, and heard of for the last time when it is heard next.
-    fn who_has(&mut self, place: usize) -> Option<String> {
-        let peers = &self.site.visitors.peers;
-        let other = peers.iter().position(|it| it.ports.contains_key(&place))?;
-        if peers[other].has_hung_up() && self.gone(other).is_ok() {
-            self.site.visitors.peers[other].doing = Doing::Nothing;
-            return None;
-        }
-        Some(self.site.visitors.peers[other].who())
-    }
-
-    fn attach(&mut self, who: usize, port: Port, endpoint: &str) -> Reply {
-        let place = self
-            .site
-            .endpoints
-            .iter()
-            .position(|it| it.is_called(endpoint));
-        let Some(place) = place else {
-            let known: Vec<_> = self.site.endpoints.iter().map(Endpoint::name).collect();
-            return Reply::Refused(format!(
-                "this machine has no port {endpoint}; it has {}",
-                known.join(", ")
-            ));
-        };
-        if !self.site.endpoints[place].is_shared()
-            && let Some(other) = self.who_has(place)
-        {
-            return Reply::Refused(format!("{other} has {endpoint} open"));
-        }
-        if let Err(error) = self.site.endpoints[place].attend(true) {
-            return Reply::Refused(error.to_string());
-        }
-        self.site.endpoints[place].opened(self.site.machine.now(), &mut self.site.machine);
-        self.site.visitors.peers[who].ports.insert(place, port);
-        Reply::Attached
     }
 }

@@ -61,6 +61,30 @@ impl Bench {
         self.machine.ports()[0].display().to_string()
     }
 
+    fn open_terminal(&self) -> File {
+        let mut options = File::options();
+        let opened = options.read(true).write(true).open(self.terminal());
+        opened.unwrap()
+    }
+
+    /// A program at an adapter that is open, and its line; the node has booted.
+    fn booted(&self) -> (Client, File) {
+        let mut client = self.client();
+        assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
+        let mut line = self.open_terminal();
+        let attach = format!("attach 0 {}", self.terminal());
+        assert_eq!(client.ask(&attach), "attached");
+        line.write_all(b"S8\rO\r").unwrap();
+        assert_eq!(client.ask("idle 100000000 0:5"), "go 0 0:2");
+        let heard = client.ask("idle 100000000");
+        assert!(
+            heard.ends_with(" 0:8"),
+            "the node says that it is there: {heard}"
+        );
+        assert_eq!(client.ask("idle 100000000"), "go 100000000");
+        (client, line)
+    }
+
     /// What the machine ended by.
     fn ended(self) -> String {
         let ended = self.machine.thread_result();
@@ -93,11 +117,7 @@ fn an_answer_comes_at_its_own_time_whenever_it_is_asked_for() {
     let bench = Bench::new("answer", |_| {});
     let mut client = bench.client();
     assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
-    let mut line = File::options()
-        .read(true)
-        .write(true)
-        .open(bench.terminal())
-        .unwrap();
+    let mut line = bench.open_terminal();
     let attach = format!("attach 4 {}", bench.terminal());
     assert_eq!(client.ask(&attach), "attached");
     line.write_all(b"$01M\r").unwrap();
@@ -121,11 +141,7 @@ fn what_an_adapter_says_at_one_moment_is_one_piece() {
     let bench = Bench::of(ON_CAN, "piece", |_| {});
     let mut client = bench.client();
     assert_eq!(client.ask("hello 1 0 me"), "welcome 0");
-    let mut line = File::options()
-        .read(true)
-        .write(true)
-        .open(bench.terminal())
-        .unwrap();
+    let mut line = bench.open_terminal();
     let attach = format!("attach 0 {}", bench.terminal());
     assert_eq!(client.ask(&attach), "attached");
     line.write_all(b"S8\rO\r").unwrap();
@@ -140,6 +156,66 @@ fn what_an_adapter_says_at_one_moment_is_one_piece() {
     assert_eq!(&answers, b"\r\rz\rt702100\r");
     client.say("bye");
     drop(bench);
+}
+
+#[test]
+fn what_comes_on_a_line_that_nobody_waits_for_is_told_with_the_next_go() {
+    let bench = Bench::new("unhurried", |_| {});
+    let mut client = bench.client();
+    client.ask("hello 1 0 me");
+    let mut line = bench.open_terminal();
+    client.ask(&format!("attach 4 {}", bench.terminal()));
+    line.write_all(b"$01M\r").unwrap();
+    let heard = client.ask("idle 1000000000 4:later 4:5");
+    let (units, time) = heard
+        .strip_prefix("go 1000000000 4:")
+        .and_then(|passed| passed.split_once('@'))
+        .unwrap_or_else(|| panic!("{heard}"));
+    let time: u64 = time.parse().unwrap();
+    assert!(units == "8" && time > 0 && time < 1_000_000_000, "{heard}");
+    let mut answer = [0; 8];
+    line.read_exact(&mut answer).unwrap();
+    assert_eq!(&answer, b"!014117\r");
+    // Whoever waits for it again hears it at once.
+    line.write_all(b"$01M\r").unwrap();
+    let heard = client.ask("idle 2000000000 4:5");
+    assert!(
+        heard.ends_with(" 4:8") && !heard.starts_with("go 2000000000"),
+        "{heard}"
+    );
+    client.say("bye");
+}
+
+/// A read of the device's type, over SDO.
+const ASKED: &[u8; 22] = b"t60284000100000000000\r";
+
+#[test]
+fn what_is_sent_ahead_of_its_time_counts_as_sent_then() {
+    let bench = Bench::of(ON_CAN, "ahead", |_| {});
+    let (mut client, mut line) = bench.booted();
+    line.write_all(ASKED).unwrap();
+    let heard = client.ask("idle 1000000000 0:22@300000000");
+    let (time, passed) = heard.strip_prefix("go ").unwrap().split_once(' ').unwrap();
+    let time: u64 = time.parse().unwrap();
+    assert!(time > 300_000_000 && time < 310_000_000, "{heard}");
+    assert_eq!(
+        passed, "0:24",
+        "what the adapter says, and the node's answer"
+    );
+    client.say("bye");
+}
+
+#[test]
+fn what_is_recalled_is_never_sent() {
+    let bench = Bench::of(ON_CAN, "recall", |_| {});
+    let (mut client, mut line) = bench.booted();
+    line.write_all(ASKED).unwrap();
+    assert_eq!(client.ask("idle 200000000 0:22@300000000"), "go 200000000");
+    assert_eq!(client.ask("idle 900000000 0:recall"), "go 900000000");
+    line.write_all(ASKED).unwrap();
+    let heard = client.ask("idle 1900000000 0:22");
+    assert!(heard.ends_with(" 0:24"), "once only: {heard}");
+    client.say("bye");
 }
 
 #[test]

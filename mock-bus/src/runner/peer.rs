@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use nix::sys::socket::{MsgFlags, recv};
 use units::Time;
-use wire::Port;
 use wire::lockstep::{Entry, LINE_MAX, Passed, Reply, Request};
+use wire::{Payload, Port, Ports};
 
 const READ_MAX: usize = 4096;
 
@@ -21,8 +21,21 @@ pub(super) enum Doing {
     Nothing,
     /// Time stands still for it.
     Working(Watch),
-    /// It waits, and has sent this before.
-    Idle { until: Time, sent: Vec<Entry> },
+    /// It waits, also when something comes on the unhurried ports, and has sent this before.
+    Idle {
+        until: Time,
+        unhurried: Ports,
+        sent: Vec<Entry>,
+    },
+}
+
+/// What it has sent already, but counts as sent at its time only.
+#[derive(Debug)]
+pub(super) struct Ahead {
+    pub(super) at: Time,
+    pub(super) place: usize,
+    pub(super) port: Port,
+    pub(super) sent: Vec<Payload>,
 }
 
 /// One program.
@@ -39,8 +52,11 @@ pub(super) struct Peer {
     pub(super) doing: Doing,
     /// Its numbers of the machine's ports, by their places.
     pub(super) ports: BTreeMap<usize, Port>,
+    pub(super) ahead: Vec<Ahead>,
     /// What it is told with the next `go`.
     pub(super) passed: Vec<Entry>,
+    /// Something of that ends its wait.
+    pub(super) is_due: bool,
 }
 
 /// What came from a peer.
@@ -68,7 +84,9 @@ impl Peer {
             pid: 0,
             doing: Doing::Nothing,
             ports: BTreeMap::new(),
+            ahead: Vec::new(),
             passed: Vec::new(),
+            is_due: false,
         })
     }
 
@@ -135,6 +153,27 @@ impl Peer {
     /// Whether something was read that nobody has taken yet.
     pub(super) fn has_unheard(&self) -> bool {
         !self.heard.is_empty()
+    }
+
+    /// Something comes to it at `now`: bytes on a line for which it has time do not end its wait.
+    pub(super) fn hand(&mut self, now: Time, mut entry: Entry, joins: bool) {
+        if let (Doing::Idle { unhurried, .. }, Passed::Units(units)) = (&self.doing, entry.passed)
+            && unhurried.contains(entry.port)
+        {
+            let at = now;
+            entry.passed = Passed::At { units, at };
+        } else {
+            self.is_due = true;
+        }
+        self.pass(entry, joins);
+    }
+
+    /// It goes on at `now`, and hears what has passed.
+    pub(super) fn wake(&mut self, now: Time) {
+        self.is_due = false;
+        let sent = core::mem::take(&mut self.passed);
+        self.set_working();
+        self.say(&Reply::Go { now, sent });
     }
 
     /// Something has passed one of its ports; with `joins` it is one with what passed there just

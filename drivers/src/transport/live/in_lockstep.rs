@@ -7,13 +7,13 @@
 //! stamp and its place in the order, however busy the computer is.
 
 use core::time::Duration;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use nix::poll::{PollFd, PollFlags, ppoll};
 use units::Time;
 use wire::lockstep::{Entry, Passed};
-use wire::{Payload, Port};
+use wire::{Payload, Port, Ports};
 
 use super::super::lockstep::{LockstepError, Participant};
 use super::super::one_core::OneCore;
@@ -32,6 +32,8 @@ pub(super) struct InLockstep {
     /// For each port how much of what it sent is in `sent`, or was.
     noted: Vec<u64>,
     arrivals: VecDeque<Arrival>,
+    /// The SYNCs that have left already and count as sent at their own time only.
+    ahead: BTreeMap<Port, Time>,
     core: OneCore,
 }
 
@@ -43,6 +45,7 @@ impl InLockstep {
             sent: Vec::new(),
             noted: Vec::new(),
             arrivals: VecDeque::new(),
+            ahead: BTreeMap::new(),
             core: OneCore::new(),
         }
     }
@@ -85,6 +88,10 @@ impl Live {
             return false;
         };
         lockstep.syncs.set(now, port, period);
+        if lockstep.ahead.remove(&port).is_some_and(|at| at > now) {
+            let passed = Passed::Recall;
+            lockstep.sent.push(Entry { port, passed });
+        }
         true
     }
 
@@ -110,6 +117,10 @@ impl Live {
     }
 
     fn note_units(&mut self, at: usize) {
+        self.note_as(at, Passed::Units);
+    }
+
+    fn note_as(&mut self, at: usize, passed: impl FnOnce(usize) -> Passed) {
         let Some(lockstep) = &mut self.lockstep else {
             return;
         };
@@ -119,41 +130,45 @@ impl Live {
         if total > before {
             lockstep.sent.push(Entry {
                 port: slot.port,
-                passed: Passed::Units((total - before) as usize),
+                passed: passed((total - before) as usize),
             });
         }
     }
 
-    /// As [`super::Transport::receive`].
-    pub(super) fn receive_in_lockstep(&mut self, until: Time) -> Option<Arrival> {
+    /// As [`super::Transport::receive_unhurried`].
+    pub(super) fn receive_in_lockstep(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
         loop {
             self.look_at_due_ports();
-            let arrival = self.lockstep.as_mut()?.arrivals.pop_front();
-            if arrival.is_some() || self.clock.now() >= until {
-                return arrival;
+            let is_over = self.clock.now() >= until;
+            let arrivals = &mut self.lockstep.as_mut()?.arrivals;
+            if is_over || arrivals.iter().any(|it| !it.can_wait(unhurried)) {
+                return arrivals.pop_front();
             }
-            self.step(until);
+            self.step(until, unhurried);
             if !self.keeps_step() {
                 return None;
             }
         }
     }
 
-    /// Lets time pass until something happens, at most to `until`: what comes is kept.
-    pub(super) fn step(&mut self, until: Time) {
+    /// Lets time pass until something happens, at most to `until`: what comes is kept. Bytes on `unhurried`
+    /// ports are nothing that happens.
+    pub(super) fn step(&mut self, until: Time, unhurried: Ports) {
         // What a port says by itself, an adapter's start for one.
         (0..self.ports.len()).for_each(|at| self.note_units(at));
+        let events = self.ports.iter().map(|slot| slot.live.next_event());
+        let until = events.fold(until, Time::min);
+        self.send_sync_ahead(until);
         let Some(lockstep) = &mut self.lockstep else {
             return;
         };
-        let events = self.ports.iter().map(|slot| slot.live.next_event());
-        let next = events.fold(until.min(lockstep.syncs.next()), Time::min);
+        let next = until.min(lockstep.syncs.next());
         let sent = core::mem::take(&mut lockstep.sent);
         let participant = Arc::clone(&lockstep.participant);
         if let Some(cpu) = lockstep.core.changed() {
             participant.on(cpu);
         }
-        let gone = participant.idle(next, sent).and_then(|()| {
+        let gone = participant.idle(next, unhurried, sent).and_then(|()| {
             self.flush_until_answered(&participant);
             participant.go()
         });
@@ -197,7 +212,8 @@ impl Live {
         let live = &mut self.ports[at].live;
         match entry.passed {
             Passed::Units(units) => live.take_in(now, units),
-            Passed::Look | Passed::Control(_) => {
+            Passed::At { units, at } => live.take_in(at, units),
+            Passed::Look | Passed::Control(_) | Passed::Recall => {
                 let seen = live.poll(now, true);
                 self.keep(at, seen);
             }
@@ -233,6 +249,25 @@ impl Live {
         }
     }
 
+    /// A SYNC that comes before anything else of ours leaves now, with the time at which it counts as sent: nobody
+    /// needs to wake then only to send it.
+    fn send_sync_ahead(&mut self, until: Time) {
+        let now = self.known.get();
+        let Some(lockstep) = &mut self.lockstep else {
+            return;
+        };
+        let is_under_way = lockstep.ahead.values().any(|at| *at > now);
+        let next = lockstep.syncs.next();
+        if is_under_way || next <= now || next > until {
+            return;
+        }
+        let due = lockstep.syncs.take(next);
+        lockstep.ahead = due.iter().map(|port| (*port, next)).collect();
+        for port in due {
+            self.send_sync(port, |units| Passed::At { units, at: next });
+        }
+    }
+
     fn send_due_syncs(&mut self) {
         let Some(lockstep) = &mut self.lockstep else {
             return;
@@ -241,15 +276,20 @@ impl Live {
         let now = self.known.get();
         lockstep.syncs.send_due(now, |port, _| due.push(port));
         for port in due {
-            let Some(at) = self.index.get(&port).copied() else {
-                continue;
-            };
-            if let Some(sink) = self.ports[at].live.sync_sink() {
-                // A SYNC that the port cannot take is lost, as on a real bus.
-                let _ = sink.send_sync();
-            }
-            self.note_units(at);
+            self.send_sync(port, Passed::Units);
         }
+    }
+
+    fn send_sync(&mut self, port: Port, passed: impl FnOnce(usize) -> Passed) {
+        let Some(at) = self.index.get(&port).copied() else {
+            return;
+        };
+        self.note_units(at);
+        if let Some(sink) = self.ports[at].live.sync_sink() {
+            // A SYNC that the port cannot take is lost, as on a real bus.
+            let _ = sink.send_sync();
+        }
+        self.note_as(at, passed);
     }
 }
 
@@ -263,7 +303,7 @@ impl Drop for Live {
         if let Some(lockstep) = &self.lockstep
             && !lockstep.sent.is_empty()
         {
-            self.step(now);
+            self.step(now, Ports::NONE);
         }
         if let Some(lockstep) = &self.lockstep {
             for slot in &self.ports {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nix::poll::{PollFd, ppoll};
 use nix::sys::time::TimeSpec;
-use wire::Port;
+use wire::{Port, Ports};
 
 use super::super::clock::Clock;
 use super::super::live_port::LivePort;
@@ -155,7 +155,7 @@ impl Live {
             }
             let next = slot.live.next_event();
             if self.keeps_step() {
-                self.step(next);
+                self.step(next, Ports::NONE);
                 continue;
             }
             let Some(slot) = self.ports.last_mut() else {
