@@ -27,3 +27,4 @@ mod volumetric_line;
 mod volumetric_resume;
 mod volumetric_scatter;
 mod wrong_position;
+mod zero_uncertainty;

@@ -1,0 +1,150 @@
+//! How often the zero lies within the uncertainty that it states, on emulated stages of all sorts: what they
+//! repeat to, how stiff they are, what they lose on a reversal and how noisy their sensors are is drawn.
+//!
+//! `SEEDS=1..400 cargo test -p tests --test systems coverage_of_zeros -- --ignored --nocapture` counts over a
+//! range and prints it; `TELL=1` before it prints each stage.
+
+use mock_bus::plant::DriftLimits;
+use tests::{Bench, Edit, random, seeds};
+use truestage::Failure;
+use truestage::emulated::HallDrift;
+use units::Volts;
+
+/// Power cycles of each stage, each with sensors that drifted anew.
+const CYCLES: u64 = 3;
+const DRIFT: DriftLimits = DriftLimits {
+    offset: Volts(0.1),
+    gain: 0.03,
+    gain_per_m: 0.0,
+};
+
+/// What is drawn of a stage.
+#[derive(Clone, Copy, Debug)]
+struct Drawn {
+    repeatability_nm: f64,
+    bandwidth_hz: f64,
+    lost_motion_um: f64,
+    noise_mv: f64,
+}
+
+impl Drawn {
+    fn new(seed: u64) -> Self {
+        let mut state = seed ^ 0x2E80_0000;
+        let mut over = |low: f64, high: f64| low * (high / low).powf(random(&mut state));
+        Self {
+            repeatability_nm: over(5.0, 1000.0),
+            bandwidth_hz: over(5.0, 200.0),
+            noise_mv: over(0.02, 0.5),
+            lost_motion_um: 20.0 * random(&mut state),
+        }
+    }
+
+    fn bench(&self, seed: u64) -> Bench {
+        let changes = [
+            (
+                "repeatability_nm = 25.0",
+                format!("repeatability_nm = {}", self.repeatability_nm),
+            ),
+            (
+                "servo_bandwidth_hz = 60.0",
+                format!("servo_bandwidth_hz = {}", self.bandwidth_hz),
+            ),
+            (
+                "\nlost_motion_um = 1.0",
+                format!("\nlost_motion_um = {}", self.lost_motion_um),
+            ),
+            ("noise_mv = 0.2", format!("noise_mv = {}", self.noise_mv)),
+        ];
+        let emulated = |text: String| {
+            let one = |text: String, (from, to): &(&str, String)| text.edit_first(from, to);
+            changes.iter().fold(text, one)
+        };
+        let machine = |text: String| {
+            // Stages that repeat to a micrometre are sound here, and soft ones are not hurried.
+            text.edit_first("uncertainty_limit_um = 0.2", "uncertainty_limit_um = 5.0")
+                .edit_first("speed_mm_per_s = 200.0", "speed_mm_per_s = 50.0")
+                .edit_first(
+                    "acceleration_mm_per_s2 = 5000.0",
+                    "acceleration_mm_per_s2 = 500.0",
+                )
+        };
+        Bench::with(seed, machine, emulated)
+    }
+}
+
+/// Where on the scale the zero has come to lie, less where the undrifted curves have their centre; and the
+/// stated uncertainty.
+fn zeroed(bench: &mut Bench) -> Result<(f64, f64), Failure> {
+    let store = bench.store.clone();
+    let zeroed = bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.linear("x")?.zero(&store)
+    })?;
+    let reading = bench.machine.reading("x")?.expect("it was read");
+    let scale = bench.emulated.simulation().truth().scale_position();
+    let off = scale - reading.position;
+    let u = zeroed.estimate.standard_uncertainty;
+    Ok((off.value(), u.value()))
+}
+
+/// off/u of each power cycle of a stage.
+fn judged(seed: u64, drawn: &Drawn) -> Result<Vec<f64>, Failure> {
+    let mut bench = drawn.bench(seed);
+    let mut all = Vec::new();
+    for number in 0..CYCLES {
+        if number > 0 {
+            bench.machine.shut_down()?;
+            bench.power_cycle(HallDrift::random(seed, number, DRIFT));
+            let back = bench.machine.now() + core::time::Duration::from_secs(1);
+            bench.machine.run_until(back)?;
+        }
+        let (off, u) = zeroed(&mut bench)?;
+        all.push(off / u);
+    }
+    if std::env::var("TELL").is_ok() {
+        println!("{seed}: {drawn:?}: {all:.2?}");
+    }
+    Ok(all)
+}
+
+/// How many zeros there are, the share of them within 2u, and the mean square of off/u.
+fn count(seeds: impl Iterator<Item = u64>, drawn: fn(u64) -> Drawn) -> (usize, f64, f64) {
+    let mut all = Vec::new();
+    for seed in seeds {
+        match judged(seed, &drawn(seed)) {
+            Ok(zeros) => all.extend(zeros),
+            Err(failure) => println!("seed {seed} is not judged: {failure}"),
+        }
+    }
+    let zeros = all.len();
+    let within = all.iter().filter(|z| z.abs() <= 2.0).count() as f64 / zeros as f64;
+    let mean_square = all.iter().map(|z| z * z).sum::<f64>() / zeros as f64;
+    println!("{zeros} zeros: {within:.3} within 2u, mean square {mean_square:.3}");
+    (zeros, within, mean_square)
+}
+
+/// A soft servo creeps into its place: what the stage does not repeat shows only in passes that begin when it
+/// has. Of 18 zeros with a right 2u more than four lie beyond it once in 700 times (binomial, 0.05 each).
+#[test]
+fn the_zero_of_a_soft_stage_lies_within_what_it_states() {
+    let soft = |seed| Drawn {
+        bandwidth_hz: 8.0,
+        repeatability_nm: 700.0,
+        ..Drawn::new(seed)
+    };
+    let (zeros, within, _) = count(6_100..6_106, soft);
+    assert_eq!(zeros, 18);
+    assert!(within * 18.0 > 13.5, "{within}");
+}
+
+/// The mean square of a Student's t with four degrees of freedom has no variance: it is printed, not judged.
+#[test]
+#[ignore = "many stages: for whoever wants the rates, over SEEDS=FIRST..LAST"]
+fn coverage_of_zeros() {
+    let (zeros, within, _) = count(seeds("1..400"), Drawn::new);
+    let chance = 3.0 * (0.05 * 0.95 / zeros as f64).sqrt();
+    assert!(
+        (0.93 - chance..=0.975 + chance).contains(&within),
+        "{within}"
+    );
+}
