@@ -6,12 +6,16 @@
 //! compared with random functions of covariance a²·exp(−d²/2ℓ²): for each length ℓ on a grid, from the
 //! distance of the nodes to more than the travel, and each size a. All functions of one axis share their
 //! length, each has a size of its own; both are weighted by their likelihood, the noise of the nodes
-//! included, and averaged in logarithms.
+//! included, and averaged in logarithms: that is how far a function likely is from its curve ([`Extent::Likely`]).
+//! A few nodes hardly tell the size, as a few readings hardly tell a scatter (of Student's t with two degrees
+//! of freedom, one in 10 000 is beyond 100). Whoever refuses something because a function cannot be that far
+//! from its curve needs what it is at most ([`Extent::AtMost`]).
 //!
 //! | symbol | name here |
 //! |---|---|
 //! | a²·(1 − 2wᵀk + wᵀKw): the mean-square error in the middle of an interval, w the node's weights | [`Between::at_middles`] |
 //! | 4t(1 − t) of it elsewhere | [`share`] |
+//! | how alike the errors in the middles of two intervals are, by k − wᵀk′ − w′ᵀk + wᵀKw′ | [`Between::alike`] |
 //!
 //! Absent: functions of two nodes, of which nothing can be said; what repeats within a step, such as the
 //! pitch of a screw or of a scale that is as long as a whole number of steps.
@@ -34,11 +38,22 @@ const LARGEST: f64 = 1e5;
 /// What rounding leaves of a mean-square error.
 const ROUNDING: f64 = 1e-16;
 
+/// Which of all lengths and sizes count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Extent {
+    /// Their mean.
+    Likely,
+    /// The one that this share of all is beyond.
+    AtMost(f64),
+}
+
 /// By block, for the middle of each interval between its nodes, the standard deviation of the function
 /// from its curve, in its SI unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Between {
     pub(super) at_middles: Vec<Vec<f64>>,
+    /// By block, the correlations of these.
+    alike: Vec<DMatrix<f64>>,
 }
 
 /// The share of what there is in the middle of an interval, at `t` of it from 0 to 1.
@@ -48,10 +63,14 @@ fn share(t: f64) -> f64 {
 
 impl Between {
     /// By the values of the functions in `fit`; `shape`: how they are drawn.
-    pub(super) fn of(blocks: &[Block], fit: &Fit, shape: Shape) -> Self {
+    pub(super) fn of(blocks: &[Block], fit: &Fit, shape: Shape, extent: Extent) -> Self {
         let mut at_middles: Vec<Vec<f64>> = blocks
             .iter()
             .map(|it| vec![0.0; it.nodes.len().saturating_sub(1)])
+            .collect();
+        let mut alike: Vec<DMatrix<f64>> = at_middles
+            .iter()
+            .map(|it| DMatrix::identity(it.len(), it.len()))
             .collect();
         for axis in Axis::ALL {
             let own: Vec<usize> = (0..blocks.len())
@@ -61,11 +80,12 @@ impl Between {
                 .into_iter()
                 .filter_map(|at| Some((at, Judged::new(&blocks[at], fit, shape)?)))
                 .collect();
-            for (at, middles) in of_axis(&judged) {
+            for (at, middles, own) in of_axis(&judged, extent) {
                 at_middles[at] = middles;
+                alike[at] = own;
             }
         }
-        Self { at_middles }
+        Self { at_middles, alike }
     }
 
     /// For the middles of the intervals of the block of this number.
@@ -76,17 +96,47 @@ impl Between {
 
     /// At a position, of the block of this number.
     pub(super) fn at(&self, number: usize, block: &Block, position: f64) -> f64 {
+        self.interval(number, block, position).1
+    }
+
+    /// Which interval a position is in, and how far the block of this number may be from its curve there.
+    fn interval(&self, number: usize, block: &Block, position: f64) -> (usize, f64) {
         let nodes = &block.nodes;
         let after = nodes.partition_point(|it| *it <= position);
         let at = after.clamp(1, nodes.len() - 1) - 1;
         let t = (position - nodes[at]) / (nodes[at + 1] - nodes[at]);
         let middles = self.at_middles.get(number);
-        middles.map_or(0.0, |it| it[at] * share(t.clamp(0.0, 1.0)))
+        let u = middles.map_or(0.0, |it| it[at] * share(t.clamp(0.0, 1.0)));
+        (at, u)
+    }
+
+    /// Adds to `covariance`, by reading, what all of them share of the block of this number: `read` is where
+    /// each was read and what it sees of the block there.
+    pub(super) fn add_shared(
+        &self,
+        number: usize,
+        block: &Block,
+        read: &[(f64, f64)],
+        covariance: &mut DMatrix<f64>,
+    ) {
+        let Some(alike) = self.alike.get(number) else {
+            return;
+        };
+        let each = read.iter().enumerate().map(|(reading, (position, seen))| {
+            let (interval, u) = self.interval(number, block, *position);
+            (reading, interval, seen * u)
+        });
+        let each: Vec<(usize, usize, f64)> = each.filter(|it| it.2 != 0.0).collect();
+        for (i, of_i, a) in &each {
+            for (j, of_j, b) in &each {
+                covariance[(*i, *j)] += a * b * alike[(*of_i, *of_j)];
+            }
+        }
     }
 }
 
 /// All lengths, weighted by what all functions of the axis say of them.
-fn of_axis(judged: &[(usize, Judged)]) -> Vec<(usize, Vec<f64>)> {
+fn of_axis(judged: &[(usize, Judged)], extent: Extent) -> Vec<(usize, Vec<f64>, DMatrix<f64>)> {
     let step = judged
         .iter()
         .map(|it| it.1.step)
@@ -94,29 +144,70 @@ fn of_axis(judged: &[(usize, Judged)]) -> Vec<(usize, Vec<f64>)> {
     let span = judged.iter().map(|it| it.1.span).fold(0.0, f64::max);
     let longest = (LONGEST * span).max(2.0 * step);
     let lengths = logarithmic(step, longest, LENGTHS);
-    let each: Vec<Vec<(f64, Vec<f64>)>> = lengths
+    let each: Vec<Vec<ByLength>> = lengths
         .iter()
         .map(|length| judged.iter().map(|it| it.1.by_length(*length)).collect())
         .collect();
     let likelihoods: Vec<f64> = each
         .iter()
-        .map(|all| all.iter().map(|it| it.0).sum())
+        .map(|all| all.iter().map(|it| it.likelihood).sum())
         .collect();
     let weights = normalised(&likelihoods);
-    let mean = |number: usize| {
-        let intervals = each[0][number].1.len();
-        let log = |at: usize| {
-            let terms = each.iter().zip(&weights);
-            terms
-                .map(|(all, weight)| weight * all[number].1[at])
-                .sum::<f64>()
+    let middles = |number: usize| {
+        let intervals = each[0][number].squares.len();
+        let own = |at: usize| {
+            let of_length = |(all, weight): (&Vec<ByLength>, &f64)| {
+                let it = &all[number];
+                let square = it.squares[at];
+                let sizes = it.sizes.clone().into_iter();
+                let weight = *weight;
+                sizes.map(move |(size, own)| (size + square, weight * own))
+            };
+            each.iter().zip(&weights).flat_map(of_length).collect()
         };
-        (0..intervals).map(|at| exp(0.5 * log(at))).collect()
+        (0..intervals)
+            .map(|at| exp(0.5 * extent.of(own(at))))
+            .collect()
+    };
+    let alike = |number: usize| {
+        let terms = lengths.iter().zip(&weights);
+        let first = &judged[number].1;
+        let nothing = DMatrix::zeros(first.middles.len(), first.middles.len());
+        terms.fold(nothing, |sum, (length, weight)| {
+            sum + first.alike(*length) * *weight
+        })
     };
     let numbered = judged.iter().enumerate();
     numbered
-        .map(|(number, (at, _))| (*at, mean(number)))
+        .map(|(number, (at, _))| (*at, middles(number), alike(number)))
         .collect()
+}
+
+impl Extent {
+    /// Of values with their weights.
+    fn of(self, mut all: Vec<(f64, f64)>) -> f64 {
+        let Self::AtMost(beyond) = self else {
+            return all.iter().map(|(value, weight)| value * weight).sum();
+        };
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut left = beyond;
+        let is_beyond = |(_, weight): &&(f64, f64)| {
+            left -= weight;
+            left > 0.0
+        };
+        let skipped = all.iter().take_while(is_beyond).count();
+        all[skipped.min(all.len() - 1)].0
+    }
+}
+
+/// What a function says of one length.
+struct ByLength {
+    /// The logarithm of the length's likelihood.
+    likelihood: f64,
+    /// Of each size the logarithm of its square, and its weight.
+    sizes: Vec<(f64, f64)>,
+    /// For each interval the logarithm of the mean-square error in its middle in units of the size's square.
+    squares: Vec<f64>,
 }
 
 /// One function, made ready to be compared with random ones.
@@ -171,9 +262,7 @@ impl Judged {
         })
     }
 
-    /// The logarithm of the likelihood of this length, and for each interval that of the mean-square
-    /// error.
-    fn by_length(&self, length: f64) -> (f64, Vec<f64>) {
+    fn by_length(&self, length: f64) -> ByLength {
         let count = self.nodes.len();
         let alike = |a: f64, b: f64| {
             let d = (a - b) / length;
@@ -183,17 +272,50 @@ impl Judged {
         let turned = &self.whitening * &self.contrasts;
         let eigen = SymmetricEigen::new(&turned * &between * turned.transpose());
         let seen = eigen.eigenvectors.transpose() * (&self.whitening * &self.values);
-        let (likelihood, size) = self.sizes(&eigen.eigenvalues, &seen);
+        let (likelihood, sizes) = self.sizes(&eigen.eigenvalues, &seen);
         let of_middle = |(at, weights): &(f64, DVector<f64>)| {
             let near = DVector::from_fn(count, |i, _| alike(*at, self.nodes[i]));
             let square = 1.0 - 2.0 * weights.dot(&near) + weights.dot(&(&between * weights));
-            size + ln(square.max(ROUNDING))
+            ln(square.max(ROUNDING))
         };
-        (likelihood, self.middles.iter().map(of_middle).collect())
+        ByLength {
+            likelihood,
+            sizes,
+            squares: self.middles.iter().map(of_middle).collect(),
+        }
     }
 
-    /// The logarithms of the likelihood over all sizes, and of the size squared.
-    fn sizes(&self, powers: &DVector<f64>, seen: &DVector<f64>) -> (f64, f64) {
+    /// The correlations of how far the function is from its curve in the middles of two intervals, for this
+    /// length.
+    fn alike(&self, length: f64) -> DMatrix<f64> {
+        let near = |a: f64, b: f64| {
+            let d = (a - b) / length;
+            exp(-0.5 * d * d)
+        };
+        let (nodes, middles) = (self.nodes.len(), self.middles.len());
+        let between = DMatrix::from_fn(nodes, nodes, |i, j| near(self.nodes[i], self.nodes[j]));
+        let to_nodes = DMatrix::from_fn(middles, nodes, |m, i| {
+            near(self.middles[m].0, self.nodes[i])
+        });
+        let weights = DMatrix::from_fn(middles, nodes, |m, i| self.middles[m].1[i]);
+        let own = DMatrix::from_fn(middles, middles, |m, n| {
+            near(self.middles[m].0, self.middles[n].0)
+        });
+        let crossed = &weights * to_nodes.transpose();
+        let error = own - &crossed - crossed.transpose() + &weights * between * weights.transpose();
+        let size: Vec<f64> = error
+            .diagonal()
+            .iter()
+            .map(|it| it.max(ROUNDING).sqrt())
+            .collect();
+        DMatrix::from_fn(middles, middles, |m, n| {
+            let own = error[(m, n)] / (size[m] * size[n]);
+            if m == n { 1.0 } else { own.clamp(-1.0, 1.0) }
+        })
+    }
+
+    /// The logarithm of the likelihood over all sizes, and of each size that of its square, with its weight.
+    fn sizes(&self, powers: &DVector<f64>, seen: &DVector<f64>) -> (f64, Vec<(f64, f64)>) {
         let rms = (self.values.norm_squared() / self.values.len() as f64).sqrt();
         let sizes = logarithmic(SMALLEST, LARGEST, SIZES);
         let sizes: Vec<f64> = sizes
@@ -215,9 +337,8 @@ impl Judged {
             .fold(f64::NEG_INFINITY, f64::max);
         let mean = likelihoods.iter().map(|it| exp(it - most)).sum::<f64>() / SIZES as f64;
         let weights = normalised(&likelihoods);
-        let logs = sizes.iter().zip(&weights);
-        let log = logs.map(|(size, weight)| weight * 2.0 * ln(*size)).sum();
-        (most + ln(mean), log)
+        let squares = sizes.iter().map(|size| 2.0 * ln(*size)).zip(weights);
+        (most + ln(mean), squares.collect())
     }
 }
 

@@ -1,11 +1,13 @@
 //! From readings to the rows of a linear problem.
 
+use nalgebra::DMatrix;
 use units::Metres;
 
-use super::between::Between;
+use super::between::{Between, Extent};
 use super::block::{Block, axis_of, block};
 use super::effect::{Effect, lever, seen, u_of};
 use super::thermal::ThermalPlan;
+use super::whiten::Whitening;
 use super::{Axis, IdentifyError, Observation, Plan, Reading, Unknown};
 use crate::least_squares::{self, Fit};
 use crate::volumetric::Point;
@@ -21,12 +23,11 @@ pub(super) struct Design {
     pub(super) blocks: Vec<Block>,
     /// What each column belongs to.
     pub(super) unknowns: Vec<Unknown>,
-    /// Rows divided by their reading's standard uncertainty.
+    /// Rows divided by their reading's standard uncertainty, made independent of each other.
     pub(super) rows: Vec<f64>,
     pub(super) values: Vec<f64>,
-    /// By reading: its standard uncertainty, in its SI unit, with how far the functions may be from their
-    /// curves where it was read.
-    pub(super) u: Vec<f64>,
+    /// By what they were divided and made independent.
+    pub(super) whitening: Whitening,
     /// How far that is.
     pub(super) between: Between,
 }
@@ -43,7 +44,7 @@ impl Design {
             unknowns,
             rows: Vec::new(),
             values: Vec::new(),
-            u: Vec::new(),
+            whitening: Whitening::default(),
             between: Between::default(),
         };
         let mut starts: Vec<Option<Point>> = vec![None; plan.runs.len()];
@@ -130,7 +131,7 @@ impl Design {
         self.rows
             .extend(errors.iter().copied().chain(open).map(|it| it / u));
         self.values.push(value / u);
-        self.u.push(u);
+        self.whitening.push(u);
     }
 
     /// Weighted with what the functions do between their nodes, which is told by a first fit; `wrong`:
@@ -140,6 +141,7 @@ impl Design {
         plan: &Plan,
         observations: &[Observation],
         wrong: &[Vec<f64>],
+        extent: Extent,
     ) -> Result<Self, IdentifyError> {
         let columns = self.columns();
         let rows = self.rows.chunks_exact(columns).enumerate();
@@ -151,31 +153,43 @@ impl Design {
             })
             .collect();
         let fit = least_squares::solve(&rows, columns + wrong.len(), &self.values)?;
-        Ok(self.between(plan, observations, &fit))
+        Ok(self.between(plan, observations, &fit, extent))
     }
 
     /// Likewise, told by a fit of these and any other unknowns.
-    pub(super) fn between(mut self, plan: &Plan, observations: &[Observation], fit: &Fit) -> Self {
+    pub(super) fn between(
+        mut self,
+        plan: &Plan,
+        observations: &[Observation],
+        fit: &Fit,
+        extent: Extent,
+    ) -> Self {
         let columns = self.columns();
-        self.between = Between::of(&self.blocks, fit, plan.shape);
-        for (at, it) in observations.iter().enumerate() {
-            let square = between_square(
-                plan,
-                &self.blocks,
-                &self.between,
-                it.at,
-                it.tool,
-                |effect| seen(it.reading, effect),
-            );
-            let u = u_of(it.reading);
-            let whole = (u * u + square).sqrt();
-            let share = self.u[at] / whole;
-            self.u[at] = whole;
-            self.values[at] *= share;
-            let row = &mut self.rows[at * columns..(at + 1) * columns];
-            row.iter_mut().for_each(|it| *it *= share);
-        }
+        self.between = Between::of(&self.blocks, fit, plan.shape, extent);
+        let shared = self.shared(plan, observations);
+        self.whitening.share(shared);
+        self.whitening.whiten(&mut self.rows, columns);
+        self.whitening.whiten(&mut self.values, 1);
         self
+    }
+
+    /// The covariance of what the functions do between their nodes, as the readings see it in units of their
+    /// own uncertainties.
+    fn shared(&self, plan: &Plan, observations: &[Observation]) -> DMatrix<f64> {
+        let count = observations.len();
+        let mut covariance = DMatrix::zeros(count, count);
+        for (number, block) in self.blocks.iter().enumerate() {
+            let read = observations.iter().zip(self.whitening.own());
+            let read = read.map(|(it, u)| {
+                let effect = effect_of(plan, block.name, it.at, it.tool);
+                let position = it.at.along(axis_of(block.name)).value();
+                (position, seen(it.reading, &effect) / u)
+            });
+            let read: Vec<(f64, f64)> = read.collect();
+            let between = &self.between;
+            between.add_shared(number, block, &read, &mut covariance);
+        }
+        covariance
     }
 }
 

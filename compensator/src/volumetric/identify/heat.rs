@@ -22,8 +22,8 @@ pub(super) fn add_heat(
         for thermometer in 0..plan.thermal.references.len() {
             let mut above = vec![0.0; plan.thermal.references.len()];
             above[thermometer] = u;
-            // A's transpose times what the readings would then seem to be off.
-            let mut pull = vec![0.0; all];
+            // What the readings would then seem to be off.
+            let mut off = vec![0.0; observations.len()];
             let own = observations.iter().enumerate();
             for (index, it) in own.filter(|(_, it)| it.run == run) {
                 let per_kelvin =
@@ -31,10 +31,14 @@ pub(super) fn add_heat(
                         seen(it.reading, effect)
                     });
                 let terms = per_kelvin[first..].iter().zip(&fit.coefficients[first..]);
-                let off: f64 = terms.map(|(a, b)| a * b).sum();
-                let row = &design.rows[index * all..(index + 1) * all];
+                off[index] = terms.map(|(a, b)| a * b).sum();
+            }
+            // A's transpose times that.
+            let mut pull = vec![0.0; all];
+            let off = design.whitening.of_column(&off);
+            for (row, off) in design.rows.chunks_exact(all).zip(&off) {
                 for (sum, part) in pull.iter_mut().zip(row) {
-                    *sum += part * off / design.u[index];
+                    *sum += part * off;
                 }
             }
             let moved: Vec<f64> = (0..count)

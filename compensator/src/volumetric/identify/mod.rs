@@ -53,11 +53,13 @@ mod solve;
 mod standard;
 mod straightness;
 mod thermal;
+mod whiten;
 
 use core::fmt;
 
 use units::{Metres, Quantity, Radians};
 
+use between::Extent;
 pub use cause::{Cause, Causes, Circumstance, Doubt, Explanation, Suspect, Trial, suspects};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
@@ -376,8 +378,14 @@ impl Plan {
         if !unseen.is_complete() {
             return Err(IdentifyError::Unobservable { unseen });
         }
-        let design = design.with_between(self, observations, &[])?;
-        solve::solve(self, &design, observations)
+        let with = |extent| design.clone().with_between(self, observations, &[], extent);
+        let mut found = solve::solve(self, &with(Extent::Likely)?, observations)?;
+        if found.scattered(observations).is_some() {
+            // A few nodes hardly tell how far a function can be from its curve: that must not explain it.
+            let at_most = with(Extent::AtMost(GROSS_FALSE_ALARMS))?;
+            found.ratio_at_least = solve::solve(self, &at_most, observations)?.birge_ratio;
+        }
+        Ok(found)
     }
 
     /// Looks for gross errors in `observations`, from which all that is planned can be identified.
@@ -395,10 +403,18 @@ impl Plan {
         let wrong: Vec<Vec<f64>> = first
             .found
             .iter()
-            .map(|it| design.column_of(it, observations))
+            .map(|it| design.whitening.of_column(&it.column(observations)))
             .collect();
-        let design = design.with_between(self, observations, &wrong)?;
-        Ok(snoop::snoop(&design, observations, GROSS_FALSE_ALARMS))
+        let with = |extent| {
+            design
+                .clone()
+                .with_between(self, observations, &wrong, extent)
+        };
+        // A few nodes hardly tell how far a function can be from its curve: it must be wrong whatever that is.
+        let at_most = with(Extent::AtMost(GROSS_FALSE_ALARMS))?;
+        let found = snoop::snoop(&at_most, observations, GROSS_FALSE_ALARMS).found;
+        let likely = with(Extent::Likely)?;
+        Ok(snoop::without(&likely, observations, found))
     }
 }
 

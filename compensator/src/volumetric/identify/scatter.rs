@@ -68,11 +68,12 @@ pub fn scatter_limit(degrees_of_freedom: usize) -> f64 {
 
 impl Identified {
     /// What is wrong with `observations`, which this was found from, where they scatter too much;
-    /// `None` when they do not, or when none is spare.
+    /// `None` when they do not, or when none is spare. What the functions may at most do between their nodes
+    /// must not explain it.
     pub fn scattered(&self, observations: &[Observation]) -> Option<Scattered> {
         let seen = self.scatter(observations)?;
         // A comparison with NaN is false, so that it is refused too.
-        let is_sound = seen.ratio <= seen.limit;
+        let is_sound = self.ratio_at_least? <= seen.limit;
         (!is_sound).then_some(seen)
     }
 

@@ -60,14 +60,6 @@ impl GrossKind {
     }
 }
 
-impl Design {
-    /// The weighted column of what is off by one unit.
-    pub(super) fn column_of(&self, gross: &Gross, observations: &[Observation]) -> Vec<f64> {
-        let column = gross.column(observations).into_iter().zip(&self.u);
-        column.map(|(it, u)| it / u).collect()
-    }
-}
-
 impl Gross {
     /// By reading, whether it is off.
     pub(super) fn column(&self, observations: &[Observation]) -> Vec<f64> {
@@ -141,13 +133,48 @@ impl Explained {
     }
 }
 
+/// A change of some readings, as the adjustment sees it.
+#[derive(Clone, Debug, Default)]
+struct Shift {
+    whole: Vec<f64>,
+    /// Of it, what the unknowns take up.
+    known: Vec<f64>,
+    /// cᵀv
+    product: f64,
+}
+
+impl Shift {
+    fn add(&mut self, other: &Self) {
+        self.whole.resize(other.whole.len(), 0.0);
+        self.known.resize(other.known.len(), 0.0);
+        add(&mut self.whole, &other.whole);
+        add(&mut self.known, &other.known);
+        self.product += other.product;
+    }
+
+    /// `None` where the readings hardly see it.
+    fn explained(&self, rival: Rival) -> Option<Explained> {
+        let square: f64 = self.whole.iter().map(|it| it * it).sum();
+        let seen = square - self.known.iter().map(|it| it * it).sum::<f64>();
+        (seen > SEEN_MIN * square).then_some(Explained {
+            rival,
+            product: self.product,
+            seen,
+        })
+    }
+}
+
+fn add(sum: &mut [f64], other: &[f64]) {
+    sum.iter_mut().zip(other).for_each(|(to, it)| *to += it);
+}
+
 /// The adjustment as it stands.
 struct Adjusted {
     /// Orthonormal columns that span what the unknowns can explain, by reading.
     explained: Vec<Vec<f64>>,
     residuals: Vec<f64>,
-    /// 1/u of each reading.
-    weights: Vec<f64>,
+    /// By reading, what one SI unit of it is among the residuals.
+    units: Vec<Vec<f64>>,
     /// By run, its readings.
     runs: Vec<(usize, Vec<usize>)>,
     freedom: usize,
@@ -164,15 +191,23 @@ pub(super) fn snoop(design: &Design, observations: &[Observation], false_alarms:
         let Some((gross, best)) = adjusted.judge(observations, false_alarms) else {
             break;
         };
-        adjusted.take_out(&best);
+        adjusted.take_out(best.rival);
         found.push(gross);
     }
-    let freedom = adjusted.freedom;
-    Snooped {
-        found,
-        ratio_left: (freedom > 0).then(|| (adjusted.squares() / freedom as f64).sqrt()),
-        degrees_of_freedom: freedom,
+    adjusted.left(found)
+}
+
+/// What is left of the readings without those that were found to be wrong.
+pub(super) fn without(design: &Design, observations: &[Observation], found: Vec<Gross>) -> Snooped {
+    if design.values.len() <= design.columns() {
+        return Snooped::default();
     }
+    let mut adjusted = Adjusted::new(design, observations);
+    for it in &found {
+        let (kind, index, run) = (it.kind, it.index, it.run);
+        adjusted.take_out(Rival { kind, index, run });
+    }
+    adjusted.left(found)
 }
 
 impl Adjusted {
@@ -199,10 +234,20 @@ impl Adjusted {
         }
         Self {
             freedom: residuals.len().saturating_sub(columns),
-            weights: design.u.iter().map(|u| 1.0 / u).collect(),
+            units: design.whitening.of_each(),
             explained,
             residuals,
             runs,
+        }
+    }
+
+    /// With `found` taken out already.
+    fn left(&self, found: Vec<Gross>) -> Snooped {
+        let freedom = self.freedom;
+        Snooped {
+            found,
+            ratio_left: (freedom > 0).then(|| (self.squares() / freedom as f64).sqrt()),
+            degrees_of_freedom: freedom,
         }
     }
 
@@ -271,50 +316,56 @@ impl Adjusted {
     }
 
     fn hypotheses(&self) -> Vec<Explained> {
+        let each: Vec<Shift> = self.units.iter().map(|it| self.shift(it)).collect();
         let mut all = Vec::new();
         for (run, own) in &self.runs {
-            let readings = own.iter().filter_map(|index| {
-                self.explained_by(GrossKind::Reading, *run, core::slice::from_ref(index))
-            });
-            all.extend(readings);
+            let rival = |kind, index| Rival {
+                kind,
+                index,
+                run: *run,
+            };
+            let readings = own
+                .iter()
+                .map(|index| each[*index].explained(rival(GrossKind::Reading, *index)));
+            all.extend(readings.flatten());
             // One that leaves a single reading on either side is that reading's.
             let steps = 2..own.len().saturating_sub(1);
-            all.extend(steps.filter_map(|at| self.explained_by(GrossKind::Slip, *run, &own[at..])));
+            let mut together = Shift::default();
+            for at in (steps.start..own.len()).rev() {
+                together.add(&each[own[at]]);
+                if steps.contains(&at) {
+                    all.extend(together.explained(rival(GrossKind::Slip, own[at])));
+                }
+            }
         }
         all
     }
 
-    /// What a common change of `shifted`, in SI units, explains.
-    fn explained_by(&self, kind: GrossKind, run: usize, shifted: &[usize]) -> Option<Explained> {
-        let first = *shifted.first()?;
-        let columns = self.explained[first].len();
-        let mut known = vec![0.0; columns];
-        let (mut square, mut product) = (0.0, 0.0);
-        for index in shifted {
-            let weight = self.weights[*index];
-            square += weight * weight;
-            product += weight * self.residuals[*index];
-            for (sum, q) in known.iter_mut().zip(&self.explained[*index]) {
-                *sum += weight * q;
+    /// What a change of these readings, by one SI unit each, is in the adjustment.
+    fn shift(&self, unit: &[f64]) -> Shift {
+        let first = unit.iter().position(|it| *it != 0.0).unwrap_or(0);
+        let mut known = vec![0.0; self.explained[first].len()];
+        let mut product = 0.0;
+        for (at, it) in unit.iter().enumerate().filter(|(_, it)| **it != 0.0) {
+            product += it * self.residuals[at];
+            for (sum, q) in known.iter_mut().zip(&self.explained[at]) {
+                *sum += it * q;
             }
         }
-        let seen = square - known.iter().map(|it| it * it).sum::<f64>();
-        let index = first;
-        (seen > SEEN_MIN * square).then_some(Explained {
-            rival: Rival { kind, index, run },
+        Shift {
+            whole: unit.to_vec(),
+            known,
             product,
-            seen,
-        })
+        }
     }
 
     /// Makes its parameter an unknown.
-    fn take_out(&mut self, best: &Explained) {
-        let Rival { kind, index, run } = best.rival;
+    fn take_out(&mut self, Rival { kind, index, run }: Rival) {
         let shifted = self.runs.iter().filter(|it| it.0 == run);
         let shifted = shifted.flat_map(|(_, own)| own.iter().copied());
         let mut column = vec![0.0; self.residuals.len()];
         for at in shifted.filter(|it| kind.concerns(*it, index)) {
-            column[at] = self.weights[at];
+            add(&mut column, &self.units[at]);
         }
         // Twice, so that rounding leaves nothing of what is explained already.
         for _ in 0..2 {

@@ -38,7 +38,8 @@ pub struct Identified {
     plan: Plan,
     blocks: Vec<Block>,
     between: Between,
-    /// By reading: its standard uncertainty with how far the functions may be from their curves there.
+    /// By reading: its standard uncertainty with how far the functions may be from their curves there, given
+    /// what all others say of that.
     pub(super) u: Vec<f64>,
     /// The functions, in the order of the plan.
     pub functions: Vec<IdentifiedFunction>,
@@ -53,6 +54,9 @@ pub struct Identified {
     /// Scatter of the readings in units of their uncertainty; 1 when these are right, `None`
     /// without spare readings.
     pub birge_ratio: Option<f64>,
+    /// The same were the functions as far from their curves between the nodes as they can be; told where the
+    /// likely scatter is beyond its limit.
+    pub(super) ratio_at_least: Option<f64>,
     /// Reading − model of each reading, in units of its uncertainty.
     pub residuals: Vec<f64>,
     /// How much of an error of each reading is left in its own residual: 1 when all of it is, 0
@@ -143,6 +147,7 @@ pub(super) fn solve(
         .map(|at| fit.cofactor[at / count * all + at % count] * enlarged * enlarged)
         .collect();
     add_heat(plan, design, observations, &fit, &mut covariance);
+    let alone = alone(design, &fit);
     let found = design.blocks.iter().enumerate().map(|(number, block)| {
         let mut gradient = vec![0.0; count];
         let (mut values, mut u) = (Vec::new(), Vec::new());
@@ -177,23 +182,49 @@ pub(super) fn solve(
         functions: found.collect(),
         blocks: design.blocks.clone(),
         between: design.between.clone(),
-        u: design.u.clone(),
+        u: alone.iter().map(|it| it.u).collect(),
         squareness: squareness(plan, &|at| known(functions + at)),
         expansions,
         bends,
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio,
-        redundancies: redundancies(design, &fit),
-        residuals: fit.residuals,
+        ratio_at_least: birge_ratio,
+        redundancies: alone.iter().map(|it| it.redundancy).collect(),
+        residuals: alone.iter().map(|it| it.residual).collect(),
         covariance,
     })
 }
 
-/// One less what each reading has to say of its own model value.
-fn redundancies(design: &Design, fit: &Fit) -> Vec<f64> {
-    let rows = design.rows.chunks_exact(design.columns());
-    rows.map(|row| (1.0 - fit.variance(row, 1.0)).clamp(0.0, 1.0))
-        .collect()
+/// A reading by itself, given what the others say of the errors that it shares with them.
+struct Alone {
+    /// Its standard uncertainty, in its SI unit.
+    u: f64,
+    /// Reading − model in units of that.
+    residual: f64,
+    /// One less what it has to say of its own model value.
+    redundancy: f64,
+}
+
+fn alone(design: &Design, fit: &Fit) -> Vec<Alone> {
+    let columns = design.columns();
+    let of_one = |column: Vec<f64>| {
+        let (mut square, mut product) = (0.0, 0.0);
+        let mut pull = vec![0.0; columns];
+        let rows = design.rows.chunks_exact(columns);
+        let seen = column.iter().zip(rows).zip(&fit.residuals);
+        for ((it, row), residual) in seen.filter(|((it, _), _)| **it != 0.0) {
+            square += it * it;
+            product += it * residual;
+            let pairs = pull.iter_mut().zip(row);
+            pairs.for_each(|(sum, part)| *sum += it * part);
+        }
+        Alone {
+            u: 1.0 / square.sqrt(),
+            residual: product / square.sqrt(),
+            redundancy: (1.0 - fit.variance(&pull, 1.0) / square).clamp(0.0, 1.0),
+        }
+    };
+    design.whitening.of_each().into_iter().map(of_one).collect()
 }
 
 /// By `known` of their number: value and standard uncertainty.

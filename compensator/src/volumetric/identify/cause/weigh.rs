@@ -4,6 +4,7 @@
 use units::portable::ln;
 
 use crate::least_squares::{self, Fit, LeastSquaresError};
+use crate::volumetric::identify::between::Extent;
 use crate::volumetric::identify::design::Design;
 use crate::volumetric::identify::scatter::scatter_limit;
 use crate::volumetric::identify::{IdentifyError, Observation, Plan};
@@ -24,7 +25,7 @@ pub(super) enum Weights {
 pub(super) struct Weighed {
     pub(super) design: Design,
     pub(super) fit: Fit,
-    /// Σ ln u², of what the functions do between their nodes with the readings' own uncertainty: a wrong
+    /// Σ ln u² (where readings share something, of what is independent), of what the functions do between their nodes with the readings' own uncertainty: a wrong
     /// model makes the functions rough, and must not gain by what that adds to the uncertainty.
     logarithms: f64,
 }
@@ -41,10 +42,10 @@ impl Weighed {
         let mut design = Design::new(plan, observations)?;
         let mut fit = solve(&design, extra)?;
         if weights == Weights::BetweenNodes {
-            design = design.between(plan, observations, &fit);
+            design = design.between(plan, observations, &fit, Extent::Likely);
             fit = solve(&design, extra)?;
         }
-        let logarithms = design.u.iter().map(|u| 2.0 * ln(*u)).sum();
+        let logarithms = design.whitening.logarithms();
         Ok(Self {
             design,
             fit,
@@ -89,7 +90,7 @@ impl Weighed {
     pub(super) fn gain(&self, basis: &[Vec<f64>], extra: &[Vec<f64>]) -> f64 {
         let mut own: Vec<Vec<f64>> = Vec::new();
         for column in extra {
-            let mut column = weighted(column, &self.design.u);
+            let mut column = self.design.whitening.of_column(column);
             let whole = squares(&column);
             leave_out(basis, &mut column);
             for before in &own {
@@ -108,13 +109,10 @@ impl Weighed {
     }
 }
 
-fn weighted(column: &[f64], u: &[f64]) -> Vec<f64> {
-    column.iter().zip(u).map(|(it, u)| it / u).collect()
-}
-
 fn solve(design: &Design, extra: &[Vec<f64>]) -> Result<Fit, LeastSquaresError> {
     let columns = design.columns();
-    let extra: Vec<Vec<f64>> = extra.iter().map(|it| weighted(it, &design.u)).collect();
+    let whitening = &design.whitening;
+    let extra: Vec<Vec<f64>> = extra.iter().map(|it| whitening.of_column(it)).collect();
     let rows = design.rows.chunks_exact(columns).enumerate();
     let rows: Vec<f64> = rows
         .flat_map(|(at, row)| {
