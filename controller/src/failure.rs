@@ -209,6 +209,25 @@ pub enum Failure {
         /// The target after it.
         to: Metres,
     },
+    /// The interferometer's count slipped after its datum was set and before the first reading.
+    #[error(
+        "axis {axis}: run {run}, between the datum and the first reading the instrument jumped by {:.3} µm, \
+         {counts} {}: {}; what it reads at the datum's place is off by that from the first reading to the end of \
+         the run. Set a new datum and measure again",
+        jump.um(), of.name, of.slipped
+    )]
+    DatumSlip {
+        /// Which axis.
+        axis: String,
+        /// By how much.
+        jump: Metres,
+        /// The same, counted.
+        counts: i64,
+        /// What its counter counts.
+        of: Count,
+        /// In which run it was noticed.
+        run: u32,
+    },
     /// With its calibration the axis is worse than without; it is not used any more.
     #[error(
         "axis {axis}: CALIBRATION {calibration} MAKES THE AXIS WORSE: systematic deviation \

@@ -154,7 +154,7 @@ fn an_interferometer_that_restarts_has_no_datum_any_more() {
 }
 
 #[track_caller]
-fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) {
+fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) -> Played {
     let fault = Fault::FringeJump { half_wavelengths };
     // In the few targets of this scene, 30 nm would hide one slip in seventy.
     let scene = Scene::during(Phase::Calibrate)
@@ -163,13 +163,20 @@ fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) {
         .seed(seed)
         .fault(fault);
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::FringeJump { .. }),
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::FringeJump { .. } | Failure::DatumSlip { .. }
+            )
+        },
         words: &["axis x", "half wavelengths", "fringes"],
         within: WHOLE,
         rest: WHOLE,
     };
     let played = check(scene, &wanted);
-    let Err(Failure::FringeJump { counts: seen, .. }) = &played.result else {
+    let Err(Failure::FringeJump { counts: seen, .. } | Failure::DatumSlip { counts: seen, .. }) =
+        &played.result
+    else {
         unreachable!("checked above")
     };
     // The stage's own deviation from point to point blurs a large jump by some counts.
@@ -179,6 +186,7 @@ fn check_jump(half_wavelengths: i64, after_ms: u64, seed: u64) {
         "{seen} instead of {half_wavelengths}"
     );
     assert_eq!(played.bench.store.active("x").unwrap().current, None);
+    played
 }
 
 #[test]
@@ -201,6 +209,22 @@ fn a_fringe_count_that_slips_is_recognised_whenever_it_does() {
         println!("after {after_ms} ms");
         check_jump(-1, after_ms, after_ms % 7);
     }
+}
+
+/// Four half wavelengths are more than the closure may be.
+#[test]
+fn a_count_that_slips_between_the_datum_and_the_first_reading_is_no_closure_that_does_not_fit() {
+    let mut before_the_first = 0;
+    for after_ms in (DATUM_IS_SET_MS..4000).step_by(140) {
+        println!("after {after_ms} ms");
+        let played = check_jump(4, after_ms, after_ms % 5);
+        let is_before = matches!(played.result, Err(Failure::DatumSlip { .. }));
+        before_the_first += u32::from(is_before);
+    }
+    assert!(
+        before_the_first >= 1,
+        "none slipped before the first reading"
+    );
 }
 
 #[test]

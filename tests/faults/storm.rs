@@ -83,6 +83,7 @@ fn optics(failure: &Failure) -> bool {
             } | machine::Failure::Device { .. }
                 | machine::Failure::Overdue { .. }
         ) | Failure::FringeJump { .. }
+            | Failure::DatumSlip { .. }
             | Failure::ScaleMismatch { .. }
             | Failure::Closure { .. }
             | Failure::Fit { .. }

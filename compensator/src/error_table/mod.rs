@@ -21,6 +21,7 @@
 
 mod compensation;
 mod curve;
+mod datum_slip;
 mod fit;
 mod outliers;
 mod robust;
@@ -35,6 +36,7 @@ pub use crate::interpolation::Interpolation;
 pub(crate) use curve::Curve;
 
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
+pub use datum_slip::{Shifts, slip_at_start};
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, Repeats, RunDrift, analyse, fit};
 pub use robust::{MeasuredPoint, Robust};
 pub use series::{LinearFault, LinearSeries, Measurement, SeriesError};

@@ -37,7 +37,7 @@ pub const SLIP_FALSE_ALARMS: f64 = 5e-5;
 const READINGS: usize = 2;
 
 /// So many standard uncertainties a step may be from a whole number of counts.
-const COVERAGE: f64 = 4.0;
+pub(super) const COVERAGE: f64 = 4.0;
 
 /// The share of slips that are passed over because some readings scatter more by chance.
 const UNLIKE: f64 = 1e-4;
@@ -48,7 +48,7 @@ const UNLIKE: f64 = 1e-4;
 const LOST_MOTION: f64 = 1e-2;
 
 /// How well the length of a count is known: it changes with the air by 3e-4.
-const COUNT_LENGTH: f64 = 1e-3;
+pub(super) const COUNT_LENGTH: f64 = 1e-3;
 
 /// Of fewer readings nothing can be said.
 const READINGS_MIN: usize = 8;

@@ -58,6 +58,7 @@ impl Failure {
             | Self::ScaleMismatch { .. } => 3,
             Self::Open(_)
             | Self::FringeJump { .. }
+            | Self::DatumSlip { .. }
             | Self::InputNotSeen { .. }
             | Self::Search { .. }
             | Self::NoLines { .. }

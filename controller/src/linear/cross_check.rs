@@ -7,7 +7,7 @@
 //! repeats to tens of nanometres, while a counter that has slipped stays slipped by a whole
 //! number of half wavelengths.
 
-use compensator::error_table::{Change, Slip, find_slip};
+use compensator::error_table::{Change, Shifts, Slip, find_slip, slip_at_start};
 use units::{Approach, Metres};
 
 use crate::config::Count;
@@ -82,6 +82,36 @@ impl WholeRun {
             start_m: self.start.forward_m,
             closure_m: self.end.forward_m,
         }
+    }
+}
+
+/// A target no further from the datum is at its place.
+const AT_THE_DATUM_M: f64 = 1e-9;
+
+impl WholeRun {
+    /// What the datum's place reads more than before the run, with the first reading, where the run begins and
+    /// ends there.
+    fn shifts(&self) -> Option<(Shifts, &PointEntry)> {
+        let [first, .., last] = &self.points[..] else {
+            return None;
+        };
+        let is_there = |it: &PointEntry, approach: Approach| {
+            it.side() == approach
+                && it.target_m.abs() <= AT_THE_DATUM_M
+                && !is_shaken(Metres(it.scatter_m))
+        };
+        if !(is_there(first, Approach::Forward) && is_there(last, Approach::Reverse)) {
+            return None;
+        }
+        let (before, after) = (self.start.reverse_m?, self.end.reverse_m?);
+        let forward = self.start.forward_m;
+        let shifts = Shifts {
+            first: Metres(deviation(first) - forward),
+            last: Metres(deviation(last) - before),
+            reverse: Metres(after - before),
+            forward: Metres(self.end.forward_m - forward),
+        };
+        Some((shifts, first))
     }
 }
 
@@ -187,7 +217,38 @@ impl CrossCheck {
             let place = pairs.get(at.saturating_sub(started));
             &run.points[place.map_or(*last, |(place, _)| *place)]
         };
-        Err(self.slipped(&slip, point(slip.at - 1), point(slip.at)))
+        let (from, to) = (point(slip.at - 1), point(slip.at));
+        // Nothing was read between the datum and the first reading.
+        if slip.at == started {
+            let run = to.run - u32::from(slip.is_in_the_earlier_run);
+            return Err(self.datum_slip(slip.counts, run));
+        }
+        Err(self.slipped(&slip, from, to))
+    }
+
+    /// Judges the first run of a measurement, which has none before it, by what the datum's place read before and
+    /// after it and, where its targets are there, at its first and last reading.
+    ///
+    /// # Errors
+    /// When the count slipped between the datum and the first reading.
+    pub(super) fn judge_start(&self, run: &WholeRun) -> Result<(), Failure> {
+        let Some((shifts, first)) = run.shifts() else {
+            return Ok(());
+        };
+        let Some(counts) = slip_at_start(&shifts, self.plausible.count.length) else {
+            return Ok(());
+        };
+        Err(self.datum_slip(counts, first.run))
+    }
+
+    fn datum_slip(&self, counts: i64, run: u32) -> Failure {
+        Failure::DatumSlip {
+            axis: self.axis.clone(),
+            jump: Metres(counts as f64 * self.plausible.count.length.value()),
+            counts,
+            of: self.plausible.count,
+            run,
+        }
     }
 
     fn slipped(&self, slip: &Slip, from: &PointEntry, to: &PointEntry) -> Failure {

@@ -105,30 +105,42 @@ struct Session<'a> {
     counter: Counter,
     check: CrossCheck,
     watch: Option<EnvironmentWatch>,
+    /// What the first run was to be refused for, before the second one told whether its count slipped.
+    held: Option<Failure>,
 }
 
 impl Session<'_> {
     /// Judges a run by the one before it and by its datum; one after which that has moved is worth
-    /// nothing.
+    /// nothing. The first run has none before it: where its datum has moved, it is compared with the second
+    /// one, which tells a count that slipped from a drift, and refused then.
     fn close(
         &mut self,
         run: u32,
         before: Option<&WholeRun>,
         whole: &WholeRun,
     ) -> Result<ClosureEntry, Failure> {
-        if let Some(before) = before {
-            self.check.compare(before, whole)?;
+        match before {
+            Some(before) => self.check.compare(before, whole)?,
+            None => self.check.judge_start(whole)?,
+        }
+        if let Some(failure) = self.held.take() {
+            return Err(failure);
         }
         let closure = whole.closure(run);
         let seen = Metres(closure.closure_m);
         // A comparison with NaN is false, so that it is refused too.
         let is_closed = |limit| seen.abs() <= limit;
         if let Some(limit) = self.plan.closure_limit.filter(|it| !is_closed(*it)) {
-            return Err(Failure::Closure {
+            let failure = Failure::Closure {
                 axis: self.axis.to_owned(),
                 seen,
                 limit,
-            });
+            };
+            if before.is_some() || run == self.plan.runs || !seen.is_finite() {
+                return Err(failure);
+            }
+            self.held = Some(failure);
+            return Ok(closure);
         }
         self.journal.write(&LinearEntry::Closed(closure))?;
         Ok(closure)
@@ -188,6 +200,7 @@ impl LinearStage<'_> {
             counter,
             check: CrossCheck::new(self.axis, plausible),
             watch: self.environment_watch(plan),
+            held: None,
         };
         let first = runs.points.last().map_or(1, |point| point.run + 1);
         let mut before = runs.last();
