@@ -103,8 +103,13 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
 
 /// What a verb prints for people.
 fn say(bench: &Bench, words: &[&str]) -> String {
+    say_with_lease(bench, words, "")
+}
+
+fn say_with_lease(bench: &Bench, words: &[&str], token: &str) -> String {
     let mut command = Command::new(program("truestage"));
-    let output = command.current_dir(bench.folder()).args(words).output();
+    command.current_dir(bench.folder()).args(words);
+    let output = command.env("TRUESTAGE_LEASE", token).output();
     let output = output.expect("it can be started");
     assert!(output.status.success(), "{output:?}");
     String::from_utf8_lossy(&output.stdout).into_owned()
@@ -161,7 +166,34 @@ fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
             resumed["error"].to_string().contains("--resume"),
             "{resumed}"
         );
+        // Whoever has the lease commands; nobody else does.
+        let body = json!({"name": "anna", "seconds": 3600});
+        let (_, lease) = ask(bench.folder(), "POST /v1/lease", &body);
+        let refused = bench.run(&["move", "machine.toml", "x=2mm"]).with_code(3);
+        assert!(refused["error"].to_string().contains("anna"), "{refused}");
+        let token = lease["token"].as_str().expect("a token");
+        let moved = say_with_lease(&bench, &["move", "machine.toml", "x=2mm"], token);
+        assert!(moved.contains("the point stands at"), "{moved}");
         service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+/// A service that is killed is no mistake of whoever waits for it.
+#[test]
+fn a_service_that_ends_in_a_run_is_told_as_such() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let service = keep(&bench);
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        let mut client = bench.start(&["calibrate", "machine.toml", "--json"]);
+        client.wait_until(|| {
+            let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+            axis["used_by"].is_string()
+        });
+        service.signal(Signal::SIGTERM);
+        let ended = client.end();
+        assert_eq!(ended.code, Some(4), "{ended:?}");
         assert_eq!(service.end().code, Some(0));
     }
 }

@@ -21,6 +21,8 @@ pub struct Course {
     pub(crate) budget: Option<AxisBudget>,
     /// Over which distance its positions were approached, where that was always the same.
     pub(crate) approach: Option<Metres>,
+    /// Over which distance moves arrive, where the configuration says one.
+    pub(crate) arrives_over: Option<Metres>,
     /// Standard uncertainty of the zero that was found last.
     pub(crate) zero: Option<Metres>,
 }
@@ -63,19 +65,14 @@ impl Corrected {
     }
 }
 
-/// A move that ends with an approach of a given length.
-pub(crate) struct Arrival {
-    /// Where the approach begins.
-    pub(crate) from: Metres,
-    /// Where the drive is to be sent then.
-    pub(crate) set_point: Metres,
-    /// How fast.
-    pub(crate) speed: MetresPerSecond,
-}
+/// Places that differ by less are one.
+const ROUNDING: Metres = Metres(1e-9);
 
 /// A move that may be begun.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedMove {
+    /// Where the drive is to be sent first, so that its last approach has the length of the configuration.
+    pub by_way_of: Option<Metres>,
     /// Where the drive is to be sent.
     pub set_point: Metres,
     /// How fast.
@@ -86,7 +83,8 @@ pub struct PlannedMove {
 
 impl Course {
     /// The move of `axis` to `target` from where it is now, at its usual speed or, where that is slower, so
-    /// fast that the correction changes no faster than its limit.
+    /// fast that the correction changes no faster than its limit. It ends with an approach over `approach_mm` of
+    /// the configuration, where that says one, unless the axis was sent just there before.
     ///
     /// # Errors
     /// Not zeroed, outside the soft limits, outside the calibrated range.
@@ -97,7 +95,14 @@ impl Course {
         target: Metres,
     ) -> Result<PlannedMove, Failure> {
         machine.require_zeroed(axis)?;
-        self.plan_anywhere(machine, axis, target, Correction::On)
+        let Some(length) = self.arrives_over else {
+            return self.plan_anywhere(machine, axis, target, Correction::On);
+        };
+        let mut planned = self.plan_arrival(machine, axis, (target, length), Correction::On)?;
+        if was_sent_to(&machine.approach(axis)?, planned.set_point) {
+            planned.by_way_of = None;
+        }
+        Ok(planned)
     }
 
     /// The same without asking for a zero.
@@ -112,12 +117,10 @@ impl Course {
         let set_point = self.set_point(machine, axis, target, correction)?;
         machine.check_soft_limits(axis, set_point)?;
         Ok(PlannedMove {
+            by_way_of: None,
             set_point,
             speed: self.speed(machine, axis, correction)?,
-            corrected: match correction {
-                Correction::On => self.corrected(target),
-                Correction::Off => Corrected::No,
-            },
+            corrected: self.corrected_by(correction, target),
         })
     }
 
@@ -129,17 +132,19 @@ impl Course {
         axis: &str,
         (target, length): (Metres, Metres),
         correction: Correction,
-    ) -> Result<Arrival, Failure> {
+    ) -> Result<PlannedMove, Failure> {
         let speed = self.speed(machine, axis, correction)?;
         let here = machine.reading(axis)?.map(|reading| reading.position);
-        let start = started(&machine.approach(axis)?, here);
+        let tracker = machine.approach(axis)?;
+        let start = started(&tracker, here);
         let is_free = |place| Ok(machine.check_soft_limits(axis, place)?);
         let (from, set_point) =
             self.arrival((axis, &start), (target, length), correction, &is_free)?;
-        Ok(Arrival {
-            from,
+        Ok(PlannedMove {
+            by_way_of: (!was_sent_to(&tracker, from)).then_some(from),
             set_point,
             speed,
+            corrected: self.corrected_by(correction, target),
         })
     }
 
@@ -224,10 +229,16 @@ impl Course {
     /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
     /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
     ///
-    /// That is the calibration's budget, with the zero that the axis has now, the scatter of one stop and what
-    /// lost motion may do: a move that is begun by its plan arrives as it happens to.
-    pub fn uncertainty_at(&self, position: Metres, approach: Approach) -> Option<Combined> {
-        self.uncertainty_after(None, position, approach)
+    /// That is the calibration's budget, with the zero that the axis has now, the scatter of one stop and, unless the
+    /// axis `has_arrived` by all of a move that [`Self::plan`] gave, what lost motion may do.
+    pub fn uncertainty_at(
+        &self,
+        position: Metres,
+        approach: Approach,
+        has_arrived: bool,
+    ) -> Option<Combined> {
+        let length = self.arrives_over.filter(|_| has_arrived);
+        self.uncertainty_after(length, position, approach)
     }
 
     /// The same after an approach over `length`: where the positions were approached so, lost motion does what
@@ -259,6 +270,13 @@ impl Course {
         Some((at(Approach::Reverse)? - at(Approach::Forward)?).abs())
     }
 
+    fn corrected_by(&self, correction: Correction, target: Metres) -> Corrected {
+        match correction {
+            Correction::On => self.corrected(target),
+            Correction::Off => Corrected::No,
+        }
+    }
+
     /// What corrects a move to `target`.
     pub(crate) fn corrected(&self, target: Metres) -> Corrected {
         let table = self.compensation.as_ref();
@@ -281,6 +299,12 @@ fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
             distance,
         },
     }
+}
+
+/// Whether that was the set-point of the last motion.
+fn was_sent_to(tracker: &ApproachTracker, place: Metres) -> bool {
+    let last = tracker.last();
+    last.is_some_and(|it| (it - place).abs() <= ROUNDING)
 }
 
 const fn opposite(side: Approach) -> Approach {

@@ -41,7 +41,10 @@ impl LinearStage<'_> {
 
     /// What corrects its moves now, for whoever begins moves without waiting for them.
     pub fn course(&self) -> Course {
-        self.memory.course.clone()
+        Course {
+            arrives_over: self.approach_length(),
+            ..self.memory.course.clone()
+        }
     }
 
     /// Uses `compensation` (or none) for every move from now on; how uncertain it is, is then not known.

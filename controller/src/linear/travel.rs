@@ -6,9 +6,6 @@ use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::stage::LinearStage;
 
-/// Places that differ by less are one.
-const ROUNDING: Metres = Metres(1e-9);
-
 impl LinearStage<'_> {
     /// Moves the point of the axis to `target` (machine coordinates), compensated when a
     /// calibration is in use, and returns the set-point the drive was sent. The move ends with an approach
@@ -47,10 +44,8 @@ impl LinearStage<'_> {
         };
         let (course, to) = (&self.memory.course, (target, length));
         let planned = course.plan_arrival(self.core.machine, self.axis, to, correction)?;
-        let stands_at = self.core.approach(self.axis)?.last();
-        if !stands_at.is_some_and(|it| (it - planned.from).abs() <= ROUNDING) {
-            self.core
-                .profile_move(self.axis, planned.from, planned.speed)?;
+        if let Some(from) = planned.by_way_of {
+            self.core.profile_move(self.axis, from, planned.speed)?;
         }
         self.core
             .profile_move(self.axis, planned.set_point, planned.speed)?;

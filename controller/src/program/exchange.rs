@@ -1,5 +1,6 @@
 //! One request to a service that keeps a machine, and its answer: HTTP/1.1, a connection for each.
 
+use std::ffi::OsString;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
@@ -13,6 +14,10 @@ use crate::Failure;
 const PATIENCE: Duration = Duration::from_secs(10);
 /// More than any answer has, in bytes.
 const ANSWER_MAX: u64 = 16 << 20;
+/// The token of a lease, as `POST /v1/lease` gave it.
+const LEASE: &str = "TRUESTAGE_LEASE";
+/// A device, a bus, or a service in their place that is gone.
+const LOST: u8 = 4;
 
 trait Stream: Read + Write {}
 
@@ -44,7 +49,23 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
         what: format!("no service answers at {at}: {error}"),
         help: "start one with `truestage serve`, or say where it is with --at".into(),
     })?;
-    let (head, body) = said.split_once("\r\n\r\n").unwrap_or((&said, ""));
+    understood(at, &said)
+}
+
+/// The same of a service that has begun what this program waits for: one that answers no more has ended meanwhile.
+pub(crate) fn ask_on(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
+    let said = exchange(at, method, path, body).map_err(|error| Failure::Kept {
+        said: format!(
+            "the service at {at} has ended before {path} had ({error}); without it the drives stop and are switched \
+             off: see its messages for the cause, start it again and zero the machine"
+        ),
+        exit_code: LOST,
+    })?;
+    understood(at, &said)
+}
+
+fn understood(at: &str, said: &str) -> Result<Value, Failure> {
+    let (head, body) = said.split_once("\r\n\r\n").unwrap_or((said, ""));
     let status = head.split(' ').nth(1).unwrap_or_default();
     let answer: Value = serde_json::from_str(body).unwrap_or_default();
     if status.starts_with('2') {
@@ -79,13 +100,35 @@ fn exchange(at: &str, method: &str, path: &str, body: &str) -> io::Result<String
     let mut stream = connect(at)?;
     let host = at.strip_prefix("tcp:").unwrap_or("localhost");
     let length = body.len();
+    let lease = lease_header(std::env::var_os(LEASE))?;
     write!(
         stream,
-        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\ncontent-length: {length}\r\n\r\n{body}"
+        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
     )?;
     let mut said = String::new();
     stream.take(ANSWER_MAX).read_to_string(&mut said)?;
+    if said.is_empty() {
+        let what = "it hung up without an answer";
+        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
+    }
     Ok(said)
+}
+
+/// What proves that this program acts for the holder of the machine's lease. From the environment: everybody on the
+/// computer can read the words of a command line.
+fn lease_header(token: Option<OsString>) -> io::Result<String> {
+    let Some(token) = token.filter(|it| !it.is_empty()) else {
+        return Ok(String::new());
+    };
+    match token.to_str() {
+        Some(token) if token.bytes().all(|it| it.is_ascii_graphic()) => {
+            Ok(format!("truestage-lease: {token}\r\n"))
+        }
+        _ => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!("{LEASE} in the environment is no token of a lease"),
+        )),
+    }
 }
 
 /// Nothing that a terminal would obey, but for the ends of lines.
@@ -110,6 +153,22 @@ mod tests {
         let failure = refusal("tcp:127.0.0.1:80", "404", &Value::Null);
         assert!(failure.to_string().contains("404"), "{failure}");
         assert_eq!(failure.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_token_of_a_lease_adds_one_header_and_nothing_else() {
+        assert_eq!(lease_header(None).unwrap(), "");
+        let header = lease_header(Some("0a1b".into())).unwrap();
+        assert_eq!(header, "truestage-lease: 0a1b\r\n");
+        let refused = lease_header(Some("x\r\nhost: y".into())).unwrap_err();
+        assert!(refused.to_string().contains("TRUESTAGE_LEASE"), "{refused}");
+    }
+
+    #[test]
+    fn a_service_that_has_gone_meanwhile_is_no_mistake_of_the_command_line() {
+        let failure = ask_on("unix:/nowhere/at/all", "GET", "/v1/runs/r1-1", "").unwrap_err();
+        assert_eq!(failure.exit_code(), 4);
+        assert!(failure.to_string().contains("r1-1"), "{failure}");
     }
 
     #[test]

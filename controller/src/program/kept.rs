@@ -9,7 +9,7 @@ use machine::records::StoreError;
 use serde_json::{Value, json};
 use units::Metres;
 
-use crate::program::exchange::{ask, exit_code_of, plain};
+use crate::program::exchange::{ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
@@ -168,10 +168,10 @@ impl Service {
         loop {
             if stop.is_requested() && !is_ending {
                 is_ending = true;
-                ask(&self.at, "POST", ender, "{}")?;
+                ask_on(&self.at, "POST", ender, "{}")?;
             }
             let wait_s = WAIT.as_secs_f64();
-            let seen = ask(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
+            let seen = ask_on(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
             meanwhile(&seen);
             match seen["state"].as_str() {
                 Some("done") => return Ok(seen),

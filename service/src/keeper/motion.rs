@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use machine::{Failure, Machine, Moving};
 use serde_json::json;
-use truestage::linear::Corrected;
+use truestage::linear::{Corrected, PlannedMove};
 use units::{Metres, MetresPerSecond, Time};
 
 use super::Keeper;
@@ -46,6 +46,8 @@ enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LegPhase {
     Waiting,
+    /// On the way to where its last approach begins.
+    OnTheWay,
     Moving,
     /// Its drive has called the target reached.
     Settling,
@@ -57,10 +59,20 @@ enum LegPhase {
 struct Leg {
     at: usize,
     target: Metres,
-    set_point: Option<Metres>,
-    corrected: Corrected,
+    planned: Option<PlannedMove>,
     deadline: Time,
     phase: LegPhase,
+}
+
+impl Leg {
+    fn corrected(&self) -> Corrected {
+        self.planned.map_or(Corrected::No, |it| it.corrected)
+    }
+
+    /// Whether it has made all of its move.
+    fn has_arrived(&self) -> bool {
+        self.phase == LegPhase::There
+    }
 }
 
 /// A motion.
@@ -134,7 +146,7 @@ impl Keeper {
         let mut motion = motion.clone();
         self.motions.published = None;
         match self.plan_legs(machine, &mut motion) {
-            Ok(speeds) => self.begin_legs(machine, &mut motion, &speeds)?,
+            Ok(()) => self.begin_legs(machine, &mut motion)?,
             Err(problem) => {
                 motion.phase = Phase::Stopping(End::Failed(Cause {
                     code: problem.code,
@@ -147,28 +159,46 @@ impl Keeper {
         Ok(())
     }
 
-    fn begin_legs(
-        &mut self,
-        machine: &mut Machine,
-        motion: &mut Motion,
-        speeds: &[MetresPerSecond],
-    ) -> Result<(), Failure> {
+    fn begin_legs(&mut self, machine: &mut Machine, motion: &mut Motion) -> Result<(), Failure> {
         motion.phase = Phase::Moving;
-        for (leg, speed) in motion.legs.iter_mut().zip(speeds) {
+        for leg in &mut motion.legs {
+            let Some(planned) = leg.planned else { continue };
             let seat = &mut self.seats[leg.at];
-            let limit = machine.patience().of(seat.settings.move_timeout + SETTLING);
+            let moves = 1 + u32::from(planned.by_way_of.is_some());
+            let limit = seat.settings.move_timeout * moves + SETTLING;
+            let limit = machine.patience().of(limit);
             let id = Arc::clone(&motion.id);
             (leg.deadline, seat.task) = match motion.jog {
                 None => (machine.now() + limit + seat.in_position, Task::Motion(id)),
                 Some(_) => (Time::NEVER, Task::Jog(id)),
             };
-            leg.phase = LegPhase::Moving;
             seat.target = Some(leg.target);
-            seat.set_point = leg.set_point;
-            let set_point = leg.set_point.unwrap_or(leg.target);
-            Moving::of(machine, &seat.name)?.begin(set_point, *speed)?;
+            let (phase, first) = match planned.by_way_of {
+                Some(from) => (LegPhase::OnTheWay, from),
+                None => (LegPhase::Moving, planned.set_point),
+            };
+            leg.phase = phase;
+            seat.set_point = Some(first);
+            Moving::of(machine, &seat.name)?.begin(first, planned.speed)?;
         }
         Ok(())
+    }
+
+    /// Carries on a leg whose drive has called its target reached.
+    fn arrive(machine: &mut Machine, leg: &mut Leg, seat: &mut Seat) -> Result<(), Failure> {
+        let mut moving = Moving::of(machine, &seat.name)?;
+        moving.arrived(seat.set_point.unwrap_or(leg.target));
+        match leg.planned {
+            Some(planned) if leg.phase == LegPhase::OnTheWay => {
+                leg.phase = LegPhase::Moving;
+                seat.set_point = Some(planned.set_point);
+                moving.begin(planned.set_point, planned.speed)
+            }
+            _ => {
+                leg.phase = LegPhase::Settling;
+                Ok(())
+            }
+        }
     }
 
     /// How motion `number` ends, when it does.
@@ -195,14 +225,12 @@ impl Keeper {
     ) -> Result<Option<End>, Failure> {
         let now = machine.now();
         for leg in &mut self.motions.active[number].legs {
-            let seat = &self.seats[leg.at];
-            if leg.phase == LegPhase::Moving
+            let seat = &mut self.seats[leg.at];
+            if matches!(leg.phase, LegPhase::OnTheWay | LegPhase::Moving)
                 && let Some(outcome) = machine.outcome(&seat.name)?
             {
                 outcome?;
-                let set_point = leg.set_point.unwrap_or(leg.target);
-                Moving::of(machine, &seat.name)?.arrived(set_point);
-                leg.phase = LegPhase::Settling;
+                Self::arrive(machine, leg, seat)?;
             }
             if leg.phase == LegPhase::Settling && seat.is_in_position(now) {
                 leg.phase = LegPhase::There;
@@ -346,7 +374,11 @@ impl Keeper {
         let seat = &mut self.seats[leg.at];
         let approach = seat.approach(machine);
         let reading = machine.reading(&seat.name).ok().flatten();
-        let combined = reading.and_then(|it| seat.course.uncertainty_at(it.position, approach));
+        let combined = reading.and_then(|it| {
+            let position = it.position;
+            seat.course
+                .uncertainty_at(position, approach, leg.has_arrived())
+        });
         seat.standard_uncertainty = combined.map(|it| it.standard_uncertainty);
     }
 }

@@ -58,6 +58,25 @@ fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
                 "{}",
                 bed.stage.true_mm()
             );
+
+            // However short a move is, it ends as the calibration's moves did: with an approach over a millimetre.
+            let sent_mm = || bed.client.axis("x").unwrap().set_point.unwrap().value;
+            let id = bed.begin(&to("x", 31.05));
+            let mut sent = Vec::new();
+            while bed.now(&id).state != MotionState::Done {
+                sent.push(sent_mm());
+                bed.let_time_pass(0.002);
+            }
+            let by_way_of = sent.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!((by_way_of - 30.05).abs() < 0.02, "{sent:?}");
+            let view = bed.ended(&id);
+            assert_eq!(view.state, MotionState::Done, "{view:?}");
+            assert!((sent_mm() - 31.05).abs() < 0.02);
+            // There already: nothing moves.
+            let id = bed.begin(&to("x", 31.05));
+            bed.let_time_pass(0.02);
+            assert!((sent_mm() - 31.05).abs() < 0.02);
+            assert_eq!(bed.ended(&id).state, MotionState::Done);
         },
     );
 }

@@ -64,6 +64,7 @@ impl JobPlan {
             compensation: Some(compensation.clone()),
             budget: record.content.axis_budget(&id)?,
             approach: record.content.approach_m.map(Metres),
+            arrives_over: None,
             zero: None,
         };
         let planner = Planner {

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use machine::Machine;
 use serde_json::json;
-use truestage::linear::{Corrected, Course, PlannedMove};
+use truestage::linear::{Course, PlannedMove};
 use units::{Metres, MetresPerSecond, Time};
 
 use super::super::seat::{MovedBy, Seat, Task};
@@ -64,8 +64,7 @@ impl Keeper {
             Ok(Leg {
                 at: self.place(axis)?,
                 target: target.0,
-                set_point: None,
-                corrected: Corrected::No,
+                planned: None,
                 deadline: Time::NEVER,
                 phase: LegPhase::Waiting,
             })
@@ -86,20 +85,15 @@ impl Keeper {
     }
 
     /// What each axis is sent, and how fast; everything is judged before anything moves.
-    pub(super) fn plan_legs(
-        &self,
-        machine: &Machine,
-        motion: &mut Motion,
-    ) -> Result<Vec<MetresPerSecond>, Problem> {
+    pub(super) fn plan_legs(&self, machine: &Machine, motion: &mut Motion) -> Result<(), Problem> {
         let (uncorrected, wanted) = (motion.uncorrected, motion.speed);
-        let planned = motion.legs.iter_mut().map(|leg| {
+        motion.legs.iter_mut().try_for_each(|leg| {
             let seat = &self.seats[leg.at];
-            let planned = plan_leg(machine, seat, leg.target, uncorrected)?;
-            leg.set_point = Some(planned.set_point);
-            leg.corrected = planned.corrected;
-            Ok(wanted.map_or(planned.speed, |it| it.min(planned.speed)))
-        });
-        planned.collect()
+            let mut planned = plan_leg(machine, seat, leg.target, uncorrected)?;
+            planned.speed = wanted.map_or(planned.speed, |it| it.min(planned.speed));
+            leg.planned = Some(planned);
+            Ok(())
+        })
     }
 
     /// Makes the axes of a new motion free, lets it wait, or refuses it.

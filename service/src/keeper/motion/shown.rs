@@ -14,8 +14,8 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
     let legs = motion.legs.iter().map(|leg| {
         let view = LegView {
             target: Quantity::mm(leg.target),
-            set_point: leg.set_point.map(Quantity::mm),
-            corrected: leg.corrected.word().to_owned(),
+            set_point: leg.planned.map(|it| Quantity::mm(it.set_point)),
+            corrected: leg.corrected().word().to_owned(),
             position: None,
             encoder: None,
             standard_uncertainty: None,
@@ -75,20 +75,20 @@ pub(super) fn ended(
 fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: Teller) -> Option<ToldView> {
     let encoder = machine.reading(&seat.name).ok().flatten()?.position;
     let approach = seat.approach(machine);
-    let is_corrected = leg.corrected != Corrected::No;
+    let is_corrected = leg.corrected() != Corrected::No;
     let moved = Moved {
         target: leg.target,
-        set_point: leg.set_point?,
+        set_point: leg.planned?.set_point,
         encoder,
         approach,
-        corrected: leg.corrected,
+        corrected: leg.corrected(),
         place: seat
             .course
             .place(encoder, approach)
             .filter(|_| is_corrected),
         uncertainty: seat
             .course
-            .uncertainty_at(encoder, approach)
+            .uncertainty_at(encoder, approach, leg.has_arrived())
             .filter(|_| is_corrected),
     };
     let calibration = seat.calibration.as_deref().filter(|_| is_corrected);
