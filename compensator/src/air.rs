@@ -3,7 +3,10 @@
 //! Source: P. E. Ciddor, "Refractive index of air: new equations for the visible and near
 //! infrared", Appl. Opt. 35, 1566 (1996), in the form of the NIST Engineering Metrology Toolbox
 //! (J. A. Stone and J. H. Zimmerman, appendix A-I to A-III), whose saturation vapour pressure
-//! over water is IAPWS-IF97's instead of Ciddor's own.
+//! over water is IAPWS-IF97's instead of Ciddor's own. Below 0 °C the humidity counts over ice, as there: W. Wagner,
+//! A. Saul, A. Pruss, "International equations for the pressure along the melting and along the sublimation curve
+//! of ordinary water substance", J. Phys. Chem. Ref. Data 23, 515 (1994). Ciddor states his equation from −40 °C on.
+//! A sensor whose humidity counts over water down there, as many do, makes the index at most 1.2e-8 larger.
 //!
 //! | symbol | name here |
 //! |---|---|
@@ -13,8 +16,9 @@
 //! | ρ_axs, ρ_vs, ρ_a, ρ_v | densities in kg/m³ |
 //! | Z, Z_a | `compressibility`, `Z_STANDARD` |
 //!
-//! Absent: the group index, ice below 0 °C, gases other than CO₂ and water.
+//! Absent: the group index, gases other than CO₂ and water.
 
+use units::portable::{exp, ln};
 use units::{Celsius, Metres, Pascals, RelativeHumidity};
 
 const GAS_CONSTANT: f64 = 8.314_472;
@@ -24,6 +28,8 @@ const DENSITY_VAPOUR_STANDARD: f64 = 0.009_859_38;
 const PRESSURE_STANDARD: f64 = 101_325.0;
 const KELVIN_STANDARD: f64 = 288.15;
 const KELVIN: f64 = 273.15;
+const TRIPLE_POINT_KELVIN: f64 = 273.16;
+const TRIPLE_POINT_PRESSURE: f64 = 611.657;
 
 /// Standard uncertainty of the equation itself, beside that of its inputs (Ciddor's estimate).
 pub const EQUATION_STANDARD_UNCERTAINTY: f64 = 1e-8;
@@ -90,7 +96,7 @@ pub struct Sensitivities {
 /// `co2_umol_per_mol` is the CO₂ content in µmol/mol (450 is usual indoors).
 ///
 /// # Errors
-/// When an input is outside 300…1700 nm, 0…100 °C, 10…140 kPa, 0…1, 0…2000 µmol/mol, or NaN.
+/// When an input is outside 300…1700 nm, −40…100 °C, 10…140 kPa, 0…1, 0…2000 µmol/mol, or NaN.
 ///
 /// # Example
 ///
@@ -121,7 +127,7 @@ pub fn refractive_index(
         1700.0,
         "nm",
     )?;
-    within(Input::Temperature, t.value(), 0.0, 100.0, "°C")?;
+    within(Input::Temperature, t.value(), -40.0, 100.0, "°C")?;
     within(Input::Pressure, p.value(), 10e3, 140e3, "Pa")?;
     within(Input::Humidity, rh.value(), 0.0, 1.0, "(fraction)")?;
     within(
@@ -228,8 +234,24 @@ fn compressibility(t: f64, p: f64, vapour_fraction: f64) -> f64 {
     1.0 - ratio * first + ratio * ratio * (1.83e-11 - 0.765e-8 * x * x)
 }
 
-/// Saturation vapour pressure over water in Pa (IAPWS-IF97 region 4, as the Toolbox prints it).
+/// Saturation vapour pressure in Pa, over ice below 0 °C.
 fn saturation_pressure(t: f64) -> f64 {
+    if t < 0.0 {
+        saturation_pressure_over_ice(t)
+    } else {
+        saturation_pressure_over_water(t)
+    }
+}
+
+/// In Pa (Wagner, Saul and Pruss, as the Toolbox prints it).
+fn saturation_pressure_over_ice(t: f64) -> f64 {
+    let theta = (t + KELVIN) / TRIPLE_POINT_KELVIN;
+    let power = |exponent: f64| 1.0 - exp(exponent * ln(theta));
+    TRIPLE_POINT_PRESSURE * exp(-13.928_169 * power(-1.5) + 34.707_823_8 * power(-1.25))
+}
+
+/// In Pa (IAPWS-IF97 region 4, as the Toolbox prints it).
+fn saturation_pressure_over_water(t: f64) -> f64 {
     let kelvin = t + KELVIN;
     let omega = kelvin - 2.385_555_756_78e-1 / (kelvin - 6.501_753_484_48e2);
     let a = omega * omega + 1.167_052_145_28e3 * omega - 7.242_131_670_32e5;
@@ -294,6 +316,47 @@ mod tests {
         rows.iter().for_each(|row| check(row));
     }
 
+    /// Vapour over ice: 8.947 Pa at 230 K, 12.84 Pa at −40 °C, 103.3 Pa at −20 °C, 259.9 Pa at −10 °C (tables).
+    #[test]
+    fn vapour_over_ice_has_the_pressure_of_the_tables() {
+        for (t, pascals, off) in [
+            (-43.15, 8.947, 0.001),
+            (-40.0, 12.84, 0.01),
+            (-20.0, 103.3, 0.05),
+            (-10.0, 259.9, 0.05),
+        ] {
+            let seen = saturation_pressure_over_ice(t);
+            assert!((seen - pascals).abs() <= off, "{t}: {seen}");
+        }
+        let [ice, water] =
+            [saturation_pressure_over_ice, saturation_pressure_over_water].map(|it| it(0.01));
+        assert!(
+            (ice - water).abs() < 0.01,
+            "they meet at the triple point: {ice}, {water}"
+        );
+    }
+
+    /// Of dry air the index less one is as the density: p/(ZT), with Z 0.99960 at 20 °C and 0.99870 at −40 °C
+    /// (Picard and others, Metrologia 45, 149 (2008)).
+    #[test]
+    fn the_index_goes_on_below_the_freezing_point() {
+        let dry = |t: f64| {
+            let (wavelength, p) = (Metres(633e-9), Pascals(100e3));
+            refractive_index(wavelength, Celsius(t), p, RelativeHumidity(0.0), 450.0).unwrap() - 1.0
+        };
+        // Ciddor's own figure, 26824.4e-8.
+        assert!((dry(20.0) - 26_824.4e-8).abs() < 0.1e-8);
+        let expected = 26_824.4e-8 * (293.15 / 233.15) * (0.99960 / 0.99870);
+        assert!((dry(-40.0) / expected - 1.0).abs() < 2e-5, "{}", dry(-40.0));
+        let wet = |t: f64| {
+            let (wavelength, p) = (Metres(633e-9), Pascals(101_325.0));
+            refractive_index(wavelength, Celsius(t), p, RelativeHumidity(1.0), 450.0).unwrap()
+        };
+        let slope = (wet(1.0) - wet(-1.0)) / 2.0;
+        let step = wet(1e-9) - wet(-1e-9);
+        assert!(step.abs() < 0.02 * slope.abs(), "no step at 0 °C: {step}");
+    }
+
     #[test]
     fn the_sensitivities_are_the_well_known_ones_of_a_helium_neon_laser() {
         let s = sensitivities(
@@ -322,10 +385,9 @@ mod tests {
                 450.0,
             )
         };
-        assert_eq!(
-            index(-5.0, 101e3, 0.5).unwrap_err().input,
-            Input::Temperature
-        );
+        for t in [-40.1, 100.1] {
+            assert_eq!(index(t, 101e3, 0.5).unwrap_err().input, Input::Temperature);
+        }
         assert_eq!(
             index(20.0, 1013.25, 0.5).unwrap_err().input,
             Input::Pressure

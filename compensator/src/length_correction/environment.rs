@@ -49,10 +49,10 @@ impl Channel {
         }
     }
 
-    /// What a machine hall can have; a sensor beyond it is broken or in another unit.
+    /// What a machine hall, or a machine in the open, can have; a sensor beyond it is broken or in another unit.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
-            Self::AirTemperature | Self::MaterialTemperature => (0.0, 40.0, "°C"),
+            Self::AirTemperature | Self::MaterialTemperature => (-40.0, 40.0, "°C"),
             Self::Pressure => (60e3, 120e3, "Pa"),
             Self::Humidity => (0.0, 1.0, "(fraction)"),
         }
@@ -127,10 +127,10 @@ pub enum EnvironmentError {
     },
 }
 
-/// Refuses readings that no machine hall can have.
+/// Refuses readings that no place of a machine can have.
 ///
 /// # Errors
-/// The first channel outside 0–40 °C, 60–120 kPa or 0–1 humidity, or NaN.
+/// The first channel outside −40 to 40 °C, 60–120 kPa or 0–1 humidity, or NaN.
 ///
 /// # Example
 ///
