@@ -10,6 +10,7 @@
 //! | P_i, P_ij | [`Measurement::target`], [`Measurement::measured`] |
 //! | x_ij | [`Measurement::deviation`] |
 
+mod environment;
 mod units_of;
 
 use std::collections::BTreeSet;
@@ -18,6 +19,7 @@ use units::{Approach, Metres};
 
 use self::units_of::Unbelievable;
 use crate::data::{DataError, Fault, Format, Table};
+use crate::length_correction::{Environment, EnvironmentError};
 
 const FORMAT: Format = Format {
     columns: &["run", "approach", "target_mm", "measured_mm"],
@@ -141,6 +143,9 @@ pub enum LinearFault {
         /// What it looks like.
         cause: &'static str,
     },
+    /// Columns of an environment that no place of a machine has.
+    #[error(transparent)]
+    Environment(EnvironmentError),
     /// Positions that do not follow their targets.
     #[error(
         "`measured_mm` lies {:.0} % of the range off a line with `target_mm`, which no stage does: are \
@@ -187,6 +192,7 @@ impl From<Unbelievable> for LinearFault {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearSeries {
     measurements: Vec<Measurement>,
+    environments: Vec<Environment>,
 }
 
 impl LinearSeries {
@@ -221,7 +227,10 @@ impl LinearSeries {
             }
             check_order(&measurements[..index], index, m)?;
         }
-        Ok(Self { measurements })
+        Ok(Self {
+            measurements,
+            environments: Vec::new(),
+        })
     }
 
     /// Every measurement, in the order taken.
@@ -256,12 +265,15 @@ impl LinearSeries {
     }
 
     /// Reads the CSV format `run,approach,target_mm,measured_mm` (columns in any order, `#`
-    /// comment lines, decimal points).
+    /// comment lines, decimal points), with the columns of the environment beside them or without.
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
     pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError<LinearFault>> {
-        let table = Table::read(text, source_name, &FORMAT)?;
+        let is_with_environment = environment::is_named(text);
+        let format = [&FORMAT, &environment::FORMAT][usize::from(is_with_environment)];
+        let table = Table::read(text, source_name, format)?;
+        let mut environments = Vec::new();
         let mut measurements = Vec::with_capacity(table.rows());
         for row in 0..table.rows() {
             measurements.push(Measurement {
@@ -270,15 +282,22 @@ impl LinearSeries {
                 target: Metres::from_mm(table.number(row, 2)?),
                 measured: Metres::from_mm(table.number(row, 3)?),
             });
+            if is_with_environment {
+                environments.push(environment::read(&table, row)?);
+            }
         }
         let series = Self::new(measurements).map_err(|error| placed(&table, error))?;
+        let series = Self {
+            environments,
+            ..series
+        };
         match units_of::judge(&series) {
             Ok(()) => Ok(series),
             Err(reason) => Err(table.fail(0, 3, LinearFault::from(reason).into())),
         }
     }
 
-    /// The series in the format [`Self::from_csv`] reads, to the last bit of every number.
+    /// The series in the format [`Self::from_csv`] reads, to the last bit of every number; without the environment.
     pub fn to_csv(&self) -> String {
         let mut text = String::from("run,approach,target_mm,measured_mm\n");
         for m in &self.measurements {

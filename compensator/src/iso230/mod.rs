@@ -20,10 +20,12 @@
 //! Absent: axes beyond 2000 mm (5.3.3, fewer runs), rotary axes, the uncertainty budget of
 //! ISO/TR 230-9.
 
+mod means;
 mod one_way;
 
 use units::{Approach, Metres};
 
+pub use self::means::{MeanTarget, Means, evaluate_means};
 pub use self::one_way::{OneWayFigures, OneWayTarget, evaluate_one_way, only_approach};
 
 use self::one_way::{Direction, repeatability};
@@ -36,7 +38,7 @@ const K: f64 = 2.0;
 const RUNS_WANTED: usize = 5;
 const TARGETS_WANTED: usize = 5;
 
-/// Why a series cannot be evaluated.
+/// Why a series cannot be evaluated as a whole; [`evaluate_means`] evaluates single measurements as far as they go.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum EvaluationError {
     /// Only one approach in the whole series.

@@ -15,7 +15,7 @@ use crate::linear::stage::LinearStage;
 use crate::store::EnvironmentRecord;
 
 /// Where no sensor is read, air is taken to be like this.
-const USUAL_AIR: Environment = Environment {
+pub(crate) const USUAL_AIR: Environment = Environment {
     air_temperature: Celsius(20.0),
     pressure: Pascals(101_325.0),
     humidity: RelativeHumidity(0.5),
@@ -100,7 +100,7 @@ fn environment(it: &EnvironmentRecord) -> Environment {
 
 /// What the corrections would have changed that are switched off: an effect that is known and not corrected
 /// counts as a whole (GUM F.2.4.5).
-fn left_out(
+pub(crate) fn left_out(
     instrument: &InstrumentConfig,
     first: &Environment,
     mean: &Environment,

@@ -1,7 +1,7 @@
 //! The cycle of a linear axis (system S3, and the zero of S5): calibrate → zero → compensate →
 //! verify, as procedures on a [`Machine`](crate::Machine).
 
-mod budget;
+pub(crate) mod budget;
 mod calibrate;
 pub(crate) mod check;
 mod config;

@@ -10,11 +10,13 @@ use compensator::hall_zero::fit_hall;
 use compensator::iso230;
 use machine::records::{CalibrationRecord, short};
 use serde_json::json;
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::config::MachineConfig;
 use crate::linear::LinearContent;
 use crate::program::data_file::{head_of, read};
+use crate::program::linear::elsewhere::Elsewhere;
+use crate::program::linear::uncertainty;
 use crate::program::output::{Ended, Output};
 use crate::program::{json as to_json, text};
 use crate::{Failure, config, store_of};
@@ -31,6 +33,8 @@ pub(crate) enum FitCommand {
         /// The axis it belongs to; may be left out when there is only one.
         #[arg(long)]
         axis: Option<String>,
+        #[command(flatten)]
+        by: MeasuredBy,
     },
     /// The drift-free zero from columns position_um,peak_v,slope_v.
     Hall {
@@ -44,6 +48,67 @@ pub(crate) enum FitCommand {
     /// The errors of three axes, from the journal of a calibration or from columns
     /// line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u.
     Volumetric(super::volumetric::fit::VolumetricArgs),
+}
+
+/// With what data were measured elsewhere.
+#[derive(Debug, clap::Args)]
+pub(crate) struct MeasuredBy {
+    /// The instrument that measured, by its name in the configuration: its corrections are made where the file has
+    /// columns air_temperature_c,pressure_hpa,humidity_percent,material_temperature_c, and its uncertainty counts.
+    #[arg(long, value_name = "NAME")]
+    instrument: Option<String>,
+    /// The configuration that describes it; may be left out beside --save.
+    #[arg(long, value_name = "CONFIG")]
+    config: Option<PathBuf>,
+}
+
+impl MeasuredBy {
+    /// The configuration that describes the instrument, `save` where none else is named; `None` where no instrument
+    /// is named.
+    fn loaded(&self, save: Option<&Path>) -> Result<Option<config::Loaded>, Failure> {
+        let path = self.config.as_deref().or(save);
+        match (&self.instrument, path) {
+            (None, _) => Ok(None),
+            (Some(_), Some(path)) => Ok(Some(config::load(path)?)),
+            (Some(name), None) => Err(Failure::Usage {
+                what: format!("--instrument {name}: no configuration says what that is"),
+                help: "add --config CONFIG".into(),
+            }),
+        }
+    }
+
+    /// The instrument in it.
+    fn instrument<'a>(&'a self, loaded: &'a config::Loaded) -> Result<Elsewhere<'a>, Failure> {
+        let name = self.instrument.as_deref().unwrap_or_default();
+        let known = &loaded.config.instrument;
+        let Some(instrument) = known.get(name) else {
+            let names: Vec<&str> = known.keys().map(String::as_str).collect();
+            return Err(Failure::Usage {
+                what: format!("--instrument {name}: the configuration has no [instrument.{name}]"),
+                help: format!("it has: {}", names.join(", ")),
+            });
+        };
+        Ok(Elsewhere { name, instrument })
+    }
+}
+
+/// Reads a series; columns of the environment that nothing would use are refused, as nobody could tell whether the
+/// readings are corrected by them.
+fn series_of(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSeries, Failure> {
+    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    match by {
+        Some(by) => by.corrected(&series),
+        None if series.environments().is_empty() => Ok(series),
+        None => Err(Failure::Usage {
+            what: format!(
+                "{}: it has the environment of each reading, and nothing says what to correct by it",
+                path.display()
+            ),
+            help: "add --instrument NAME --config CONFIG, whose section [instrument.NAME] says it; where the readings \
+                   are corrected already, remove the columns"
+                .into(),
+        }),
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -62,8 +127,14 @@ pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
     }
 }
 
-pub(crate) fn iso230(path: &Path, output: Output) -> Ended {
-    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+pub(crate) fn iso230(path: &Path, by: &MeasuredBy, output: Output) -> Ended {
+    let loaded = by.loaded(None)?;
+    let by = loaded.as_ref().map(|it| by.instrument(it)).transpose()?;
+    let series = series_of(path, by.as_ref())?;
+    if is_single(&series) {
+        let means = iso230::evaluate_means(&series)?;
+        return output.result(&text::means(&means), &to_json::means(&means));
+    }
     if let Some(approach) = iso230::only_approach(&series) {
         let figures = iso230::evaluate_one_way(&series, approach)?;
         return output.result(
@@ -76,11 +147,28 @@ pub(crate) fn iso230(path: &Path, output: Output) -> Ended {
     output.result(&text, &to_json::figures(&figures))
 }
 
+/// Whether some target was measured once from a side and none never, so that there are means and no scatter.
+fn is_single(series: &LinearSeries) -> bool {
+    let only = iso230::only_approach(series);
+    let sides = [Approach::Forward, Approach::Reverse];
+    let sides = sides
+        .into_iter()
+        .filter(|it| only.is_none_or(|only| only == *it));
+    let counts = sides.flat_map(|side| {
+        let targets = series.targets().into_iter();
+        targets.map(move |it| series.deviations(it, side).count())
+    });
+    counts.min() == Some(1)
+}
+
 pub(crate) fn fit(command: &FitCommand, output: Output) -> Ended {
     match command {
-        FitCommand::Linear { data, save, axis } => {
-            linear(data, save.as_deref(), axis.as_deref(), output)
-        }
+        FitCommand::Linear {
+            data,
+            save,
+            axis,
+            by,
+        } => linear(data, save.as_deref(), axis.as_deref(), by, output),
         FitCommand::Hall { data } => hall(data, output),
         FitCommand::Screw(args) => super::platform::fit::run(args, output),
         FitCommand::Rotary(args) => super::rotary::fit::fit(args, output),
@@ -88,8 +176,16 @@ pub(crate) fn fit(command: &FitCommand, output: Output) -> Ended {
     }
 }
 
-fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) -> Ended {
-    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+fn linear(
+    path: &Path,
+    save: Option<&Path>,
+    axis: Option<&str>,
+    by: &MeasuredBy,
+    output: Output,
+) -> Ended {
+    let loaded = by.loaded(save)?;
+    let by = loaded.as_ref().map(|it| by.instrument(it)).transpose()?;
+    let series = series_of(path, by.as_ref())?;
     let name = axis.unwrap_or("x").to_owned();
     let fitted = error_table::analyse(&series, &FitOptions::default())
         .map_err(|source| Failure::Fit { axis: name, source })?;
@@ -123,26 +219,36 @@ fn linear(path: &Path, save: Option<&Path>, axis: Option<&str>, output: Output) 
     value["wrong_position_noticed_um"] = json!(judged.ok().flatten().map(to_json::um));
     value["stands_off"] = json!(judged.err().map(|it| it.to_string()));
     if let Some(config) = save {
-        let id = store_fit(config, axis, path, &series, &fitted)?;
+        let (id, content) = store_fit(config, axis, path, &series, &fitted, by.as_ref())?;
         text += &format!(
-            "\nstored as {}; use it with `truestage cal activate {} {}`",
+            "\n{}\nstored as {}; use it with `truestage cal activate {} {}`",
+            match content.budget {
+                Some(_) => uncertainty::sentence(&content),
+                None => NO_INSTRUMENT.to_owned(),
+            },
             short(&id),
             config.display(),
             short(&id)
         );
         value["calibration"] = json!(id);
+        value["uncertainty"] = json!(content.budget.as_ref().map(uncertainty::value));
     }
     output.result(&text, &value)
 }
 
-/// Stores a table measured elsewhere.
+/// Why a table has no budget.
+const NO_INSTRUMENT: &str =
+    "no uncertainty budget: nothing says what measured; name it with --instrument NAME";
+
+/// Stores a table measured elsewhere; with its uncertainty budget where it is known with what.
 fn store_fit(
     config_path: &Path,
     axis: Option<&str>,
     data: &Path,
     series: &LinearSeries,
     fitted: &Fitted,
-) -> Result<String, Failure> {
+    by: Option<&Elsewhere<'_>>,
+) -> Result<(String, LinearContent), Failure> {
     let loaded = config::load(config_path)?;
     let axes = &loaded.config.axis;
     let name = linear_axis(config_path, &loaded.config, axis)?;
@@ -150,9 +256,14 @@ fn store_fit(
     if axes[&name].compensation.is_some() {
         crate::linear::settings::compensation(&loaded.config, &name, fitted.table.clone())?;
     }
-    let content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
+    let mut content = LinearContent::new(&fitted.table, series.runs().len() as u32, None);
+    if let Some(by) = by {
+        let budget = by.budget(&name, &axes[&name], series, fitted)?;
+        content = content.with_budget(&budget);
+    }
     let record = CalibrationRecord { head, content };
-    Ok(store_of(&loaded.config.machine).save(&record)?)
+    let id = store_of(&loaded.config.machine).save(&record)?;
+    Ok((id, record.content))
 }
 
 /// The linear axis that a table is stored for.

@@ -2,7 +2,7 @@
 
 use compensator::error_table::{ErrorTable, Fitted};
 use compensator::hall_zero::ZeroEstimate;
-use compensator::iso230::{Conformity, Directional, Figures, OneWayFigures};
+use compensator::iso230::{Conformity, Directional, Figures, Means, OneWayFigures};
 use serde_json::{Value, json};
 use units::{Approach, Metres};
 
@@ -84,6 +84,34 @@ pub(crate) fn one_way(figures: &OneWayFigures) -> Value {
         "runs": figures.conformity.runs,
         "conforms_to_iso_230_2": figures.conformity.conforms(),
         "iso_230_2_asks_for": asked_for(&figures.conformity),
+        "targets": targets.collect::<Vec<_>>(),
+    })
+}
+
+/// What ISO 230-2 can be told of single measurements, in micrometres, with the names of all figures; `null`
+/// where a side was not measured.
+pub(crate) fn means(means: &Means) -> Value {
+    let of = |figure: Option<Metres>| figure.map(um);
+    let targets = means.targets.iter().map(|it| {
+        json!({
+            "target_mm": it.target.mm(),
+            "mean_deviation": { "forward": of(it.forward), "reverse": of(it.reverse) },
+        })
+    });
+    json!({
+        "unit": "um",
+        "systematic_deviation": {
+            "bidirectional": of(means.systematic_deviation),
+            "forward": of(means.forward),
+            "reverse": of(means.reverse),
+        },
+        "mean_bidirectional_deviation_range": of(means.mean_bidirectional_deviation_range),
+        "reversal_value": of(means.reversal_value),
+        "mean_reversal_value": of(means.mean_reversal_value),
+        "not_stated": "repeatability and accuracy: a target was measured only once from a side",
+        "runs": means.conformity.runs,
+        "conforms_to_iso_230_2": means.conformity.conforms(),
+        "iso_230_2_asks_for": asked_for(&means.conformity),
         "targets": targets.collect::<Vec<_>>(),
     })
 }

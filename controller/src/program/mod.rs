@@ -114,6 +114,8 @@ enum Command {
     Iso230 {
         /// The data file.
         data: PathBuf,
+        #[command(flatten)]
+        by: data::MeasuredBy,
     },
     /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
     Serve(ServeArgs),
@@ -450,7 +452,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => data::plan(&command, output),
-        Command::Iso230 { data } => data::iso230(&data, output),
+        Command::Iso230 { data, by } => data::iso230(&data, &by, output),
         Command::Status(service) => ask::status(&service, output),
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),

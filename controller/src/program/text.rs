@@ -1,7 +1,7 @@
 //! What a person reads on a terminal.
 
 use compensator::error_table::FALSE_ALARMS;
-use compensator::iso230::{Conformity, Figures, OneWayFigures};
+use compensator::iso230::{Conformity, Figures, Means, OneWayFigures};
 use compensator::screw::ScrewModel;
 use units::{Approach, Metres};
 
@@ -74,6 +74,37 @@ pub(crate) fn one_way_figures(figures: &OneWayFigures) -> String {
     }
     text += "\nall targets were approached from one side: figures of both sides (A, R, E, M, B) are not stated";
     let lack = lack(&figures.conformity).map(|it| format!("\nmeasured: {it}"));
+    text + &lack.unwrap_or_default()
+}
+
+/// What ISO 230-2 can be told of single measurements.
+pub(crate) fn means(means: &Means) -> String {
+    let rows = [
+        ("systematic deviation", "E", means.systematic_deviation),
+        ("systematic deviation, forward", "E↑", means.forward),
+        ("systematic deviation, reverse", "E↓", means.reverse),
+        (
+            "range of the mean deviation",
+            "M",
+            means.mean_bidirectional_deviation_range,
+        ),
+        ("reversal value", "B", means.reversal_value),
+        ("mean reversal value", "B̄", means.mean_reversal_value),
+    ];
+    let mut text = format!("{:<32} {:>3} {:>22}", "ISO 230-2 (µm)", "", "measured");
+    for (name, symbol, figure) in rows {
+        if let Some(figure) = figure {
+            // A combining mark takes no column of its own.
+            let width = if symbol.contains('\u{304}') { 4 } else { 3 };
+            text += &format!("\n  {name:<30} {symbol:>width$} {:>22.3}", figure.um());
+        }
+    }
+    text += "\nrepeatability (R) and accuracy (A) are not stated: a target was measured only once from a side, which \
+             has no standard deviation; nor is a closure, which needs a second run";
+    if means.systematic_deviation.is_none() {
+        text += "\nall targets were approached from one side: figures of both sides (E, M, B) are not stated";
+    }
+    let lack = lack(&means.conformity).map(|it| format!("\nmeasured: {it}"));
     text + &lack.unwrap_or_default()
 }
 

@@ -1,6 +1,7 @@
 //! Linear axes on the command line.
 
 pub(crate) mod demo;
+pub(crate) mod elsewhere;
 pub(crate) mod job;
 mod moved;
 mod page;
@@ -9,7 +10,7 @@ mod shown;
 #[cfg(test)]
 mod stored_tests;
 pub(crate) mod told;
-mod uncertainty;
+pub(crate) mod uncertainty;
 pub(crate) mod verbs;
 
 use machine::records::Log;

@@ -1,0 +1,92 @@
+//! Data that were measured elsewhere, with an instrument that a configuration describes: what its corrections make
+//! of them, and how uncertain a table of them is.
+
+use compensator::budget::{AxisBudget, BudgetError};
+use compensator::error_table::uncertainty::{self, Circumstances};
+use compensator::error_table::{Fitted, LinearSeries};
+use compensator::length_correction::{Environment, LengthCorrection};
+use units::{Celsius, Metres, Pascals, RelativeHumidity};
+
+use crate::config::{AxisConfig, InstrumentConfig};
+use crate::failure::Failure;
+use crate::linear::budget::{USUAL_AIR, left_out};
+use crate::linear::settings;
+
+/// An instrument of a configuration, by its name there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elsewhere<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) instrument: &'a InstrumentConfig,
+}
+
+impl Elsewhere<'_> {
+    /// The readings with the corrections that the instrument's section switches on, each by its own environment;
+    /// as they are where the file has no columns of it.
+    ///
+    /// # Errors
+    /// When the environment permits no correction.
+    pub(crate) fn corrected(&self, series: &LinearSeries) -> Result<LinearSeries, Failure> {
+        let settings = self.instrument.corrections();
+        series.corrected(settings).map_err(self.failed())
+    }
+
+    /// What makes the table that was `fitted` to `series` uncertain. The zero of the data is the datum of the
+    /// table; what the axis finds as its zero is added where the table is used. Without columns of the environment
+    /// the corrections are taken to have been made at 20 °C and 1013.25 hPa.
+    ///
+    /// # Errors
+    /// When there are not two runs, so that nothing is known of the scatter; when the environment permits no
+    /// correction.
+    pub(crate) fn budget(
+        &self,
+        name: &str,
+        axis: &AxisConfig,
+        series: &LinearSeries,
+        fitted: &Fitted,
+    ) -> Result<AxisBudget, Failure> {
+        let all = series.environments();
+        let first = all.first().copied().unwrap_or(USUAL_AIR);
+        let mean = mean(all).unwrap_or(USUAL_AIR);
+        let length = LengthCorrection::new(self.instrument.corrections(), &first);
+        let made = length.and_then(|it| it.contributions(&mean));
+        let made = made.map_err(self.failed())?.into_iter().map(|(_, it)| it);
+        let short_period_nm = axis
+            .calibrate
+            .as_ref()
+            .map_or(0.0, |it| it.short_period_standard_uncertainty_nm);
+        let known = Circumstances {
+            instrument: Metres(self.instrument.instrument_standard_uncertainty_nm * 1e-9),
+            closure: fitted.drift.closure.unwrap_or(Metres::ZERO),
+            zero: (Metres::ZERO, None),
+            short_period: Metres(short_period_nm * 1e-9),
+            interpolation: settings::interpolation_of(axis),
+            corrections: made
+                .chain(left_out(self.instrument, &first, &mean))
+                .collect(),
+        };
+        uncertainty::budget(fitted, known).map_err(|source: BudgetError| Failure::Budget {
+            axis: name.to_owned(),
+            source,
+        })
+    }
+
+    fn failed(
+        &self,
+    ) -> impl Fn(compensator::length_correction::EnvironmentError) -> Failure + use<> {
+        let instrument = self.name.to_owned();
+        move |source| Failure::Correction {
+            instrument: instrument.clone(),
+            source,
+        }
+    }
+}
+
+fn mean(all: &[Environment]) -> Option<Environment> {
+    let mean = |of: fn(&Environment) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    (!all.is_empty()).then(|| Environment {
+        air_temperature: Celsius(mean(|it| it.air_temperature.value())),
+        pressure: Pascals(mean(|it| it.pressure.value())),
+        humidity: RelativeHumidity(mean(|it| it.humidity.value())),
+        material_temperature: Celsius(mean(|it| it.material_temperature.value())),
+    })
+}

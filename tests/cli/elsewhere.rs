@@ -1,0 +1,101 @@
+//! Data that were measured elsewhere, as somebody at a desk evaluates them.
+
+use std::fs;
+use std::path::Path;
+
+use tests::LINEAR;
+
+use crate::programs::{check_error, text, truestage};
+
+/// Runs of three positions from both sides; `environment` goes behind each row.
+fn data(runs: u32, scale: f64, environment: Option<&str>) -> String {
+    let mut text = "run,approach,target_mm,measured_mm".to_owned();
+    if environment.is_some() {
+        text += ",air_temperature_c,pressure_hpa,humidity_percent,material_temperature_c";
+    }
+    for run in 1..=runs {
+        for (approach, targets) in [("+", [0.0, 30.0, 60.0]), ("-", [60.0, 30.0, 0.0])] {
+            for target in targets {
+                let lag_mm = if approach == "+" { -0.5e-3 } else { 0.5e-3 };
+                let measured = target * scale + lag_mm + 0.01e-3 * f64::from(run);
+                text += &format!("\n{run},{approach},{target},{measured:.7}");
+                text += &environment.map_or(String::new(), |it| format!(",{it}"));
+            }
+        }
+    }
+    text + "\n"
+}
+
+fn folder(data: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    fs::write(folder.path().join("machine.toml"), LINEAR.machine).expect("there is room");
+    fs::write(folder.path().join("data.csv"), data).expect("there is room");
+    folder
+}
+
+/// micrometres at a place of what is printed.
+fn um(value: &serde_json::Value, place: &str) -> f64 {
+    value
+        .pointer(place)
+        .and_then(serde_json::Value::as_f64)
+        .unwrap_or_else(|| panic!("no number at {place} in {value}"))
+}
+
+#[test]
+fn a_single_run_has_the_figures_that_need_no_scatter_and_no_others() {
+    let folder = folder(&data(1, 1.0 + 1e-4, None));
+    let figures = truestage(folder.path(), &["iso230", "data.csv"]).with_code(0);
+    // From -0.49 at the zero to 6.51 at 60 mm; 1 apart.
+    assert!((um(&figures, "/systematic_deviation/bidirectional") - 7.0).abs() < 1e-3);
+    assert!((um(&figures, "/reversal_value") - 1.0).abs() < 1e-3);
+    for absent in ["accuracy", "repeatability"] {
+        assert_eq!(figures.get(absent), None, "{figures}");
+    }
+    assert!(text(&figures["not_stated"]).contains("only once"), "{figures}");
+    assert_eq!(figures["conforms_to_iso_230_2"], false);
+}
+
+fn saved(folder: &Path, words: &[&str]) -> serde_json::Value {
+    let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
+    truestage(folder, &[&fit, words].concat()).with_code(0)
+}
+
+#[test]
+fn a_table_that_is_stored_has_a_budget_where_its_instrument_is_named() {
+    let folder = folder(&data(3, 1.0 + 1e-4, None));
+    assert!(saved(folder.path(), &[])["uncertainty"].is_null());
+    let stored = saved(folder.path(), &["--instrument", "laser"]);
+    let lines = &stored["uncertainty"]["contributions"];
+    let lines = lines.as_array().expect("a list of contributions");
+    let named = |name: &str| lines.iter().any(|it| it["name"] == name);
+    for name in ["instrument", "run to run", "datum", "drift", "curve between positions"] {
+        assert!(named(name), "{name}: {lines:?}");
+    }
+    let id = text(&stored["calibration"]);
+    let shown = truestage(folder.path(), &["cal", "show", "machine.toml", id]).with_code(0);
+    assert!(shown.to_string().contains("run to run"), "{shown}");
+    let wrong = saved_wrongly(folder.path(), &["--instrument", "ruler"]);
+    check_error(&wrong, &["no [instrument.ruler]", "laser"]);
+}
+
+fn saved_wrongly(folder: &Path, words: &[&str]) -> serde_json::Value {
+    let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
+    truestage(folder, &[&fit, words].concat()).with_code(2)
+}
+
+/// Air of 0.27 per mille, and a stage of 24 °C that is 46 ppm longer than at 20 °C.
+#[test]
+fn readings_are_corrected_by_the_environment_beside_them_or_the_file_is_refused() {
+    let vacuum = 1.000_271_373 * (1.0 + 11.5e-6 * 4.0);
+    let folder = folder(&data(2, vacuum, Some("20,1013.25,50,24")));
+    for words in [["iso230", "data.csv"].as_slice(), &["fit", "linear", "data.csv"]] {
+        let refused = truestage(folder.path(), words).with_code(2);
+        check_error(&refused, &["nothing says what to correct by it", "--instrument NAME"]);
+        let alone = truestage(folder.path(), &[words, &["--instrument", "laser"]].concat());
+        check_error(&alone.with_code(2), &["add --config CONFIG"]);
+    }
+    let with = ["iso230", "data.csv", "--instrument", "laser", "--config", "machine.toml"];
+    let figures = truestage(folder.path(), &with).with_code(0);
+    let off = um(&figures, "/systematic_deviation/forward");
+    assert!(off < 0.01, "{off} um are left of 19: {figures}");
+}
