@@ -6,12 +6,17 @@
 //! middle between the two places, curve 2 is odd about it and changes by Vc0 at least. A side lobe of a
 //! curve that is upside down, a broken sensor, or each sensor on the other's input have no such place.
 //!
+//! A pass that ends within the pattern, as of an axis that goes a tenth of what it is commanded, shows the maximum of
+//! curve 1 and what lies before it. The middle is then that maximum, and both curves must have their shape about it
+//! as far as the pass went beyond it.
+//!
 //! Absent: patterns that lie within the search limit of the nominal zero. There the place of a limit
 //! switch, which nobody knows better, explains as much as the axis does.
 
 use units::{Metres, Volts};
 
 use super::{HallPoint, Settings};
+use crate::least_squares::polynomial;
 
 /// By how much of its fall curve 1 may be uneven, and curve 2 of its change not odd: a plate that is not
 /// parallel and samples that lie far apart leave less.
@@ -23,6 +28,16 @@ const PLACES: u32 = 8;
 /// The outermost of them, as a multiple of where curve 1 has fallen by Vc: the flank of a side lobe towards
 /// the middle is a good deal lower there than the other.
 const REACH: f64 = 1.6;
+
+/// A pass that ends within the pattern must go beyond its middle by this share of the distance to where curve 1 has
+/// fallen by Vc.
+const COVERED_MIN: f64 = 0.25;
+
+/// Voltages are known up to the last point of a pass, which is beyond the last place that is looked at.
+const WITHIN: f64 = 0.99;
+
+/// Over this share of that distance on either side the maximum of curve 1 is a parabola.
+const PARABOLA: f64 = 0.25;
 
 /// A pattern that was passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,18 +73,66 @@ pub fn pattern(points: &[HallPoint], settings: &Settings) -> Option<Pattern> {
     let level = points[top].peak - settings.vc;
     let (before, after) = points.split_at(top);
     let left = crossing(before.iter().rev().zip(before.iter().rev().skip(1)), level)?;
-    let right = crossing(after.iter().zip(after.iter().skip(1)), level)?;
+    match crossing(after.iter().zip(after.iter().skip(1)), level) {
+        Some(right) => whole(&points, left, right, settings),
+        None => begun(&points, top, left, settings),
+    }
+}
+
+/// The pattern between two places at which curve 1 has fallen by Vc.
+fn whole(
+    points: &[HallPoint],
+    left: Metres,
+    right: Metres,
+    settings: &Settings,
+) -> Option<Pattern> {
     let (middle, half) = ((left + right) / 2.0, (right - left) / 2.0);
-    let curves = Curves {
-        points: &points,
-        middle,
-    };
-    let is_shaped = curves.is_even(half, settings.vc) && curves.is_odd(half);
+    let curves = Curves { points, middle };
+    let covered = points.last()?.position - middle;
+    let reach = (half * REACH).min(covered * WITHIN);
+    let is_shaped = curves.is_even(reach, settings.vc) && curves.is_odd(reach);
     let change = curves.slope(half)? - curves.slope(-half)?;
     (is_shaped && change.abs() >= settings.vc0).then_some(Pattern {
         middle,
         slope_rises: change > Volts::ZERO,
     })
+}
+
+/// The pattern in which a pass ended, beyond its maximum at the point `top`.
+fn begun(points: &[HallPoint], top: usize, left: Metres, settings: &Settings) -> Option<Pattern> {
+    let half = points[top].position - left;
+    let middle = vertex(points, points[top].position, half * PARABOLA)?;
+    let covered = points.last()?.position - middle;
+    // One that was passed as far as whole ones are judged has no end that is missing.
+    let is_within = covered >= half * COVERED_MIN && covered < half * REACH;
+    if !is_within {
+        return None;
+    }
+    let curves = Curves { points, middle };
+    let reach = covered * WITHIN;
+    let fall = curves.peak(Metres::ZERO)? - curves.peak(-reach)?;
+    let is_shaped = fall > settings.delta1 && curves.is_even(reach, fall) && curves.is_odd(reach);
+    let change = curves.slope(reach)? - curves.slope(-reach)?;
+    (is_shaped && change.abs() >= settings.vc0).then_some(Pattern {
+        middle,
+        slope_rises: change > Volts::ZERO,
+    })
+}
+
+/// Where curve 1 is highest, by a parabola through the points that far around `place`.
+fn vertex(points: &[HallPoint], place: Metres, around: Metres) -> Option<Metres> {
+    let near = points
+        .iter()
+        .filter(|it| (it.position - place).abs() <= around);
+    let (x, y): (Vec<f64>, Vec<f64>) = near
+        .map(|it| ((it.position - place) / around, it.peak.value()))
+        .unzip();
+    let fit = polynomial(&x, &y, 2).ok()?;
+    let [_, slope, bend] = fit.coefficients[..] else {
+        return None;
+    };
+    let at = -slope / (2.0 * bend);
+    (bend < 0.0 && at.abs() <= 1.0).then_some(place + around * at)
 }
 
 /// What a pattern found by a pass from the limit switch at `limit`, the nominal zero being at `nominal`,
@@ -141,9 +204,9 @@ impl Curves<'_> {
         self.at(distance, |it| it.slope)
     }
 
-    /// Whether curve 1 is the same on both sides.
-    fn is_even(&self, half: Metres, fall: Volts) -> bool {
-        places(half).all(|at| {
+    /// Whether curve 1 is the same on both sides, as far as that; it falls by so much.
+    fn is_even(&self, reach: Metres, fall: Volts) -> bool {
+        places(reach).all(|at| {
             let apart = self
                 .peak(at)
                 .zip(self.peak(-at))
@@ -152,23 +215,24 @@ impl Curves<'_> {
         })
     }
 
-    /// Whether curve 2 is as far above its value in the middle on one side as below it on the other.
-    fn is_odd(&self, half: Metres) -> bool {
+    /// Whether curve 2 is as far above its value in the middle on one side as below it on the other, as far as
+    /// that.
+    fn is_odd(&self, reach: Metres) -> bool {
         let Some(middle) = self.slope(Metres::ZERO) else {
             return false;
         };
         let both = |at: Metres| self.slope(at).zip(self.slope(-at));
-        let largest = places(half).filter_map(both).map(|(a, b)| (a - b).abs());
+        let largest = places(reach).filter_map(both).map(|(a, b)| (a - b).abs());
         let largest = largest.fold(Volts::ZERO, Volts::max);
-        places(half).all(|at| {
+        places(reach).all(|at| {
             let off = both(at).map(|(a, b)| ((a + b) / 2.0 - middle).abs());
             off.is_some_and(|it| it <= largest * ASYMMETRY_MAX)
         })
     }
 }
 
-fn places(half: Metres) -> impl Iterator<Item = Metres> {
-    (1..=PLACES).map(move |at| half * (REACH * f64::from(at) / f64::from(PLACES)))
+fn places(reach: Metres) -> impl Iterator<Item = Metres> {
+    (1..=PLACES).map(move |at| reach * (f64::from(at) / f64::from(PLACES)))
 }
 
 #[cfg(test)]
@@ -240,12 +304,14 @@ mod tests {
         let one = |at: u64| {
             let mut noise = Noise(seed.wrapping_add(at.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
             let stage = Stage::drawn(&mut noise);
+            // Some passes end short of the magnets, or among them.
+            let end = if at % 12 < 6 { 63.0 } else { noise.within(4.0) };
             let points = match at % 6 {
-                0 | 1 => stage.pass(63.0, &mut noise, |it| it),
-                2 => stage.pass(63.0, &mut noise, |[v1, v2]| [5.0 - v1, v2]),
-                3 => stage.pass(63.0, &mut noise, |[v1, v2]| [v2, v1]),
-                4 => stage.pass(63.0, &mut noise, |[_, v2]| [2.5, v2]),
-                _ => stage.pass(63.0, &mut noise, |[v1, _]| [v1, 2.5]),
+                0 | 1 => stage.pass(end, &mut noise, |it| it),
+                2 => stage.pass(end, &mut noise, |[v1, v2]| [5.0 - v1, v2]),
+                3 => stage.pass(end, &mut noise, |[v1, v2]| [v2, v1]),
+                4 => stage.pass(end, &mut noise, |[_, v2]| [2.5, v2]),
+                _ => stage.pass(end, &mut noise, |[v1, _]| [v1, 2.5]),
             };
             seen(&points)
         };
@@ -294,6 +360,30 @@ mod tests {
                     panic!("{factor}: {seen:?}");
                 };
                 assert!((it / factor - 1.0).abs() < 0.02, "{factor}: {it}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pass_that_ends_within_the_pattern_tells_it_once_it_is_beyond_its_middle() {
+        for (end_mm, is_told) in [(52.0, false), (56.0, true), (58.0, true), (60.0, true)] {
+            for seed in 0..10 {
+                let mut noise = Noise(seed);
+                let sound = Stage::drawn(&mut noise);
+                let stage = Stage {
+                    factor: 0.1,
+                    distance_mm: 6.0,
+                    lost_motion_mm: 0.0,
+                    ..sound
+                };
+                let seen = seen(&stage.pass(end_mm, &mut noise, |it| it));
+                match (seen, is_told) {
+                    (Some(Mistake::Scale { factor: it }), true) => {
+                        assert!((it / 0.1 - 1.0).abs() < 0.04, "{end_mm}: {it}");
+                    }
+                    (None, false) => {}
+                    _ => panic!("{end_mm} mm, {seed}: {seen:?}"),
+                }
             }
         }
     }

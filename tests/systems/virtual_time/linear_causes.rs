@@ -86,3 +86,9 @@ fn an_axis_that_meets_no_limit_switch_on_far_more_than_its_travel_is_named() {
         }
     }
 }
+
+/// The travel is 69 mm by its encoder, which is hardly more than to the middle of the magnets.
+#[test]
+fn an_axis_that_goes_a_tenth_of_what_it_is_commanded_is_named_with_its_resolution() {
+    check("100.0", "resolution is probably `resolution_nm = ", 10.0);
+}
