@@ -2,6 +2,7 @@
 
 pub(crate) mod advice;
 mod exit_code;
+pub(crate) mod of_kind;
 
 use std::path::PathBuf;
 
@@ -16,10 +17,9 @@ use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
 use crate::linear::PatternFinding;
-use crate::platform::{Explanation, PlatformFailure};
-use crate::rotary::RotaryFailure;
 use crate::store::StoreError;
-use crate::volumetric::{PathRefusal, VolumetricFailure};
+
+use of_kind::{KindFailure, OfKind};
 
 /// Everything that ends a verb without its result.
 #[derive(Debug, thiserror::Error)]
@@ -30,15 +30,9 @@ pub enum Failure {
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A platform did not do what it was asked.
+    /// A machine of one kind did not do what it was asked ([`Failure::of_kind`]).
     #[error(transparent)]
-    Platform(#[from] PlatformFailure),
-    /// A rotary table did not do what it was asked.
-    #[error(transparent)]
-    Table(#[from] RotaryFailure),
-    /// Three axes cannot be zeroed or corrected together.
-    #[error(transparent)]
-    Volumetric(#[from] VolumetricFailure),
+    Kind(OfKind),
     /// A port cannot be opened.
     #[error(transparent)]
     Open(#[from] drivers::transport::live::OpenError),
@@ -49,17 +43,6 @@ pub enum Failure {
         axis: String,
         /// The missing section.
         section: &'static str,
-    },
-    /// A turn over a plate saw none of its lines.
-    #[error(
-        "axis {axis}: none of {lines} lines was seen in a whole turn; is the plate there, the \
-         detector on and wired to the drive's touch probe?"
-    )]
-    NoLines {
-        /// Which axis.
-        axis: String,
-        /// How many there should be.
-        lines: u32,
     },
     /// The Hall search failed.
     #[error("axis {axis}: {source}")]
@@ -293,59 +276,6 @@ pub enum Failure {
         /// Why.
         source: CompensationError,
     },
-    /// A screw's model cannot be computed.
-    #[error("{place}: axis {axis}: {source}")]
-    Screw {
-        /// The data file and the line where the axis begins, or the run.
-        place: String,
-        /// Which axis.
-        axis: String,
-        /// Why.
-        source: compensator::screw::FitError,
-    },
-    /// A screw's model cannot be applied.
-    #[error("axis {axis}: {source}")]
-    ScrewCompensation {
-        /// Which axis.
-        axis: String,
-        /// Why.
-        source: compensator::screw::ScrewError,
-    },
-    /// A platform whose readings contradict its configuration by far.
-    #[error("platform: {explanation}; nothing was stored. {source}")]
-    Misdescribed {
-        /// What explains them, if anything.
-        explanation: Box<Explanation>,
-        /// What its calibration was refused for.
-        source: Box<Failure>,
-    },
-    /// A rotary table's error cannot be computed.
-    #[error("{place}: {source}")]
-    Rotary {
-        /// The data file, or the run.
-        place: String,
-        /// Why.
-        source: compensator::rotary::SolveError,
-    },
-    /// A plate was turned otherwise than was entered.
-    #[error("{place}: {source}")]
-    Misplaced {
-        /// The data file, or the run.
-        place: String,
-        /// Which placement, and what it fits.
-        source: compensator::rotary::Misplaced,
-    },
-    /// A rotary table's error cannot be applied.
-    #[error("axis {axis}: {source}")]
-    RotaryCompensation {
-        /// Which axis.
-        axis: String,
-        /// Why.
-        source: compensator::rotary::PeriodicError,
-    },
-    /// No offsets of a plate can be planned, or those given are of no use.
-    #[error(transparent)]
-    Plan(#[from] compensator::rotary::PlanError),
     /// ISO 230-2 figures cannot be computed.
     #[error(transparent)]
     Figures(#[from] compensator::iso230::EvaluationError),
@@ -393,14 +323,6 @@ pub enum Failure {
         /// Where the run is written.
         journal: PathBuf,
     },
-    /// A path cannot be driven as it is.
-    #[error("{}: {source}; nothing was moved", path.display())]
-    Path {
-        /// The file.
-        path: PathBuf,
-        /// What cannot be driven.
-        source: PathRefusal,
-    },
     /// The command line asks for something that is not there.
     #[error("{what}; {help}")]
     Usage {
@@ -430,6 +352,22 @@ fn in_use_text(in_use: Option<&str>) -> String {
     )
 }
 
+impl Failure {
+    /// The failure of one kind of machine, where it is one of that kind.
+    pub fn of_kind<K: KindFailure>(&self) -> Option<&K> {
+        match self {
+            Self::Kind(failure) => failure.downcast_ref(),
+            _ => None,
+        }
+    }
+}
+
+impl<K: KindFailure> From<K> for Failure {
+    fn from(failure: K) -> Self {
+        Self::Kind(failure.into())
+    }
+}
+
 impl<K: std::error::Error + Send + Sync + 'static> From<DataError<K>> for Failure {
     fn from(failure: DataError<K>) -> Self {
         Self::Data(Box::new(failure))
@@ -451,12 +389,12 @@ impl Layered for Failure {
     }
 
     fn depends_on_time(&self) -> bool {
-        matches!(
-            self,
-            Self::Search { .. }
-                | Self::InputNotSeen { .. }
-                | Self::StandsOff { .. }
-                | Self::Platform(PlatformFailure::NotAligned { .. })
-        )
+        match self {
+            Self::Kind(failure) => failure.depends_on_time(),
+            _ => matches!(
+                self,
+                Self::Search { .. } | Self::InputNotSeen { .. } | Self::StandsOff { .. }
+            ),
+        }
     }
 }

@@ -3,6 +3,9 @@
 use core::ops::{Deref, DerefMut};
 
 use crate::config::{ConfigHash, MachineConfig};
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::memories::Memories;
 use crate::run;
 use crate::store::{IdentityRecord, InstrumentRecord, RecordHead};
 
@@ -14,16 +17,14 @@ pub(crate) struct Core<'m> {
 }
 
 impl<'m> Core<'m> {
-    pub(crate) const fn new(
-        machine: &'m mut machine::Machine,
-        config: &'m MachineConfig,
-        config_hash: &'m ConfigHash,
-    ) -> Self {
-        Self {
-            machine,
-            config,
-            config_hash,
-        }
+    /// What a handle of `machine` works on, and where its kind remembers something.
+    pub(crate) const fn of(machine: &'m mut Machine) -> (Self, &'m mut Memories) {
+        let core = Self {
+            machine: &mut machine.core,
+            config: &machine.config,
+            config_hash: &machine.config_hash,
+        };
+        (core, &mut machine.memories)
     }
 }
 
@@ -66,4 +67,12 @@ impl DerefMut for Core<'_> {
     fn deref_mut(&mut self) -> &mut machine::Machine {
         self.machine
     }
+}
+
+/// That `axis` is none of the `known` ones.
+pub(crate) fn no_such_axis(axis: &str, known: &[String]) -> Failure {
+    Failure::Machine(machine::Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: known.join(", "),
+    })
 }

@@ -53,6 +53,7 @@ mod hardware;
 mod homing;
 mod kinds;
 pub mod linear;
+mod memories;
 pub mod platform;
 pub mod ports;
 #[cfg(feature = "program")]

@@ -4,10 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tests::{Bench, Edit, UVW};
+use tests::{Bench, Edit, Rig, UVW, UVW_COPLEY};
+use truestage::config;
 use truestage::platform::Pose;
 
-use crate::programs::{check_says, page, truestage};
+use crate::demo;
+use crate::programs::{check_says, live_rigs, page, truestage};
 
 /// A platform that was calibrated twice, verified before and after, and its runs.
 struct Runs {
@@ -132,4 +134,46 @@ fn a_page_of_a_journal_that_was_taken_elsewhere_shows_its_strokes_without_models
             "No calibration was made from this run",
         ],
     );
+}
+
+#[test]
+fn the_platform_shows_its_cycle() {
+    let left = [
+        "/as_left/largest_um",
+        "/as_left_after_power_cycle/largest_um",
+    ];
+    demo::check("uvw", "/as_found/largest_um", left, 2.0);
+}
+
+/// Two machines are shown: what the second one stores is none of the first one's business.
+#[test]
+fn both_platforms_shown_in_one_folder_keep_their_calibrations() {
+    if !live_rigs().any(|rig| rig == Rig::Pty) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for machine in ["uvw", "uvw-copley"] {
+        let words = ["demo", "--machine", machine, "--data-dir", "."];
+        truestage(folder.path(), &words).with_code(0);
+    }
+    for shipped in [&UVW, &UVW_COPLEY] {
+        let here = format!("data_dir = {:?}", folder.path());
+        let text = shipped
+            .machine
+            .to_owned()
+            .edit("data_dir = \"machine-data\"", &here);
+        let machine = config::parse(&text, "machine.toml");
+        let machine = machine.unwrap_or_else(|error| panic!("{error}"));
+        let machine = machine.config.machine;
+        let store = truestage::store_of(&machine);
+        for screw in ["u", "v", "w"] {
+            let active = store.active(screw).expect("it can be read").current;
+            let id = active.unwrap_or_else(|| panic!("{}: {screw} has none", machine.name));
+            let head = store.glance(&id).expect("it is whole").head;
+            assert_eq!(
+                (head.machine, head.stage_serial),
+                (machine.name.clone(), machine.stage_serial.clone())
+            );
+        }
+    }
 }

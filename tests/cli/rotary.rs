@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 use tests::{Edit, MACHINE};
 
+use crate::demo;
 use crate::programs::{Ended, truestage};
 
 const HEADER: &str = "offset,line,deviation_arcsec\n";
@@ -345,4 +346,13 @@ fn a_plan_says_what_it_makes_of_noise_and_what_others_would() {
     plan(&["--lines", "360", "--placements", "1"]).with_code(2);
     plan(&["--lines", "3", "--placements", "4"]).with_code(2);
     plan(&["--lines", "360"]).with_code(2);
+}
+
+#[test]
+fn the_rotary_table_shows_its_cycle() {
+    let left = [
+        "/verified/as_left/largest_arcsec",
+        "/verified_after_power_cycle/as_left/largest_arcsec",
+    ];
+    demo::check("rotary", "/verified/as_found/largest_arcsec", left, 0.3);
 }

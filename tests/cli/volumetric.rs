@@ -13,6 +13,7 @@ use truestage::volumetric::GeometryContent;
 use truestage::volumetric::VolumeLog;
 use truestage::volumetric::{VerifyBy, WarmUp};
 
+use crate::demo;
 use crate::programs::{check_error, check_says, number, page, text, truestage};
 
 /// A machine that was calibrated twice and verified before and after, in virtual time.
@@ -240,4 +241,40 @@ fn refuses_files(runs: &Runs, csv: &str) {
     linear.expect("there is room");
     let words = ["fit", "volumetric", "lines.csv", "--config", "linear.toml"];
     runs.run(&words).with_code(2);
+}
+
+/// The errors of the machine and their drift by far exceed what is left of them when it is corrected
+/// by what it sees; its tables alone drift away.
+#[test]
+fn three_axes_show_their_day() {
+    let Some((said, page)) = demo::shown("volumetric") else {
+        return;
+    };
+    let hours = said["hours"].as_array().expect("a list");
+    assert_eq!(hours.len(), 5);
+    let of = |at: usize, state: &str| demo::number(&said, &format!("/hours/{at}/{state}"));
+    for at in 0..5 {
+        let (found, live) = (of(at, "as_found_um"), of(at, "corrected_um"));
+        assert!(
+            live < found / 3.0 && live < 2.0,
+            "reading {at}: {found}, {live}"
+        );
+    }
+    let (morning, evening) = (of(0, "by_tables_um"), of(4, "by_tables_um"));
+    assert!(
+        evening > 3.0 * of(4, "corrected_um"),
+        "{morning}, {evening}"
+    );
+    assert!(evening > morning, "{morning}, {evening}");
+    let parts = [
+        "hour (h)",
+        "as found",
+        "tables alone",
+        "corrected live",
+        "e_xx",
+        "Squareness",
+    ];
+    for part in parts.into_iter().chain(["<polygon", "thermometer (°C)"]) {
+        assert!(page.contains(part), "`{part}` is not on the page");
+    }
 }

@@ -293,7 +293,8 @@ fn an_input_that_is_stuck_stops_the_machine_where_that_is_wanted() {
 /// In a controlled way, and by the right cause, which is told.
 #[track_caller]
 fn check_stopped(stood: &Stood, noticed: u64, source: Source) -> String {
-    let Err(Failure::Volumetric(VolumetricFailure::NotThere { cause })) = &stood.result else {
+    let failure = stood.result.as_ref().err().and_then(Failure::of_kind);
+    let Some(VolumetricFailure::NotThere { cause }) = failure else {
         panic!("{}: {:?}", stood.text, stood.result)
     };
     let Cause::CorrectionLost { lack } = cause else {

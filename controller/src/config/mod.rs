@@ -4,7 +4,7 @@
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
 mod axis;
-mod dependence;
+pub(crate) mod dependence;
 mod diagnostic;
 #[cfg(test)]
 mod impossible_tests;

@@ -7,24 +7,12 @@ impl Failure {
     /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus,
     /// 5 the result is out of tolerance, 128 and the signal's number (130 for Ctrl-C, 143 for
     /// SIGTERM) when it was stopped on request.
-    pub const fn exit_code(&self) -> u8 {
+    pub fn exit_code(&self) -> u8 {
         match self {
             Self::Machine(failure) => failure.exit_code(),
-            Self::Platform(failure) => failure.exit_code(),
-            Self::Table(failure) => failure.exit_code(),
+            Self::Kind(failure) => failure.exit_code(),
             Self::Resumable { source, .. } => source.exit_code(),
             Self::Kept { exit_code, .. } => *exit_code,
-            Self::Misdescribed {
-                explanation,
-                source,
-            } => {
-                if explanation.names_a_cause() {
-                    2
-                } else {
-                    source.exit_code()
-                }
-            }
-            Self::Volumetric(failure) => failure.exit_code(),
             #[cfg(feature = "emulator")]
             Self::Emulator(failure) => failure.exit_code(),
             Self::Config(_)
@@ -34,10 +22,6 @@ impl Failure {
             | Self::Figures(_)
             | Self::Data(_)
             | Self::Series(_)
-            | Self::Screw { .. }
-            | Self::Rotary { .. }
-            | Self::Misplaced { .. }
-            | Self::Plan(_)
             | Self::SearchSettings { .. }
             | Self::File { .. }
             | Self::Usage { .. }
@@ -48,11 +32,8 @@ impl Failure {
                 | StoreError::NoEarlier { .. }
                 | StoreError::AlreadyComplete { .. },
             ) => 2,
-            Self::Path { .. }
-            | Self::Store(_)
+            Self::Store(_)
             | Self::Compensation { .. }
-            | Self::ScrewCompensation { .. }
-            | Self::RotaryCompensation { .. }
             | Self::OutOfCalibration { .. }
             | Self::StandsOff { .. }
             | Self::ScaleMismatch { .. } => 3,
@@ -61,7 +42,6 @@ impl Failure {
             | Self::DatumSlip { .. }
             | Self::InputNotSeen { .. }
             | Self::Search { .. }
-            | Self::NoLines { .. }
             | Self::Correction { .. }
             | Self::ScanMismatch { .. } => 4,
             Self::ZeroUncertain { .. }

@@ -3,6 +3,7 @@
 use machine::records::ContentKind;
 
 use crate::config::MachineConfig;
+use crate::config::dependence::text::Place;
 use crate::config::judge::Finding;
 #[cfg(test)]
 use crate::store::golden::Golden;
@@ -11,6 +12,8 @@ use crate::store::golden::Golden;
 pub(crate) struct Kind {
     /// Which values of its part of a configuration are impossible.
     pub(crate) check: fn(&MachineConfig, &mut Vec<Finding>),
+    /// What its calibrations depend on. The order of kinds in their list is that of the published text.
+    pub(crate) depends: fn(&MachineConfig, &mut Place<'_>),
     /// What its calibrations say.
     pub(crate) contents: &'static [ContentKind],
     /// What its machines have written.

@@ -4,7 +4,11 @@
 pub(crate) mod kind;
 
 use self::kind::Kind;
-use crate::{linear, platform, rotary, volumetric};
 
-/// Each kind.
-pub(crate) const KINDS: [Kind; 4] = [linear::KIND, rotary::KIND, platform::KIND, volumetric::KIND];
+/// Each kind; a further one comes last ([`Kind::depends`]).
+pub(crate) const KINDS: &[&Kind] = &[
+    &crate::linear::KIND,
+    &crate::rotary::KIND,
+    &crate::platform::KIND,
+    &crate::volumetric::KIND,
+];

@@ -4,12 +4,14 @@ use machine::records::ContentKind;
 
 use crate::kinds::kind::Kind;
 use crate::linear::check::check;
+use crate::linear::dependence::depends;
 #[cfg(test)]
 use crate::linear::golden::GOLDEN;
 use crate::linear::record::LinearContent;
 
 pub(crate) const KIND: Kind = Kind {
     check,
+    depends,
     contents: &[ContentKind::of::<LinearContent>()],
     #[cfg(test)]
     golden: GOLDEN,

@@ -9,6 +9,7 @@ mod course;
 mod cross_check;
 mod datum;
 mod datum_in_use;
+mod dependence;
 pub(crate) mod entries;
 mod finding;
 #[cfg(test)]
@@ -17,6 +18,7 @@ pub(crate) mod job;
 mod kind;
 mod log;
 pub(crate) mod measure;
+mod memory;
 pub(crate) mod moved;
 pub(crate) mod positions;
 pub(crate) mod record;
@@ -56,7 +58,6 @@ pub(crate) use job::JobConfig;
 pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
-pub(crate) use stage::AxisMemory;
 pub(crate) use table_correction::table_correction;
 #[cfg(feature = "program")]
 pub(crate) use verify::UncertaintyAtTarget;

@@ -2,20 +2,15 @@
 
 use compensator::budget::AxisBudget;
 use compensator::error_table::Compensation;
+use machine::engine::TableCorrection;
 use units::Metres;
 
 use crate::config::AxisConfig;
-use crate::handle::Core;
-use crate::linear::{Course, Datum, RunPlan};
-
-/// What is known about a linear axis beyond what its drive says.
-#[derive(Default)]
-pub(crate) struct AxisMemory {
-    /// What corrects its moves.
-    pub(crate) course: Course,
-    /// What was measured last, and how lengths were corrected since its datum.
-    pub(crate) datum: Option<(RunPlan, Datum)>,
-}
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::handle::{Core, no_such_axis};
+use crate::linear::memory::AxisMemory;
+use crate::linear::{Course, table_correction};
 
 /// One linear axis of a machine: its zero, its moves, its calibration and what they need to
 /// remember. [`Machine::linear`](crate::Machine::linear) gives it.
@@ -24,6 +19,36 @@ pub struct LinearStage<'m> {
     pub(crate) axis: &'m str,
     pub(crate) config: &'m AxisConfig,
     pub(crate) memory: &'m mut AxisMemory,
+}
+
+impl Machine {
+    /// The linear axis `axis`, calibrated by itself.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn linear(&mut self, axis: &str) -> Result<LinearStage<'_>, Failure> {
+        let (core, memories) = Core::of(self);
+        let Some((axis, config)) = core.config.axis.get_key_value(axis) else {
+            return Err(no_such_axis(axis, &core.devices().axis_names()));
+        };
+        Ok(LinearStage {
+            memory: memories.of(axis, AxisMemory::default),
+            core,
+            axis,
+            config,
+        })
+    }
+
+    /// What the calibrations that linear `axes` use ([`LinearStage::load_active`]) say, for an engine
+    /// of these axes in this order.
+    ///
+    /// # Errors
+    /// When there is no such axis, it is not configured for the engine, or its correction at full
+    /// speed would change faster than `correction_rate_um_per_s`, or be larger than
+    /// `correction_limit_um`: it would be cut off on the way.
+    pub fn table_correction(&self, axes: &[&str]) -> Result<TableCorrection, Failure> {
+        table_correction(&self.core, &self.memories, axes)
+    }
 }
 
 impl<'m> LinearStage<'m> {

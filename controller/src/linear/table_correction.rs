@@ -1,24 +1,23 @@
 //! The calibrations in use, as a correction of cyclic set-points (system S3).
 
-use std::collections::BTreeMap;
-
 use compensator::error_table::Compensation;
 use machine::engine::{EngineFailure, PerAxis, TableCorrection};
 use units::MetresPerSecond;
 
 use crate::failure::Failure;
-use crate::linear::AxisMemory;
+use crate::linear::memory::AxisMemory;
+use crate::memories::Memories;
 
-/// What the calibrations in `memory` say of `axes`, for an engine of these axes in this order.
+/// What the calibrations in `memories` say of `axes`, for an engine of these axes in this order.
 pub(crate) fn table_correction(
     machine: &machine::Machine,
-    memory: &BTreeMap<String, AxisMemory>,
+    memories: &Memories,
     axes: &[&str],
 ) -> Result<TableCorrection, Failure> {
     let mut tables: PerAxis<Option<Compensation>> = core::array::from_fn(|_| None);
     for (own, axis) in tables.iter_mut().zip(axes) {
         let settings = machine.cyclic_settings(axis)?;
-        let known = memory.get(*axis);
+        let known: Option<&AxisMemory> = memories.get(axis);
         let Some(table) = known.and_then(|it| it.course.compensation.as_ref()) else {
             continue;
         };

@@ -90,6 +90,7 @@ mod tests {
     use compensator::platform::{Actuator, Point};
 
     use super::*;
+    use crate::failure::of_kind::KindFailure;
 
     fn four() -> Platform {
         let place = |name: &str, x: f64, y: f64, direction| Actuator {

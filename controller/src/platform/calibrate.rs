@@ -234,7 +234,7 @@ impl AlignmentPlatform<'_> {
         ScrewCompensation::new(model, limits_of(limits, resolution), rule_of(limits)).map_err(
             |source| {
                 let axis = axis.clone();
-                Failure::ScrewCompensation { axis, source }
+                PlatformFailure::Compensation { axis, source }.into()
             },
         )
     }

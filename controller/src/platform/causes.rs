@@ -16,19 +16,21 @@ impl AlignmentPlatform<'_> {
     /// `failure`, with what of the configuration explains the readings; as it is where they do not
     /// contradict the configuration beyond what a screw may do.
     pub(super) fn explained(&self, failure: Failure, sightings: &[Sighting]) -> Failure {
-        let is_judgement = matches!(
-            failure,
-            Failure::Closure { .. }
-                | Failure::ScrewCompensation { .. }
-                | Failure::Platform(PlatformFailure::Fit { .. })
-        );
+        let is_judgement = match failure.of_kind() {
+            Some(own) => matches!(
+                own,
+                PlatformFailure::Fit { .. } | PlatformFailure::Compensation { .. }
+            ),
+            None => matches!(failure, Failure::Closure { .. }),
+        };
         let explanation = is_judgement.then(|| self.explanation(sightings)).flatten();
         match explanation {
             None => failure,
-            Some(explanation) => Failure::Misdescribed {
+            Some(explanation) => PlatformFailure::Misdescribed {
                 explanation: Box::new(explanation),
                 source: Box::new(failure),
-            },
+            }
+            .into(),
         }
     }
 

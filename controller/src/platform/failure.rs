@@ -6,6 +6,10 @@ use compensator::platform::{ForwardError, OutOfReach, PathError};
 use compensator::screw;
 use units::Metres;
 
+use crate::failure::Failure;
+use crate::failure::of_kind::KindFailure;
+use crate::platform::explanation::Explanation;
+
 /// Why a platform did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum PlatformFailure {
@@ -100,6 +104,32 @@ pub enum PlatformFailure {
         /// The tolerance.
         limit: Metres,
     },
+    /// A screw's model cannot be computed.
+    #[error("{place}: axis {axis}: {source}")]
+    Screw {
+        /// The data file and the line where the axis begins, or the run.
+        place: String,
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: screw::FitError,
+    },
+    /// A screw's model cannot be applied.
+    #[error("axis {axis}: {source}")]
+    Compensation {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: screw::ScrewError,
+    },
+    /// A platform whose readings contradict its configuration by far.
+    #[error("platform: {explanation}; nothing was stored. {source}")]
+    Misdescribed {
+        /// What explains them, if anything.
+        explanation: Box<Explanation>,
+        /// What its calibration was refused for.
+        source: Box<Failure>,
+    },
 }
 
 /// Screws and how far each is from a pose.
@@ -116,19 +146,33 @@ impl fmt::Display for Contradiction {
     }
 }
 
-impl PlatformFailure {
-    /// As [`crate::Failure::exit_code`].
-    pub const fn exit_code(&self) -> u8 {
+impl KindFailure for PlatformFailure {
+    fn exit_code(&self) -> u8 {
         match self {
-            Self::None | Self::NotConfigured { .. } => 2,
+            Self::None | Self::NotConfigured { .. } | Self::Screw { .. } => 2,
+            Self::Misdescribed {
+                explanation,
+                source,
+            } => {
+                if explanation.names_a_cause() {
+                    2
+                } else {
+                    source.exit_code()
+                }
+            }
             Self::NotZeroed
             | Self::OutOfReach(_)
             | Self::OutOfRange { .. }
             | Self::Path(_)
             | Self::Contradiction { .. }
-            | Self::OutOfCalibration { .. } => 3,
+            | Self::OutOfCalibration { .. }
+            | Self::Compensation { .. } => 3,
             Self::Forward(_) => 4,
             Self::Fit { .. } | Self::NotAligned { .. } | Self::OutOfTolerance { .. } => 5,
         }
+    }
+
+    fn depends_on_time(&self) -> bool {
+        matches!(self, Self::NotAligned { .. })
     }
 }

@@ -4,12 +4,14 @@ use machine::records::ContentKind;
 
 use crate::kinds::kind::Kind;
 use crate::platform::check::check;
+use crate::platform::dependence::depends;
 #[cfg(test)]
 use crate::platform::golden::GOLDEN;
 use crate::platform::record::ScrewContent;
 
 pub(crate) const KIND: Kind = Kind {
     check,
+    depends,
     contents: &[ContentKind::of::<ScrewContent>()],
     #[cfg(test)]
     golden: GOLDEN,

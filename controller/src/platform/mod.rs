@@ -10,6 +10,7 @@ pub(crate) mod calibrate;
 mod causes;
 pub(crate) mod check;
 pub(crate) mod config;
+mod dependence;
 mod entries;
 mod explanation;
 mod failure;
@@ -41,8 +42,7 @@ pub(crate) use config::{
     AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
 };
 pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
-pub(crate) use explanation::Explanation;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
 pub(crate) use record::ScrewMethodName;
-pub(crate) use state::{PlatformState, kinematics};
+pub(crate) use state::kinematics;

@@ -9,6 +9,7 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::memories::Memory;
 use crate::platform::PlatformConfig;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;

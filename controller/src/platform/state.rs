@@ -6,6 +6,7 @@ use units::portable::hypot;
 use units::{Metres, Radians};
 
 use crate::config::MachineConfig;
+use crate::memories::Memory;
 use crate::platform::PlatformConfig;
 
 /// One screw of a platform.
@@ -35,9 +36,8 @@ pub(crate) struct PlatformState {
 }
 
 impl PlatformState {
-    /// The platform of a configuration that has been checked; `None` when it has none.
-    pub(crate) fn of(config: &MachineConfig) -> Option<Self> {
-        let platform = config.platform.as_ref()?;
+    /// The platform of a configuration that has been checked.
+    pub(crate) fn of(platform: &PlatformConfig, config: &MachineConfig) -> Self {
         let kinematics =
             kinematics(platform, config).expect("the configuration was checked when it was loaded");
         let screws = platform.actuator.iter().map(|it| Screw {
@@ -47,16 +47,18 @@ impl PlatformState {
             calibration: None,
             memory: None,
         });
-        Some(Self {
+        Self {
             kinematics,
             screws: screws.collect(),
             pose: None,
             datum: None,
-        })
+        }
     }
+}
 
+impl Memory for PlatformState {
     /// Nothing that was known of where it is holds any more.
-    pub(crate) fn forget(&mut self) {
+    fn forget(&mut self) {
         self.pose = None;
         self.datum = None;
         for screw in &mut self.screws {
@@ -66,7 +68,7 @@ impl PlatformState {
 
     /// A move begins: should it not end, nobody knows where it stopped; the zero and the datum
     /// hold. What is known is set again when it has ended.
-    pub(crate) fn interrupted_before_it_ends(&mut self) {
+    fn interrupted_before_it_ends(&mut self) {
         self.pose = None;
         for screw in &mut self.screws {
             screw.memory = None;

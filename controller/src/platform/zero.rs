@@ -11,6 +11,7 @@ use units::{Metres, MetresPerSecond};
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::homing;
+use crate::memories::Memory;
 use crate::platform::PlatformEntry;
 use crate::platform::PoseEntry;
 use crate::platform::handle::AlignmentPlatform;

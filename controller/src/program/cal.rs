@@ -10,8 +10,6 @@ use crate::config::Loaded;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
-use crate::volumetric::MemoryName;
-use crate::volumetric::{GEOMETRY, REFERENCES, memory_pointer};
 use crate::{Failure, config, store_of};
 
 #[derive(Debug, Subcommand)]
@@ -135,7 +133,7 @@ pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure>
 
 /// How a kind of content is shown that the store knows.
 fn of_kind(kind: &str) -> Shown {
-    let all = KINDS.into_iter().flat_map(|it| it.shown);
+    let all = KINDS.iter().flat_map(|it| it.shown);
     let own = all.into_iter().find(|it| it.kind == kind);
     *own.expect("a test looks for each kind that is stored")
 }
@@ -191,11 +189,9 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
     let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
-    let volume = [GEOMETRY, REFERENCES]
-        .into_iter()
-        .chain([MemoryName::First, MemoryName::Second].map(memory_pointer));
-    let mut volume = volume.filter(|_| loaded.config.volumetric.is_some());
-    if known.contains(&axis) || volume.any(|it| it == axis) {
+    let mut kinds = KINDS.iter();
+    let is_pointer = kinds.any(|it| (it.pointers)(&loaded.config).iter().any(|it| it == axis));
+    if known.contains(&axis) || is_pointer {
         return Ok(());
     }
     Err(Failure::Machine(machine::Failure::NoSuchAxis {
@@ -204,16 +200,13 @@ fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     }))
 }
 
-/// What `--axis` calls all screws of a platform.
-const PLATFORM: &str = "platform";
-
 fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let store = store_of(&loaded.config.machine);
     let _lease = Lease::take(&store, "cal rollback")?;
-    if let (PLATFORM, Some(platform)) = (axis, &loaded.config.platform) {
-        let screws = platform.actuator.iter().map(|it| it.axis.as_str());
-        return rollback_all(&store, &screws.collect::<Vec<_>>(), output);
+    let mut kinds = KINDS.iter();
+    if let Some(all) = kinds.find_map(|it| (it.made_together)(&loaded.config, axis)) {
+        return rollback_all(&store, axis, &all, output);
     }
     known_axis(&loaded, axis)?;
     let id = store.rollback(axis)?;
@@ -221,8 +214,8 @@ fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     output.result(&text, &json!({"axis": axis, "active": id}))
 }
 
-/// Every screw goes back, or none: a platform moves by models that were made together.
-fn rollback_all(store: &Store, axes: &[&str], output: Output) -> Ended {
+/// Every axis of those called `name` goes back, or none.
+fn rollback_all(store: &Store, name: &str, axes: &[String], output: Output) -> Ended {
     for axis in axes {
         store.earlier(axis)?;
     }
@@ -231,12 +224,9 @@ fn rollback_all(store: &Store, axes: &[&str], output: Output) -> Ended {
     for axis in axes {
         let id = store.rollback(axis)?;
         lines.push(format!("axis {axis}: back to {}", short(&id)));
-        active.insert((*axis).to_owned(), json!(id));
+        active.insert(axis.clone(), json!(id));
     }
-    output.result(
-        &lines.join("\n"),
-        &json!({"axis": PLATFORM, "active": active}),
-    )
+    output.result(&lines.join("\n"), &json!({"axis": name, "active": active}))
 }
 
 #[cfg(test)]

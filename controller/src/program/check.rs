@@ -6,9 +6,8 @@ use serde_json::json;
 use units::Several;
 
 use crate::config;
+use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
-use crate::program::platform::plan;
-use crate::program::text;
 
 pub(crate) fn run(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
@@ -25,8 +24,8 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
         Several(loaded.config.camera.len(), "camera"),
         &loaded.hash.as_str()[..12],
     );
-    let mut notes = text::table_notes(&loaded.config);
-    notes.extend(plan::notes(&loaded.config));
+    let notes = KINDS.iter().flat_map(|it| (it.notes)(&loaded.config));
+    let notes: Vec<_> = notes.collect();
     let text = notes.iter().fold(text, |text, note| text + "\n" + note);
     output.result(
         &text,

@@ -8,7 +8,7 @@ use crate::program::MachineArgs;
 use crate::program::output::Ended;
 
 /// Each kind.
-pub(crate) const KINDS: [&Verbs; 4] = [
+pub(crate) const KINDS: &[&Verbs] = &[
     &linear::VERBS,
     &platform::VERBS,
     &rotary::VERBS,
@@ -38,7 +38,7 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<&'static Verbs, Fai
         });
     }
     // Three axes that move a platform are first of all three axes.
-    let mut kinds = KINDS.into_iter().rev();
+    let mut kinds = KINDS.iter().copied().rev();
     if let Some(kind) = kinds.find(|it| (it.has_the_axes)(config)) {
         return Ok(kind);
     }

@@ -24,7 +24,7 @@ pub(crate) struct ReportArgs {
 pub(crate) fn html(run: &Path) -> Result<String, Failure> {
     let opened_by = read_journal::<AnyLog>(run)?.log.opened_by;
     let own = opened_by.and_then(|name| {
-        let mut kinds = KINDS.into_iter();
+        let mut kinds = KINDS.iter().copied();
         kinds.find(|it| it.opened_by.contains(&&*name))
     });
     // A run of which only the header was written shows that.

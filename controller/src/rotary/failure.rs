@@ -1,8 +1,11 @@
 //! What can go wrong with a rotary table beyond what can go wrong with its drive.
 
-use compensator::rotary::RotarySeriesError;
-use compensator::rotary::{Misplaced, NotAnAngle, SolveError};
+use compensator::rotary::{
+    Misplaced, NotAnAngle, PeriodicError, PlanError, RotarySeriesError, SolveError,
+};
 use units::Radians;
+
+use crate::failure::of_kind::KindFailure;
 
 /// Why a rotary table did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -161,15 +164,52 @@ pub enum RotaryFailure {
         /// The tolerance.
         limit: Radians,
     },
+    /// A turn over a plate saw none of its lines.
+    #[error(
+        "axis {axis}: none of {lines} lines was seen in a whole turn; is the plate there, the \
+         detector on and wired to the drive's touch probe?"
+    )]
+    NoLines {
+        /// Which axis.
+        axis: String,
+        /// How many there should be.
+        lines: u32,
+    },
+    /// A rotary table's error cannot be computed.
+    #[error("{place}: {source}")]
+    Unsolved {
+        /// The data file, or the run.
+        place: String,
+        /// Why.
+        source: SolveError,
+    },
+    /// A plate was turned otherwise than was entered.
+    #[error("{place}: {source}")]
+    MisplacedInData {
+        /// The data file, or the run.
+        place: String,
+        /// Which placement, and what it fits.
+        source: Misplaced,
+    },
+    /// A rotary table's error cannot be applied.
+    #[error("axis {axis}: {source}")]
+    Compensation {
+        /// Which axis.
+        axis: String,
+        /// Why.
+        source: PeriodicError,
+    },
 }
 
-impl RotaryFailure {
-    /// As [`crate::Failure::exit_code`].
-    pub const fn exit_code(&self) -> u8 {
+impl KindFailure for RotaryFailure {
+    fn exit_code(&self) -> u8 {
         match self {
-            Self::OtherPlate { .. } => 2,
-            Self::Misplaced { .. } | Self::LiesElsewhere { .. } | Self::NotAnAngle { .. } => 3,
-            Self::TooFewLines { .. } => 4,
+            Self::OtherPlate { .. } | Self::Unsolved { .. } | Self::MisplacedInData { .. } => 2,
+            Self::Misplaced { .. }
+            | Self::LiesElsewhere { .. }
+            | Self::NotAnAngle { .. }
+            | Self::Compensation { .. } => 3,
+            Self::TooFewLines { .. } | Self::NoLines { .. } => 4,
             Self::Slipped { .. }
             | Self::Noise { .. }
             | Self::Series { .. }
@@ -177,5 +217,12 @@ impl RotaryFailure {
             | Self::MadeWorse { .. }
             | Self::OutOfTolerance { .. } => 5,
         }
+    }
+}
+
+/// No offsets of a plate can be planned, or those given are of no use.
+impl KindFailure for PlanError {
+    fn exit_code(&self) -> u8 {
+        2
     }
 }

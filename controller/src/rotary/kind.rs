@@ -4,12 +4,14 @@ use machine::records::ContentKind;
 
 use crate::kinds::kind::Kind;
 use crate::rotary::check::check_rotaries;
+use crate::rotary::dependence::depends;
 #[cfg(test)]
 use crate::rotary::golden::GOLDEN;
 use crate::rotary::record::RotaryContent;
 
 pub(crate) const KIND: Kind = Kind {
     check: check_rotaries,
+    depends,
     contents: &[ContentKind::of::<RotaryContent>()],
     #[cfg(test)]
     golden: GOLDEN,

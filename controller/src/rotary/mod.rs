@@ -14,6 +14,7 @@
 mod calibrate;
 pub(crate) mod check;
 mod config;
+mod dependence;
 mod entries;
 pub(crate) mod estimate;
 mod failure;
@@ -55,4 +56,3 @@ pub(crate) use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry
 pub(crate) use in_use::TableInUse;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlateEntry;
-pub(crate) use table::RotaryMemory;

@@ -17,6 +17,7 @@ use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
 use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
 use crate::hardware::{CHECKED, millis};
+use crate::rotary::failure::RotaryFailure;
 use crate::rotary::{
     EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
     RotaryCompensationConfig, RotaryConfig, RotaryDevice,
@@ -126,7 +127,7 @@ pub(crate) fn periodic_compensation(
     };
     PeriodicCompensation::new(table, interpolation, limits).map_err(|source| {
         let axis = axis.to_owned();
-        Failure::RotaryCompensation { axis, source }
+        RotaryFailure::Compensation { axis, source }.into()
     })
 }
 

@@ -14,6 +14,7 @@ use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use crate::failure::Failure;
+use crate::rotary::failure::RotaryFailure;
 use crate::rotary::line_speed::SPACING_SHARE;
 use crate::rotary::table::RotaryTable;
 use crate::rotary::turn::Way;
@@ -97,10 +98,8 @@ impl RotaryTable<'_> {
         self.core.turning(self.axis)?.latch(LatchCommand::Disarm)?;
         let latched = self.core.turning(self.axis)?.take_latched();
         if latched.is_empty() {
-            return Err(Failure::NoLines {
-                axis: self.axis.to_owned(),
-                lines: options.lines,
-            });
+            let (axis, lines) = (self.axis.to_owned(), options.lines);
+            return Err(RotaryFailure::NoLines { axis, lines }.into());
         }
         Ok(assign(&latched, first, options))
     }

@@ -1,6 +1,7 @@
 //! What can go wrong with three axes beyond what can go wrong with each.
 
 use core::time::Duration;
+use std::path::PathBuf;
 
 use compensator::volumetric::function::FunctionError;
 use compensator::volumetric::identify::IdentifyError;
@@ -9,6 +10,7 @@ use compensator::volumetric::online::{MemoryError, RollError, Trouble};
 use compensator::volumetric::{Axis, NoCorrection, VolumeError};
 use units::{Celsius, Metres, Radians};
 
+use crate::failure::of_kind::KindFailure;
 use crate::volumetric::calibrate::Scatter;
 use crate::volumetric::limits::{BeyondLimits, NotWithin};
 use crate::volumetric::settings::BeamDetectorError;
@@ -244,6 +246,14 @@ pub enum VolumetricFailure {
         /// What it may be.
         limit: Metres,
     },
+    /// A path cannot be driven as it is.
+    #[error("{}: {source}; nothing was moved", path.display())]
+    RefusedPath {
+        /// The file.
+        path: PathBuf,
+        /// What cannot be driven.
+        source: PathRefusal,
+    },
     /// A path that cannot be driven.
     #[error("the path was not driven to its end: {source}")]
     Path {
@@ -361,9 +371,24 @@ impl From<NotWithin> for VolumetricFailure {
     }
 }
 
-impl VolumetricFailure {
-    /// As [`crate::Failure::exit_code`].
-    pub const fn exit_code(&self) -> u8 {
+/// Why a path is not begun.
+#[derive(Debug, thiserror::Error)]
+pub enum PathRefusal {
+    /// The axes cannot follow it: soft limits, speed, acceleration or jerk.
+    #[error(transparent)]
+    Point(#[from] PushError),
+    /// It leaves the volume that is calibrated.
+    #[error("at {at_s:.4} s: {source}")]
+    Volume {
+        /// When it does, in seconds from the path's beginning.
+        at_s: f64,
+        /// Where it is then, and what is calibrated.
+        source: Box<VolumetricFailure>,
+    },
+}
+
+impl KindFailure for VolumetricFailure {
+    fn exit_code(&self) -> u8 {
         match self {
             Self::None
             | Self::NotConfigured { .. }
@@ -396,7 +421,8 @@ impl VolumetricFailure {
             | Self::NoCorrection(_)
             | Self::Model(_)
             | Self::Limits(_)
-            | Self::Path { .. } => 3,
+            | Self::Path { .. }
+            | Self::RefusedPath { .. } => 3,
             Self::NoSamples { .. }
             | Self::NoLight { .. }
             | Self::NotThere { .. }

@@ -2,15 +2,30 @@
 
 use units::Metres;
 
+use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::handle::Core;
 use crate::volumetric::VolumetricConfig;
+use crate::volumetric::failure::VolumetricFailure;
 
 /// The work volume of three axes: its zero, its moves, its calibration and its references.
 /// [`Machine::volumetric`](crate::Machine::volumetric) gives it.
 pub struct WorkVolume<'m> {
     pub(crate) core: Core<'m>,
     pub(crate) config: &'m VolumetricConfig,
+}
+
+impl Machine {
+    /// The work volume of the three axes.
+    ///
+    /// # Errors
+    /// When its errors are not corrected.
+    pub fn volumetric(&mut self) -> Result<WorkVolume<'_>, Failure> {
+        let (core, _) = Core::of(self);
+        let config = core.config.volumetric.as_ref();
+        let config = config.ok_or(VolumetricFailure::None)?;
+        Ok(WorkVolume { core, config })
+    }
 }
 
 impl<'m> WorkVolume<'m> {

@@ -4,12 +4,14 @@ use machine::records::ContentKind;
 
 use crate::kinds::kind::Kind;
 use crate::volumetric::check::check;
+use crate::volumetric::dependence::depends;
 #[cfg(test)]
 use crate::volumetric::golden::GOLDEN;
 use crate::volumetric::record::{BeamReferencesContent, GeometryContent, StateMemoryContent};
 
 pub(crate) const KIND: Kind = Kind {
     check,
+    depends,
     contents: &[
         ContentKind::of::<GeometryContent>(),
         ContentKind::of::<BeamReferencesContent>(),

@@ -20,8 +20,9 @@ pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
 mod correction;
+mod dependence;
 pub(crate) mod entries;
-mod failure;
+pub(crate) mod failure;
 pub(crate) mod first_part;
 #[cfg(test)]
 mod golden;
@@ -34,7 +35,6 @@ mod log;
 mod memory;
 pub(crate) mod memory_import;
 mod moves;
-mod path_refusal;
 pub(crate) mod record;
 pub(crate) mod reference;
 pub(crate) mod settings;
@@ -73,7 +73,6 @@ pub(crate) use log::VolumeEntry;
 pub(crate) use memory::Remembered;
 #[cfg(feature = "program")]
 pub(crate) use memory_import::import;
-pub(crate) use path_refusal::PathRefusal;
 pub(crate) use record::{AXES, error_name};
 pub(crate) use record::{
     AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, DriftRecord, ExpansionRecord,

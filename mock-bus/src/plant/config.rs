@@ -10,6 +10,7 @@ pub use self::parts::{
 };
 
 use super::camera::CameraConfig;
+use super::mechanics::Section;
 use super::platform::config::PlatformConfig;
 use super::table::config::TableConfig;
 use super::volumetric::config::VolumetricConfig;
@@ -38,35 +39,35 @@ pub struct PlantConfig {
 }
 
 impl PlantConfig {
+    /// What stands in place of the stage, of each kind.
+    pub(super) fn others(&self) -> [Option<&dyn Section>; 3] {
+        [
+            self.platform.as_ref().map(|it| it as &dyn Section),
+            self.table.as_ref().map(|it| it as &dyn Section),
+            self.volumetric.as_ref().map(|it| it as &dyn Section),
+        ]
+    }
+
     /// Travel of one encoder count of the machine's axes.
     pub fn resolution_nm(&self) -> f64 {
-        match (&self.platform, &self.volumetric) {
-            (Some(platform), _) => platform.screw.resolution_nm,
-            (None, Some(volumetric)) => volumetric.resolution_nm,
-            (None, None) => self.stage.encoder.resolution_nm,
-        }
+        let mut others = self.others().into_iter().flatten();
+        let other = others.find_map(Section::resolution_nm);
+        other.unwrap_or(self.stage.encoder.resolution_nm)
     }
 
     /// What makes no machine: numbers that no kind has, and more than one kind.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        if let Some(platform) = &self.platform {
-            platform.check()?;
+        let mut others = self.others().into_iter().flatten();
+        others.try_for_each(Section::check)?;
+        if self.platform.is_some() {
             positive("field_mm", self.camera.field_mm)?;
         }
-        self.table.as_ref().map_or(Ok(()), TableConfig::check)?;
-        let volumetric = self.volumetric.as_ref();
-        volumetric.map_or(Ok(()), VolumetricConfig::check)?;
         self.is_one_machine()
     }
 
     /// A machine is one thing or the other.
     fn is_one_machine(&self) -> Result<(), ConfigError> {
-        let others = [
-            self.platform.is_some(),
-            self.table.is_some(),
-            self.volumetric.is_some(),
-        ];
-        let others = others.into_iter().filter(|there| *there).count();
+        let others = self.others().into_iter().flatten().count();
         if others <= 1 {
             return Ok(());
         }

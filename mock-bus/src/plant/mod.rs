@@ -10,6 +10,7 @@ pub mod config;
 mod hall_field;
 mod instrument;
 mod machine;
+mod mechanics;
 mod parts;
 pub mod platform;
 mod stage;
@@ -21,7 +22,7 @@ pub mod volumetric;
 #[cfg(test)]
 mod tests;
 
-use units::{Celsius, Metres, Radians, Time};
+use units::{Celsius, Metres, Time};
 
 pub use analog::InputFault;
 pub use camera::{Mark, Target};
@@ -42,8 +43,10 @@ use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
 use machine::Machine;
 use parts::actuator::Actuator;
+use platform::Platform;
+use stage::Stage;
 use thermal::Climate;
-use volumetric::{BeamTrouble, Sighting, Signal, TERMINALS};
+use volumetric::{Sighting, Signal, TERMINALS, Volumetric};
 
 /// Inputs 0 and 1 are the Hall sensors; the others are spare. Three axes have their own.
 const ANALOG_INPUTS: usize = 8;
@@ -181,7 +184,7 @@ impl Plant {
 
     /// What is wired to analog input `channel`.
     fn signal(&mut self, channel: usize) -> Option<Signal> {
-        if let Some(volumetric) = self.machine.volumetric_mut() {
+        if let Some(volumetric) = self.machine.of_mut::<Volumetric>() {
             return volumetric.signal(channel, self.now);
         }
         let sensor = match (channel, self.inputs_swapped) {
@@ -221,12 +224,12 @@ impl Plant {
     }
 
     fn sighting(&self, air: &Environment) -> Option<Sighting> {
-        if let Some(volumetric) = self.machine.volumetric() {
+        if let Some(volumetric) = self.machine.of::<Volumetric>() {
             return volumetric.sighting(self.now);
         }
         let stage_c = air.stage_temperature.value();
         let position_m = self.true_position_at(stage_c).value();
-        let stage = self.machine.stage();
+        let stage = self.machine.of::<Stage>();
         let speed = stage.map_or(0.0, |stage| stage.speed(self.now));
         Some(self.interferometer.reflector(position_m, speed))
     }
@@ -239,7 +242,7 @@ impl Plant {
     /// Air and machine. Three axes have their own warmth, in the air that makes it.
     fn environment(&self) -> Environment {
         let climate = self.climate.at(self.now);
-        let Some(volumetric) = self.machine.volumetric() else {
+        let Some(volumetric) = self.machine.of::<Volumetric>() else {
             return climate;
         };
         let (air_c, machine_c) = volumetric.temperatures_c(self.now);
@@ -262,14 +265,14 @@ impl Plant {
 
     /// What carries the marks; on a machine without a platform they stand.
     fn pose(&self) -> Pose {
-        let platform = self.machine.platform();
+        let platform = self.machine.of::<Platform>();
         platform.map_or_else(Pose::default, |platform| platform.pose(self.now))
     }
 
     /// Of the linear stage: what carries the magnets and the reflector. Without one these
     /// stand at their zero.
     fn true_position(&self) -> Metres {
-        if self.machine.stage().is_none() {
+        if self.machine.of::<Stage>().is_none() {
             return Metres::ZERO;
         }
         self.true_position_at(self.climate.stage_temperature(self.now).value())
@@ -277,7 +280,7 @@ impl Plant {
 
     /// The same with the stage's temperature known.
     fn true_position_at(&self, stage_c: f64) -> Metres {
-        let stage = self.machine.stage();
+        let stage = self.machine.of::<Stage>();
         stage.map_or(Metres::ZERO, |stage| {
             Metres(stage.true_position_m(self.now, stage_c))
         })
@@ -293,57 +296,6 @@ impl Plant {
     pub fn power_cycle(&mut self, drift: HallDrift) {
         self.hall.drift = drift;
         self.machine.power_cycle();
-    }
-
-    /// Somebody takes up the table's plate, turns it by so many lines and fixes it again.
-    pub fn turn_plate(&mut self, lines: f64) {
-        if let Some(table) = self.machine.table_mut() {
-            table.turn_plate(lines);
-        }
-    }
-
-    /// Somebody mounts a target on the tool of three axes and sets a laser up along a line that
-    /// begins where the machine stands, a little off as ever.
-    pub fn set_up_line(&mut self, set_up: &LineSetUp) {
-        let now = self.now;
-        if let Some(volumetric) = self.machine.volumetric_mut() {
-            volumetric.set_up_line(set_up, now);
-        }
-    }
-
-    /// Somebody takes laser and target away again.
-    pub fn take_line_away(&mut self) {
-        if let Some(volumetric) = self.machine.volumetric_mut() {
-            volumetric.take_line_away();
-        }
-    }
-
-    /// Covers a line of the table's plate with dirt, or wipes it.
-    pub fn set_line_smudged(&mut self, line: u32, smudged: bool) {
-        if let Some(table) = self.machine.table_mut() {
-            table.set_smudged(line, smudged);
-        }
-    }
-
-    /// Scratches the plate beside a line, which then gives a second edge, or mends it.
-    pub fn set_line_scratched(&mut self, line: u32, scratched: bool) {
-        if let Some(table) = self.machine.table_mut() {
-            table.set_scratched(line, scratched);
-        }
-    }
-
-    /// Lets the line detector see a line so far beside its place; zero is where it is.
-    pub fn shift_line(&mut self, line: u32, shift: Radians) {
-        if let Some(table) = self.machine.table_mut() {
-            table.shift_line(line, shift);
-        }
-    }
-
-    /// Lets the line detector see nothing, or everything again.
-    pub fn set_detector_dead(&mut self, dead: bool) {
-        if let Some(table) = self.machine.table_mut() {
-            table.set_detector_dead(dead);
-        }
     }
 
     /// Holds `axis` fast, or lets it go.
@@ -375,14 +327,6 @@ impl Plant {
     /// Exchanges inputs 0 and 1.
     pub fn set_inputs_swapped(&mut self, swapped: bool) {
         self.inputs_swapped = swapped;
-    }
-
-    /// What goes wrong with the reference beam along `axis`, or is mended.
-    pub(crate) fn trouble_beam(&mut self, axis: usize, change: impl FnOnce(&mut BeamTrouble)) {
-        let volumetric = self.machine.volumetric_mut();
-        if let Some(trouble) = volumetric.and_then(|it| it.trouble_mut(axis)) {
-            change(trouble);
-        }
     }
 
     /// What becomes of the interferometer's beam.

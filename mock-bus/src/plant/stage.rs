@@ -6,6 +6,7 @@ use crate::random::Stream;
 use units::Time;
 
 use super::config::StageConfig;
+use super::mechanics::Mechanics;
 use super::parts::actuator::Actuator;
 use super::parts::deviation::{Field, Path};
 use super::parts::drive_train::DriveTrain;
@@ -55,31 +56,12 @@ impl Stage {
         stage
     }
 
-    pub(super) fn advance(&mut self, now: Time) {
-        while let Some((from, to)) = self.train.step_until(now) {
-            if to != from {
-                self.path.travel(to - from);
-                self.watch_switches();
-            }
-        }
-        self.train.settle(now);
-    }
-
     /// The switches' own place varies by more than the scale grows: expansion is left out.
     fn watch_switches(&mut self) {
         let field = &self.field;
         let error_m = field.at_most(self.train.mass.position_at(Time::ZERO));
         self.train
             .watch_switches(error_m, |scale_m| scale_m + field.at(scale_m));
-    }
-
-    /// Without power the stage can be moved; `now` is when the power is off.
-    pub(super) fn push_a_little(&mut self) {
-        let limit_m = self.config.motion.power_cycle_shift_um * 1e-6;
-        let by_m = self.shift.between(-limit_m, limit_m);
-        self.train.mass.push(by_m);
-        self.path.leave();
-        self.path.travel(by_m);
     }
 
     /// Scale position of the encoder's present zero count.
@@ -118,6 +100,39 @@ impl Stage {
     /// True minus scale position, fully engaged in the direction of `sign` (0: between both).
     pub(super) fn systematic_deviation_m(&self, scale_m: f64, sign: f64, stage_c: f64) -> f64 {
         self.grown(scale_m, stage_c) - scale_m + self.field.at(scale_m) + self.path.engaged_m(sign)
+    }
+}
+
+impl Mechanics for Stage {
+    fn advance(&mut self, now: Time) {
+        while let Some((from, to)) = self.train.step_until(now) {
+            if to != from {
+                self.path.travel(to - from);
+                self.watch_switches();
+            }
+        }
+        self.train.settle(now);
+    }
+
+    fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
+        (number == 0).then_some(self as &dyn Actuator)
+    }
+
+    fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
+        (number == 0).then_some(self as &mut dyn Actuator)
+    }
+
+    /// Without power the stage can be moved; `now` is when the power is off.
+    fn power_cycle(&mut self) {
+        let limit_m = self.config.motion.power_cycle_shift_um * 1e-6;
+        let by_m = self.shift.between(-limit_m, limit_m);
+        self.train.mass.push(by_m);
+        self.path.leave();
+        self.path.travel(by_m);
+    }
+
+    fn boxed(&self) -> Box<dyn Mechanics> {
+        Box::new(self.clone())
     }
 }
 

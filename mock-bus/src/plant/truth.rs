@@ -3,7 +3,7 @@
 use units::{Approach, Celsius, Metres};
 
 use super::stage::Stage;
-use super::{Environment, Plant, PlatformTruth, TableTruth, VolumetricTruth};
+use super::{Environment, Plant};
 
 /// A look at the truth behind all sensors.
 ///
@@ -12,7 +12,7 @@ use super::{Environment, Plant, PlatformTruth, TableTruth, VolumetricTruth};
 /// position for 0 would test nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth<'a> {
-    plant: &'a Plant,
+    pub(super) plant: &'a Plant,
 }
 
 impl<'a> Truth<'a> {
@@ -54,28 +54,8 @@ impl<'a> Truth<'a> {
         Metres(self.stage().systematic_deviation_m(scale_m, sign, stage_c))
     }
 
-    /// The platform, where the machine is one.
-    pub fn platform(&self) -> Option<PlatformTruth<'a>> {
-        let platform = self.plant.machine.platform()?;
-        Some(PlatformTruth::new(platform, self.plant.now))
-    }
-
-    /// The rotary table, where the machine is one.
-    pub fn table(&self) -> Option<TableTruth<'a>> {
-        let plant: &'a Plant = self.plant;
-        let table = plant.machine.table()?;
-        Some(TableTruth::new(table, plant.now))
-    }
-
-    /// The three axes, where the machine has them.
-    pub fn volumetric(&self) -> Option<VolumetricTruth<'a>> {
-        let plant: &'a Plant = self.plant;
-        let volumetric = plant.machine.volumetric()?;
-        Some(VolumetricTruth::new(volumetric, plant.now))
-    }
-
     fn stage(&self) -> &Stage {
-        let stage = self.plant.machine.stage();
+        let stage = self.plant.machine.of::<Stage>();
         stage.expect("the judged machine has a linear stage")
     }
 

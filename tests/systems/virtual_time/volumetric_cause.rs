@@ -49,7 +49,7 @@ fn refused(
         Ok(made) => panic!("stored as {}", made.id),
         Err(failure) => failure,
     };
-    let scattered = matches!(&failure, Failure::Volumetric(VolumetricFailure::Scatter(_)));
+    let scattered = matches!(failure.of_kind(), Some(VolumetricFailure::Scatter(_)));
     assert!(scattered, "{failure}");
     assert_eq!(failure.exit_code(), 5);
     assert!(store.list().expect("it can be read").is_empty());

@@ -267,8 +267,8 @@ fn a_line_that_cannot_be_measured_is_refused_before_anything_moves() {
     let about = LineOptics::Angular { about: Axis::X };
     let refused = set_up(&mut bench, &task(about, ORIGIN, end, TOOL)).unwrap_err();
     assert!(matches!(
-        refused,
-        Failure::Volumetric(VolumetricFailure::NotALine)
+        refused.of_kind(),
+        Some(VolumetricFailure::NotALine)
     ));
     let moved = target(&bench, TOOL, ORIGIN) - before;
     assert!(moved.distance() < Metres::from_um(0.1));
@@ -288,7 +288,7 @@ fn a_count_of_the_wrong_sign_is_no_error_of_the_machine() {
         .unwrap()
         .read_line(&line, near)
         .unwrap_err();
-    let Failure::Volumetric(VolumetricFailure::ImpossibleReading { seen, .. }) = refused else {
+    let Some(VolumetricFailure::ImpossibleReading { seen, .. }) = refused.of_kind() else {
         panic!("{refused}")
     };
     assert!((seen.mm() + 20.0).abs() < 0.1, "{} mm", seen.mm());
@@ -306,8 +306,8 @@ fn a_line_without_light_is_refused() {
     bench.emulated.simulation_mut().inject(blocked).unwrap();
     let refused = set_up(&mut bench, &task).unwrap_err();
     assert!(matches!(
-        refused,
-        Failure::Volumetric(VolumetricFailure::NoLight { .. })
+        refused.of_kind(),
+        Some(VolumetricFailure::NoLight { .. })
     ));
 }
 

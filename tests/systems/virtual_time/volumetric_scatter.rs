@@ -76,7 +76,7 @@ fn a_count_that_slips_is_stored_nowhere_and_its_line_is_named_and_read_again_alo
             Err(failure) => failure,
         };
         let text = failure.to_string();
-        let scattered = matches!(&failure, Failure::Volumetric(VolumetricFailure::Scatter(_)));
+        let scattered = matches!(failure.of_kind(), Some(VolumetricFailure::Scatter(_)));
         assert!(scattered, "line {slips_on}: {text}");
         assert_eq!(failure.exit_code(), 5);
         assert!(

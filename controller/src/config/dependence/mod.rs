@@ -5,7 +5,8 @@
 //! taken from the names or the order of Rust types. It has a version in its first line. A version that
 //! was ever published stays as it is, and its hash stays good: calibrations carry it.
 
-mod text;
+pub(crate) mod devices;
+pub(crate) mod text;
 mod version_1;
 mod version_2;
 

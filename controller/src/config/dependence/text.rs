@@ -3,12 +3,12 @@
 use core::fmt::Write;
 
 /// A value as it stands in the text; `None` leaves no line.
-pub(super) trait Value {
+pub(crate) trait Value {
     fn written(&self) -> Option<String>;
 }
 
 /// A name that the configuration file gives, in quotes: it may have dots in it.
-pub(super) fn quoted(name: &str) -> String {
+pub(crate) fn quoted(name: &str) -> String {
     let mut text = String::from("\"");
     for letter in name.chars() {
         match letter {
@@ -81,13 +81,13 @@ impl<T: Value + ?Sized> Value for &T {
 }
 
 /// Where lines are added: the text, and the path in front of every key.
-pub(super) struct Place<'a> {
+pub(crate) struct Place<'a> {
     text: &'a mut String,
     path: String,
 }
 
 impl<'a> Place<'a> {
-    pub(super) const fn top(text: &'a mut String) -> Self {
+    pub(crate) const fn top(text: &'a mut String) -> Self {
         Self {
             text,
             path: String::new(),
@@ -95,7 +95,7 @@ impl<'a> Place<'a> {
     }
 
     /// Below `key`.
-    pub(super) fn at(&mut self, key: impl core::fmt::Display) -> Place<'_> {
+    pub(crate) fn at(&mut self, key: impl core::fmt::Display) -> Place<'_> {
         Place {
             path: format!("{}{key}.", self.path),
             text: self.text,
@@ -103,9 +103,25 @@ impl<'a> Place<'a> {
     }
 
     /// One line, unless there is no such value.
-    pub(super) fn say(&mut self, key: &str, value: impl Value) {
+    pub(crate) fn say(&mut self, key: &str, value: impl Value) {
         if let Some(value) = value.written() {
             writeln!(self.text, "{}{key} = {value}", self.path).expect("a String takes everything");
         }
     }
 }
+
+/// Words of the configuration file. They are written out here: a word that changes there must not
+/// change here.
+macro_rules! by_its_word {
+    ($($name:ty { $($variant:ident: $word:literal),* })*) => {$(
+        impl $crate::config::dependence::text::Value for $name {
+            fn written(&self) -> Option<String> {
+                let word = match self {
+                    $(Self::$variant => $word,)*
+                };
+                $crate::config::dependence::text::Value::written(word)
+            }
+        }
+    )*};
+}
+pub(crate) use by_its_word;

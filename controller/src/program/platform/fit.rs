@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use units::{Metres, Short};
 
 use crate::platform::PlatformConfig;
+use crate::platform::PlatformFailure;
 use crate::platform::{ScrewContent, ScrewMethodName};
 use crate::program::data_file::{head_of, read};
 use crate::program::output::{Ended, Output};
@@ -70,7 +71,7 @@ pub(crate) fn run(args: &ScrewArgs, output: Output) -> Ended {
     }
     let mut axes = Vec::new();
     for strokes in series.axes() {
-        let failed = |source| Failure::Screw {
+        let failed = |source| PlatformFailure::Screw {
             place: strokes
                 .line
                 .map_or(file.clone(), |line| format!("{file}:{line}")),
@@ -253,7 +254,7 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
         let limits = limits_of(&loaded, it.axis);
         ScrewCompensation::new(it.model.clone(), limits, rule).map_err(|source| {
             let axis = it.axis.to_owned();
-            Failure::ScrewCompensation { axis, source }
+            PlatformFailure::Compensation { axis, source }
         })?;
         let rows = u32::try_from(it.rows).unwrap_or(u32::MAX);
         let content = ScrewContent::new(&it.model, method, rows).without(&it.outliers);

@@ -18,6 +18,7 @@ use crate::program::output::{Ended, Output};
 use crate::program::rotary::json as to_json;
 use crate::program::show::{Changes, Show};
 use crate::rotary::RotaryContent;
+use crate::rotary::RotaryFailure;
 use crate::{Failure, config, store_of};
 
 /// Harmonics that a plan prints; `--json` has them all.
@@ -147,12 +148,13 @@ pub(crate) fn fit(args: &RotaryArgs, output: Output) -> Ended {
         ..SolveOptions::default()
     };
     if let Some(source) = rotary::misplaced(&series, &options) {
-        return Err(Failure::Misplaced {
+        return Err(RotaryFailure::MisplacedInData {
             place: file,
             source,
-        });
+        }
+        .into());
     }
-    let solution = rotary::solve(&series, &options).map_err(|source| Failure::Rotary {
+    let solution = rotary::solve(&series, &options).map_err(|source| RotaryFailure::Unsolved {
         place: file,
         source,
     })?;

@@ -22,6 +22,9 @@ use crate::rotary::{PlateLog, RotaryContent};
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |_| false,
+    notes: |_| Vec::new(),
+    pointers: |_| Vec::new(),
+    made_together: |_, _| None,
     demos: demo::DEMOS,
     zero: verbs::zero,
     calibrate: verbs::calibrate,

@@ -185,7 +185,7 @@ fn leave_out(read: &mut VolumeLog, names: &[String]) -> Result<(), Failure> {
 
 /// The line of the data file in place of a reading's number.
 fn placed(failure: Failure, file: &Path, rows: &[usize]) -> Failure {
-    let Failure::Volumetric(VolumetricFailure::Identify(source)) = &failure else {
+    let Some(VolumetricFailure::Identify(source)) = failure.of_kind() else {
         return failure;
     };
     let index = match source {

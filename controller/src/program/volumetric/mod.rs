@@ -18,11 +18,16 @@ use super::made_from::source;
 use super::show::Shown;
 use super::verbs::Verbs;
 use crate::Failure;
+use crate::config::MachineConfig;
 use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog};
+use crate::volumetric::{GEOMETRY, MemoryName, REFERENCES, memory_pointer};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |config| config.volumetric.is_some(),
+    notes: |_| Vec::new(),
+    pointers,
+    made_together: |_, _| None,
     demos: demo::DEMOS,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
@@ -49,4 +54,14 @@ fn made_from(path: &Path) -> Result<Made, Failure> {
         Some((store, name)) => Made::of(&store, &name)?,
         None => Made::default(),
     })
+}
+
+/// Of the whole volume.
+fn pointers(config: &MachineConfig) -> Vec<String> {
+    if config.volumetric.is_none() {
+        return Vec::new();
+    }
+    let memories = [MemoryName::First, MemoryName::Second].map(memory_pointer);
+    let pointers = [GEOMETRY, REFERENCES].into_iter().chain(memories);
+    pointers.map(str::to_owned).collect()
 }

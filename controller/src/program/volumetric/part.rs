@@ -17,8 +17,10 @@ use crate::program::session::Session;
 use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
 use crate::program::{ImportArgs, MachineArgs, MemoryArgs};
 use crate::volumetric::MemoryName;
+use crate::volumetric::VolumetricFailure;
+use crate::volumetric::failure::PathRefusal;
 use crate::volumetric::first_part::FirstPart;
-use crate::volumetric::{GEOMETRY, Mover, PathRefusal, Remembered, import, memory_pointer};
+use crate::volumetric::{GEOMETRY, Mover, Remembered, import, memory_pointer};
 use crate::{Failure, Machine, Store, store_of};
 
 /// How a path was followed.
@@ -115,7 +117,7 @@ fn judged(
     (file, text): (&Path, &str),
     is_corrected: bool,
 ) -> Result<CsvPath, Failure> {
-    let refused = |source| Failure::Path {
+    let refused = |source| VolumetricFailure::RefusedPath {
         path: file.to_owned(),
         source,
     };

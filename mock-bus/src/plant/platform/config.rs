@@ -17,7 +17,7 @@ pub struct PlatformConfig {
 
 impl PlatformConfig {
     /// What makes no platform.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+    pub(super) fn check_numbers(&self) -> Result<(), ConfigError> {
         let screw = &self.screw;
         for (key, seen) in [
             ("lead_mm", screw.lead_mm),

@@ -22,7 +22,10 @@ use units::{Metres, Radians, Time};
 
 pub use truth::PlatformTruth;
 
+use super::config::InterferometerConfig;
+use super::mechanics::{Mechanics, Section};
 use super::parts::actuator::Actuator;
+use crate::config::error::ConfigError;
 use config::PlatformConfig;
 use kinematics::Kinematics;
 use screw::Screw;
@@ -68,27 +71,6 @@ impl Platform {
         }
     }
 
-    pub(super) fn advance(&mut self, now: Time) {
-        for screw in &mut self.screws {
-            screw.advance(now);
-        }
-    }
-
-    pub(super) fn power_cycle(&mut self) {
-        for screw in &mut self.screws {
-            screw.push_a_little();
-        }
-    }
-
-    pub(super) fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
-        self.screws.get(number).map(|screw| screw as &dyn Actuator)
-    }
-
-    pub(super) fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
-        let screw = self.screws.get_mut(number);
-        screw.map(|screw| screw as &mut dyn Actuator)
-    }
-
     /// Where the platform really is.
     pub(super) fn pose(&self, now: Time) -> Pose {
         self.pose_by(|screw| screw.stroke_m(now))
@@ -97,6 +79,47 @@ impl Platform {
     fn pose_by(&self, stroke_m: impl Fn(&Screw) -> f64) -> Pose {
         let strokes: Vec<f64> = self.screws.iter().map(stroke_m).collect();
         self.kinematics.pose(&strokes)
+    }
+}
+
+impl Section for PlatformConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        self.check_numbers()
+    }
+
+    fn resolution_nm(&self) -> Option<f64> {
+        Some(self.screw.resolution_nm)
+    }
+
+    fn build(&self, _: &InterferometerConfig, seed: u64) -> Box<dyn Mechanics> {
+        Box::new(Platform::new(self, seed))
+    }
+}
+
+impl Mechanics for Platform {
+    fn advance(&mut self, now: Time) {
+        for screw in &mut self.screws {
+            screw.advance(now);
+        }
+    }
+
+    fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
+        self.screws.get(number).map(|screw| screw as &dyn Actuator)
+    }
+
+    fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
+        let screw = self.screws.get_mut(number);
+        screw.map(|screw| screw as &mut dyn Actuator)
+    }
+
+    fn power_cycle(&mut self) {
+        for screw in &mut self.screws {
+            screw.push_a_little();
+        }
+    }
+
+    fn boxed(&self) -> Box<dyn Mechanics> {
+        Box::new(self.clone())
     }
 }
 

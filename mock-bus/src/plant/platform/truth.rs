@@ -3,6 +3,7 @@
 use units::{Approach, Metres, Time};
 
 use super::{Platform, Pose};
+use crate::plant::truth::Truth;
 
 /// A look at a platform behind all sensors. Screws are numbered like the machine's axes.
 #[derive(Clone, Copy, Debug)]
@@ -11,8 +12,17 @@ pub struct PlatformTruth<'a> {
     now: Time,
 }
 
+impl<'a> Truth<'a> {
+    /// The platform, where the machine is one.
+    pub fn platform(&self) -> Option<PlatformTruth<'a>> {
+        let plant = self.plant;
+        let platform = plant.machine.of::<Platform>()?;
+        Some(PlatformTruth::new(platform, plant.now))
+    }
+}
+
 impl<'a> PlatformTruth<'a> {
-    pub(in crate::plant) const fn new(platform: &'a Platform, now: Time) -> Self {
+    const fn new(platform: &'a Platform, now: Time) -> Self {
         Self { platform, now }
     }
 

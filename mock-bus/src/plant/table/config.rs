@@ -200,7 +200,7 @@ impl Default for DetectorConfig {
 
 impl TableConfig {
     /// What makes no table.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+    pub(super) fn check_numbers(&self) -> Result<(), ConfigError> {
         let mut numbers = self.positive_numbers().into_iter();
         numbers.try_for_each(|(key, seen)| positive(key, seen))
     }

@@ -17,6 +17,7 @@
 pub mod config;
 mod detector;
 mod encoder_error;
+mod hands;
 mod plate;
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,9 @@ use units::{Radians, Time};
 
 pub use truth::TableTruth;
 
+use crate::config::error::ConfigError;
+use crate::plant::config::InterferometerConfig;
+use crate::plant::mechanics::{Mechanics, Section};
 use crate::plant::parts::actuator::Actuator;
 use crate::plant::parts::drive_train::DriveTrain;
 use crate::plant::parts::encoder::Encoder;
@@ -92,18 +96,6 @@ impl Table {
         }
     }
 
-    pub(super) fn advance(&mut self, now: Time) {
-        while let Some((from, to)) = self.train.step_until(now) {
-            self.step += 1;
-            if to != from {
-                self.watch_lines(from, to);
-            }
-        }
-        if self.train.settle(now) {
-            self.step = now.nanos() / GRID_NS;
-        }
-    }
-
     fn true_angle(&self, reading: f64) -> f64 {
         reading - self.error.at(reading)
     }
@@ -152,12 +144,6 @@ impl Table {
             .see(passage, |reading| encoder.counts(reading));
     }
 
-    /// Without power the table can be turned.
-    pub(super) fn push_a_little(&mut self) {
-        let limit = self.power_cycle_shift;
-        self.train.mass.push(self.shift.between(-limit, limit));
-    }
-
     pub(super) fn turn_plate(&mut self, lines: f64) {
         self.plate.turn(lines);
         self.passages_before = self.detector.passages();
@@ -187,6 +173,48 @@ impl Table {
 
     pub(super) fn set_scratched(&mut self, line: u32, scratched: bool) {
         self.detector.scratch(line, scratched);
+    }
+}
+
+impl Section for TableConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        self.check_numbers()
+    }
+
+    fn build(&self, _: &InterferometerConfig, seed: u64) -> Box<dyn Mechanics> {
+        Box::new(Table::new(self, seed))
+    }
+}
+
+impl Mechanics for Table {
+    fn advance(&mut self, now: Time) {
+        while let Some((from, to)) = self.train.step_until(now) {
+            self.step += 1;
+            if to != from {
+                self.watch_lines(from, to);
+            }
+        }
+        if self.train.settle(now) {
+            self.step = now.nanos() / GRID_NS;
+        }
+    }
+
+    fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
+        (number == 0).then_some(self as &dyn Actuator)
+    }
+
+    fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
+        (number == 0).then_some(self as &mut dyn Actuator)
+    }
+
+    /// Without power the table can be turned.
+    fn power_cycle(&mut self) {
+        let limit = self.power_cycle_shift;
+        self.train.mass.push(self.shift.between(-limit, limit));
+    }
+
+    fn boxed(&self) -> Box<dyn Mechanics> {
+        Box::new(self.clone())
     }
 }
 

@@ -5,6 +5,7 @@ use units::{Radians, Time};
 use crate::plant::parts::actuator::Actuator;
 
 use super::Table;
+use crate::plant::truth::Truth;
 
 /// A look at a rotary table behind all sensors. Angles count on over the turns.
 #[derive(Clone, Copy, Debug)]
@@ -13,8 +14,17 @@ pub struct TableTruth<'a> {
     now: Time,
 }
 
+impl<'a> Truth<'a> {
+    /// The rotary table, where the machine is one.
+    pub fn table(&self) -> Option<TableTruth<'a>> {
+        let plant = self.plant;
+        let table = plant.machine.of::<Table>()?;
+        Some(TableTruth::new(table, plant.now))
+    }
+}
+
 impl<'a> TableTruth<'a> {
-    pub(in crate::plant) const fn new(table: &'a Table, now: Time) -> Self {
+    const fn new(table: &'a Table, now: Time) -> Self {
         Self { table, now }
     }
 

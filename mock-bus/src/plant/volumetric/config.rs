@@ -380,7 +380,7 @@ impl Default for LaserConfig {
 
 impl VolumetricConfig {
     /// What makes no three axes.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+    pub(super) fn check_numbers(&self) -> Result<(), ConfigError> {
         for (key, seen) in self.positive_numbers() {
             positive(key, seen)?;
         }

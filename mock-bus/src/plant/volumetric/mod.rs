@@ -18,6 +18,7 @@ mod beam;
 mod chain;
 pub mod config;
 mod guide;
+mod hands;
 mod heat;
 mod laser;
 #[cfg(test)]
@@ -36,7 +37,10 @@ pub(super) use laser::Sighting;
 pub use laser::{LineOptics, LineSetUp};
 pub use truth::{ErrorMotion, LineTruth, Point, VolumetricTruth};
 
+use super::config::InterferometerConfig;
+use super::mechanics::{Mechanics, Section};
 use super::parts::actuator::Actuator;
+use crate::config::error::ConfigError;
 use crate::random::Stream;
 use beam::{Beam, Place};
 use chain::{Chain, Stand};
@@ -110,27 +114,6 @@ impl Volumetric {
             sensor_offsets_k: [(); 6].map(|()| stream.between(-offset_k, offset_k)),
             laser: Laser::new(&config.laser, dead_path_m, seed),
         }
-    }
-
-    pub(super) fn advance(&mut self, now: Time) {
-        for slide in &mut self.slides {
-            slide.advance(now);
-        }
-    }
-
-    pub(super) fn power_cycle(&mut self) {
-        for slide in &mut self.slides {
-            slide.push_a_little();
-        }
-    }
-
-    pub(super) fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
-        self.slides.get(number).map(|slide| slide as &dyn Actuator)
-    }
-
-    pub(super) fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
-        let slide = self.slides.get_mut(number);
-        slide.map(|slide| slide as &mut dyn Actuator)
     }
 
     /// What goes wrong with a beam from now on; nothing happens to one that is not there.
@@ -234,5 +217,47 @@ impl Volumetric {
         let motion = self.motion(axis, scale_m, now);
         let seen = (&motion, across(axis));
         self.beams[axis].look(place, scale_m, seen, now)[quadrant]
+    }
+}
+
+impl Section for VolumetricConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        self.check_numbers()
+    }
+
+    fn resolution_nm(&self) -> Option<f64> {
+        Some(self.resolution_nm)
+    }
+
+    fn build(&self, interferometer: &InterferometerConfig, seed: u64) -> Box<dyn Mechanics> {
+        let dead_path_m = interferometer.dead_path_mm * 1e-3;
+        Box::new(Volumetric::new(self, dead_path_m, seed))
+    }
+}
+
+impl Mechanics for Volumetric {
+    fn advance(&mut self, now: Time) {
+        for slide in &mut self.slides {
+            slide.advance(now);
+        }
+    }
+
+    fn actuator(&self, number: usize) -> Option<&dyn Actuator> {
+        self.slides.get(number).map(|slide| slide as &dyn Actuator)
+    }
+
+    fn actuator_mut(&mut self, number: usize) -> Option<&mut dyn Actuator> {
+        let slide = self.slides.get_mut(number);
+        slide.map(|slide| slide as &mut dyn Actuator)
+    }
+
+    fn power_cycle(&mut self) {
+        for slide in &mut self.slides {
+            slide.push_a_little();
+        }
+    }
+
+    fn boxed(&self) -> Box<dyn Mechanics> {
+        Box::new(self.clone())
     }
 }

@@ -4,6 +4,7 @@ use units::{Celsius, Metres, Radians, Time};
 
 use super::Volumetric;
 use super::rigid::Vector;
+use crate::plant::truth::Truth;
 
 /// What the hand that set a line up has left.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,8 +47,17 @@ fn values(point: Point) -> Vector {
     point.map(Metres::value)
 }
 
+impl<'a> Truth<'a> {
+    /// The three axes, where the machine has them.
+    pub fn volumetric(&self) -> Option<VolumetricTruth<'a>> {
+        let plant = self.plant;
+        let volumetric = plant.machine.of::<Volumetric>()?;
+        Some(VolumetricTruth::new(volumetric, plant.now))
+    }
+}
+
 impl<'a> VolumetricTruth<'a> {
-    pub(in crate::plant) const fn new(machine: &'a Volumetric, now: Time) -> Self {
+    const fn new(machine: &'a Volumetric, now: Time) -> Self {
         Self { machine, now }
     }
 
