@@ -2,7 +2,7 @@
 //!
 //! `cargo run --example stream -- machine.toml path.csv` (`time_s,x_mm`)
 #![expect(clippy::print_stdout, reason = "an example shows what it reads")]
-use truestage::engine::{Engine, State, read_path};
+use machine::engine::{Engine, State, read_path};
 use truestage::{Failure, Lease, Machine, config, ports, store_of};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -34,8 +34,9 @@
 //! # Names
 //!
 //! Here is what a program has to write. Quantities are those of `units`; what a machine of any kind is and
-//! fails with, and records of any kind, are in `machine`; mathematics are in `compensator`. What is read only
-//! (sections of a configuration, entries of a journal) has fields and needs no name.
+//! fails with, records of any kind, and several axes as one motion ([`machine::engine`]) are in `machine`;
+//! mathematics are in `compensator`. What is read only (sections of a configuration, entries of a journal, what
+//! a procedure found) has fields and needs no name.
 //!
 //! This is not a safety controller: wire STO.
 
@@ -80,14 +81,6 @@ pub use machine::{Observer, Stage, StopRequest};
 #[cfg(feature = "program")]
 pub use program::{Serving, main};
 
-/// Several axes as one motion, a set-point at every SYNC. What a correction of one's own is given and
-/// has to say is in [`machine::engine`].
-pub mod engine {
-    pub use machine::engine::{
-        Cause, Correction, Desk, Engine, Live, NoCorrection, State, read_path,
-    };
-}
-
 /// What the tests of this project need beyond that. No promise is made about it.
 #[doc(hidden)]
 pub mod for_tests {
@@ -96,10 +89,18 @@ pub mod for_tests {
     pub use crate::hardware::camera::CameraDevice;
     pub use crate::hardware::drive::DriveConfig;
     pub use crate::hardware::instrument::InstrumentDevice;
+    pub use crate::linear::calibrate::Calibrated;
     pub use crate::linear::entries::PointEntry;
+    pub use crate::linear::job::JobDone;
     pub use crate::linear::settings::{compensation, harmless};
+    pub use crate::linear::verify::Verified;
+    pub use crate::linear::zero::Zeroed;
+    pub use crate::platform::moves::PoseMoved;
+    pub use crate::rotary::calibrate::RotaryCalibrated;
     pub use crate::rotary::settings::rotary_settings;
-    pub use crate::volumetric::calibrate::VolumetricEvaluated;
+    pub use crate::rotary::sweep::Sweep;
+    pub use crate::rotary::verify::RotaryVerified;
+    pub use crate::volumetric::calibrate::{VolumetricCalibrated, VolumetricEvaluated};
     pub use crate::volumetric::entries::OpticsName;
     pub use crate::volumetric::first_part::FirstPartCorrection;
     pub use crate::volumetric::line::{Line, LineReading, LineReadout};

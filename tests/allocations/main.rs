@@ -6,12 +6,12 @@
 
 use std::alloc::System;
 
+use machine::engine::{Cause, Correction, Engine, NoCorrection};
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 use tests::apart::{Apart, used_by_the_loop};
 use tests::stream::{Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::config::MachineConfig;
-use truestage::engine::{Cause, Correction, Engine, NoCorrection};
 use truestage::for_tests::FirstPartCorrection;
 use truestage::volumetric::{VolumetricCorrection, VolumetricFailure};
 

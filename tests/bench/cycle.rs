@@ -20,6 +20,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use drivers::transport::real_time::RealTime;
+use machine::engine::{Cause, Correction, Engine, NoCorrection};
 use machine::engine::{Histogram, Timing};
 use serde_json::{Value, json};
 use tests::apart::{Apart, used_by_the_loop};
@@ -27,7 +28,6 @@ use tests::stream::{self, Writer, circle, diagonal, nothing_known};
 use tests::{Rig, Setup, Stand};
 use truestage::Failure;
 use truestage::config::MachineConfig;
-use truestage::engine::{Cause, Correction, Engine, NoCorrection};
 use truestage::volumetric::VolumetricCorrection;
 use units::Metres;
 

@@ -8,11 +8,11 @@ use std::time::Duration;
 use drivers::transport::in_process::InProcess;
 use drivers::transport::{SendError, Transport};
 use machine::engine::EngineFailure;
+use machine::engine::{Cause, Engine, NoCorrection, State};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, machine_config};
 use truestage::StopRequest;
 use truestage::emulated::Emulated;
-use truestage::engine::{Cause, Engine, NoCorrection, State};
 use truestage::{Failure, Machine};
 use units::{Metres, Time};
 use wire::{Arrival, Payload, Port};
@@ -42,7 +42,7 @@ fn here(bench: &Bench) -> Metres {
 }
 
 /// Stands for 200 ms, then stops.
-fn hold(machine: &mut Machine, engine: &mut Engine, desk: &mut truestage::engine::Desk) {
+fn hold(machine: &mut Machine, engine: &mut Engine, desk: &mut machine::engine::Desk) {
     let mut periods = 0;
     let cause = machine.follow_with(engine, &mut || {
         periods += 1;

@@ -7,11 +7,11 @@ use core::time::Duration;
 
 use compensator::volumetric::{Axis, Point};
 use machine::engine::Source;
+use machine::engine::{Cause, Live};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::Edit;
 use tests::volume::{Off, REFERENCES, Volume, good, point_mm, size};
 use truestage::Failure;
-use truestage::engine::{Cause, Live};
 use truestage::volumetric::{VolumetricFailure, VolumetricState};
 use units::{Metres, Quantity, Time};
 

@@ -9,12 +9,12 @@ use std::time::Duration;
 use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
 use machine::Patience;
+use machine::engine::{Cause, Engine, NoCorrection};
 use serde_json::{Value, json};
 use tests::stream::{self, Watch, Writer, circle};
 use tests::{Edit, INTERFACE, Rig, SlcanHub, VOLUMETRIC, left_out, not_run, shipped_config};
 use truestage::Machine;
 use truestage::config::Loaded;
-use truestage::engine::{Cause, Engine, NoCorrection};
 use units::Metres;
 use wire::Port;
 

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use drivers::transport::{SendError, Transport};
-use truestage::engine::{Cause, Engine};
+use machine::engine::{Cause, Engine};
 use truestage::{Failure, Machine};
 use units::Time;
 use wire::{Arrival, Payload, Port};

@@ -7,10 +7,10 @@ use core::time::Duration;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
 use compensator::volumetric::{Axis, Point};
+use machine::engine::Live;
 use machine::engine::Observed;
 use machine::records::{CalibrationRecord, RecordHead};
 use mock_bus::plant::VolumetricTruth;
-use truestage::engine::Live;
 use truestage::volumetric::{GeometryContent, WorkVolume};
 use truestage::volumetric::{Mover, VolumetricCorrection, VolumetricState};
 use units::{Celsius, Metres, Radians, Time};
@@ -438,7 +438,7 @@ impl Volume {
         let mut correction = correction.unwrap_or_else(|failure| panic!("{failure}"));
         self.truth(|truth| {
             let one = |mm: &[f64; 3]| {
-                use truestage::engine::Correction;
+                use machine::engine::Correction;
                 let target = each(point_mm(*mm));
                 let corrected = correction.correct(&Observed {
                     now: self.bench.machine.now(),

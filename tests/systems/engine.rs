@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use drivers::transport::real_time::RealTime;
 use machine::engine::Timing;
+use machine::engine::{Cause, Engine, NoCorrection};
 use mock_bus::simulation::Simulation;
 use tests::stream::{
     self, Bounds, RADIUS, Writer, check_lives, circle, diagonal, is_lateness, is_overrun,
@@ -18,7 +19,6 @@ use tests::stream::{
 };
 use tests::{Rig, Setup, Stand, not_run, rigs, true_pose};
 use truestage::Failure;
-use truestage::engine::{Cause, Engine, NoCorrection};
 use truestage::volumetric::VolumetricCorrection;
 use units::{Metres, MetresPerSecond};
 

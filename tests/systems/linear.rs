@@ -7,7 +7,8 @@ use tests::{Setup, Stand, on_every_rig};
 use truestage::CalibrateOptions;
 use truestage::Failure;
 use truestage::emulated::HallDrift;
-use truestage::linear::{Verified, VerifyOptions};
+use truestage::for_tests::Verified;
+use truestage::linear::VerifyOptions;
 use units::{Metres, Volts};
 
 const SEED: u64 = 1;

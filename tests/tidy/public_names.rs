@@ -10,6 +10,9 @@ use crate::root;
 const LIBRARY: &str = "controller/src/lib.rs";
 const LIST: &str = "tests/tidy/public_names.txt";
 
+/// How many names somebody else's program may be promised; whoever takes one off the list lowers it.
+const PROMISED_MAX: usize = 69;
+
 /// The packages whose modules may be offered under another roof.
 const PACKAGES: &[&str] = &[
     "units",
@@ -241,6 +244,12 @@ fn the_library_offers_what_is_listed() {
         .filter(|line| !line.is_empty() && !line.starts_with('#'))
         .map(str::to_owned)
         .collect();
+    let promised = listed.iter().filter(|it| !it.starts_with("for_tests::"));
+    let promised = promised.count();
+    assert!(
+        promised <= PROMISED_MAX,
+        "{promised} names are promised, at most {PROMISED_MAX} should be"
+    );
     let more: Vec<_> = offered.difference(&listed).collect();
     let fewer: Vec<_> = listed.difference(&offered).collect();
     assert!(

@@ -2,7 +2,7 @@
 //! verify, as procedures on a [`Machine`](crate::Machine).
 
 pub(crate) mod budget;
-mod calibrate;
+pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
 mod course;
@@ -30,23 +30,21 @@ mod survey;
 mod table_correction;
 mod told;
 mod travel;
-mod verify;
-mod zero;
+pub(crate) mod verify;
+pub(crate) mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
-pub use calibrate::Calibrated;
 pub use course::{Corrected, Course, PlannedMove};
-pub use job::{Job, JobDone, JobOperator, JobPlan, Reached, parse_job};
+pub use job::{Job, JobOperator, JobPlan, Reached, parse_job};
 pub use log::LinearLog;
 pub use moved::Moved;
 pub use record::LinearContent;
-pub use run_plan::PlannedRun;
 pub use stage::LinearStage;
 pub use told::{Teller, Told};
-pub use verify::{Verified, VerifyOptions};
-pub use zero::Zeroed;
+pub use verify::VerifyOptions;
 
 // What the rest of this package uses.
+pub(crate) use calibrate::Calibrated;
 pub(crate) use config::{
     CalibrateConfig, CompensationConfig, EndPolicyName, InterpolationName, VerifyConfig, ZeroConfig,
 };
@@ -61,3 +59,5 @@ pub(crate) use run_plan::RunPlan;
 pub(crate) use table_correction::table_correction;
 #[cfg(feature = "program")]
 pub(crate) use verify::UncertaintyAtTarget;
+pub(crate) use verify::Verified;
+pub(crate) use zero::Zeroed;

@@ -21,7 +21,7 @@ mod header;
 mod kind;
 mod log;
 mod look;
-mod moves;
+pub(crate) mod moves;
 pub(crate) mod record;
 mod sound;
 pub(crate) mod state;
@@ -34,7 +34,6 @@ pub use compensator::platform::Pose;
 pub use failure::PlatformFailure;
 pub use handle::AlignmentPlatform;
 pub use log::PlatformLog;
-pub use moves::PoseMoved;
 pub use record::ScrewContent;
 
 // What the rest of this package uses.
@@ -44,5 +43,7 @@ pub(crate) use config::{
 pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
+#[cfg(feature = "program")]
+pub(crate) use moves::PoseMoved;
 pub(crate) use record::ScrewMethodName;
 pub(crate) use state::kinematics;

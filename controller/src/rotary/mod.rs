@@ -11,7 +11,7 @@
 //! | table position p, line n | line n of a placement with offset s is read at p = n + s |
 //! | pass | one turn over all lines, in one direction |
 
-mod calibrate;
+pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
 mod dependence;
@@ -30,23 +30,23 @@ pub(crate) mod placement;
 pub(crate) mod record;
 pub(crate) mod settings;
 mod sound;
-mod sweep;
+pub(crate) mod sweep;
 mod table;
 mod turn;
 pub(crate) mod verify;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
-pub use calibrate::RotaryCalibrated;
 pub use failure::RotaryFailure;
 pub use log::PlateLog;
 pub use operator::{Operator, PlateMove, PlateTask};
 pub use record::RotaryContent;
-pub use sweep::{Sweep, SweepOptions};
+pub use sweep::SweepOptions;
 pub use table::RotaryTable;
 pub use turn::Way;
-pub use verify::RotaryVerified;
 
 // What the rest of this package uses.
+#[cfg(feature = "program")]
+pub(crate) use calibrate::RotaryCalibrated;
 pub(crate) use config::{
     DirectionName, EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
     RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
@@ -56,3 +56,6 @@ pub(crate) use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry
 pub(crate) use in_use::TableInUse;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlateEntry;
+pub(crate) use sweep::Sweep;
+#[cfg(feature = "program")]
+pub(crate) use verify::RotaryVerified;

@@ -45,7 +45,7 @@ pub(crate) mod verify;
 mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
-pub use calibrate::{VolumetricCalibrated, WarmUp};
+pub use calibrate::WarmUp;
 pub use correction::{VolumetricCorrection, VolumetricState};
 pub use failure::VolumetricFailure;
 pub use handle::WorkVolume;
@@ -57,6 +57,8 @@ pub use verify::VerifyBy;
 
 // What the rest of this package uses.
 pub(crate) use calibrate::Scatter;
+#[cfg(feature = "program")]
+pub(crate) use calibrate::VolumetricCalibrated;
 pub(crate) use config::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
     FeedConfig, InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName,

@@ -6,7 +6,8 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
 use tests::{Bench, EDGE, Edit, PoseJudge, Shipped, UVW, UVW_COPLEY, true_pose};
 use truestage::Failure;
-use truestage::platform::{Pose, PoseMoved};
+use truestage::for_tests::PoseMoved;
+use truestage::platform::Pose;
 use units::{Approach, Metres, Time};
 
 /// How many poses are visited as found, and as left.

@@ -11,11 +11,10 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
 use truestage::CalibrateOptions;
 use truestage::emulated::{Emulated, HallDrift};
+use truestage::for_tests::{RotaryCalibrated, RotaryVerified};
 use truestage::rotary::PlateLog;
 use truestage::rotary::Way;
-use truestage::rotary::{
-    Operator, PlateMove, PlateTask, RotaryCalibrated, RotaryFailure, RotaryVerified,
-};
+use truestage::rotary::{Operator, PlateMove, PlateTask, RotaryFailure};
 use truestage::{Failure, Machine};
 use truestage::{Observer, Stage};
 use units::Radians;

@@ -7,7 +7,8 @@ use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit};
 use truestage::Failure;
 use truestage::emulated::HallDrift;
-use truestage::rotary::{RotaryFailure, Sweep, SweepOptions, Way};
+use truestage::for_tests::Sweep;
+use truestage::rotary::{RotaryFailure, SweepOptions, Way};
 use units::{Approach, Radians, RadiansPerSecond};
 
 const AXIS: &str = "c";

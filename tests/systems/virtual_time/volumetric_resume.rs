@@ -9,9 +9,10 @@ use machine::records::{ReadJournal, read_journal};
 use tests::volume::{Volume, good, quick};
 use truestage::Failure;
 use truestage::emulated::{Emulated, HallDrift};
+use truestage::for_tests::VolumetricCalibrated;
 use truestage::for_tests::VolumetricEvaluated;
 use truestage::volumetric::VolumeLog;
-use truestage::volumetric::{LineOperator, LineTask, VolumetricCalibrated, WarmUp};
+use truestage::volumetric::{LineOperator, LineTask, WarmUp};
 
 /// Sets lines up, notes which, and goes home before the one that it is told.
 struct Hand {

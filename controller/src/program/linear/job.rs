@@ -6,8 +6,9 @@ use machine::records::short;
 use serde_json::{Value, json};
 use units::{Metres, Short};
 
+use crate::linear::job::JobDone;
 use crate::linear::job::plan::PlannedPoint;
-use crate::linear::{Job, JobDone, JobOperator, JobPlan, Reached, parse_job};
+use crate::linear::{Job, JobOperator, JobPlan, Reached, parse_job};
 use crate::ports::Use;
 use crate::program::MachineArgs;
 use crate::program::data_file::read;
