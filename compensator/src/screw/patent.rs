@@ -17,6 +17,7 @@ use units::{Approach, Metres};
 
 use super::{FitError, ScrewModel};
 use crate::screw::Stroke;
+use crate::uncertainty;
 
 /// The patent's means of the deviations, in the deviations' own sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,8 +130,9 @@ fn scatter(strokes: &[Stroke]) -> Option<(Metres, usize)> {
     let squares: f64 = cells
         .values()
         .map(|values| {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()
+            let centre = uncertainty::mean(values).unwrap_or(0.0);
+            let off = values.iter().map(|v| v - centre);
+            off.map(|it| it * it).sum::<f64>()
         })
         .sum();
     let variance = squares / degrees_of_freedom as f64;

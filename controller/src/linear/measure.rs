@@ -355,7 +355,7 @@ fn mean_environment(points: &[PointEntry]) -> EnvironmentRecord {
             .iter()
             .filter_map(|point| of(&point.environment))
             .collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        compensator::uncertainty::mean(&values)
     };
     EnvironmentRecord {
         air_temperature_c: mean(|it| it.air_temperature_c),

@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use compensator::uncertainty::{median, robust_sigma, standard_deviation};
+use compensator::uncertainty::{mean, median, robust_sigma, standard_deviation};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use crate::failure::Failure;
@@ -183,8 +183,7 @@ fn closure(first: &[Option<f64>], again: &[Option<f64>]) -> f64 {
     let sectors = (apart.len() / SECTOR_LINES).clamp(1, SECTORS);
     let of_sector = |lines: &[Option<f64>]| {
         let seen: Vec<f64> = lines.iter().flatten().copied().collect();
-        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
-        if seen.is_empty() { 0.0 } else { mean }
+        mean(&seen).unwrap_or(0.0)
     };
     let means = apart.chunks(apart.len().div_ceil(sectors).max(1));
     means

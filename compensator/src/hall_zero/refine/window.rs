@@ -5,7 +5,7 @@ use units::{Metres, Volts};
 use super::{RefineError, RefineOptions, Sensor};
 use crate::hall_zero::HallPoint;
 use crate::least_squares::{self, LeastSquaresError, powers};
-use crate::uncertainty::{reduced_chi_square_limit, robust_sigma};
+use crate::uncertainty::{mean, reduced_chi_square_limit, robust_sigma};
 
 /// The samples with their travel per sample, and the noise of both sensors.
 pub(super) struct Data<'a> {
@@ -374,6 +374,5 @@ pub(super) fn lag(fits: &[&Window]) -> Option<f64> {
             Some(-coefficient / w.slope(w.around))
         })
         .collect();
-    let lags = lags?;
-    Some(lags.iter().sum::<f64>() / lags.len() as f64)
+    mean(&lags?)
 }

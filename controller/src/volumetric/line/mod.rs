@@ -16,6 +16,7 @@ mod task;
 use core::time::Duration;
 
 use compensator::length_correction::{LengthCorrection, combined};
+use compensator::uncertainty::combine;
 use compensator::volumetric::Point;
 use compensator::volumetric::identify::{Observation, Reading};
 use drivers::device::DisplacementReading;
@@ -189,7 +190,7 @@ impl WorkVolume<'_> {
         let own_nm = self.core.config.instrument[instrument].instrument_standard_uncertainty_nm;
         let mean = counted.standard_deviation / f64::from(counted.samples).sqrt();
         let parts = [Metres(own_nm * 1e-9), mean, combined(&budget)].map(Metres::value);
-        let u = Metres(parts.iter().map(|it| it * it).sum::<f64>().sqrt());
+        let u = Metres(combine(&parts));
         let way = at - line.task.start;
         let path = corrected.displacement;
         let reading = line.measure.reading(line.along, way, path, u);
