@@ -7,6 +7,7 @@ mod example;
 mod examples;
 mod interrupted;
 mod job;
+mod killed;
 mod manager;
 mod platform;
 mod programs;

@@ -59,6 +59,11 @@ impl Process {
         Self(child.unwrap_or_else(|error| panic!("{command:?}: {error}")))
     }
 
+    /// Its number.
+    pub(crate) fn id(&self) -> u32 {
+        self.0.id()
+    }
+
     /// Sends a signal to this process and no other.
     pub(crate) fn signal(&self, signal: Signal) {
         let id = i32::try_from(self.0.id()).expect("process numbers are positive");

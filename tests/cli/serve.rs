@@ -14,7 +14,7 @@ use crate::programs::{Bench, Process, live_rigs, number, program};
 /// Below the machine's folder.
 const SOCKET: &str = "truestage.sock";
 
-fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
+pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
     let mut stream = UnixStream::connect(folder.join(SOCKET)).expect("it listens");
     let body = body.to_string();
     let length = body.len();
@@ -31,11 +31,16 @@ fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
     (status.expect("a status"), json)
 }
 
-fn keep(bench: &Bench) -> Process {
+pub(crate) fn keep(bench: &Bench) -> Process {
     let mut service = bench.start(&["serve", "machine.toml", "--listen", "unix:truestage.sock"]);
     // The last that it does before it only listens: other programs find it by this.
     let lease = bench.records().join("lease");
-    let says_where = || std::fs::read_to_string(&lease).is_ok_and(|it| it.contains("listening at"));
+    // One that was killed before may have left its own.
+    let own = format!("process {}\n", service.id());
+    let says_where = || {
+        let said = std::fs::read_to_string(&lease);
+        said.is_ok_and(|it| it.contains(&own) && it.contains("listening at"))
+    };
     service.wait_until(says_where);
     service
 }

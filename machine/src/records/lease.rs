@@ -49,8 +49,11 @@ impl Lease {
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
             Ok(mut lock) => {
                 let owner = format!("truestage {verb}, process {}\n", std::process::id());
-                lock.set_len(0).map_err(io_error("write", &path))?;
-                lock.write_all(owner.as_bytes())
+                // Over what a killed program has left, and only then the rest of that: whoever looks meanwhile is
+                // told a name.
+                let written = lock.write_all(owner.as_bytes());
+                written
+                    .and_then(|()| lock.set_len(owner.len() as u64))
                     .map_err(io_error("write", &path))?;
                 Ok(Self { lock })
             }
@@ -60,8 +63,12 @@ impl Lease {
                 let _ = file.rewind().and_then(|()| file.read_to_string(&mut said));
                 let (owner, places) = said.split_once('\n').unwrap_or((&said, ""));
                 let places = places.lines().filter_map(|it| it.strip_prefix(PLACE));
+                let owner = match owner.trim() {
+                    "" => "a program that has just begun",
+                    owner => owner,
+                };
                 Err(StoreError::Leased {
-                    owner: owner.trim().to_owned(),
+                    owner: owner.to_owned(),
                     places: places.map(str::to_owned).collect(),
                 })
             }
@@ -118,6 +125,21 @@ mod tests {
         // What it said is gone with it.
         let _second = Lease::take(&store, "calibrate").unwrap();
         assert!(of_second().1.is_empty());
+    }
+
+    #[test]
+    fn what_a_killed_owner_said_is_gone_with_the_next_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path(), "m", &[]);
+        let left = format!("truestage serve, process 1\n{PLACE}unix:/run/a\n{PLACE}unix:/run/b\n");
+        fs::create_dir_all(store.root()).unwrap();
+        fs::write(store.root().join("lease"), left).unwrap();
+        let _lease = Lease::take(&store, "move").unwrap();
+        let said = fs::read_to_string(store.root().join("lease")).unwrap();
+        assert_eq!(
+            said,
+            format!("truestage move, process {}\n", std::process::id())
+        );
     }
 
     #[test]
