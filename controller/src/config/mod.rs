@@ -19,6 +19,7 @@ mod structure;
 pub(crate) mod validate;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
+pub use diagnostic::ConfigError;
 pub use load::{Loaded, load, parse};
 pub use model::MachineConfig;
 
@@ -30,7 +31,6 @@ pub(crate) use crate::hardware::drive::*;
 pub(crate) use crate::hardware::instrument::*;
 pub(crate) use crate::hardware::node::IdentityConfig;
 pub(crate) use axis::AxisConfig;
-pub(crate) use diagnostic::ConfigError;
 pub(crate) use load::read;
 pub(crate) use machine::records::ConfigHash;
 pub(crate) use model::MachineSection;

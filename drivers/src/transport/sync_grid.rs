@@ -40,6 +40,7 @@ impl SyncGrid {
     }
 
     /// The ports whose SYNC is due at `at`, their next one. They are sent then: the grid goes on.
+    #[cfg(feature = "live")]
     pub(super) fn take(&mut self, at: Time) -> Vec<Port> {
         let due = self.0.iter_mut().filter(|(_, it)| it.next == at);
         due.map(|(port, producer)| {
@@ -63,7 +64,7 @@ impl SyncGrid {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "live"))]
 mod tests {
     use super::*;
 
