@@ -38,6 +38,11 @@ impl Answered {
         self.units += reply.len();
         self.is_awaited |= !matches!(reply, b"z\r" | b"Z\r");
     }
+
+    fn add(&mut self, more: Self) {
+        self.units += more.units;
+        self.is_awaited |= more.is_awaited;
+    }
 }
 
 enum Kind {
@@ -112,11 +117,10 @@ impl Endpoint {
             }
             Kind::Slcan(Some(pty), adapter) => {
                 pty.flush()?;
-                for byte in pty.receive()? {
-                    if let Some(reply) = answer(adapter, byte, now, port, machine) {
-                        pty.send(&reply)?;
-                    }
-                }
+                let bytes = pty.receive()?;
+                say((pty, adapter), &bytes, |frame| {
+                    machine.deliver(now, port, &Payload::Frame(frame)).is_ok()
+                })?;
             }
             Kind::Vcan(vcan) => {
                 for _ in 0..READS_MAX {
@@ -218,25 +222,29 @@ impl Endpoint {
         machine: &mut Simulation,
     ) -> io::Result<Answered> {
         let port = self.port;
-        let mut answered = Answered::default();
-        for payload in sent {
-            match (&mut self.kind, payload) {
-                (Kind::Slcan(Some(pty), adapter), Payload::Bytes(bytes)) => {
-                    for byte in bytes {
-                        if let Some(reply) = answer(adapter, *byte, now, port, machine) {
-                            answered.note(&reply);
-                            pty.send(&reply)?;
-                        }
-                    }
-                }
-                (Kind::Slcan(None, _), _) => {}
-                // A line that is down swallows what is said into it.
-                (Kind::Serial(..) | Kind::Slcan(..) | Kind::Vcan(_), _) => {
+        match &mut self.kind {
+            Kind::Slcan(pty, adapter) => say_all((pty, adapter), sent, |frame| {
+                machine.deliver(now, port, &Payload::Frame(frame)).is_ok()
+            }),
+            Kind::Serial(..) | Kind::Vcan(_) => {
+                for payload in sent {
+                    // A line that is down swallows what is said into it.
                     let _ = machine.deliver(now, port, payload);
                 }
+                Ok(Answered::default())
             }
         }
-        Ok(answered)
+    }
+
+    /// What was read is not sent after all: the machine never hears of it, but an adapter answers as if it had.
+    ///
+    /// # Errors
+    /// When the port fails.
+    pub(super) fn take_back(&mut self, sent: &[Payload]) -> io::Result<Answered> {
+        match &mut self.kind {
+            Kind::Slcan(pty, adapter) => say_all((pty, adapter), sent, |_| true),
+            Kind::Serial(..) | Kind::Vcan(_) => Ok(Answered::default()),
+        }
     }
 
     /// A frame on an interface that nobody who shares the clock has sent.
@@ -312,20 +320,39 @@ fn passed(pty: &mut Pty, bytes: &[u8]) -> io::Result<Option<Passed>> {
     Ok(taken.then_some(Passed::Units(bytes.len())))
 }
 
-/// What the adapter says to one byte of the host.
-fn answer(
-    adapter: &mut SlcanAdapter,
-    byte: u8,
-    now: Time,
-    port: Port,
-    machine: &mut Simulation,
-) -> Option<Vec<u8>> {
-    match adapter.take(byte)? {
-        Action::Reply(reply) => Some(reply),
-        Action::Transmit(frame) => {
-            let taken =
-                !adapter.in_tune() || machine.deliver(now, port, &Payload::Frame(frame)).is_ok();
-            Some(adapter.transmitted(&frame, taken))
+/// The host says all this to an adapter, where there is one.
+fn say_all(
+    (pty, adapter): (&mut Option<Pty>, &mut SlcanAdapter),
+    sent: &[Payload],
+    mut transmit: impl FnMut(CanFrame) -> bool,
+) -> io::Result<Answered> {
+    let mut answered = Answered::default();
+    for payload in sent {
+        if let (Some(pty), Payload::Bytes(bytes)) = (&mut *pty, payload) {
+            answered.add(say((pty, adapter), bytes, &mut transmit)?);
         }
     }
+    Ok(answered)
+}
+
+/// The host says `bytes` to the adapter, which has `transmit` send its frames; its answers go to `pty`.
+fn say(
+    (pty, adapter): (&mut Pty, &mut SlcanAdapter),
+    bytes: &[u8],
+    mut transmit: impl FnMut(CanFrame) -> bool,
+) -> io::Result<Answered> {
+    let mut answered = Answered::default();
+    for byte in bytes {
+        let reply = match adapter.take(*byte) {
+            None => continue,
+            Some(Action::Reply(reply)) => reply,
+            Some(Action::Transmit(frame)) => {
+                let is_sent = !adapter.in_tune() || transmit(frame);
+                adapter.transmitted(&frame, is_sent)
+            }
+        };
+        answered.note(&reply);
+        pty.send(&reply)?;
+    }
+    Ok(answered)
 }

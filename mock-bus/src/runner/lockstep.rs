@@ -204,7 +204,11 @@ impl Lockstep {
             }
             Passed::Recall => {
                 let ahead = &mut self.site.visitors.peers[who].ahead;
-                ahead.retain(|it| it.place != place);
+                let recalled: Vec<_> = ahead.extract_if(.., |it| it.place == place).collect();
+                for it in recalled {
+                    let answered = self.site.endpoints[place].take_back(&it.sent)?;
+                    self.pass_answer(who, place, it.port, answered);
+                }
                 Ok(false)
             }
             Passed::Control(control) => {
