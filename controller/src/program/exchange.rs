@@ -17,7 +17,7 @@ const ANSWER_MAX: u64 = 16 << 20;
 /// The token of a lease, as `POST /v1/lease` gave it.
 const LEASE: &str = "TRUESTAGE_LEASE";
 /// A device, a bus, or a service in their place that is gone.
-const LOST: u8 = 4;
+pub(crate) const LOST: u8 = 4;
 
 trait Stream: Read + Write {}
 
@@ -44,24 +44,54 @@ fn connect(at: &str) -> io::Result<Box<dyn Stream>> {
 
 /// One request over HTTP, and the JSON of its answer.
 pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
-    let said = exchange(at, method, path, body);
-    let said = said.map_err(|error| Failure::Usage {
+    let stream = connect(at).map_err(|error| Failure::Usage {
         what: format!("no service answers at {at}: {error}"),
         help: "start one with `truestage serve`, or say where it is with --at".into(),
     })?;
+    exchange(stream, at, (method, path), body)
+}
+
+/// The same of a service that has begun what this program waits for: one that is not there any more has ended meanwhile.
+pub(crate) fn ask_on(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
+    let stream = connect(at).map_err(|error| gone(at, path, &error))?;
+    exchange(stream, at, (method, path), body)
+}
+
+fn gone(at: &str, path: &str, error: &io::Error) -> Failure {
+    Failure::Kept {
+        said: format!(
+            "the service at {at} has ended before {path} was answered ({error}); without it the drives stop and are \
+             switched off: see its messages for the cause, start it again and zero the machine"
+        ),
+        exit_code: LOST,
+    }
+}
+
+fn exchange(
+    stream: Box<dyn Stream>,
+    at: &str,
+    (method, path): (&str, &str),
+    body: &str,
+) -> Result<Value, Failure> {
+    let lease = lease_header(std::env::var_os(LEASE))?;
+    let host = at.strip_prefix("tcp:").unwrap_or("localhost");
+    let length = body.len();
+    let request = format!(
+        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
+    );
+    let said = said_to(stream, &request).map_err(|error| gone(at, path, &error))?;
     understood(at, &said)
 }
 
-/// The same of a service that has begun what this program waits for: one that answers no more has ended meanwhile.
-pub(crate) fn ask_on(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
-    let said = exchange(at, method, path, body).map_err(|error| Failure::Kept {
-        said: format!(
-            "the service at {at} has ended before {path} had ({error}); without it the drives stop and are switched \
-             off: see its messages for the cause, start it again and zero the machine"
-        ),
-        exit_code: LOST,
-    })?;
-    understood(at, &said)
+fn said_to(mut stream: Box<dyn Stream>, request: &str) -> io::Result<String> {
+    stream.write_all(request.as_bytes())?;
+    let mut said = String::new();
+    stream.take(ANSWER_MAX).read_to_string(&mut said)?;
+    if said.is_empty() {
+        let what = "it hung up without an answer";
+        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
+    }
+    Ok(said)
 }
 
 fn understood(at: &str, said: &str) -> Result<Value, Failure> {
@@ -96,27 +126,9 @@ pub(crate) fn exit_code_of(said: &Value) -> Option<u8> {
         .and_then(|it| u8::try_from(it).ok())
 }
 
-fn exchange(at: &str, method: &str, path: &str, body: &str) -> io::Result<String> {
-    let mut stream = connect(at)?;
-    let host = at.strip_prefix("tcp:").unwrap_or("localhost");
-    let length = body.len();
-    let lease = lease_header(std::env::var_os(LEASE))?;
-    write!(
-        stream,
-        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
-    )?;
-    let mut said = String::new();
-    stream.take(ANSWER_MAX).read_to_string(&mut said)?;
-    if said.is_empty() {
-        let what = "it hung up without an answer";
-        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
-    }
-    Ok(said)
-}
-
 /// What proves that this program acts for the holder of the machine's lease. From the environment: everybody on the
 /// computer can read the words of a command line.
-fn lease_header(token: Option<OsString>) -> io::Result<String> {
+fn lease_header(token: Option<OsString>) -> Result<String, Failure> {
     let Some(token) = token.filter(|it| !it.is_empty()) else {
         return Ok(String::new());
     };
@@ -124,10 +136,10 @@ fn lease_header(token: Option<OsString>) -> io::Result<String> {
         Some(token) if token.bytes().all(|it| it.is_ascii_graphic()) => {
             Ok(format!("truestage-lease: {token}\r\n"))
         }
-        _ => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            format!("{LEASE} in the environment is no token of a lease"),
-        )),
+        _ => Err(Failure::Usage {
+            what: format!("{LEASE} in the environment is no token of a lease"),
+            help: "take the one that POST /v1/lease gave, or leave it out".into(),
+        }),
     }
 }
 

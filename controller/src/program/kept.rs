@@ -9,7 +9,7 @@ use machine::records::StoreError;
 use serde_json::{Value, json};
 use units::Metres;
 
-use crate::program::exchange::{ask, ask_on, exit_code_of, plain};
+use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
@@ -220,7 +220,7 @@ fn failed(seen: &Value) -> Failure {
                 .as_str()
                 .unwrap_or("the service says no cause"),
         ),
-        exit_code: exit_code_of(cause).unwrap_or(4),
+        exit_code: exit_code_of(cause).unwrap_or(LOST),
     }
 }
 
