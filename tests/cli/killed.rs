@@ -2,9 +2,12 @@
 //! goes on from there.
 
 use core::time::Duration;
-use std::io::{BufRead, BufReader, Write};
-use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 
+use drivers::transport::Transport;
+use drivers::transport::clock::Clock;
+use drivers::transport::live::Live;
+use drivers::transport::lockstep::{Participant, lend_hand};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::Edit;
@@ -18,45 +21,29 @@ const STOPPED_WITHIN: Duration = Duration::from_millis(500 + 100 + 100);
 const STANDS_MM: f64 = 1e-3;
 
 /// Somebody who only looks: time passes while it waits.
-struct Watcher(BufReader<UnixStream>);
+struct Watcher {
+    clock: PathBuf,
+    time: Live,
+}
 
 impl Watcher {
     fn of(bench: &Bench) -> Self {
-        let stream = UnixStream::connect(bench.folder().join("clock")).expect("it listens");
-        let mut watcher = Self(BufReader::new(stream));
-        let welcome = watcher.ask("hello 1 0 a watcher");
-        assert!(welcome.starts_with("welcome "), "{welcome}");
-        watcher
+        let clock = bench.folder().join("clock");
+        let participant = Participant::join(&clock, "a watcher").expect("it listens");
+        let time = Live::builder(Clock::lockstep(participant)).build();
+        let time = time.expect("it has no port to open");
+        Self { clock, time }
     }
 
-    fn ask(&mut self, line: &str) -> String {
-        let stream = self.0.get_mut();
-        writeln!(stream, "{line}").expect("it hears");
-        let mut answer = String::new();
-        self.0.read_line(&mut answer).expect("it answers");
-        answer.trim_end().to_owned()
-    }
-
-    /// When it is, in seconds, and where the stage truly is, in millimetres.
-    fn truth(&mut self) -> (f64, f64) {
-        let said = self.ask("do truth");
-        let said = said.strip_prefix("done ").expect("the truth");
-        let truth: Value = serde_json::from_str(said).expect("an object");
-        (number(&truth["time_s"]), number(&truth["position_mm"]))
+    /// Where the stage truly is, in millimetres.
+    fn true_mm(&self) -> f64 {
+        let truth = lend_hand(&self.clock, "truth").expect("the truth");
+        let truth: Value = serde_json::from_str(&truth).expect("an object");
+        number(&truth["position_mm"])
     }
 
     fn wait(&mut self, span: Duration) {
-        let (now, _) = self.truth();
-        let until = Duration::from_secs_f64(now) + span;
-        let gone = self.ask(&format!("idle {}", until.as_nanos()));
-        assert_eq!(gone, format!("go {}", until.as_nanos()));
-    }
-}
-
-impl Drop for Watcher {
-    fn drop(&mut self) {
-        // The machine may have ended.
-        let _ = writeln!(self.0.get_mut(), "bye");
+        self.time.sleep_until(self.time.now() + span);
     }
 }
 
@@ -100,11 +87,11 @@ fn the_drive_of_a_service_that_is_killed_stops_in_time_and_the_next_service_goes
         for instant in 0..instants() {
             killed_after(&bench, moving(&bench), instant * 7 % 40);
             let mut watcher = Watcher::of(&bench);
-            let (_, killed_at) = watcher.truth();
+            let killed_at = watcher.true_mm();
             watcher.wait(STOPPED_WITHIN);
-            let (_, stopped_at) = watcher.truth();
+            let stopped_at = watcher.true_mm();
             watcher.wait(Duration::from_secs(3));
-            let (_, later) = watcher.truth();
+            let later = watcher.true_mm();
             // It moved at a millimetre a second, and went on until its drive missed the heartbeat.
             let went_on = stopped_at - killed_at;
             assert!(

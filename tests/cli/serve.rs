@@ -184,18 +184,24 @@ fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
     }
 }
 
+/// A client whose calibration goes on.
+fn calibrating(bench: &Bench) -> Process {
+    bench.run(&["zero", "machine.toml"]).with_code(0);
+    let mut client = bench.start(&["calibrate", "machine.toml"]);
+    client.wait_until(|| {
+        let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+        axis["used_by"].is_string()
+    });
+    client
+}
+
 /// A service that is killed is no mistake of whoever waits for it.
 #[test]
 fn a_service_that_is_killed_in_a_run_is_told_as_gone() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);
-        bench.run(&["zero", "machine.toml"]).with_code(0);
-        let mut client = bench.start(&["calibrate", "machine.toml", "--json"]);
-        client.wait_until(|| {
-            let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
-            axis["used_by"].is_string()
-        });
+        let client = calibrating(&bench);
         service.signal(Signal::SIGKILL);
         let ended = client.end();
         assert_eq!(ended.code, Some(4), "{ended:?}");
@@ -209,12 +215,7 @@ fn a_signal_to_the_client_stops_its_run_and_leaves_the_machine_kept() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);
-        bench.run(&["zero", "machine.toml"]).with_code(0);
-        let mut client = bench.start(&["calibrate", "machine.toml"]);
-        client.wait_until(|| {
-            let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
-            axis["used_by"].is_string()
-        });
+        let client = calibrating(&bench);
         client.signal(Signal::SIGINT);
         let ended = client.end();
         assert_eq!(ended.code, Some(130), "{ended:?}");

@@ -70,6 +70,15 @@ impl Approach {
         }
     }
 
+    /// The other one.
+    #[must_use]
+    pub const fn opposite(self) -> Self {
+        match self {
+            Self::Forward => Self::Reverse,
+            Self::Reverse => Self::Forward,
+        }
+    }
+
     /// `+1.0` for forward, `-1.0` for reverse.
     pub const fn sign(self) -> f64 {
         match self {

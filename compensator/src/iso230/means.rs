@@ -107,29 +107,58 @@ pub fn evaluate_means(series: &LinearSeries) -> Result<Means, EvaluationError> {
 }
 
 fn of_targets(targets: Vec<MeanTarget>, runs: usize) -> Means {
-    let range = |all: &[Metres]| (!all.is_empty()).then(|| Extent::of(all.iter().copied()).range());
-    let collect = |of: fn(&MeanTarget) -> Option<Metres>| -> Vec<Metres> {
-        targets.iter().filter_map(of).collect()
+    let one_way = |of: fn(&MeanTarget) -> Option<Metres>| {
+        let all: Vec<_> = targets.iter().filter_map(of).collect();
+        (!all.is_empty()).then(|| Extent::of(all.into_iter()).range())
     };
-    let forward = collect(|it| it.forward);
-    let reverse = collect(|it| it.reverse);
-    let middles = collect(|it| {
-        it.both()
-            .map(|(forward, reverse)| (forward + reverse) / 2.0)
-    });
-    let reversals = collect(|it| it.both().map(|(forward, reverse)| forward - reverse));
-    let is_both = !reversals.is_empty();
-    let all: Vec<Metres> = forward.iter().chain(&reverse).copied().collect();
-    let sum: Metres = reversals.iter().copied().sum();
+    let both: Vec<_> = targets.iter().filter_map(MeanTarget::both).collect();
+    let both = (!both.is_empty()).then(|| BothSides::of(&both));
     Means {
-        forward: range(&forward),
-        reverse: range(&reverse),
-        systematic_deviation: range(&all).filter(|_| is_both),
-        mean_bidirectional_deviation_range: range(&middles),
-        reversal_value: reversals.iter().map(|it| it.abs()).reduce(Metres::max),
-        mean_reversal_value: is_both.then(|| sum / reversals.len() as f64),
+        forward: one_way(|it| it.forward),
+        reverse: one_way(|it| it.reverse),
+        systematic_deviation: both.map(|it| it.systematic_deviation),
+        mean_bidirectional_deviation_range: both.map(|it| it.mean_bidirectional_deviation_range),
+        reversal_value: both.map(|it| it.reversal_value),
+        mean_reversal_value: both.map(|it| it.mean_reversal_value),
         conformity: Conformity::of(runs, targets.iter().map(|it| it.target)),
         targets,
+    }
+}
+
+/// What the mean deviations of targets that were reached from both sides tell together.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BothSides {
+    /// E.
+    pub(super) systematic_deviation: Metres,
+    /// M.
+    pub(super) mean_bidirectional_deviation_range: Metres,
+    /// B.
+    pub(super) reversal_value: Metres,
+    /// B̄.
+    pub(super) mean_reversal_value: Metres,
+}
+
+impl BothSides {
+    /// Of x̄_i↑ and x̄_i↓ of at least one target.
+    pub(super) fn of(means: &[(Metres, Metres)]) -> Self {
+        let reversals = means.iter().map(|(forward, reverse)| *forward - *reverse);
+        let middles = means
+            .iter()
+            .map(|(forward, reverse)| (*forward + *reverse) / 2.0);
+        let sides = means
+            .iter()
+            .flat_map(|(forward, reverse)| [*forward, *reverse]);
+        let largest = reversals
+            .clone()
+            .map(Metres::abs)
+            .fold(Metres::ZERO, Metres::max);
+        let sum: Metres = reversals.sum();
+        Self {
+            systematic_deviation: Extent::of(sides).range(),
+            mean_bidirectional_deviation_range: Extent::of(middles).range(),
+            reversal_value: largest,
+            mean_reversal_value: sum / means.len() as f64,
+        }
     }
 }
 

@@ -25,6 +25,7 @@ mod one_way;
 
 use units::{Approach, Metres};
 
+use self::means::BothSides;
 pub use self::means::{MeanTarget, Means, evaluate_means};
 pub use self::one_way::{OneWayFigures, OneWayTarget, evaluate_one_way, only_approach};
 
@@ -270,23 +271,26 @@ fn target_figures(
 }
 
 fn axis_figures(targets: Vec<TargetFigures>, runs: usize) -> Figures {
-    let of = |f: fn(&TargetFigures) -> Metres| Extent::of(targets.iter().map(f));
+    let largest = targets.iter().map(|t| t.repeatability);
+    let means: Vec<_> = targets
+        .iter()
+        .map(|t| (t.mean_forward, t.mean_reverse))
+        .collect();
+    let means = BothSides::of(&means);
     let forward = Direction::of(targets.iter().map(|t| (t.mean_forward, t.s_forward)));
     let reverse = Direction::of(targets.iter().map(|t| (t.mean_reverse, t.s_reverse)));
-    let reversal = of(|t| t.reversal_value);
-    let sum: Metres = targets.iter().map(|t| t.reversal_value).sum();
     let conformity = Conformity::of(runs, targets.iter().map(|t| t.target));
     Figures {
-        reversal_value: reversal.low.abs().max(reversal.high.abs()),
-        mean_reversal_value: sum / targets.len() as f64,
-        mean_bidirectional_deviation_range: of(TargetFigures::mean_bidirectional).range(),
+        reversal_value: means.reversal_value,
+        mean_reversal_value: means.mean_reversal_value,
+        mean_bidirectional_deviation_range: means.mean_bidirectional_deviation_range,
         systematic_deviation: Directional {
-            bidirectional: forward.means.with(reverse.means).range(),
+            bidirectional: means.systematic_deviation,
             forward: forward.means.range(),
             reverse: reverse.means.range(),
         },
         repeatability: Directional {
-            bidirectional: of(|t| t.repeatability).high,
+            bidirectional: Extent::of(largest).high,
             forward: forward.repeatability,
             reverse: reverse.repeatability,
         },

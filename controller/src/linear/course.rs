@@ -165,7 +165,7 @@ impl Course {
             Ok((from, set_point))
         };
         let usual = start.approach_of(target).unwrap_or(Approach::Forward);
-        from_side(usual).or_else(|_: Failure| from_side(opposite(usual)))
+        from_side(usual).or_else(|_: Failure| from_side(usual.opposite()))
     }
 
     /// So fast that the correction changes no faster than its limit.
@@ -193,10 +193,7 @@ impl Course {
             return Ok(target);
         };
         let set_point = compensation.set_point(target, side);
-        set_point.map_err(|source| Failure::OutOfCalibration {
-            axis: axis.to_owned(),
-            source,
-        })
+        set_point.map_err(|source| out_of_calibration(axis, source))
     }
 
     /// The set-point that brings the point to `target` from where the axis is now.
@@ -212,12 +209,8 @@ impl Course {
         };
         let tracker = machine.approach(axis)?;
         let here = machine.reading(axis)?.map(|reading| reading.position);
-        set_point_of(compensation, &tracker, here, target).map_err(|source| {
-            Failure::OutOfCalibration {
-                axis: axis.to_owned(),
-                source,
-            }
-        })
+        let set_point = set_point_of(compensation, &tracker, here, target);
+        set_point.map_err(|source| out_of_calibration(axis, source))
     }
 
     /// Where the point stands when the drive's encoder says `encoder`; `None` without a calibration.
@@ -284,6 +277,11 @@ impl Course {
     }
 }
 
+fn out_of_calibration(axis: &str, source: OutOfRange) -> Failure {
+    let axis = axis.to_owned();
+    Failure::OutOfCalibration { axis, source }
+}
+
 fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
     let (first, last) = table.table().range();
     if target >= first && target <= last {
@@ -305,13 +303,6 @@ fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
 fn was_sent_to(tracker: &ApproachTracker, place: Metres) -> bool {
     let last = tracker.last();
     last.is_some_and(|it| (it - place).abs() <= ROUNDING)
-}
-
-const fn opposite(side: Approach) -> Approach {
-    match side {
-        Approach::Forward => Approach::Reverse,
-        Approach::Reverse => Approach::Forward,
-    }
 }
 
 /// `tracker`, which with no motion remembered (after a zero) starts `here`.
@@ -338,7 +329,7 @@ pub(super) fn set_point_of(
 ) -> Result<Metres, OutOfRange> {
     let from = started(tracker, here);
     let usual = from.approach().unwrap_or(Approach::Forward);
-    for approach in [usual, opposite(usual)] {
+    for approach in [usual, usual.opposite()] {
         if let Ok(set_point) = compensation.set_point(target, approach)
             && from.approach_of(set_point) == Some(approach)
         {

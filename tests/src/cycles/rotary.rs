@@ -1,7 +1,7 @@
 //! What the rotary table that ships does.
 
 use truestage::rotary::Way;
-use truestage::{CalibrateOptions, Failure};
+use truestage::{CalibrateOptions, Failure, Machine, Store};
 use units::Radians;
 
 use super::{Cycle, changed, cycle, started};
@@ -26,13 +26,17 @@ fn hand_of(bench: &Bench) -> Hand<'static> {
     Hand::new(move |lines| emulated.simulation_mut().turn_plate(lines))
 }
 
+fn calibrated(machine: &mut Machine, store: &Store, hand: &mut Hand<'_>) -> Result<(), Failure> {
+    machine.rotary("c")?.zero()?;
+    let options = CalibrateOptions::default();
+    machine.rotary("c")?.calibrate(store, &options, hand)?;
+    Ok(())
+}
+
 fn rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
     started(bench, |machine, store| {
-        machine.rotary("c")?.zero()?;
-        machine
-            .rotary("c")?
-            .calibrate(store, &CalibrateOptions::default(), &mut hand)?;
+        calibrated(machine, store, &mut hand)?;
         machine.rotary("c")?.verify(store, true, &mut hand)?;
         Ok(())
     })
@@ -41,10 +45,7 @@ fn rotary(bench: Bench) -> Result<Bench, Failure> {
 fn part_of_rotary(bench: Bench) -> Result<Bench, Failure> {
     let mut hand = hand_of(&bench);
     started(bench, |machine, store| {
-        machine.rotary("c")?.zero()?;
-        machine
-            .rotary("c")?
-            .calibrate(store, &CalibrateOptions::default(), &mut hand)?;
+        calibrated(machine, store, &mut hand)?;
         machine
             .rotary("c")?
             .move_to(Radians::from_degrees(123.4), Way::Shortest)?;
