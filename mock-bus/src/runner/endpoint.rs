@@ -181,19 +181,24 @@ impl Endpoint {
         }
     }
 
-    /// Reads exactly what a participant says that it has sent.
+    /// Reads exactly what a participant says that it has sent; less, when it is not there any more and was killed
+    /// before it had sent it.
     ///
     /// # Errors
     /// When it does not come, or the port fails.
-    pub(super) fn read(&mut self, units: usize) -> io::Result<Vec<Payload>> {
+    pub(super) fn read(
+        &mut self,
+        units: usize,
+        is_there: impl Fn() -> bool,
+    ) -> io::Result<Vec<Payload>> {
         match &mut self.kind {
             Kind::Serial(Some(pty), _) | Kind::Slcan(Some(pty), _) => {
-                Ok(vec![Payload::Bytes(pty.receive_exactly(units)?)])
+                Ok(vec![Payload::Bytes(pty.receive_exactly(units, is_there)?)])
             }
             Kind::Vcan(vcan) => {
                 let mut frames = Vec::new();
                 for _ in 0..units {
-                    frames.extend(vcan.receive_one()?.map(Payload::Frame));
+                    frames.extend(vcan.receive_one(&is_there)?.map(Payload::Frame));
                 }
                 Ok(frames)
             }

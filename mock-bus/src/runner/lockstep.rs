@@ -175,8 +175,9 @@ impl Lockstep {
     }
 
     fn take_in_one(&mut self, who: usize, entry: Entry) -> io::Result<bool> {
-        let ports = &self.site.visitors.peers[who].ports;
-        let place = ports.iter().find(|(_, port)| **port == entry.port);
+        let peer = &self.site.visitors.peers[who];
+        let is_there = || !peer.has_hung_up();
+        let place = peer.ports.iter().find(|(_, port)| **port == entry.port);
         let Some((&place, _)) = place else {
             return Ok(false);
         };
@@ -184,14 +185,14 @@ impl Lockstep {
         let endpoint = &mut self.site.endpoints[place];
         match entry.passed {
             Passed::Units(units) => {
-                let sent = endpoint.read(units)?;
+                let sent = endpoint.read(units, is_there)?;
                 let answered = endpoint.take_in(&sent, now, &mut self.site.machine)?;
                 self.pass_answer(who, place, entry.port, answered);
                 self.tell_sharers(who, place, units);
                 Ok(answered.is_awaited)
             }
             Passed::At { units, at } => {
-                let (sent, port) = (endpoint.read(units)?, entry.port);
+                let (sent, port) = (endpoint.read(units, is_there)?, entry.port);
                 self.site.visitors.peers[who].ahead.push(Ahead {
                     at,
                     place,
@@ -384,16 +385,20 @@ impl Lockstep {
         self.forget(who)
     }
 
-    /// What somebody who has ended had sent is still on its way, as on a real line.
+    /// What somebody who has ended had sent is still on its way, as on a real line: where it said how much that is,
+    /// no more than that. The next program may have opened the port by now, and what it writes is its own.
     fn forget(&mut self, who: usize) -> io::Result<()> {
-        let places: Vec<_> = self.site.visitors.peers[who]
-            .ports
-            .keys()
-            .copied()
-            .collect();
-        let now = self.site.machine.now();
-        for place in places {
-            self.site.endpoints[place].receive(now, &mut self.site.machine)?;
+        let peer = &mut self.site.visitors.peers[who];
+        if let Doing::Idle { sent, .. } = &mut peer.doing {
+            for entry in core::mem::take(sent) {
+                self.take_in_one(who, entry)?;
+            }
+        } else {
+            let places: Vec<_> = peer.ports.keys().copied().collect();
+            let now = self.site.machine.now();
+            for place in places {
+                self.site.endpoints[place].receive(now, &mut self.site.machine)?;
+            }
         }
         self.detach(who, None);
         self.follow(None);

@@ -299,6 +299,49 @@ fn the_port_of_one_that_was_killed_while_it_waited_is_free_for_the_next_one() {
     other.say("bye");
 }
 
+/// The next program opens its port, and writes, before it says so.
+#[test]
+fn what_one_had_sent_that_was_killed_while_it_waited_is_not_taken_from_the_next_one() {
+    for written in [&b"$01M\r"[..], b"$0", b""] {
+        let bench = Bench::new("next", |options| options.outlive = true);
+        let attach = format!("attach 0 {}", bench.terminal());
+        // Time stands still for this one.
+        let mut other = bench.client();
+        other.ask("hello 1 0 other");
+        let mut client = bench.client();
+        client.ask("hello 1 0 a killed one");
+        let mut line = bench.open_terminal();
+        assert_eq!(client.ask(&attach), "attached");
+        line.write_all(written).unwrap();
+        // It was killed before it had written all.
+        client.say("idle 3000000 0:5");
+        drop((client, line));
+        let mut next = bench.client();
+        next.ask("hello 1 0 the next one");
+        let mut line = bench.open_terminal();
+        if written.len() == 5 {
+            line.write_all(b"$01M\r").unwrap();
+        }
+        assert_eq!(next.ask(&attach), "attached");
+        if written.len() < 5 {
+            // What is left of a line ends with the next one, as on a real line.
+            line.write_all(b"\r$01M\r").unwrap();
+        }
+        other.say("bye");
+        let sent = if written.len() == 5 { 5 } else { 6 };
+        let mut heard = next.ask(&format!("idle 1000000000 0:{sent}"));
+        while !heard.starts_with("go 1000000000") {
+            let (_, passed) = heard.split_once(" 0:").unwrap_or_else(|| panic!("{heard}"));
+            let mut answer = vec![0; passed.parse().unwrap()];
+            line.read_exact(&mut answer).unwrap();
+            let text = String::from_utf8_lossy(&answer).into_owned();
+            assert!("!014117\r?01\r".contains(&text), "{text}");
+            heard = next.ask("idle 1000000000");
+        }
+        next.say("bye");
+    }
+}
+
 #[test]
 fn somebody_who_hangs_is_named_and_ends_the_machine() {
     let bench = Bench::new("hangs", |options| {

@@ -104,8 +104,12 @@ impl Pty {
     }
 
     /// Exactly so many bytes of the client, which it has written: the kernel may still have them
-    /// on the way.
-    pub(super) fn receive_exactly(&mut self, count: usize) -> io::Result<Vec<u8>> {
+    /// on the way. Fewer, when the client is not there any more and they do not come.
+    pub(super) fn receive_exactly(
+        &mut self,
+        count: usize,
+        is_there: impl Fn() -> bool,
+    ) -> io::Result<Vec<u8>> {
         self.look_who_is_there()?;
         self.clients.heard();
         let mut bytes = vec![0; count];
@@ -113,11 +117,13 @@ impl Pty {
         while filled < count {
             match read(&self.master, &mut bytes[filled..]) {
                 Ok(length) => filled += length,
-                Err(Errno::EAGAIN) => await_readable(self.fd())?,
+                Err(Errno::EAGAIN) if await_readable(self.fd(), &is_there)? => {}
+                Err(Errno::EAGAIN) => break,
                 Err(Errno::EINTR) => {}
                 Err(errno) => return Err(errno.into()),
             }
         }
+        bytes.truncate(filled);
         Ok(bytes)
     }
 
@@ -229,21 +235,30 @@ impl Drop for Pty {
     }
 }
 
-/// Waits for what a client says that it has sent.
+/// Waits for what a client says that it has sent; `false` when that is not there any more and nothing comes.
 ///
 /// # Errors
 /// When it does not come.
-pub(super) fn await_readable(descriptor: BorrowedFd<'_>) -> io::Result<()> {
+pub(super) fn await_readable(
+    descriptor: BorrowedFd<'_>,
+    is_there: &impl Fn() -> bool,
+) -> io::Result<bool> {
     /// The kernel hands on what was written within microseconds, on a busy computer too.
-    const LIMIT_MS: u16 = 10_000;
-    let mut fds = [PollFd::new(descriptor, PollFlags::POLLIN)];
-    match poll(&mut fds, PollTimeout::from(LIMIT_MS)) {
-        Ok(0) => Err(io::Error::other(
-            "a participant reports more bytes sent than have arrived",
-        )),
-        Ok(_) | Err(Errno::EINTR) => Ok(()),
-        Err(errno) => Err(errno.into()),
+    const LOOK_MS: u16 = 500;
+    const LOOKS: u16 = 20;
+    for _ in 0..LOOKS {
+        let was_there = is_there();
+        let mut fds = [PollFd::new(descriptor, PollFlags::POLLIN)];
+        match poll(&mut fds, PollTimeout::from(LOOK_MS)) {
+            Ok(0) if !was_there => return Ok(false),
+            Ok(0) => {}
+            Ok(_) | Err(Errno::EINTR) => return Ok(true),
+            Err(errno) => return Err(errno.into()),
+        }
     }
+    Err(io::Error::other(
+        "a participant reports more bytes sent than have arrived",
+    ))
 }
 
 /// Points `link` at `target`; a file that is no link is left alone.

@@ -71,8 +71,11 @@ impl Vcan {
     }
 
     /// Exactly the next frame of a host, which has sent it: the kernel may still have it on the
-    /// way.
-    pub(super) fn receive_one(&mut self) -> io::Result<Option<CanFrame>> {
+    /// way. `None` also when the host is not there any more and it does not come.
+    pub(super) fn receive_one(
+        &mut self,
+        is_there: &impl Fn() -> bool,
+    ) -> io::Result<Option<CanFrame>> {
         loop {
             let Link::Open(socket) = &self.socket else {
                 return Ok(None);
@@ -80,7 +83,9 @@ impl Vcan {
             match socket.read_frame() {
                 Ok(frame) => return Ok(from_socket(&frame)),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                    await_readable(socket.as_fd())?;
+                    if !await_readable(socket.as_fd(), is_there)? {
+                        return Ok(None);
+                    }
                 }
                 Err(error) => return self.pass(error).map(|()| None),
             }
