@@ -5,7 +5,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows what it measured")]
 use truestage::emulated::Emulated;
 use truestage::linear::VerifyOptions;
-use truestage::{CalibrateOptions, Machine, config, store_in};
+use truestage::{CalibrateOptions, Machine, config};
 
 const MACHINE: &str = include_str!("../../configs/machines/linear.toml");
 const STAGE: &str = include_str!("../../configs/emulated/linear.toml");
@@ -14,8 +14,9 @@ const SEED: u64 = 7;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
-    let loaded = config::parse(MACHINE, "linear.toml")?;
-    let store = store_in(folder.path(), &loaded.config.machine.name);
+    let mut loaded = config::parse(MACHINE, "linear.toml")?;
+    loaded.config.machine.data_dir = folder.path().to_owned();
+    let store = loaded.config.machine.store();
     let emulated = Emulated::new(STAGE, SEED, &loaded.config)?;
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
     let verified = machine.guarded(|machine| {

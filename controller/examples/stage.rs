@@ -2,7 +2,8 @@
 //!
 //! `cargo run --example stage -- machine.toml x 12.5`
 #![expect(clippy::print_stdout, reason = "an example shows where the stage is")]
-use truestage::{Lease, Machine, config, ports, store_of};
+use machine::records::Lease;
+use truestage::{Machine, config, ports};
 use units::Metres;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -12,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let target = Metres::from_mm(target_mm.parse()?);
     let loaded = config::load(file.as_ref())?;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     // Nobody else drives this machine meanwhile.
     let _lease = Lease::take(&store, "move")?;
     let ports = ports::open(&loaded.config, &Default::default(), ports::Use::Motion, 1.0)?;

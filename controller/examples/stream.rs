@@ -3,12 +3,13 @@
 //! `cargo run --example stream -- machine.toml path.csv` (`time_s,x_mm`)
 #![expect(clippy::print_stdout, reason = "an example shows what it reads")]
 use machine::engine::{Engine, State, read_path};
-use truestage::{Failure, Lease, Machine, config, ports, store_of};
+use machine::records::Lease;
+use truestage::{Failure, Machine, config, ports};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().collect();
     let loaded = config::load(words[1].as_ref())?;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let _lease = Lease::take(&store, "stream")?;
     let ports = ports::open(&loaded.config, &Default::default(), ports::Use::Motion, 1.0)?;
     let mut machine = Machine::new(&loaded, Box::new(ports));

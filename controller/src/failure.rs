@@ -81,6 +81,21 @@ pub enum Failure {
         /// How long it looked.
         source: Box<Failure>,
     },
+    /// The axis could not follow before it had found its zero.
+    #[error(
+        "axis {axis}: could not follow before it had found its zero, and nothing has shown so far that \
+         `resolution_nm = {}` in [axis.{axis}] is right: where a count of the encoder is longer than that, the axis \
+         is sent as many times faster than it is asked to. Compare it with the encoder's data sheet; if it is right, \
+         look for what blocks or overloads the axis. {source}", units::Short(*resolution_nm)
+    )]
+    BeforeZero {
+        /// Which axis.
+        axis: String,
+        /// One count as configured, nanometres.
+        resolution_nm: f64,
+        /// What its drive said.
+        source: Box<Failure>,
+    },
     /// The settings of the Hall search cannot work.
     #[error("axis {axis}: {source}")]
     SearchSettings {

@@ -41,3 +41,18 @@ pub(crate) fn explained(
         source: Box::new(failure),
     }
 }
+
+/// `failure` of an axis that had not found its zero, by which alone it is known how far a count is: told by that,
+/// where its drive could not follow.
+pub(crate) fn before_zero(core: &Core<'_>, axis: &str, failure: Failure) -> Failure {
+    match &failure {
+        Failure::Machine(machine::Failure::Alarm { alarm, .. }) if alarm.is_following_error() => {
+            Failure::BeforeZero {
+                axis: axis.to_owned(),
+                resolution_nm: core.config.axis[axis].motion.resolution_nm,
+                source: Box::new(failure),
+            }
+        }
+        _ => failure,
+    }
+}

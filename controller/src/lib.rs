@@ -7,14 +7,14 @@
 //! # A stage in a program of yours
 //!
 //! ```no_run
-//! use truestage::{Failure, Machine, config, ports, store_of};
+//! use truestage::{Failure, Machine, config, ports};
 //! use units::Metres;
 //!
 //! fn main() -> Result<(), Failure> {
 //!     let loaded = config::load("machine.toml".as_ref())?;
 //!     let transport = ports::open(&loaded.config, &ports::Overrides::default(), ports::Use::Motion, 1.0)?;
 //!     let mut machine = Machine::new(&loaded, Box::new(transport));
-//!     let store = store_of(&loaded.config.machine);
+//!     let store = loaded.config.machine.store();
 //!     machine.guarded(|machine| {
 //!         machine.start()?;
 //!         machine.linear("x")?.zero(&store)?;
@@ -34,7 +34,8 @@
 //! # Names
 //!
 //! Here is what a program has to write. Quantities are those of `units`; what a machine of any kind is and
-//! fails with, records of any kind, and several axes as one motion ([`machine::engine`]) are in `machine`;
+//! fails with, who is told and who stops it ([`machine::Observer`], [`machine::StopRequest`]), records of any kind and
+//! who has the machine meanwhile ([`machine::records`]), and several axes as one motion ([`machine::engine`]) are in `machine`;
 //! mathematics are in `compensator`. What is read only (sections of a configuration, entries of a journal, what
 //! a procedure found) has fields and needs no name.
 //!
@@ -70,13 +71,6 @@ pub use connected::Machine;
 pub use failure::Failure;
 pub use run::CalibrateOptions;
 
-// What is kept, and who has the machine meanwhile.
-pub use machine::records::{Lease, Store};
-pub use stores::{store_in, store_of};
-
-// Who is told how far a procedure is, and who asks it to stop.
-pub use machine::{Observer, Stage, StopRequest};
-
 // The command, whose `main` is this alone; who keeps a machine for others is given to it.
 #[cfg(feature = "program")]
 pub use program::{Serving, main};
@@ -84,6 +78,7 @@ pub use program::{Serving, main};
 /// What the tests of this project need beyond that. No promise is made about it.
 #[doc(hidden)]
 pub mod for_tests {
+    pub use crate::assemble::ports as port_numbers;
     pub use crate::edit::{Edit, with_rare_heartbeats};
     pub use crate::hardware::analog::ModuleConfig;
     pub use crate::hardware::camera::CameraDevice;
@@ -100,6 +95,7 @@ pub mod for_tests {
     pub use crate::rotary::settings::rotary_settings;
     pub use crate::rotary::sweep::Sweep;
     pub use crate::rotary::verify::RotaryVerified;
+    pub use crate::stores::store_in;
     pub use crate::volumetric::calibrate::{VolumetricCalibrated, VolumetricEvaluated};
     pub use crate::volumetric::entries::OpticsName;
     pub use crate::volumetric::first_part::FirstPartCorrection;

@@ -14,8 +14,6 @@ use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
 use machine::Patience;
 
-pub use crate::assemble::ports as numbers;
-
 /// Where a bus or a line is really found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Endpoint {

@@ -15,9 +15,11 @@ pub(crate) fn contents() -> &'static [ContentKind] {
     &CONTENTS
 }
 
-/// The store of the machine that a configuration describes.
-pub fn store_of(machine: &MachineSection) -> Store {
-    store_in(&machine.data_dir, &machine.name)
+impl MachineSection {
+    /// The store of the machine that this describes.
+    pub fn store(&self) -> Store {
+        store_in(&self.data_dir, &self.name)
+    }
 }
 
 /// The store of `machine` below `data_dir`.

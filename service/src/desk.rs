@@ -1,10 +1,13 @@
 //! Where clients come: orders go to the machine's thread, and what it publishes is read.
 
 mod calibrations;
+mod journals;
+mod runs;
 
 use core::time::Duration;
 use std::fs::File;
 use std::io::Read;
+use std::path::Path;
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -12,14 +15,15 @@ use std::time::Instant;
 
 use machine::records::Store;
 use tokio::sync::oneshot;
+use truestage::Failure;
 
 use crate::keeper::utc_now;
 use crate::ledger::{Asked, Ledger, LedgerError};
 use crate::order::{Answer, Answered, Letter, Order};
 use crate::problem::{Code, Problem};
-use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
-use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView, RunView};
+use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
 
 /// How often whoever waits looks.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
@@ -37,7 +41,12 @@ struct Shared {
     fixed: Arc<Fixed>,
     ledger: Mutex<Ledger>,
     store: Store,
+    /// Who makes a page of a journal.
+    page: Option<Page>,
 }
+
+/// Makes a page of a journal.
+pub(crate) type Page = fn(&Path) -> Result<String, Failure>;
 
 /// An answer that will come.
 #[derive(Debug)]
@@ -66,12 +75,14 @@ impl Desk {
         fixed: Arc<Fixed>,
         ledger: Ledger,
         store: Store,
+        page: Option<Page>,
     ) -> Self {
         let shared = Shared {
             board,
             fixed,
             ledger: Mutex::new(ledger),
             store,
+            page,
         };
         Self {
             letters,
@@ -427,74 +438,5 @@ pub(crate) fn named(answer: Answer) -> Result<String, Problem> {
     match answer {
         Answer::Named(name) => Ok(name),
         Answer::Done | Answer::Leased(_) => Err(ended()),
-    }
-}
-
-/// Runs.
-impl Desk {
-    /// Plans a run, and starts it when the request says so; returns its name.
-    ///
-    /// # Errors
-    /// When it is refused; nothing has moved then.
-    pub fn plan_run(&self, caller: &Caller, request: &RunRequest) -> Result<String, Problem> {
-        let id = self.next_run();
-        let order = Order::Plan {
-            id: id.clone(),
-            request: request.clone(),
-        };
-        self.done(caller, order)?;
-        Ok(id)
-    }
-
-    pub(crate) fn next_run(&self) -> String {
-        self.ledger().next_id('r')
-    }
-
-    /// Begins the planned run `id`.
-    ///
-    /// # Errors
-    /// When it is not planned any more, or an axis is in use.
-    pub fn start_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
-        let run = id.to_owned();
-        self.done(caller, Order::Start { run })
-    }
-
-    /// Ends the run `id`.
-    ///
-    /// # Errors
-    /// When there is none.
-    pub fn abort_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
-        let run = id.to_owned();
-        self.done(caller, Order::Abort { run })
-    }
-
-    /// The run `id`.
-    ///
-    /// # Errors
-    /// When there is none.
-    pub fn run(&self, id: &str) -> Result<RunView, Problem> {
-        let found = self.runs().into_iter().find(|it| it.id == *id);
-        found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
-    }
-
-    /// The run `id` once it has ended, or after `limit`, whichever comes first.
-    ///
-    /// # Errors
-    /// When there is none.
-    pub fn wait_run(&self, id: &str, limit: Duration) -> Result<RunView, Problem> {
-        let begun = Instant::now();
-        loop {
-            let view = self.run(id)?;
-            if view.state.is_end() || begun.elapsed() >= limit {
-                return Ok(view);
-            }
-            thread::sleep(LOOK_EVERY);
-        }
-    }
-
-    /// The runs that are known.
-    pub fn runs(&self) -> Vec<RunView> {
-        let snapshot = self.snapshot();
-        snapshot.runs.iter().map(|it| RunView::clone(it)).collect()
     }
 }

@@ -34,6 +34,7 @@ pub use request::{
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{
-    AxisState, AxisView, CalibrationView, Cause, Event, LeaseView, Leased, LegView, MachineState,
-    MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped, ToldView,
+    AxisState, AxisView, CalibrationView, Cause, Event, JournalView, LeaseView, Leased, LegView,
+    MachineState, MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
+    ToldView,
 };

@@ -27,6 +27,10 @@ pub(crate) enum Order {
     Start { run: String },
     /// A run ends.
     Abort { run: String },
+    /// A run ends where it is, to go on later.
+    Pause { run: String },
+    /// A paused run goes on.
+    Resume { run: String },
     /// Who may command; the token is what the holder is given.
     Lease {
         request: LeaseRequest,
@@ -62,6 +66,8 @@ impl Order {
             | Self::Plan { .. }
             | Self::Start { .. }
             | Self::Abort { .. }
+            | Self::Pause { .. }
+            | Self::Resume { .. }
             | Self::Calibration(_) => true,
         }
     }

@@ -1,10 +1,12 @@
 //! What runs do with a linear axis, and what they found.
 
+use machine::records::Store;
 use serde_json::{Value, json};
 use truestage::linear::{Teller, Told, VerifyOptions};
-use truestage::{CalibrateOptions, Failure, Machine, Store};
+use truestage::{CalibrateOptions, Failure, Machine};
 
-use crate::request::{RunKind, RunRequest};
+use crate::keeper::RunTask;
+use crate::request::RunKind;
 use crate::view::ToldView;
 
 /// Figures, and what the command line says of them.
@@ -14,13 +16,13 @@ pub(crate) fn perform(
     machine: &mut Machine,
     store: &Store,
     axis: &str,
-    request: &RunRequest,
+    task: &RunTask,
     teller: Option<Teller>,
 ) -> Result<Found, Failure> {
-    let (found, told) = match request.kind {
+    let (found, told) = match task.request.kind {
         RunKind::Zero => zero(machine, store, axis, teller),
-        RunKind::Calibrate => calibrate(machine, store, axis, request.accept_drift, teller),
-        RunKind::Verify => verify(machine, store, axis, !request.uncompensated, teller),
+        RunKind::Calibrate => calibrate(machine, store, axis, task, teller),
+        RunKind::Verify => verify(machine, store, axis, task, teller),
     }?;
     let told = told.zip(teller).map(|(mut told, teller)| {
         told.value["counters"] = (teller.counters)(machine);
@@ -47,12 +49,12 @@ fn calibrate(
     machine: &mut Machine,
     store: &Store,
     axis: &str,
-    accept_drift: bool,
+    task: &RunTask,
     teller: Option<Teller>,
 ) -> Outcome {
     let options = CalibrateOptions {
-        resume: None,
-        accept_drift,
+        resume: task.resume.clone(),
+        accept_drift: task.request.accept_drift,
     };
     let made = machine.linear(axis)?.calibrate(store, &options)?;
     let found = json!({
@@ -69,9 +71,10 @@ fn verify(
     machine: &mut Machine,
     store: &Store,
     axis: &str,
-    compensated: bool,
+    task: &RunTask,
     teller: Option<Teller>,
 ) -> Outcome {
+    let compensated = !task.request.uncompensated;
     let calibration = match compensated {
         true => machine.linear(axis)?.load_active(store)?,
         false => None,
@@ -79,7 +82,7 @@ fn verify(
     let options = VerifyOptions {
         compensated,
         calibration,
-        resume: None,
+        resume: task.resume.clone(),
     };
     let verified = machine.linear(axis)?.verify(store, &options)?;
     let found = json!({

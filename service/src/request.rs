@@ -118,6 +118,17 @@ pub enum RunKind {
     Verify,
 }
 
+impl RunKind {
+    /// What its journals are called when a run can go on with them.
+    pub(crate) const fn verb(self) -> Option<&'static str> {
+        match self {
+            Self::Zero => None,
+            Self::Calibrate => Some("calibrate"),
+            Self::Verify => Some("verify"),
+        }
+    }
+}
+
 /// A run that is asked for. It is planned, and begins when it is started.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

@@ -10,13 +10,14 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{self, JoinHandle};
 
 use machine::attend;
+use machine::records::Store;
 use serde_json::json;
 use triple_buffer::Input;
 use truestage::linear::Teller;
-use truestage::{Failure, Machine, Store};
+use truestage::{Failure, Machine};
 use wire::cia402::PowerState;
 
-use crate::desk::Desk;
+use crate::desk::{Desk, Page};
 use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
 use crate::manager::{Manager, Watch};
@@ -88,10 +89,10 @@ impl Service {
             .name("machine".into())
             .spawn(move || keep(open, inbox, input, &told))?;
         match ready.recv() {
-            Ok((fixed, store)) => {
+            Ok((fixed, store, page)) => {
                 let folder = store.root().join("service");
                 let ledger = Ledger::open(&folder)?;
-                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store);
+                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store, page);
                 Ok(Self {
                     scribe: Scribe::start(desk.clone(), folder)?,
                     desk,
@@ -141,7 +142,7 @@ impl Service {
     }
 }
 
-type Told = Sender<(Arc<Fixed>, Store)>;
+type Told = Sender<(Arc<Fixed>, Store, Option<Page>)>;
 
 /// All that the machine's thread does.
 fn keep(
@@ -169,13 +170,14 @@ fn keep(
     };
     kept.machine.guarded(Machine::start)?;
     kept.load_courses();
+    kept.offer_runs();
     let mut keeper = kept.keeper.borrow_mut();
     keeper.set_mode(Mode::Idle);
     // Whoever is told that the machine is there sees it so.
     keeper.publish_now(&kept.machine);
     drop(keeper);
     // Whoever started it may have gone.
-    let _ = told.send((fixed, kept.store.clone()));
+    let _ = told.send((fixed, kept.store.clone(), teller.map(|it| it.page)));
     let ended = kept.live();
     kept.keeper.borrow_mut().dismiss();
     drop(held);
@@ -354,13 +356,43 @@ impl Kept {
                 self.load_courses();
                 self.keeper.borrow_mut().run_done(id, result, told);
             }
-            Err(failure) if was_stopped && is_stop(&failure) => {}
+            Err(failure) if was_stopped && is_stop(&failure) => self.leave(&task),
             Err(failure) if stops_the_machine(&failure) => self.failed(failure),
             Err(failure) => {
                 // A verification that finds a calibration harmful takes it out of use.
                 self.load_courses();
                 let cause = cause_of(&failure);
                 self.keeper.borrow_mut().run_failed(id, &cause);
+            }
+        }
+    }
+
+    /// Where a run that ended early goes on, if it is one that can.
+    fn leave(&mut self, task: &RunTask) {
+        let begun = match (task.request.kind.verb(), &task.axis, &task.resume) {
+            (_, _, Some(journal)) => Some(journal.clone()),
+            (Some(verb), Some(axis), None) => {
+                let found = self.store.interrupted_run(verb, axis);
+                found.ok().flatten().map(|it| it.journal)
+            }
+            _ => None,
+        };
+        self.keeper.borrow_mut().run_left(&task.id, begun);
+    }
+
+    /// Runs that were interrupted before this service began can go on.
+    fn offer_runs(&mut self) {
+        for axis in self.machine.devices().axis_names() {
+            for kind in [RunKind::Calibrate, RunKind::Verify] {
+                let found = kind
+                    .verb()
+                    .map(|verb| self.store.interrupted_run(verb, &axis));
+                let mut keeper = self.keeper.borrow_mut();
+                match found {
+                    Some(Ok(Some(found))) => keeper.offer_run(kind, &found),
+                    Some(Err(error)) => keeper.warn(&format!("axis {axis}: {error}")),
+                    Some(Ok(None)) | None => {}
+                }
             }
         }
     }
@@ -374,7 +406,7 @@ impl Kept {
         if task.request.kind != RunKind::Zero {
             machine.enable(axis)?;
         }
-        procedures::perform(machine, store, axis, &task.request, teller)
+        procedures::perform(machine, store, axis, task, teller)
     }
 }
 

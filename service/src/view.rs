@@ -217,6 +217,8 @@ pub enum RunState {
     Running,
     /// Its axes slow down.
     Stopping,
+    /// Its axes stand and are free, and what it measured is kept: it can go on.
+    Paused,
     /// It has its result.
     Done,
     /// Somebody stopped it.
@@ -229,7 +231,7 @@ impl RunState {
     /// Whether it is an end.
     pub const fn is_end(self) -> bool {
         match self {
-            Self::Planned | Self::Running | Self::Stopping => false,
+            Self::Planned | Self::Running | Self::Stopping | Self::Paused => false,
             Self::Done | Self::Stopped | Self::Failed => true,
         }
     }
@@ -276,6 +278,36 @@ pub struct RunView {
     pub result: serde_json::Value,
     /// The same, as the command line prints it.
     pub told: Option<ToldView>,
+    /// Where one that ended before its result has what it measured.
+    #[serde(default)]
+    pub journal: Option<String>,
+}
+
+impl RunView {
+    /// A run of which nothing is done yet.
+    pub(crate) fn planned(
+        id: &str,
+        by: &str,
+        kind: crate::request::RunKind,
+        axes: Vec<String>,
+        plan: RunPlanView,
+    ) -> Self {
+        Self {
+            id: id.to_owned(),
+            by: by.to_owned(),
+            kind,
+            axes,
+            state: RunState::Planned,
+            plan,
+            steps_done: 0,
+            steps: 0,
+            stopped: None,
+            cause: None,
+            result: serde_json::Value::Null,
+            told: None,
+            journal: None,
+        }
+    }
 }
 
 /// What something gave, as the command line prints it.
@@ -293,6 +325,21 @@ impl From<truestage::linear::Told> for ToldView {
         let truestage::linear::Told { text, value } = told;
         Self { text, value }
     }
+}
+
+/// A journal of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct JournalView {
+    /// Its name.
+    pub name: String,
+    /// `zero`, `calibrate`, `verify`, …; null when it cannot be read.
+    pub verb: Option<String>,
+    /// Of which axis.
+    pub axis: Option<String>,
+    /// When it was begun, UTC, RFC 3339.
+    pub started: Option<String>,
+    /// Whether its run came to its end.
+    pub complete: bool,
 }
 
 /// A calibration that is stored.

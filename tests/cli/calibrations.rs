@@ -2,8 +2,8 @@
 
 use std::fs;
 
+use machine::records::Lease;
 use tests::LINEAR;
-use truestage::Lease;
 
 use crate::programs::{check_error, text, truestage};
 
@@ -36,7 +36,7 @@ fn no_calibration_is_activated_or_rolled_back_while_another_program_has_the_mach
     let activate = |id: &str| truestage(here, &["cal", "activate", "machine.toml", id]);
     let back = || truestage(here, &["cal", "rollback", "machine.toml", "--axis", "x"]);
     activate(first).with_code(0);
-    let store = truestage::store_in(&here.join("machine-data"), "linear");
+    let store = truestage::for_tests::store_in(&here.join("machine-data"), "linear");
     let verify = Lease::take(&store, "verify").expect("nobody else has it");
     for refused in [activate(second), back()] {
         check_error(

@@ -2,11 +2,13 @@
 
 mod alone;
 mod calibrations;
+mod dead_man;
 mod demo;
 mod example;
 mod examples;
 mod interrupted;
 mod job;
+mod jog;
 mod killed;
 mod manager;
 mod platform;

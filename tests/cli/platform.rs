@@ -165,7 +165,7 @@ fn both_platforms_shown_in_one_folder_keep_their_calibrations() {
         let machine = config::parse(&text, "machine.toml");
         let machine = machine.unwrap_or_else(|error| panic!("{error}"));
         let machine = machine.config.machine;
-        let store = truestage::store_of(&machine);
+        let store = machine.store();
         for screw in ["u", "v", "w"] {
             let active = store.active(screw).expect("it can be read").current;
             let id = active.unwrap_or_else(|| panic!("{}: {screw} has none", machine.name));

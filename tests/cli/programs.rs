@@ -176,6 +176,7 @@ pub(crate) struct Bench {
     shipped: Shipped,
     mock: Process,
     ports: Vec<String>,
+    is_lockstep: bool,
     folder: tempfile::TempDir,
     _turn: MutexGuard<'static, ()>,
 }
@@ -222,6 +223,7 @@ impl Bench {
             shipped,
             mock,
             ports,
+            is_lockstep: clock.contains(&LOCKSTEP),
             folder,
             _turn: turn,
         };
@@ -319,11 +321,14 @@ impl Bench {
             "calibrate",
             "verify",
             "move",
+            "jog",
             "run",
             "serve",
         ];
         if uses_machine.contains(&words[0]) {
-            command.args(["--clock", LOCKSTEP]);
+            if self.is_lockstep {
+                command.args(["--clock", LOCKSTEP]);
+            }
             let machine = self.shipped.machine;
             let uses = |name: &str| machine.contains(&format!(".{name}]"));
             for port in self

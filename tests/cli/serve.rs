@@ -15,6 +15,13 @@ use crate::programs::{Bench, Process, live_rigs, number, program};
 const SOCKET: &str = "truestage.sock";
 
 pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
+    let (status, said) = fetch(folder, request, body);
+    let json = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
+    (status, json)
+}
+
+/// The status of an answer, and its body as it is.
+fn fetch(folder: &Path, request: &str, body: &Value) -> (u16, String) {
     let mut stream = UnixStream::connect(folder.join(SOCKET)).expect("it listens");
     let body = body.to_string();
     let length = body.len();
@@ -27,8 +34,7 @@ pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
     stream.read_to_string(&mut said).expect("it answers");
     let status = said.split(' ').nth(1).and_then(|it| it.parse().ok());
     let body = said.split_once("\r\n\r\n").map_or("", |it| it.1);
-    let json = serde_json::from_str(body).unwrap_or_else(|error| panic!("{error}: {said}"));
-    (status.expect("a status"), json)
+    (status.expect("a status"), body.to_owned())
 }
 
 pub(crate) fn keep(bench: &Bench) -> Process {
@@ -168,7 +174,7 @@ fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
         let resumed = bench.run(&["calibrate", "machine.toml", "--resume"]);
         let resumed = resumed.with_code(2);
         assert!(
-            resumed["error"].to_string().contains("--resume"),
+            resumed["error"].to_string().contains("was interrupted"),
             "{resumed}"
         );
         // Whoever has the lease commands; nobody else does.
@@ -179,6 +185,52 @@ fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
         let token = lease["token"].as_str().expect("a token");
         let moved = say_with_lease(&bench, &["move", "machine.toml", "x=2mm"], token);
         assert!(moved.contains("the point stands at"), "{moved}");
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+/// What runs measured can be asked for, and looked at.
+#[test]
+fn a_service_shows_the_journals_of_runs_and_their_pages() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        bench.run(&["calibrate", "machine.toml"]).with_code(0);
+        let service = keep(&bench);
+        let folder = bench.folder();
+        let get = |path: &str| fetch(folder, &format!("GET /v1/{path}"), &json!({}));
+        let (_, journals) = ask(folder, "GET /v1/journals", &json!({}));
+        let [calibration, zero] = &journals.as_array().expect("a list")[..] else {
+            panic!("{journals}");
+        };
+        assert_eq!(
+            (&calibration["verb"], &zero["verb"]),
+            (&json!("calibrate"), &json!("zero"))
+        );
+        assert_eq!(
+            (&calibration["axis"], &calibration["complete"]),
+            (&json!("x"), &json!(true))
+        );
+        let name = calibration["name"].as_str().expect("a name");
+        let (status, journal) = get(&format!("journals/{name}"));
+        let stored = std::fs::read_to_string(bench.records().join(format!("runs/{name}.jsonl")));
+        assert_eq!((status, journal), (200, stored.expect("it is there")));
+        let (status, page) = get(&format!("reports/{name}"));
+        assert_eq!(status, 200, "{page}");
+        assert!(
+            page.starts_with("<!doctype html>") && page.contains("</svg>"),
+            "{page}"
+        );
+        // Nothing but journals has a name.
+        for other in [
+            "journals/nobody",
+            "journals/..%2Flease",
+            "reports/..%2F..%2Fmachine",
+            "reports/nobody",
+        ] {
+            let (status, said) = get(other);
+            assert_eq!(status, 404, "{other}: {said}");
+        }
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }
@@ -222,6 +274,9 @@ fn a_signal_to_the_client_stops_its_run_and_leaves_the_machine_kept() {
         let status = bench.run(&["status"]).with_code(0);
         assert_eq!(status["machine"]["state"], "running", "{status}");
         assert_eq!(status["axes"][0]["state"], "Standstill", "{status}");
+        assert!(ended.said.contains("--resume"), "{ended:?}");
+        let made = bench.run(&["calibrate", "machine.toml", "--resume"]);
+        assert!(made.with_code(0)["calibration"].is_string());
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }

@@ -10,7 +10,7 @@ use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
 use mock_bus::simulation::Simulation;
 use tests::{Emulator, Group, Rig, Setup, Stand, rigs};
-use truestage::{Observer, Stage};
+use machine::{Observer, Stage};
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 use wire::cia402::PowerState;
 

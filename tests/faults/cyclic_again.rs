@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use drivers::transport::in_process::InProcess;
 use drivers::transport::{SendError, Transport};
+use machine::StopRequest;
 use machine::engine::EngineFailure;
 use machine::engine::{Cause, Engine, NoCorrection, State};
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, machine_config};
-use truestage::StopRequest;
 use truestage::emulated::Emulated;
 use truestage::{Failure, Machine};
 use units::{Metres, Time};

@@ -5,11 +5,11 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
+use machine::StopRequest;
 use machine::engine::Cause;
 use machine::engine::EngineFailure;
 use tests::{Bench, Edit};
 use truestage::Failure;
-use truestage::StopRequest;
 use units::Metres;
 
 use crate::scene::{PERIOD, Phase, STOPPING, Scene, Wanted, check, cyclic, follow, shortened};

@@ -10,6 +10,7 @@ use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::online::{BeamDetector, BeamReference, Sample};
 use machine::engine::{Cause, Correction, Engine, Live};
 use machine::engine::{Channel, Corrected, Observed, Source, ThermometerSample, Validity};
+use machine::{Observer, Stage};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::simulation::Simulation;
 use tests::volume::{Volume, good};
@@ -17,7 +18,6 @@ use tests::{Bench, Edit, VOLUMETRIC};
 use truestage::Failure;
 use truestage::for_tests::{beam_detector, beam_drift, roll_optics};
 use truestage::volumetric::{VolumetricCorrection, VolumetricState};
-use truestage::{Observer, Stage};
 use units::{Celsius, Metres, Quantity, Radians};
 
 const AXES: [&str; 3] = ["x", "y", "z"];

@@ -3,13 +3,14 @@
 
 use std::fs;
 
+use machine::records::Lease;
+use machine::records::Store;
 use machine::records::{CalibrationRecord, StoreError};
 use tests::{Bench, Edit};
 use truestage::CalibrateOptions;
-use truestage::Lease;
 use truestage::linear::{LinearContent, LinearLog};
 use truestage::rotary::RotaryContent;
-use truestage::{Failure, Machine, Store};
+use truestage::{Failure, Machine};
 
 use crate::scene::shortened;
 
@@ -181,7 +182,7 @@ fn a_run_whose_journal_cannot_be_written_is_not_begun() {
     bench.machine.start().unwrap();
     bench.machine.linear("x").unwrap().zero(&store).unwrap();
     let before = bench.true_position();
-    let full = truestage::store_in(&bench.folder.path().join("file"), "m");
+    let full = truestage::for_tests::store_in(&bench.folder.path().join("file"), "m");
     fs::write(bench.folder.path().join("file"), b"").unwrap();
     let options = CalibrateOptions::default();
     let failure = bench
@@ -312,7 +313,7 @@ fn a_killed_run_goes_on_where_it_stopped() {
     // Another process would have a flag of its own.
     bench
         .machine
-        .share_stop_request(&truestage::StopRequest::default());
+        .share_stop_request(&machine::StopRequest::default());
     let made = bench
         .machine
         .guarded(|machine| run(machine, Some(journal.clone())))
@@ -334,12 +335,12 @@ fn a_killed_run_goes_on_where_it_stopped() {
 /// Asks to stop after so many measured points.
 struct StopAt {
     left: u64,
-    stop: truestage::StopRequest,
+    stop: machine::StopRequest,
 }
 
-impl truestage::Observer for StopAt {
-    fn progress(&mut self, stage: truestage::Stage, _: &str, done: u64, _: u64) {
-        if stage == truestage::Stage::Calibrate && done == self.left {
+impl machine::Observer for StopAt {
+    fn progress(&mut self, stage: machine::Stage, _: &str, done: u64, _: u64) {
+        if stage == machine::Stage::Calibrate && done == self.left {
             self.stop.stop();
         }
     }

@@ -293,6 +293,36 @@ fn an_encoder_whose_counts_are_taken_for_another_length_makes_no_zero() {
 }
 
 #[test]
+fn an_encoder_whose_counts_are_far_longer_than_configured_is_not_only_a_following_error() {
+    // The axis is sent four and ten times faster than the file asks for; as fine counts permit no more, it shall
+    // brake and speed up less.
+    for resolution in ["resolution_nm = 2.5 ", "resolution_nm = 1.0 "] {
+        let scene = Scene::during(Phase::Zero)
+            .machine("resolution_nm = 10.0 ", resolution)
+            .machine(
+                "quick_stop_deceleration_mm_per_s2 = 20000.0",
+                "quick_stop_deceleration_mm_per_s2 = 2000.0",
+            )
+            .machine(
+                "\nacceleration_mm_per_s2 = 5000.0",
+                "\nacceleration_mm_per_s2 = 2000.0",
+            );
+        let wanted = Wanted {
+            cause: |failure| matches!(failure, Failure::BeforeZero { .. }),
+            words: &[
+                "axis x",
+                "following error",
+                "resolution_nm = ",
+                "data sheet",
+            ],
+            within: WHOLE,
+            rest: WHOLE,
+        };
+        check(scene, &wanted);
+    }
+}
+
+#[test]
 fn a_small_error_of_scale_is_refused_after_the_first_run() {
     // As if the beam ran 60 mrad beside the travel: 1800 ppm.
     check_scale(

@@ -2,11 +2,12 @@
 //! large or too steep, and those that make the axis worse (classes 48, 49).
 
 use machine::records::CalibrationRecord;
+use machine::records::Store;
 use tests::Bench;
 use truestage::CalibrateOptions;
 use truestage::linear::LinearContent;
 use truestage::linear::VerifyOptions;
-use truestage::{Failure, Machine, Store};
+use truestage::{Failure, Machine};
 use units::Metres;
 
 use crate::scene::shortened;
@@ -212,7 +213,7 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
 #[test]
 fn a_first_calibration_that_makes_it_worse_leaves_none_behind() {
     let (mut bench, record, _) = calibrated(2);
-    let fresh = truestage::store_in(bench.folder.path(), "fresh");
+    let fresh = truestage::for_tests::store_in(bench.folder.path(), "fresh");
     activate(&fresh, &record, |_, deviation| -deviation);
     bench
         .machine

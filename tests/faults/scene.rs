@@ -6,7 +6,9 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use machine::engine::{Cause, Engine, NoCorrection};
+use machine::records::Store;
 use machine::records::read_journal;
+use machine::{Observer, Stage};
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::simulation::Simulation;
@@ -16,8 +18,7 @@ use truestage::emulated::Emulated;
 use truestage::for_tests::Calibrated;
 use truestage::linear::LinearLog;
 use truestage::linear::VerifyOptions;
-use truestage::{Failure, Machine, Store};
-use truestage::{Observer, Stage};
+use truestage::{Failure, Machine};
 use units::{Metres, Time};
 use wire::cia402::PowerState;
 

@@ -7,11 +7,12 @@ use std::rc::Rc;
 use drivers::transport::record::Recorder;
 use drivers::transport::replay::{Replay, ReplayReport};
 use drivers::transport::{SendError, Transport};
+use machine::records::Store;
 use tests::{Bench, Edit, machine_config};
-use truestage::for_tests::PointEntry;
+use truestage::for_tests::{PointEntry, port_numbers};
 use truestage::for_tests::{Verified, Zeroed};
 use truestage::linear::VerifyOptions;
-use truestage::{Failure, Machine, Store, ports};
+use truestage::{Failure, Machine};
 use units::Time;
 use wire::{Arrival, Payload, Port};
 
@@ -100,7 +101,7 @@ fn recorded(seed: u64) -> (Found, String) {
         |text| text,
         |inner| {
             let config = machine_config("/".as_ref(), short).config;
-            let ports = ports::numbers(&config);
+            let ports = port_numbers(&config);
             let names: Vec<_> = ports.iter().map(|(name, port)| (*port, &**name)).collect();
             Box::new(Recorder::new(inner, writer, &names).expect("memory takes every byte"))
         },
@@ -147,12 +148,12 @@ impl Transport for Watched {
 fn replayed(recording: &str) -> (Found, ReplayReport) {
     let folder = tempfile::tempdir().unwrap();
     let loaded = machine_config(folder.path(), short);
-    let ports = ports::numbers(&loaded.config);
+    let ports = port_numbers(&loaded.config);
     let names: Vec<_> = ports.iter().map(|(name, port)| (*port, &**name)).collect();
     let replay = Replay::parse(recording, &names).unwrap_or_else(|error| panic!("{error}"));
     let replay = Rc::new(RefCell::new(replay));
     let mut machine = Machine::new(&loaded, Box::new(Watched(replay.clone())));
-    let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
+    let store = truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name);
     let found = run(&mut machine, &store);
     let report = replay.borrow().report();
     (found, report)
@@ -199,7 +200,7 @@ fn a_recording_whose_drive_falls_silent_ends_with_the_reason() {
     let loaded = machine_config(folder.path(), short);
     let replay = Replay::parse(&silent, &[]).unwrap();
     let mut machine = Machine::new(&loaded, Box::new(replay));
-    let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
+    let store = truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name);
     let result = machine.guarded(|machine| procedure(machine, &store).map(drop));
     let failure = result.unwrap_err();
     assert!(

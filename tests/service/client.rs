@@ -32,6 +32,9 @@ pub(crate) trait Client {
     fn plan(&self, who: &Caller, request: &RunRequest) -> Result<String, Problem>;
     fn start(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn abort(&self, who: &Caller, id: &str) -> Result<(), Problem>;
+    fn pause(&self, who: &Caller, id: &str) -> Result<(), Problem>;
+    fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem>;
+    fn runs(&self) -> Vec<RunView>;
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem>;
     fn lease(&self, who: &Caller, request: &LeaseRequest) -> Result<Leased, Problem>;
     fn release(&self, who: &Caller) -> Result<(), Problem>;
@@ -127,6 +130,20 @@ impl Client for InProcess {
     fn abort(&self, who: &Caller, id: &str) -> Result<(), Problem> {
         let _passing = self.gate.pass();
         self.desk.abort_run(who, id)
+    }
+
+    fn pause(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let _passing = self.gate.pass();
+        self.desk.pause_run(who, id)
+    }
+
+    fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let _passing = self.gate.pass();
+        self.desk.resume_run(who, id)
+    }
+
+    fn runs(&self) -> Vec<RunView> {
+        self.desk.runs()
     }
 
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem> {

@@ -4,6 +4,7 @@ mod calibrations;
 mod jogs;
 mod machine;
 mod motions;
+mod paused;
 mod repeated;
 mod runs;
 

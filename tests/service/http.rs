@@ -231,6 +231,20 @@ impl Client for Http {
         answer.read::<RunView>().map(|_| ())
     }
 
+    fn pause(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let answer = self.post(who, &format!("/v1/runs/{id}/pause"), "", &json!({}));
+        answer.read::<RunView>().map(|_| ())
+    }
+
+    fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+        let answer = self.post(who, &format!("/v1/runs/{id}/resume"), "", &json!({}));
+        answer.read::<RunView>().map(|_| ())
+    }
+
+    fn runs(&self) -> Vec<RunView> {
+        self.get("/v1/runs").expect("runs are always told")
+    }
+
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem> {
         self.wait(&format!("/v1/runs/{id}"), wait)
     }

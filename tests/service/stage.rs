@@ -252,7 +252,7 @@ impl Stage {
     {
         let gate = Arc::new(Gate::default());
         let inner_gate = Arc::clone(&gate);
-        let store = truestage::store_of(&loaded.config.machine);
+        let store = loaded.config.machine.store();
         let passing = gate.wait_for_an_end();
         let service = Service::start(move || {
             let (inner, meddling) = open(&loaded)?;

@@ -10,7 +10,7 @@ use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
 use truestage::config::Loaded;
 use truestage::for_tests::DriveConfig;
-use truestage::ports;
+use truestage::for_tests::port_numbers;
 use units::{Coordinate, Time};
 use wire::canopen::NodeId;
 use wire::{Payload, Port};
@@ -37,7 +37,7 @@ impl<D: Device> Desk<D> {
     /// When the configuration has no such bus or line.
     pub fn new(emulator: Emulator, name: &str, device: D) -> Self {
         let config = &emulator.loaded.config;
-        let port = ports::numbers(config)[name];
+        let port = port_numbers(config)[name];
         let mut transport = emulator.transport();
         let heartbeat = config.can.get(name).map(|bus| {
             let sync = bus.sync_period();

@@ -5,7 +5,7 @@ use core::time::Duration;
 use drivers::device::{Alarm, Axis, AxisCommand, AxisReading, DeviceError, LineUse};
 use drivers::protocol::heartbeat::HeartbeatProducer;
 use drivers::transport::Transport;
-use truestage::ports;
+use truestage::for_tests::port_numbers;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Time};
 use wire::canopen::NodeId;
 use wire::{Payload, Port};
@@ -50,7 +50,7 @@ impl Group {
     /// When the machine's buses cannot be used.
     pub fn new(emulator: Emulator) -> Self {
         let config = &emulator.loaded.config;
-        let ports = ports::numbers(config);
+        let ports = port_numbers(config);
         let patience = emulator.loaded.patience;
         let mut transport = emulator.transport();
         let members = config.axis.values().map(|axis| {

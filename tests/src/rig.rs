@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use drivers::transport::Transport;
+use machine::records::Store;
+use truestage::Machine;
 use truestage::config::{self, Loaded};
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::for_tests::Edit;
-use truestage::{Machine, Store};
 use units::Metres;
 
 use crate::shipped::{LINEAR, ROTARY, Shipped};
@@ -114,7 +115,7 @@ impl Bench {
         Self {
             machine: Machine::new(&loaded, Box::new(emulated.transport())),
             emulated,
-            store: truestage::store_in(folder.path(), &loaded.config.machine.name),
+            store: truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name),
             loaded,
             folder,
         }
@@ -167,7 +168,7 @@ impl Bench {
         let emulated =
             Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
-        let store = truestage::store_in(folder.path(), &loaded.config.machine.name);
+        let store = truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name);
         Self {
             machine,
             emulated,

@@ -3,9 +3,10 @@
 use core::time::Duration;
 
 use drivers::transport::Transport;
+use machine::records::Store;
 use mock_bus::simulation::Simulation;
 use truestage::emulated::HallDrift;
-use truestage::{Failure, Machine, Store};
+use truestage::{Failure, Machine};
 use units::Metres;
 
 use crate::emulator::{Emulator, Setup};
@@ -46,7 +47,7 @@ impl Stand {
         let name = &emulator.loaded.config.machine.name;
         Self {
             machine: Machine::new(&emulator.loaded, wrap(emulator.transport())),
-            store: truestage::store_in(emulator.folder.path(), name),
+            store: truestage::for_tests::store_in(emulator.folder.path(), name),
             emulator,
         }
     }

@@ -458,7 +458,7 @@ fn machines_that_ship_share_no_name_no_serial_number_and_no_folder() {
         let path = entry.unwrap().path();
         let loaded = truestage::config::load(&path).unwrap_or_else(|error| panic!("{error}"));
         let machine = &loaded.config.machine;
-        let store = truestage::store_of(machine);
+        let store = machine.store();
         machines += 1;
         for what in [
             format!("name {}", machine.name),

@@ -11,7 +11,7 @@ const LIBRARY: &str = "controller/src/lib.rs";
 const LIST: &str = "tests/tidy/public_names.txt";
 
 /// How many names somebody else's program may be promised; whoever takes one off the list lowers it.
-const PROMISED_MAX: usize = 70;
+const PROMISED_MAX: usize = 61;
 
 /// The packages whose modules may be offered under another roof.
 const PACKAGES: &[&str] = &[

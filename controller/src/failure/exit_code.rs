@@ -11,7 +11,7 @@ impl Failure {
         match self {
             Self::Machine(failure) => failure.exit_code(),
             Self::Kind(failure) => failure.exit_code(),
-            Self::Resumable { source, .. } => source.exit_code(),
+            Self::Resumable { source, .. } | Self::BeforeZero { source, .. } => source.exit_code(),
             Self::Kept { exit_code, .. } => *exit_code,
             #[cfg(feature = "emulator")]
             Self::Emulator(failure) => failure.exit_code(),

@@ -15,6 +15,8 @@ mod finding;
 #[cfg(test)]
 mod golden;
 pub(crate) mod job;
+#[cfg(feature = "program")]
+pub(crate) mod jog;
 mod kind;
 mod log;
 pub(crate) mod measure;
@@ -35,7 +37,7 @@ pub(crate) mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use course::{Corrected, Course, PlannedMove};
-pub use job::{Job, JobOperator, JobPlan, Reached, parse_job};
+pub use job::{Job, JobOperator, JobPlan, Reached};
 pub use log::LinearLog;
 pub use moved::Moved;
 pub use record::LinearContent;

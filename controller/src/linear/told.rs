@@ -1,8 +1,11 @@
 //! What a linear axis gave, in the words of the command line: for whoever keeps a machine for others.
 
+use std::path::Path;
+
 use machine::Machine;
 use serde_json::Value;
 
+use crate::failure::Failure;
 use crate::linear::{Calibrated, Moved, Verified, Zeroed};
 
 /// A result as the command line prints it.
@@ -27,4 +30,6 @@ pub struct Teller {
     pub moved: fn(axis: &str, moved: &Moved, calibration: Option<&str>) -> Told,
     /// What the devices have counted so far.
     pub counters: fn(machine: &Machine) -> Value,
+    /// The page of a run, made of its journal.
+    pub page: fn(journal: &Path) -> Result<String, Failure>,
 }

@@ -86,7 +86,9 @@ impl LinearStage<'_> {
         self.core.set_zeroed(self.axis, false)?;
         let previous = previous_zero(store, self.axis);
         let mut journal = Journal::create(&store.runs(), &self.zero_header())?;
-        let found = self.find_zero(&config, &mut journal);
+        let found = self
+            .find_zero(&config, &mut journal)
+            .map_err(|failure| homing::before_zero(&self.core, self.axis, failure));
         let (outcome, estimate, entry) =
             found.inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.complete()?;

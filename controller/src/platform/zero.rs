@@ -82,7 +82,10 @@ impl AlignmentPlatform<'_> {
         let command = AxisCommand::HomeIndex { position, speed };
         let start = homing::place(&self.core, axis)?;
         let done = self.core.command(axis, command, "home on the index", limit);
-        done.map_err(|failure| homing::explained(&self.core, axis, start, failure.into()))
+        done.map_err(|failure| {
+            let failure = homing::explained(&self.core, axis, start, failure.into());
+            homing::before_zero(&self.core, axis, failure)
+        })
     }
 
     /// All screws to their zero from below, so that all lean on the same flank as ever.

@@ -10,7 +10,7 @@ use crate::config::Loaded;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
-use crate::{Failure, config, store_of};
+use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CalCommand {
@@ -69,7 +69,7 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
 
 fn opened(config: &std::path::Path) -> Result<Store, Failure> {
     let loaded = config::load(config)?;
-    Ok(store_of(&loaded.config.machine))
+    Ok(loaded.config.machine.store())
 }
 
 fn list(store: &Store, output: Output) -> Ended {
@@ -169,7 +169,7 @@ pub(crate) fn compared(
 fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let section = &loaded.config.machine;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     // Whoever measures with a calibration must find it there to the end.
     let _lease = Lease::take(&store, "cal activate")?;
     let id = store.resolve(id)?;
@@ -202,7 +202,7 @@ fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
 
 fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let _lease = Lease::take(&store, "cal rollback")?;
     let mut kinds = KINDS.iter();
     if let Some(all) = kinds.find_map(|it| (it.made_together)(&loaded.config, axis)) {

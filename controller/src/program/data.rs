@@ -19,7 +19,7 @@ use crate::program::linear::elsewhere::Elsewhere;
 use crate::program::linear::uncertainty;
 use crate::program::output::{Ended, Output};
 use crate::program::{json as to_json, text};
-use crate::{Failure, config, store_of};
+use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum FitCommand {
@@ -262,7 +262,7 @@ fn store_fit(
         content = content.with_budget(&budget);
     }
     let record = CalibrationRecord { head, content };
-    let id = store_of(&loaded.config.machine).save(&record)?;
+    let id = loaded.config.machine.store().save(&record)?;
     Ok((id, record.content))
 }
 

@@ -1,4 +1,5 @@
-//! What `--json` prints: one object, lengths in the unit its key or `unit` names.
+//! What `--json` prints: one object, lengths in the unit its key or `unit` names
+//! (docs/decisions/0033-what-json-prints-is-composed.md).
 
 use compensator::error_table::{ErrorTable, Fitted};
 use compensator::hall_zero::ZeroEstimate;
@@ -6,11 +7,15 @@ use compensator::iso230::{Conformity, Directional, Figures, Means, OneWayFigures
 use serde_json::{Value, json};
 use units::{Approach, Metres};
 
-/// Micrometres, rounded to a tenth of a nanometre: beyond it is noise of the arithmetic.
+/// To multiples of `1 / per_unit`: beyond that is noise of the arithmetic.
+pub(crate) fn rounded(value: f64, per_unit: f64) -> f64 {
+    // Adding zero turns -0.0, which would print as "-0.0", into 0.0.
+    (value * per_unit).round() / per_unit + 0.0
+}
+
+/// Micrometres, rounded to a tenth of a nanometre.
 pub(crate) fn um(length: Metres) -> f64 {
-    let rounded = (length.um() * 1e4).round() / 1e4;
-    // -0.0 would print as "-0.0".
-    rounded + 0.0
+    rounded(length.um(), 1e4)
 }
 
 fn directional(figure: &Directional) -> Value {

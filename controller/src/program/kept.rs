@@ -3,22 +3,27 @@
 //! A verb first tries to take the machine. Whoever has it says in its lease where it can be asked; what is wrong
 //! with the command line itself has been refused by then.
 
-use std::time::Duration;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 use machine::records::StoreError;
 use serde_json::{Value, json};
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
+use crate::Failure;
 use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
+use crate::program::jog::{JogArgs, told};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
 use crate::program::targets::axis_target;
-use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
-use crate::{Failure, Observer as _, Stage, StopRequest};
+use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, NEWEST_RUN, VerifyArgs};
+use machine::{Observer as _, Stage, StopRequest};
 
 /// How long an answer is held back: Ctrl-C is looked for so often.
 const WAIT: Duration = Duration::from_millis(200);
+/// How often a jog is renewed: a service stops one that was not for 200 ms.
+const AGAIN: Duration = Duration::from_millis(50);
 
 /// Where the service is.
 pub(crate) struct Service {
@@ -45,16 +50,18 @@ impl Service {
 
     pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
         refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
-        let stop = self.prepare(&args.axis, args.resume.is_some(), output)?;
+        let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});
-        let run = self.run(Stage::Calibrate, request, &stop, output)?;
+        let resume = args.resume.as_deref();
+        let run = self.run(Stage::Calibrate, request, resume, &stop, output)?;
         tell(&run, output)
     }
 
     pub(crate) fn verify(&self, args: &VerifyArgs, output: Output) -> Ended {
-        let stop = self.prepare(&args.axis, args.resume.is_some(), output)?;
+        let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "uncompensated": args.uncompensated});
-        let run = self.run(Stage::Verify, request, &stop, output)?;
+        let resume = args.resume.as_deref();
+        let run = self.run(Stage::Verify, request, resume, &stop, output)?;
         let um = |name: &str| Metres::from_um(run["result"][name].as_f64().unwrap_or(f64::NAN));
         if args.uncompensated || run["result"]["within_tolerance"] == true {
             return tell(&run, output);
@@ -83,15 +90,57 @@ impl Service {
         output.result(&texts.join("\n"), &json!({"moves": values}))
     }
 
-    /// What comes before a run that measures: options that are not offered are refused, and the axis has its zero.
-    fn prepare(
-        &self,
-        args: &AxisArgs,
-        resumes: bool,
-        output: Output,
-    ) -> Result<StopRequest, Failure> {
+    /// Says again and again that the axis shall go on, as a service wants to hear it; the axis has its zero.
+    pub(crate) fn jog(&self, args: &JogArgs, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
-        refuse(resumes, "--resume")?;
+        let (jog, stop) = (args.jog()?, stop_request()?);
+        self.zero_first(Some(&jog.axis), &stop, output)?;
+        let request = |speed: MetresPerSecond| {
+            let mm_per_s = speed.value() * 1e3;
+            json!({"axis": jog.axis, "speed": {"value": mm_per_s, "unit": "mm/s"}})
+        };
+        let id = self.begin("/v1/jog", &request(jog.speed))?;
+        // By the wall: whoever keeps the machine has its own clock.
+        let end = jog.duration.map(|it| Instant::now() + it);
+        let is_over = || stop.is_requested() || end.is_some_and(|end| Instant::now() >= end);
+        let path = format!("/v1/motions/{id}");
+        self.keep_alive(&path, is_over)?;
+        let is_ours = is_over();
+        if is_ours {
+            // It may just have ended by itself.
+            let over = request(MetresPerSecond(0.0)).to_string();
+            let _ = ask_on(&self.at, "POST", "/v1/jog", &over);
+        }
+        let motion = ask_on(&self.at, "GET", &format!("{path}?wait_s=10"), "")?;
+        match motion["state"].as_str() {
+            Some("failed" | "timed_out") => Err(failed(&motion)),
+            _ if stop.is_requested() => Err(stop.failure().into()),
+            Some("stopped") if !is_ours => Err(stopped(&motion)),
+            _ => {
+                let (text, value) = told(&jog.axis, &motion).unwrap_or_else(|| words_of(&motion));
+                output.result(&text, &value)
+            }
+        }
+    }
+
+    /// Renews the dead-man of the motion at `path` until that has ended, or `is_over`. Renewed and never asked for
+    /// again: what somebody has stopped meanwhile stays stopped.
+    fn keep_alive(&self, path: &str, is_over: impl Fn() -> bool) -> Result<(), Failure> {
+        let look = format!("{path}?wait_s={}", AGAIN.as_secs_f64());
+        while !is_over() {
+            let seen = ask_on(&self.at, "GET", &look, "")?;
+            if seen["state"] != "moving" && seen["state"] != "queued" {
+                break;
+            }
+            // Refused when it has ended since; then the next look says how.
+            let _ = ask_on(&self.at, "POST", &format!("{path}/renew"), "{}");
+        }
+        Ok(())
+    }
+
+    /// What comes before a run that measures: options that are not offered are refused, and the axis has its zero.
+    fn prepare(&self, args: &AxisArgs, output: Output) -> Result<StopRequest, Failure> {
+        refuse(args.machine.record.is_some(), "--record")?;
         let stop = stop_request()?;
         self.zero_first(args.axis.as_deref(), &stop, output)?;
         Ok(stop)
@@ -120,28 +169,64 @@ impl Service {
         stop: &StopRequest,
         output: Output,
     ) -> Result<Value, Failure> {
-        self.run(Stage::Zero, json!({"axis": axis}), stop, output)
+        self.run(Stage::Zero, json!({"axis": axis}), None, stop, output)
     }
 
-    /// Begins a run and waits for its end; the service names runs as people name their stages.
+    /// Begins a run, or goes on with the one that is paused, and waits for its end; the service names runs as people
+    /// name their stages.
     fn run(
         &self,
         stage: Stage,
         mut request: Value,
+        resume: Option<&Path>,
         stop: &StopRequest,
         output: Output,
     ) -> Result<Value, Failure> {
         request["kind"] = json!(stage.text());
         request["start"] = json!(true);
-        let id = self.begin("/v1/runs", &request)?;
+        let id = match resume {
+            None => self.begin("/v1/runs", &request)?,
+            Some(journal) => {
+                let id = self.paused(&request, journal)?;
+                self.begin(&format!("/v1/runs/{id}/resume"), &json!({}))?
+            }
+        };
         let mut bars = Bars::new(output.is_json());
-        let abort = format!("/v1/runs/{id}/abort");
-        self.end_of(&format!("/v1/runs/{id}"), &abort, stop, |run| {
+        // What measures can go on later; a zero cannot.
+        let ending = if stage == Stage::Zero {
+            "abort"
+        } else {
+            "pause"
+        };
+        let ender = format!("/v1/runs/{id}/{ending}");
+        self.end_of(&format!("/v1/runs/{id}"), &ender, stop, |run| {
             let of = |name: &str| run[name].as_u64().unwrap_or(0);
             let axis = plain(run["axes"][0].as_str().unwrap_or_default());
             if of("steps") > 0 {
                 bars.progress(stage, &axis, of("steps_done"), of("steps"));
             }
+        })
+    }
+
+    /// The name of the newest run that is paused and of the kind and axis that `request` asks for; or the one of
+    /// `journal`, where a file is named.
+    fn paused(&self, request: &Value, journal: &Path) -> Result<String, Failure> {
+        let runs = ask(&self.at, "GET", "/v1/runs", "")?;
+        let is_meant = |run: &&Value| {
+            let of_axis = request["axis"].is_null() || run["axes"][0] == request["axis"];
+            let left = run["journal"].as_str().map(Path::new);
+            let of_journal = journal == Path::new(NEWEST_RUN)
+                || left.is_some_and(|it| it.file_name() == journal.file_name());
+            run["state"] == "paused" && run["kind"] == request["kind"] && of_axis && of_journal
+        };
+        let found = runs.as_array().into_iter().flatten().rfind(is_meant);
+        let id = found.and_then(|run| run["id"].as_str()).map(plain);
+        id.ok_or_else(|| Failure::Usage {
+            what: format!(
+                "the service knows no {} run that was interrupted and can go on",
+                plain(request["kind"].as_str().unwrap_or_default())
+            ),
+            help: "start a new one without --resume".into(),
         })
     }
 
@@ -176,6 +261,7 @@ impl Service {
             match seen["state"].as_str() {
                 Some("done") => return Ok(seen),
                 Some("stopped") if is_ending => return Err(stop.failure().into()),
+                Some("paused") => return Err(paused(&seen, is_ending.then(|| stop.failure()))),
                 Some("stopped") => return Err(stopped(&seen)),
                 Some("failed" | "timed_out") => return Err(failed(&seen)),
                 _ => {}
@@ -209,6 +295,22 @@ fn stopped(seen: &Value) -> Failure {
     Failure::Kept {
         said: format!("stopped by {by}; the axes stand"),
         exit_code: machine::Failure::Interrupted.exit_code(),
+    }
+}
+
+/// `asked`: this program was told to end, and paused it for that.
+fn paused(seen: &Value, asked: Option<machine::Failure>) -> Failure {
+    let failure = asked.unwrap_or(machine::Failure::Interrupted);
+    Failure::Kept {
+        said: format!(
+            "{failure}; the run is paused and the axes stand: go on with --resume ({})",
+            plain(
+                seen["journal"]
+                    .as_str()
+                    .unwrap_or("nothing was measured yet")
+            )
+        ),
+        exit_code: failure.exit_code(),
     }
 }
 

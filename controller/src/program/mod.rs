@@ -7,6 +7,7 @@ mod data;
 mod data_file;
 mod demo;
 mod exchange;
+mod jog;
 mod json;
 mod kept;
 mod kind;
@@ -85,6 +86,8 @@ enum Command {
     Verify(VerifyArgs),
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
+    /// Zero, then run an axis at a speed, to its soft limit, for a time, or until Ctrl-C: `truestage jog x=2mm/s`.
+    Jog(jog::JogArgs),
     /// Zero, then record the references of the detectors of three axes, for the calibration in use.
     Reference(MachineArgs),
     /// Zero, then do a job of one axis (`JOB.toml`), or follow a path of three axes (`PATH.csv`), corrected.
@@ -437,6 +440,12 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
                 (kind.move_to)(&args, output)
             });
             kept::or_by_its_service(here, |service| service.move_to(&args, output))
+        }
+        Command::Jog(args) => {
+            let args = args.settle();
+            kept::or_by_its_service(jog::run(&args, output), |service| {
+                service.jog(&args, output)
+            })
         }
         Command::Reference(args) => volumetric::verbs::reference(&args, output),
         Command::Run(args) => run(args, output),

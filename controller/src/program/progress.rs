@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{Observer, Stage};
+use machine::{Observer, Stage};
 
 /// One bar for the procedure that runs.
 pub(crate) struct Bars {

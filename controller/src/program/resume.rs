@@ -78,7 +78,7 @@ mod tests {
 
     fn store() -> (tempfile::TempDir, Store) {
         let folder = tempfile::tempdir().unwrap();
-        let store = crate::store_in(folder.path(), "m");
+        let store = crate::stores::store_in(folder.path(), "m");
         fs::create_dir_all(store.runs()).unwrap();
         fs::write(store.runs().join("20200101-calibrate-x-00.jsonl"), "").unwrap();
         (folder, store)

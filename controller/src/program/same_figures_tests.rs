@@ -18,7 +18,8 @@ use crate::program::volumetric::verbs as volumetric;
 use crate::rotary::{RotaryCalibrated, RotaryVerified};
 use crate::volumetric::VolumetricCalibrated;
 use crate::volumetric::verify::VolumetricVerified;
-use crate::{Machine, Store, config, store_of};
+use crate::{Machine, config};
+use machine::records::Store;
 
 /// A machine in virtual time, and where it keeps its records.
 struct Desk {
@@ -36,7 +37,7 @@ impl Desk {
         let emulated = Emulated::new(emulated, 20_261_125, &loaded.config).unwrap();
         Self {
             machine: Machine::new(&loaded, Box::new(emulated.transport())),
-            store: store_of(&loaded.config.machine),
+            store: loaded.config.machine.store(),
             emulated,
             _folder: folder,
         }

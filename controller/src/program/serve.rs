@@ -10,8 +10,10 @@ use crate::ports::Use;
 use crate::program::ServeArgs;
 use crate::program::linear::told::TELLER;
 use crate::program::output::{Ended, Output};
+use crate::program::report::html;
 use crate::program::session::Session;
-use crate::{Failure, Lease, Machine, Store};
+use crate::{Failure, Machine};
+use machine::records::{Lease, Store};
 
 /// A machine, where its records are, and what must be held as long as it is used.
 type Opening = dyn FnOnce() -> Result<(Machine, Store, Box<dyn Any>), Failure> + Send;
@@ -51,7 +53,11 @@ pub(crate) fn run(
             let _ = lease.set(Arc::downgrade(&own));
             Ok((session.machine, session.store, Box::new(own)))
         }),
-        teller: TELLER,
+        // Pages of journals of any kind: whatever has worked on this machine left its own.
+        teller: Teller {
+            page: html,
+            ..TELLER
+        },
         announce: Box::new(move |places| announce(&taken, places)),
         told: Box::new(move |text| output.note(text)),
     })?;

@@ -13,7 +13,9 @@ use crate::ports::{self, Overrides, Use};
 use crate::program::output::Output;
 use crate::program::progress::Bars;
 use crate::program::{AxisArgs, MachineArgs};
-use crate::{Failure, Machine, StopRequest, Store, assemble, store_of};
+use crate::{Failure, Machine, assemble};
+use machine::StopRequest;
+use machine::records::Store;
 
 /// A machine that is connected and leased to this process.
 pub(crate) struct Session {
@@ -36,7 +38,7 @@ impl Session {
         if let Some(path) = &args.record {
             refuse_existing(path)?;
         }
-        let store = store_of(&loaded.config.machine);
+        let store = loaded.config.machine.store();
         let lease = Lease::take(&store, verb)?;
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();

@@ -7,7 +7,7 @@ use crate::platform::record::{HarmonicRecord, StrokeRecord};
 use crate::platform::{ScrewContent, ScrewMethodName};
 use crate::rotary::RotaryContent;
 use crate::rotary::record::ReadingName;
-use crate::store_in;
+use crate::stores::store_in;
 
 /// Written by the first program, before there were other kinds, and named by its hash then.
 const EARLIER: &str = include_str!("earlier_linear.json");

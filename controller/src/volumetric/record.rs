@@ -471,7 +471,7 @@ fn no_error(id: &str, name: &str) -> StoreError {
 mod tests {
     use super::*;
     use crate::store::{CalibrationRecord, Content, RecordHead};
-    use crate::store_in;
+    use crate::stores::store_in;
 
     fn function(values: [f64; 3]) -> Function<Metres> {
         let nodes = [0.0, 0.1, 0.25].map(Metres);

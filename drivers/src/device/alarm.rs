@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 use units::LengthOrAngle;
 use wire::canopen::NodeId;
-use wire::canopen::emcy::Emergency;
+use wire::canopen::emcy::{Emergency, EmergencyCode};
 use wire::canopen::nmt::NmtState;
 use wire::cia402::PowerState;
 use wire::copley::Faults;
@@ -158,6 +158,22 @@ pub enum Alarm {
         jump: LengthOrAngle,
         limit: LengthOrAngle,
     },
+}
+
+impl Alarm {
+    /// Whether a drive says that its axis is farther from the demand than its limit permits.
+    pub fn is_following_error(&self) -> bool {
+        match self {
+            Self::FollowingError { .. } => true,
+            Self::Emergency { emergency, .. } => emergency.code == EmergencyCode::FOLLOWING_ERROR,
+            Self::Amplifier { trouble, .. } => match trouble {
+                AmplifierTrouble::TrackingError => true,
+                AmplifierTrouble::Faults(faults) => faults.contains(Faults::FOLLOWING_ERROR),
+                _ => false,
+            },
+            _ => false,
+        }
+    }
 }
 
 /// What only one family of devices can say; its file has them as constants.

@@ -32,6 +32,7 @@ mod difference;
 mod failure;
 mod hash;
 mod head;
+mod interrupted;
 mod journal;
 mod lease;
 mod name;
@@ -44,6 +45,7 @@ pub use difference::{Difference, first_difference};
 pub use failure::{ModelError, StoreError};
 pub use hash::ConfigHash;
 pub use head::{EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead};
+pub use interrupted::InterruptedRun;
 pub use journal::{
     AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_journal,
 };

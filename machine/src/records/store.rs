@@ -76,14 +76,24 @@ impl Store {
         &self.root
     }
 
+    /// The file names of all run journals, in no order.
+    ///
+    /// # Errors
+    /// When the folder cannot be read; a missing one is an empty one.
+    pub fn journals(&self) -> Result<Vec<String>, StoreError> {
+        let mut names = list_folder(&self.runs())?;
+        names.retain(|name| name.ends_with(".jsonl"));
+        Ok(names)
+    }
+
     /// The newest journal of `verb` on `axis`; their names begin with the time.
     ///
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn newest_run(&self, verb: &str, axis: &str) -> Result<Option<PathBuf>, StoreError> {
         let part = format!("-{verb}-{axis}-");
-        let mut names = list_folder(&self.runs())?;
-        names.retain(|name| name.contains(&part) && name.ends_with(".jsonl"));
+        let mut names = self.journals()?;
+        names.retain(|name| name.contains(&part));
         Ok(names.into_iter().max().map(|name| self.runs().join(name)))
     }
 

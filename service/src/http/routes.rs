@@ -1,6 +1,7 @@
 //! The resources.
 
 mod calibrations;
+mod journals;
 mod machine;
 mod motions;
 mod runs;
@@ -43,8 +44,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
     tags(
         (name = "machine", description = "The machine and its axes"),
         (name = "motions", description = "Motions; their end is a level"),
-        (name = "runs", description = "Procedures: plan, start, abort"),
+        (name = "runs", description = "Procedures: plan, start, pause, resume, abort"),
         (name = "calibrations", description = "What corrects motions: activate, roll back"),
+        (name = "journals", description = "What runs measured, and their pages"),
         (name = "events", description = "What happens"),
         (name = "service", description = "The service itself")
     )
@@ -79,6 +81,11 @@ fn routed() -> (Router<State>, OpenApi) {
         .routes(routes!(runs::run))
         .routes(routes!(runs::start))
         .routes(routes!(runs::abort))
+        .routes(routes!(runs::pause))
+        .routes(routes!(runs::resume))
+        .routes(routes!(journals::journals))
+        .routes(routes!(journals::journal))
+        .routes(routes!(journals::report))
         .routes(routes!(events::events));
     OpenApiRouter::with_openapi(Described::openapi())
         .routes(routes!(healthz))

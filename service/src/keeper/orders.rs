@@ -51,6 +51,8 @@ impl Keeper {
             }
             Order::Start { run } => self.start_run(machine, &run).map(|()| Answer::Done),
             Order::Abort { run } => self.abort_run(machine, &run, by).map(|()| Answer::Done),
+            Order::Pause { run } => self.pause_run(machine, &run).map(|()| Answer::Done),
+            Order::Resume { run } => self.resume_run(machine, &run).map(|()| Answer::Done),
             Order::Power { axis, on } => return self.power(machine, &axis, on, reply),
             Order::Calibration(choice) => return self.take_choice(choice, by, reply),
             Order::Reset => return self.take_reset(reply),

@@ -1,6 +1,9 @@
 //! Runs: planned, started, stopped; what they do is sequential code on the machine's thread.
 
+mod paused;
+
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use machine::{Machine, Stage};
@@ -23,6 +26,8 @@ pub(crate) struct Task {
     pub(crate) request: RunRequest,
     /// The axis; `None` for all axes of a volume.
     pub(crate) axis: Option<String>,
+    /// The journal that it goes on with.
+    pub(crate) resume: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug)]
@@ -32,8 +37,28 @@ struct Run {
     view: RunView,
     /// Somebody stopped it; it ends so when its procedure has ended and its axes stand.
     stopped: Option<Stopped>,
+    /// Somebody pauses it, likewise; a stop counts for more.
+    is_pausing: bool,
     /// Its procedure has ended.
     is_over: bool,
+}
+
+impl Run {
+    const fn new(task: Task, axes: Vec<usize>, view: RunView) -> Self {
+        Self {
+            task,
+            axes,
+            view,
+            stopped: None,
+            is_pausing: false,
+            is_over: false,
+        }
+    }
+
+    /// Whether its procedure is to end before it is complete.
+    const fn is_to_end(&self) -> bool {
+        self.stopped.is_some() || self.is_pausing
+    }
 }
 
 /// All runs.
@@ -56,9 +81,18 @@ impl Runs {
 
     /// Whether the procedure that runs has to end.
     pub(super) fn is_to_end(&self) -> bool {
-        self.kept
-            .iter()
-            .any(|it| it.stopped.is_some() && !it.is_over)
+        self.kept.iter().any(|it| it.is_to_end() && !it.is_over)
+    }
+
+    /// One more; the oldest that is over or was never begun makes room.
+    fn keep(&mut self, run: Run) {
+        self.kept.push_back(run);
+        if self.kept.len() > KEPT {
+            let is_old = |it: &Run| it.view.state.is_end() || it.view.state == RunState::Planned;
+            let old = self.kept.iter().position(is_old);
+            old.map(|at| self.kept.remove(at));
+        }
+        self.published = None;
     }
 
     fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
@@ -85,41 +119,15 @@ impl Keeper {
         let (axis, axes) = self.axes_of_run(request)?;
         let plan = self.plan_of(request.kind, axes[0])?;
         let names = axes.iter().map(|at| self.name(*at).to_string());
-        let view = RunView {
-            id: id.to_owned(),
-            by: by.to_owned(),
-            kind: request.kind,
-            axes: names.collect(),
-            state: RunState::Planned,
-            plan,
-            steps_done: 0,
-            steps: 0,
-            stopped: None,
-            cause: None,
-            result: Value::Null,
-            told: None,
-        };
+        let view = RunView::planned(id, by, request.kind, names.collect(), plan);
         self.events.push("run", id, json!(view));
-        self.runs.kept.push_back(Run {
-            task: Task {
-                id: id.into(),
-                request: request.clone(),
-                axis,
-            },
-            axes,
-            view,
-            stopped: None,
-            is_over: false,
-        });
-        if self.runs.kept.len() > KEPT {
-            let old = self
-                .runs
-                .kept
-                .iter()
-                .position(|it| it.view.state.is_end() || it.view.state == RunState::Planned);
-            old.map(|at| self.runs.kept.remove(at));
-        }
-        self.runs.published = None;
+        let task = Task {
+            id: id.into(),
+            request: request.clone(),
+            axis,
+            resume: None,
+        };
+        self.runs.keep(Run::new(task, axes, view));
         Ok(())
     }
 
@@ -174,12 +182,18 @@ impl Keeper {
     /// Begins the planned run `id` as soon as this tick has ended.
     pub(super) fn start_run(&mut self, machine: &Machine, id: &str) -> Result<(), Problem> {
         self.require_running()?;
-        let run = self.runs.find(id)?;
-        let (axes, kind, state) = (run.axes.clone(), run.view.kind, run.view.state);
-        if state != RunState::Planned {
+        if self.runs.find(id)?.view.state != RunState::Planned {
             let what = format!("run {id} was started before");
             return Err(Problem::new(Code::RunState, what, "plan another one"));
         }
+        self.begin(machine, id)
+    }
+
+    /// Begins the run `id`, or goes on with it.
+    fn begin(&mut self, machine: &Machine, id: &str) -> Result<(), Problem> {
+        self.require_running()?;
+        let run = self.runs.find(id)?;
+        let (axes, kind) = (run.axes.clone(), run.view.kind);
         self.require_no_run()?;
         for at in &axes {
             self.require_free(*at)?;
@@ -192,6 +206,8 @@ impl Keeper {
             self.seats[at].task = SeatTask::Run(id.into(), kind);
         }
         self.job = Some(Job::Run(id.into()));
+        let run = self.runs.find(id)?;
+        (run.is_pausing, run.is_over) = (false, false);
         self.change_run(id, |view| view.state = RunState::Running);
         Ok(())
     }
@@ -206,7 +222,7 @@ impl Keeper {
         let run = self.runs.find(id)?;
         let stopped = stopped_by(by);
         match run.view.state {
-            RunState::Planned => self.change_run(id, |view| {
+            RunState::Planned | RunState::Paused => self.change_run(id, |view| {
                 view.state = RunState::Stopped;
                 view.stopped = Some(stopped);
             }),
@@ -223,11 +239,18 @@ impl Keeper {
     }
 
     fn stop_run(&mut self, machine: &mut Machine, stopped: &Stopped) {
+        if let Some(run) = self.runs.under_way() {
+            run.stopped.get_or_insert_with(|| stopped.clone());
+            self.slow_down_run(machine);
+        }
+    }
+
+    /// The axes of the run under way slow down, and its procedure ends.
+    fn slow_down_run(&mut self, machine: &mut Machine) {
         let is_waiting = matches!(self.job, Some(Job::Run(_)));
         let Some(run) = self.runs.under_way() else {
             return;
         };
-        run.stopped.get_or_insert_with(|| stopped.clone());
         run.view.state = RunState::Stopping;
         // What has not begun is over.
         run.is_over |= is_waiting;
@@ -258,7 +281,7 @@ impl Keeper {
         }
     }
 
-    /// Stopped runs end when their axes stand.
+    /// Stopped and paused runs are so when their axes stand.
     pub(super) fn advance_runs(&mut self) {
         let Some(run) = self
             .runs
@@ -271,7 +294,10 @@ impl Keeper {
         let (id, stopped) = (Arc::clone(&run.task.id), run.stopped.clone());
         if !self.is_stopping(run.axes.iter().copied()) {
             self.change_run(&id, |view| {
-                view.state = RunState::Stopped;
+                view.state = match stopped {
+                    Some(_) => RunState::Stopped,
+                    None => RunState::Paused,
+                };
                 view.stopped = stopped;
             });
         }
@@ -284,14 +310,14 @@ impl Keeper {
         Some(task)
     }
 
-    /// The procedure of the run `id` has ended; says whether somebody stopped it.
+    /// The procedure of the run `id` has ended; says whether somebody stopped or paused it.
     pub(crate) fn end_procedure(&mut self, id: &str) -> bool {
         self.mode = Mode::Idle;
         let Ok(run) = self.runs.find(id) else {
             return false;
         };
         run.is_over = true;
-        run.stopped.is_some()
+        run.is_to_end()
     }
 
     /// The run `id` has its result.

@@ -2,8 +2,9 @@
 
 use core::time::Duration;
 
+use machine::Stage;
 use truestage::linear::Course;
-use truestage::{Failure, Machine, Stage};
+use truestage::{Failure, Machine};
 
 use super::seat::{MovedBy, Plans, Seat, Task};
 use crate::quantity::Quantity;

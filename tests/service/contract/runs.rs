@@ -10,7 +10,7 @@ use crate::client::PATIENCE;
 use crate::stage::Stage;
 
 /// Fewer measurements: how good they are is asked elsewhere.
-fn short(text: String) -> String {
+pub(super) fn short(text: String) -> String {
     patient(text)
         .edit("runs = 3", "runs = 2")
         .edit("step_mm = 3.0", "step_mm = 10.0")

@@ -5,7 +5,8 @@ mod platform;
 mod rotary;
 mod volumetric;
 
-use truestage::{Failure, Machine, Store};
+use machine::records::Store;
+use truestage::{Failure, Machine};
 
 use crate::Edit;
 use crate::rig::Bench;

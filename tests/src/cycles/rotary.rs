@@ -1,7 +1,8 @@
 //! What the rotary table that ships does.
 
+use machine::records::Store;
 use truestage::rotary::Way;
-use truestage::{CalibrateOptions, Failure, Machine, Store};
+use truestage::{CalibrateOptions, Failure, Machine};
 use units::Radians;
 
 use super::{Cycle, changed, cycle, started};

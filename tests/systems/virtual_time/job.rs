@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use machine::StopRequest;
 use machine::records::read_journal;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit};
 use truestage::emulated::Emulated;
 use truestage::for_tests::JobDone;
-use truestage::linear::{Job, JobOperator, JobPlan, LinearLog, Reached, parse_job};
-use truestage::{CalibrateOptions, Failure, StopRequest};
+use truestage::linear::{Job, JobOperator, JobPlan, LinearLog, Reached};
+use truestage::{CalibrateOptions, Failure};
 use units::Metres;
 use wire::cia402::PowerState;
 
@@ -88,7 +89,7 @@ impl JobOperator for Person {
 
 fn job(bench: &Bench, change: impl Fn(String) -> String) -> Job {
     let text = change(JOB.edit(INPUT, "above_v = 2.0, within_s = 3.0"));
-    parse_job(&text, "job.toml", &bench.loaded.config).unwrap_or_else(|error| panic!("{error}"))
+    Job::parse(&text, "job.toml", &bench.loaded.config).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn calibrated(seed: u64) -> Bench {

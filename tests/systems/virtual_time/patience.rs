@@ -19,7 +19,7 @@ fn told_after(fault: &Fault, speed: f64) -> Duration {
     let emulated = Emulated::new(EMULATED, 7, &loaded.config);
     let emulated = emulated.unwrap_or_else(|error| panic!("{error}"));
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
-    let store = truestage::store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let ready = machine.guarded(|machine| {
         machine.start()?;
         machine.linear("x")?.zero(&store)

@@ -1,8 +1,8 @@
 //! What a platform does with what it knows and does not know: play after an interruption, images
 //! that never agree, a fourth screw that contradicts the others.
 
+use machine::StopRequest;
 use tests::{Bench, Edit, PoseJudge, UVW, with_fourth_drive, with_fourth_screw};
-use truestage::StopRequest;
 use truestage::platform::Pose;
 use truestage::{Failure, config};
 use units::{Metres, Radians};

@@ -8,8 +8,8 @@ use std::time::Instant;
 use drivers::transport::record::Recorder;
 use tests::Bench;
 use truestage::CalibrateOptions;
+use truestage::for_tests::port_numbers;
 use truestage::linear::VerifyOptions;
-use truestage::ports;
 
 /// What a recorder writes and a test reads.
 #[derive(Clone, Default)]
@@ -42,7 +42,7 @@ fn cycle(seed: u64) -> Traces {
         |text| text,
         |inner| {
             let config = tests::machine_config(std::path::Path::new("/"), |text| text).config;
-            let ports = ports::numbers(&config);
+            let ports = port_numbers(&config);
             let names: Vec<_> = ports.iter().map(|(name, port)| (*port, &**name)).collect();
             Box::new(Recorder::new(inner, writer, &names).expect("memory takes every byte"))
         },

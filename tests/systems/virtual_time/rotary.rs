@@ -6,6 +6,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use machine::records::{StoreError, read_journal};
+use machine::{Observer, Stage};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use tests::{Bench, Edit, Hand};
@@ -16,7 +17,6 @@ use truestage::rotary::PlateLog;
 use truestage::rotary::Way;
 use truestage::rotary::{Operator, PlateMove, PlateTask, RotaryFailure};
 use truestage::{Failure, Machine};
-use truestage::{Observer, Stage};
 use units::Radians;
 use wire::cia402::PowerState;
 

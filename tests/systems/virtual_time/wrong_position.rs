@@ -5,9 +5,10 @@
 //! both over a range and prints them.
 
 use compensator::error_table::{ErrorTable, Node};
+use machine::records::Store;
 use tests::{Bench, Edit, random, seeds};
 use truestage::CalibrateOptions;
-use truestage::{Failure, Store};
+use truestage::Failure;
 use units::Metres;
 
 /// A stage that is drawn: what is written into its two files.

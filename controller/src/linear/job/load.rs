@@ -12,14 +12,16 @@ use crate::config::{AxisConfig, ConfigError, MachineConfig, read};
 /// So many points a job has at most, and an interval makes of one.
 const POINTS_MAX: usize = 100_000;
 
-/// Reads and judges a job for the machine of `config`; `file` is the file's name in findings.
-///
-/// # Errors
-/// When it is no TOML, has unknown or missing keys, or asks for something that this machine cannot do; every
-/// finding names line and column.
-pub fn parse_job(text: &str, file: &str, config: &MachineConfig) -> Result<Job, ConfigError> {
-    let own: JobConfig = read(text, file, |job| judge(job, config))?;
-    Ok(job_of(&own, config))
+impl Job {
+    /// Reads and judges a job for the machine of `config`; `file` is the file's name in findings.
+    ///
+    /// # Errors
+    /// When it is no TOML, has unknown or missing keys, or asks for something that this machine cannot do; every
+    /// finding names line and column.
+    pub fn parse(text: &str, file: &str, config: &MachineConfig) -> Result<Self, ConfigError> {
+        let own: JobConfig = read(text, file, |job| judge(job, config))?;
+        Ok(job_of(&own, config))
+    }
 }
 
 fn judge(job: &JobConfig, config: &MachineConfig) -> Vec<Finding> {
@@ -267,7 +269,7 @@ mod tests {
 
     fn read(text: &str, machine: &str) -> Result<Job, ConfigError> {
         let config = crate::config::parse(machine, "m.toml").unwrap().config;
-        parse_job(text, "job.toml", &config)
+        Job::parse(text, "job.toml", &config)
     }
 
     #[test]

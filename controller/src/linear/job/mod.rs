@@ -24,7 +24,6 @@ use crate::linear::moved::Moved;
 
 #[cfg(test)]
 pub(crate) use config::JobConfig;
-pub use load::parse_job;
 pub use operator::JobOperator;
 pub use plan::JobPlan;
 pub use run::JobDone;

@@ -24,7 +24,7 @@ use crate::emulated::{Emulated, EmulatedOnPtys};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
-use crate::{Failure, Machine, store_of};
+use crate::{Failure, Machine};
 
 #[derive(Debug, Args)]
 pub(crate) struct DemoCommand {
@@ -51,7 +51,7 @@ fn on_stand(
 ) -> Ended {
     let started = Instant::now();
     let mut loaded = load(demo, args)?;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let _lease = Lease::take(&store, "demo")?;
     let [_, _, description] = demo.files;
     let emulated = emulation(args, description, &loaded)?;

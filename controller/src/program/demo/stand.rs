@@ -11,7 +11,8 @@ use units::Time;
 use super::emulation::Emulation;
 use crate::emulated::HallDrift;
 use crate::program::output::{Ended, Output};
-use crate::{Failure, Machine, Store};
+use crate::{Failure, Machine};
+use machine::records::Store;
 
 /// How long the mains stays off, and what the drives take to boot, in machine time.
 const POWER_OFF: Duration = Duration::from_millis(800);

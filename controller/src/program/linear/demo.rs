@@ -20,7 +20,8 @@ use crate::program::output::Output;
 use crate::program::page::facts_of;
 use crate::program::{json as to_json, text};
 use crate::run::CalibrateOptions;
-use crate::{Failure, Machine, Store};
+use crate::{Failure, Machine};
+use machine::records::Store;
 
 const AXIS: &str = "x";
 /// What aged, warmed and disturbed Hall sensors may do between two power-ups.

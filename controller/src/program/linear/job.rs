@@ -8,7 +8,7 @@ use units::{Metres, Short};
 
 use crate::linear::job::JobDone;
 use crate::linear::job::plan::PlannedPoint;
-use crate::linear::{Job, JobOperator, JobPlan, Reached, parse_job};
+use crate::linear::{Job, JobOperator, JobPlan, Reached};
 use crate::ports::Use;
 use crate::program::MachineArgs;
 use crate::program::data_file::read;
@@ -17,7 +17,7 @@ use crate::program::linear::{moved, uncertainty};
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
-use crate::{Failure, config, store_of};
+use crate::{Failure, config};
 
 /// What is asked of a job besides doing it.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +31,8 @@ pub(crate) struct JobOptions {
 pub(crate) fn run(args: &MachineArgs, file: &Path, options: JobOptions, output: Output) -> Ended {
     let text = read(file)?;
     let loaded = config::load(&args.config)?;
-    let job = parse_job(&text, &file.display().to_string(), &loaded.config)?;
-    let plan = JobPlan::of(&job, &loaded, &store_of(&loaded.config.machine))?;
+    let job = Job::parse(&text, &file.display().to_string(), &loaded.config)?;
+    let plan = JobPlan::of(&job, &loaded, &loaded.config.machine.store())?;
     if options.dry_run {
         return output.result(&planned_text(&job, &plan), &planned_value(&job, &plan));
     }

@@ -14,6 +14,7 @@ pub(crate) const TELLER: Teller = Teller {
     verified,
     moved,
     counters: |machine| to_json::counters(&machine.devices().counters()),
+    page: super::page::html,
 };
 
 pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {

@@ -6,6 +6,7 @@ use machine::records::read_journal;
 use serde_json::json;
 use units::{Metres, Radians};
 
+use crate::Failure;
 use crate::emulated::HallDrift;
 use crate::platform::Pose;
 use crate::platform::calibrate::PlatformCalibrated;
@@ -22,7 +23,7 @@ use crate::program::platform::report::PlatformPage;
 use crate::program::platform::verbs::{
     calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
 };
-use crate::{Failure, Store};
+use machine::records::Store;
 
 /// Everything the demonstration found.
 struct Story {

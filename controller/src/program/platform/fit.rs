@@ -20,7 +20,7 @@ use crate::program::platform::json as to_json;
 use crate::program::show::{Changes, Show};
 use crate::program::text;
 use crate::program::text::ScrewTerm;
-use crate::{Failure, config, store_of};
+use crate::{Failure, config};
 
 /// What `truestage fit screw` is told.
 #[derive(Debug, Args)]
@@ -260,7 +260,7 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
         let content = ScrewContent::new(&it.model, method, rows).without(&it.outliers);
         records.push(CalibrationRecord { head, content });
     }
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let ids: Result<_, _> = records.iter().map(|record| store.save(record)).collect();
     Ok(ids?)
 }

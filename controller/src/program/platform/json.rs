@@ -6,6 +6,8 @@ use serde_json::{Value, json};
 use units::portable::atan2;
 use units::{Metres, Radians};
 
+use crate::program::json as to_json;
+
 /// Rounded to a picometre: uncertainties are small and wanted with digits.
 fn um(length: Metres) -> f64 {
     rounded(length.um())
@@ -17,8 +19,7 @@ fn um_per_mm(slope: f64) -> f64 {
 }
 
 fn rounded(value: f64) -> f64 {
-    // Adding zero turns -0.0, which would print as "-0.0", into 0.0.
-    (value * 1e6).round() / 1e6 + 0.0
+    to_json::rounded(value, 1e6)
 }
 
 /// The patent's means, of the deviations as they stand in the file. What was not repeated has no

@@ -11,7 +11,8 @@ use crate::program::output::{Ended, Output};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::session::Session;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
-use crate::{Failure, Machine, Store};
+use crate::{Failure, Machine};
+use machine::records::Store;
 use units::text::{angle, length};
 
 /// Starts the platform, zeroes it, runs `procedure`, switches off; what `possible` refuses, before

@@ -7,6 +7,7 @@ use machine::records::read_journal;
 use serde_json::json;
 use units::Radians;
 
+use crate::Failure;
 use crate::emulated::HallDrift;
 use crate::program::demo::emulation::Emulation;
 use crate::program::demo::stand::{
@@ -23,7 +24,7 @@ use crate::rotary::Way;
 use crate::rotary::moves::RotaryMoved;
 use crate::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryVerified};
 use crate::run::CalibrateOptions;
-use crate::{Failure, Store};
+use machine::records::Store;
 
 const AXIS: &str = "c";
 /// Two turns on and a little.

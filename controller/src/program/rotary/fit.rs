@@ -19,7 +19,7 @@ use crate::program::rotary::json as to_json;
 use crate::program::show::{Changes, Show};
 use crate::rotary::RotaryContent;
 use crate::rotary::RotaryFailure;
-use crate::{Failure, config, store_of};
+use crate::{Failure, config};
 
 /// Harmonics that a plan prints; `--json` has them all.
 const SHOWN: usize = 8;
@@ -263,7 +263,7 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
         crate::rotary::settings::periodic_compensation(limits, &axis, content.table("just made")?)?;
     }
     let record = CalibrationRecord { head, content };
-    Ok(store_of(&loaded.config.machine).save(&record)?)
+    Ok(loaded.config.machine.store().save(&record)?)
 }
 
 impl Show for RotaryContent {

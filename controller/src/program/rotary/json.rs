@@ -7,11 +7,11 @@ use compensator::rotary::{
 use serde_json::{Value, json};
 use units::Radians;
 
-/// Arcseconds, rounded to a thousandth of a microarcsecond: beyond it is noise of the arithmetic.
+use crate::program::json::rounded;
+
+/// Arcseconds, rounded to a thousandth of a microarcsecond.
 pub(crate) fn arcsec(angle: Radians) -> f64 {
-    let rounded = (angle.arcsec() * 1e9).round() / 1e9;
-    // -0.0 would print as "-0.0".
-    rounded + 0.0
+    rounded(angle.arcsec(), 1e9)
 }
 
 /// The word for a criterion.

@@ -17,7 +17,8 @@ use crate::rotary::moves::RotaryMoved;
 use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
 use crate::run::CalibrateOptions;
-use crate::{Failure, Machine, Store};
+use crate::{Failure, Machine};
+use machine::records::Store;
 use units::text::angle;
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {

@@ -20,7 +20,8 @@ use serde_json::Value;
 use crate::program::output::Output;
 use crate::program::{cal, report};
 use crate::store::golden::Golden;
-use crate::{Failure, Store, platform, rotary};
+use crate::{Failure, platform, rotary};
+use machine::records::Store;
 
 /// So many of each kind in every run.
 pub(super) const QUICK: usize = 400;
@@ -41,7 +42,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let store = crate::store_in(folder.path(), "m");
+        let store = crate::stores::store_in(folder.path(), "m");
         for part in ["calibrations", "runs"] {
             fs::create_dir_all(store.root().join(part)).expect("there is room");
         }

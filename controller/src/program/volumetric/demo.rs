@@ -16,7 +16,8 @@ use crate::program::output::{Ended, Output};
 use crate::program::volumetric::report::{HourOfDay, render_day};
 use crate::program::volumetric::verbs::{calibrated_text, calibrated_value};
 use crate::volumetric::{VerifyBy, VolumeLog, VolumetricCalibrated, WarmUp};
-use crate::{Failure, Machine, Store, config, store_of};
+use crate::{Failure, Machine, config};
+use machine::records::Store;
 
 /// How long the machine warms up between cold and warm lines.
 const WARM_UP: Duration = Duration::from_secs(2 * 3600);
@@ -50,7 +51,7 @@ fn run(demo: &Demo, args: &DemoArgs, output: Output) -> Ended {
         loaded.config.machine.data_dir.clone_from(folder);
     }
     let section = &loaded.config.machine;
-    let store = store_of(section);
+    let store = section.store();
     let _lease = Lease::take(&store, "demo")?;
     let emulated = Emulated::new(description, args.seed, &loaded.config)?;
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));

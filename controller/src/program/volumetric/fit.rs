@@ -10,6 +10,7 @@ use machine::records::{CalibrationRecord, ReadJournal, RecordHead, read_journal,
 use serde_json::json;
 use units::Radians;
 
+use crate::Failure;
 use crate::config;
 use crate::config::Loaded;
 use crate::program::data_file::{read, volume_head_of};
@@ -25,7 +26,6 @@ use crate::volumetric::{
     VolumeReferencesEntry,
 };
 use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
-use crate::{Failure, store_of};
 
 /// What `truestage fit volumetric` is told.
 #[derive(Debug, Args)]
@@ -219,7 +219,7 @@ fn save(
             help: "give with --temperatures-c what they showed when the lines were read".into(),
         });
     }
-    let store = store_of(&machine.machine);
+    let store = machine.machine.store();
     let mut head = volume_head_of(loaded, GEOMETRY, &args.data)?;
     let references = match &given.journal {
         Some(journal) => {
@@ -301,8 +301,8 @@ mod tests {
 
     use super::*;
     use crate::Edit;
-    use crate::Store;
     use crate::program::stored_tests::lines_of;
+    use machine::records::Store;
 
     const JOURNAL: &str = include_str!("../../../golden/volumetric_calibrate.jsonl");
     const MACHINE: &str = include_str!("../../../../configs/machines/volumetric.toml");
@@ -334,7 +334,7 @@ mod tests {
             Self {
                 folder,
                 config,
-                store: store_of(&loaded.config.machine),
+                store: loaded.config.machine.store(),
             }
         }
 

@@ -21,7 +21,8 @@ use crate::volumetric::VolumetricFailure;
 use crate::volumetric::failure::PathRefusal;
 use crate::volumetric::first_part::FirstPart;
 use crate::volumetric::{GEOMETRY, Mover, Remembered, import, memory_pointer};
-use crate::{Failure, Machine, Store, store_of};
+use crate::{Failure, Machine};
+use machine::records::Store;
 
 /// How a path was followed.
 struct Followed {
@@ -292,7 +293,7 @@ pub(crate) fn memory_import(args: &ImportArgs, output: Output) -> Ended {
     let loaded = config::load(&args.config)?;
     let text = read(&args.file)?;
     let head = volume_head_of(&loaded, memory_pointer(MemoryName::First), &args.file)?;
-    let store = store_of(&loaded.config.machine);
+    let store = loaded.config.machine.store();
     let file = args.file.display().to_string();
     let kept = import(&loaded.config, &store, head, (&text, &file))?;
     let text = format!(

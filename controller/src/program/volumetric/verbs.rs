@@ -25,7 +25,8 @@ use crate::volumetric::verify::VolumetricVerified;
 use crate::volumetric::{
     GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, WarmUp,
 };
-use crate::{Failure, Machine, Store, config};
+use crate::{Failure, Machine, config};
+use machine::records::Store;
 
 /// How long the tool is seen to stand at its target.
 const STAND: Duration = Duration::from_millis(200);

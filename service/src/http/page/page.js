@@ -214,7 +214,9 @@ function showRun(run) {
   }
   const doing = document.createElement("p");
   if (run.state === "planned") doing.append(button("Start", () => ask("POST", `/v1/runs/${run.id}/start`)));
-  if (run.state === "planned" || run.state === "running") doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
+  if (run.state === "running" && run.kind !== "zero") doing.append(button("Pause", () => ask("POST", `/v1/runs/${run.id}/pause`)));
+  if (run.state === "paused") doing.append(button("Resume", () => ask("POST", `/v1/runs/${run.id}/resume`)));
+  if (["planned", "running", "paused"].includes(run.state)) doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
   shown.replaceChildren(...parts, doing);
 }
 

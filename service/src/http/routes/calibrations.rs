@@ -7,10 +7,11 @@ use utoipa::ToSchema;
 
 use super::super::guard::{Asks, Body, By, Named, plain};
 use super::super::state::State;
+use super::journals::from_disk;
 use super::obey;
 use crate::desk::{Desk, named};
 use crate::order::{Choice, Order};
-use crate::problem::{Code, Problem, ProblemBody};
+use crate::problem::{Problem, ProblemBody};
 use crate::request::Caller;
 use crate::view::{AxisView, CalibrationView};
 
@@ -25,10 +26,7 @@ use crate::view::{AxisView, CalibrationView};
 pub(super) async fn calibrations(
     Of(state): Of<State>,
 ) -> Result<Json<Vec<CalibrationView>>, Problem> {
-    // It waits for the disk: others are served meanwhile.
-    let listed = tokio::task::spawn_blocking(move || state.desk.calibrations()).await;
-    let listed = listed.map_err(|it| Problem::new(Code::Storage, it.to_string(), ""))?;
-    listed.map(Json)
+    from_disk(state, Desk::calibrations).await.map(Json)
 }
 
 /// Uses a calibration from now on. Nothing moves; the next motion is corrected by it.

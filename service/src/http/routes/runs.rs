@@ -98,3 +98,39 @@ pub(super) async fn abort(
     obey(&state.desk, &caller, Order::Abort { run: id.clone() }).await?;
     Ok(Json(state.desk.run(&id)?))
 }
+
+/// Lets a run end where it is, to go on later: its axes slow down and are free.
+#[utoipa::path(
+    post, path = "/runs/{id}/pause", tag = "runs", params(Asks, ("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It is paused when its axes stand", body = RunView),
+        (status = "4XX", description = "It is not under way, or cannot go on where it is left", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn pause(
+    Of(state): Of<State>,
+    By(caller): By,
+    Named(id): Named,
+) -> Result<Json<RunView>, Problem> {
+    obey(&state.desk, &caller, Order::Pause { run: id.clone() }).await?;
+    Ok(Json(state.desk.run(&id)?))
+}
+
+/// A paused run goes on with what it measured; so does one that an earlier service or program left.
+#[utoipa::path(
+    post, path = "/runs/{id}/resume", tag = "runs", params(Asks, ("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It goes on", body = RunView),
+        (status = "4XX", description = "It is not paused, or its axis is in use or has no zero", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn resume(
+    Of(state): Of<State>,
+    By(caller): By,
+    Named(id): Named,
+) -> Result<Json<RunView>, Problem> {
+    obey(&state.desk, &caller, Order::Resume { run: id.clone() }).await?;
+    Ok(Json(state.desk.run(&id)?))
+}

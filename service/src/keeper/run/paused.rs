@@ -1,0 +1,102 @@
+//! Runs that are paused, and those that an earlier service left: they go on with what was measured.
+
+use std::path::{Path, PathBuf};
+
+use machine::Machine;
+use machine::records::InterruptedRun;
+use serde_json::json;
+
+use super::super::Keeper;
+use super::{Run, Task};
+use crate::problem::{Code, Problem};
+use crate::request::{RunKind, RunRequest};
+use crate::view::{RunState, RunView};
+
+/// Who left a run that is found at the start.
+const EARLIER: &str = "an earlier service or program";
+
+impl Keeper {
+    /// Lets the run `id` end where it is, so that it can go on later; a level: a run that is paused stays so.
+    pub(in super::super) fn pause_run(
+        &mut self,
+        machine: &mut Machine,
+        id: &str,
+    ) -> Result<(), Problem> {
+        let run = self.runs.find(id)?;
+        match (run.view.state, run.view.kind) {
+            (RunState::Running, RunKind::Calibrate | RunKind::Verify) => {
+                run.is_pausing = true;
+                self.slow_down_run(machine);
+                Ok(())
+            }
+            (RunState::Paused, _) => Ok(()),
+            (RunState::Running, RunKind::Zero) => Err(Problem::new(
+                Code::RunState,
+                "a zero cannot go on where it was left",
+                "abort it, and zero again",
+            )),
+            _ => Err(Problem::new(
+                Code::RunState,
+                format!("run {id} is not under way"),
+                "only a run that is under way can be paused",
+            )),
+        }
+    }
+
+    /// The run `id` goes on as soon as this tick has ended.
+    pub(in super::super) fn resume_run(
+        &mut self,
+        machine: &Machine,
+        id: &str,
+    ) -> Result<(), Problem> {
+        if self.runs.find(id)?.view.state != RunState::Paused {
+            let what = format!("run {id} is not paused");
+            return Err(Problem::new(Code::RunState, what, "plan another one"));
+        }
+        self.begin(machine, id)
+    }
+
+    /// The procedure of the run `id` has ended early; what it measured is in `journal`.
+    pub(crate) fn run_left(&mut self, id: &str, journal: Option<PathBuf>) {
+        if let Ok(run) = self.runs.find(id) {
+            run.view.journal = journal.as_deref().map(text);
+            run.task.resume = journal;
+        }
+    }
+
+    /// A run of `kind` that was interrupted before this service began is offered as a paused one. One that the
+    /// configuration does not know any more is not.
+    pub(crate) fn offer_run(&mut self, kind: RunKind, found: &InterruptedRun) {
+        let axis = &found.header.axis;
+        let Ok((at, plan)) = self
+            .place(axis)
+            .and_then(|at| Ok((at, self.plan_of(kind, at)?)))
+        else {
+            return;
+        };
+        let id = found.journal.file_stem().unwrap_or_default();
+        let id = id.to_string_lossy().into_owned();
+        let request = RunRequest {
+            uncompensated: kind == RunKind::Verify && found.header.calibration.is_none(),
+            start: false,
+            ..RunRequest::of(kind, Some(axis))
+        };
+        let view = RunView {
+            state: RunState::Paused,
+            journal: Some(text(&found.journal)),
+            ..RunView::planned(&id, EARLIER, kind, vec![axis.clone()], plan)
+        };
+        self.events.push("run", &id, json!(view));
+        let task = Task {
+            id: id.into(),
+            request,
+            axis: Some(axis.clone()),
+            resume: Some(found.journal.clone()),
+        };
+        self.runs.keep(Run::new(task, vec![at], view));
+    }
+}
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
