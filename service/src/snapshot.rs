@@ -26,6 +26,14 @@ pub(crate) struct FixedAxis {
     pub(crate) soft_max: Metres,
 }
 
+/// What corrects an axis.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct CalibrationInUse {
+    pub(crate) id: String,
+    /// When it was made, UTC, RFC 3339.
+    pub(crate) created: String,
+}
+
 /// An axis at one moment.
 #[derive(Clone, Debug)]
 pub(crate) struct AxisSample {
@@ -36,7 +44,7 @@ pub(crate) struct AxisSample {
     pub(crate) target: Option<Metres>,
     pub(crate) set_point: Option<Metres>,
     pub(crate) homed: bool,
-    pub(crate) calibration: Option<Arc<str>>,
+    pub(crate) calibration: Option<Arc<CalibrationInUse>>,
     pub(crate) used_by: Option<Arc<str>>,
     pub(crate) last_cause: Option<Arc<Cause>>,
 }
@@ -125,7 +133,8 @@ fn view_of(fixed: &FixedAxis, sample: &AxisSample) -> AxisView {
         homed: sample.homed,
         soft_min: Quantity::mm(fixed.soft_min),
         soft_max: Quantity::mm(fixed.soft_max),
-        calibration: sample.calibration.as_deref().map(str::to_owned),
+        calibration: sample.calibration.as_ref().map(|it| it.id.clone()),
+        calibration_created: sample.calibration.as_ref().map(|it| it.created.clone()),
         used_by: sample.used_by.as_deref().map(str::to_owned),
         last_cause: sample.last_cause.as_deref().cloned(),
     }

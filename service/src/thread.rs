@@ -26,7 +26,7 @@ use crate::problem::Problem;
 use crate::procedures::{self, Found};
 use crate::request::RunKind;
 use crate::scribe::Scribe;
-use crate::snapshot::{Board, Fixed, Snapshot};
+use crate::snapshot::{Board, CalibrationInUse, Fixed, Snapshot};
 
 /// So many orders may wait for the next tick.
 const QUEUE: usize = 64;
@@ -298,7 +298,7 @@ impl Kept {
         let course = machine.linear(&axis).map(|it| it.course());
         let course = course.map_err(Problem::from)?;
         let mut keeper = self.keeper.borrow_mut();
-        keeper.set_course(&axis, course, Some(&id));
+        keeper.set_course(&axis, course, in_use(&self.store, Some(&id)));
         keeper.chosen(machine, &axis, &id, by);
         Ok(Answer::Named(axis))
     }
@@ -324,7 +324,7 @@ impl Kept {
             let course = self.machine.linear(&axis).map(|it| it.course());
             let mut keeper = self.keeper.borrow_mut();
             if let Ok(course) = course {
-                keeper.set_course(&axis, course, id.as_deref());
+                keeper.set_course(&axis, course, in_use(&self.store, id.as_deref()));
             }
             if let Some(failure) = warning {
                 keeper.warn(&format!(
@@ -408,6 +408,16 @@ impl Kept {
         }
         procedures::perform(machine, store, axis, task, teller)
     }
+}
+
+fn in_use(store: &Store, id: Option<&str>) -> Option<CalibrationInUse> {
+    let id = id?.to_owned();
+    // It has just been read.
+    let created = store.glance(&id).map(|it| it.head.created);
+    Some(CalibrationInUse {
+        id,
+        created: created.unwrap_or_default(),
+    })
 }
 
 /// Whether it is what ends a procedure that was asked to end.

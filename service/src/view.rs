@@ -76,6 +76,9 @@ pub struct AxisView {
     pub soft_max: Quantity,
     /// The calibration in use.
     pub calibration: Option<String>,
+    /// When that was made, UTC, RFC 3339.
+    #[serde(default)]
+    pub calibration_created: Option<String>,
     /// The motion or run that has it.
     pub used_by: Option<String>,
     /// What stopped it last.

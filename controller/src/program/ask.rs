@@ -50,6 +50,9 @@ fn text_of(machine: &Value, axes: &Value) -> String {
         text += &place_of(axis);
         if let Some(id) = axis["calibration"].as_str() {
             text += &format!(", calibration {}", plain(&short(id)));
+            if let Some(created) = axis["calibration_created"].as_str() {
+                text += &format!(" of {}", plain(created));
+            }
         }
         if let Some(id) = axis["used_by"].as_str() {
             text += &format!(", in use by {}", plain(id));
@@ -88,14 +91,15 @@ mod tests {
                              "cause": {"cause": "x: \u{7}fault"}, "lease": {"name": "anna"}});
         let axes = json!([
             {"name": "x", "state": "Standstill", "position": {"value": 12.5}, "homed": true, "corrected": true,
-             "standard_uncertainty": {"value": 0.1234}, "calibration": "0123456789abcdef", "used_by": "m1-2"},
+             "standard_uncertainty": {"value": 0.1234}, "calibration": "0123456789abcdef",
+             "calibration_created": "2026-03-01T08:00:00Z", "used_by": "m1-2"},
             {"name": "y", "state": "Disabled", "position": {"value": -1.0}, "homed": false, "corrected": false},
         ]);
         let text = text_of(&machine, &axes);
         assert_eq!(
             text,
             "machine linear (TS[31m): error_stop, x: fault\nlease: anna\naxis x: Standstill at 12.500000 mm \
-             (corrected, u = 0.123 µm), calibration 0123456789ab, in use by m1-2\n\
+             (corrected, u = 0.123 µm), calibration 0123456789ab of 2026-03-01T08:00:00Z, in use by m1-2\n\
              axis y: Disabled at -1.000000 mm (by its encoder), NOT ZEROED"
         );
     }

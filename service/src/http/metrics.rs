@@ -58,6 +58,19 @@ fn axes(text: &mut String, desk: &crate::desk::Desk) {
         let (name, homed) = (label(&axis.name), u8::from(axis.homed));
         let _ = writeln!(text, "truestage_axis_homed{{axis=\"{name}\"}} {homed}");
     }
+    *text += "# HELP truestage_calibration_created_timestamp_seconds When the calibration in use was made.\n\
+              # TYPE truestage_calibration_created_timestamp_seconds gauge\n";
+    for axis in &axes {
+        let created = axis.calibration_created.as_deref();
+        let created = created.and_then(|it| it.parse::<jiff::Timestamp>().ok());
+        if let Some(created) = created {
+            let (name, seconds) = (label(&axis.name), created.as_second());
+            let _ = writeln!(
+                text,
+                "truestage_calibration_created_timestamp_seconds{{axis=\"{name}\"}} {seconds}"
+            );
+        }
+    }
     *text += "# HELP truestage_axis_position_metres Where its point stands.\n\
               # TYPE truestage_axis_position_metres gauge\n";
     for axis in &axes {

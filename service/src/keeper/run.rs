@@ -14,6 +14,7 @@ use super::stop::stopped_by;
 use super::{Job, Keeper, Mode};
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
+use crate::snapshot::CalibrationInUse;
 use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
 
 /// So many runs are kept in the snapshot.
@@ -386,11 +387,11 @@ impl Keeper {
         &mut self,
         name: &str,
         course: truestage::linear::Course,
-        calibration: Option<&str>,
+        calibration: Option<CalibrationInUse>,
     ) {
         if let Some(seat) = self.seats.iter_mut().find(|it| *it.name == *name) {
             seat.course = course;
-            seat.calibration = calibration.map(Arc::from);
+            seat.calibration = calibration.map(Arc::new);
         }
     }
 }

@@ -10,7 +10,7 @@ use wire::cia402::PowerState;
 
 use crate::order::Reply;
 use crate::request::RunKind;
-use crate::snapshot::AxisSample;
+use crate::snapshot::{AxisSample, CalibrationInUse};
 use crate::view::{AxisState, Cause, RunPlanView};
 
 /// Who may move an axis.
@@ -56,7 +56,7 @@ pub(crate) struct Seat {
     /// How long it must have been in position.
     pub(super) in_position: Duration,
     pub(super) course: Course,
-    pub(super) calibration: Option<Arc<str>>,
+    pub(super) calibration: Option<Arc<CalibrationInUse>>,
     pub(super) plans: Plans,
     pub(super) task: Task,
     pub(super) standing_since: Option<Time>,

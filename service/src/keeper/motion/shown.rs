@@ -91,7 +91,7 @@ fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: Teller) -> Option<Tol
             .uncertainty_at(encoder, approach, leg.has_arrived())
             .filter(|_| is_corrected),
     };
-    let calibration = seat.calibration.as_deref().filter(|_| is_corrected);
-    let told = (teller.moved)(&seat.name, &moved, calibration);
+    let calibration = seat.calibration.as_ref().filter(|_| is_corrected);
+    let told = (teller.moved)(&seat.name, &moved, calibration.map(|it| &*it.id));
     Some(ToldView::from(told))
 }
