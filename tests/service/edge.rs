@@ -200,3 +200,37 @@ fn what_there_is_is_described_and_counted() {
         );
     });
 }
+
+/// Somebody who begins requests and never ends them takes all places, for a while.
+#[test]
+fn half_a_request_does_not_keep_its_place_for_ever() {
+    /// So many are served at once.
+    const PLACES: usize = 64;
+    on_a_stage(|stage, _| {
+        let any = "tcp:127.0.0.1:0".parse().unwrap();
+        let edge = Edge::open(stage.desk.clone(), &[any]).unwrap();
+        let Listen::Tcp(address) = edge.places()[0] else {
+            panic!("it is TCP")
+        };
+        let half = |text: &'static str| {
+            move |_| {
+                let mut stream = TcpStream::connect(address).unwrap();
+                stream.write_all(text.as_bytes()).unwrap();
+                stream
+            }
+        };
+        // Half a head, and half a body.
+        let head = "POST /v1/stop HTTP/1.1\r\nhost: 127.0.0.1\r\n";
+        let body = "POST /v1/stop HTTP/1.1\r\nhost: 127.0.0.1\r\ncontent-length: 2\r\n\r\n{";
+        let heads = (0..PLACES / 2).map(half(head));
+        let slow: Vec<_> = heads.chain((0..PLACES / 2).map(half(body))).collect();
+        let _passing = stage.gate.pass();
+        let mut stream = TcpStream::connect(address).unwrap();
+        let whole = format!("{head}connection: close\r\ncontent-length: 2\r\n\r\n{{}}");
+        stream.write_all(whole.as_bytes()).unwrap();
+        let mut said = String::new();
+        stream.read_to_string(&mut said).unwrap();
+        assert!(said.starts_with("HTTP/1.1 200 "), "{said}");
+        drop(slow);
+    });
+}

@@ -1,5 +1,7 @@
 //! Who is let in, and what is taken from a request.
 
+use core::time::Duration;
+
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Request, State};
@@ -9,6 +11,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
 use serde::de::DeserializeOwned;
+use tokio::time::timeout;
 use utoipa::IntoParams;
 
 use super::door::Peer;
@@ -19,6 +22,8 @@ use crate::request::Caller;
 const BODY_MAX: usize = 64 << 10;
 /// So much of a larger one is heard, so that its answer is heard, too.
 const HEARD_MAX: usize = 1 << 20;
+/// How long a body may take to come: its connection has one of the places meanwhile.
+const BODY_TIME: Duration = Duration::from_secs(10);
 /// So long a name of a client may be.
 pub(super) const NAME_MAX: usize = 64;
 /// What whoever sent a wrong body is told.
@@ -53,7 +58,11 @@ pub(super) async fn guard(
     let allowed = check(guarded, request.headers());
     let (parts, body) = request.into_parts();
     // Who is answered before he has said all may never hear it.
-    let whole = whole(body).await;
+    let whole = timeout(BODY_TIME, whole(body)).await;
+    let whole = whole.unwrap_or_else(|_| {
+        let what = format!("the request had not come as a whole after {BODY_TIME:?}");
+        Err(Problem::new(Code::BadRequest, what, "send it faster"))
+    });
     match allowed.and(whole) {
         Ok(body) => next.run(Request::from_parts(parts, body.into())).await,
         Err(problem) => problem.into_response(),

@@ -13,16 +13,27 @@ mod routes;
 mod state;
 
 use core::fmt;
+use core::time::Duration;
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::thread::{self, JoinHandle};
 
+use axum::Router;
+use axum::body::Body;
+use axum::extract::ConnectInfo;
+use axum::serve::Listener as _;
+use hyper::Request;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::oneshot;
+use tower_service::Service as _;
 
 use crate::desk::Desk;
-use door::{Door, Peer};
+use door::{Connection, Door, Peer};
 
 /// Where the service is found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -150,11 +161,34 @@ impl Drop for Edge {
     }
 }
 
-async fn serve(door: Door, desk: Desk) {
+/// How long a client may take to say which request it has: also how long a connection that asks nothing is kept.
+/// Whoever says half a request would keep one of the places for ever.
+const SAYING_MAX: Duration = Duration::from_secs(10);
+
+/// Ends with the runtime only.
+async fn serve(mut door: Door, desk: Desk) {
     let app = routes::router(desk, door.is_tcp());
-    let app = app.into_make_service_with_connect_info::<Peer>();
-    // It ends with the runtime only.
-    let _ = axum::serve(door, app).await;
+    loop {
+        let (connection, peer) = door.accept().await;
+        tokio::spawn(answer(connection, peer, app.clone()));
+    }
+}
+
+/// The requests of one connection, until it is closed or says nothing more.
+async fn answer(connection: Connection, peer: Peer, app: Router) {
+    let asked = service_fn(move |request: Request<Incoming>| {
+        let mut request = request.map(Body::new);
+        request.extensions_mut().insert(ConnectInfo(peer.clone()));
+        app.clone().call(request)
+    });
+    let mut server = http1::Builder::new();
+    server
+        .timer(TokioTimer::new())
+        .header_read_timeout(SAYING_MAX);
+    // Whoever hangs up, or says what is no HTTP, is not waited for.
+    let _ = server
+        .serve_connection(TokioIo::new(connection), asked)
+        .await;
 }
 
 /// What the interface is, as OpenAPI 3.1.
