@@ -31,7 +31,7 @@ pub(super) async fn journals(Of(state): Of<State>) -> Result<Json<Vec<JournalVie
 #[utoipa::path(
     get, path = "/journals/{name}", tag = "journals", params(("name" = String, Path, description = "Its name")),
     responses(
-        (status = 200, description = "JSON Lines", body = String, content_type = "application/x-ndjson"),
+        (status = 200, description = "JSON Lines", body = String, content_type = "text/plain"),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The disk", body = ProblemBody, content_type = "application/problem+json"),
     )
@@ -41,7 +41,7 @@ pub(super) async fn journal(
     Named(name): Named,
 ) -> Result<impl IntoResponse, Problem> {
     let said = from_disk(state, move |desk| desk.journal(&name)).await?;
-    Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], said))
+    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], said))
 }
 
 /// The page of a run: what `truestage report` makes of its journal.
