@@ -1,6 +1,54 @@
 //! `truestage jog`: an axis that runs as long as somebody says so.
 
+use core::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::{self, JoinHandle};
+
+use drivers::transport::Transport;
+use drivers::transport::clock::Clock;
+use drivers::transport::live::Live;
+use drivers::transport::lockstep::Participant;
+use nix::sys::signal::Signal;
+use serde_json::json;
+
 use crate::programs::{Bench, live_rigs, number};
+use crate::serve::{ask, keep};
+
+/// Holds the machine's time back to a tenth of the wall's: who renews a dead-man of 200 ms has two seconds for it, on
+/// however busy a computer.
+struct Brake {
+    release: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Brake {
+    fn on(bench: &Bench) -> Self {
+        const STEP: Duration = Duration::from_millis(5);
+        const TIMES_SLOWER: u32 = 10;
+        let participant = Participant::join(&bench.folder().join("clock"), "a brake");
+        let clock = Clock::lockstep(participant.expect("it listens"));
+        let (release, released) = channel();
+        let thread = thread::spawn(move || {
+            let time = Live::builder(clock).build();
+            let mut time = time.expect("it has no port to open");
+            while released.recv_timeout(STEP * TIMES_SLOWER) == Err(RecvTimeoutError::Timeout) {
+                time.sleep_until(time.now() + STEP);
+            }
+        });
+        Self {
+            release: Some(release),
+            thread: Some(thread),
+        }
+    }
+}
+
+impl Drop for Brake {
+    fn drop(&mut self) {
+        self.release.take();
+        let ended = self.thread.take().map(JoinHandle::join);
+        assert!(thread::panicking() || matches!(ended, Some(Ok(()))));
+    }
+}
 
 #[test]
 fn an_axis_is_jogged_for_a_time_and_to_its_soft_limit() {
@@ -35,5 +83,36 @@ fn a_jog_that_makes_no_sense_is_refused_before_anything_moves() {
         refused(&["q=2mm/s"], "q");
         let zeros = std::fs::read_dir(bench.records().join("runs"));
         assert_eq!(zeros.map_or(0, Iterator::count), 0, "it zeroed nothing");
+    }
+}
+
+#[test]
+fn a_machine_that_a_service_keeps_is_jogged_as_long_as_the_jog_is_renewed() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let service = keep(&bench);
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        let brake = Brake::on(&bench);
+        let jog = ["jog", "machine.toml", "x=2mm/s"];
+        // Three times as long as an axis runs without being told so.
+        let jogged = bench.run(&[&jog[..], &["--for", "6"]].concat());
+        let jogged = jogged.with_code(0);
+        let stands = number(&jogged["encoder_mm"]);
+        assert!((0.7..=1.5).contains(&stands), "{jogged}");
+        // What somebody stops stays stopped, whoever holds the key.
+        let mut client = bench.start(&jog);
+        client.wait_until(|| {
+            let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+            axis["state"] == "ContinuousMotion"
+        });
+        bench.run(&["stop"]).with_code(0);
+        let ended = client.end();
+        assert_eq!(ended.code, Some(130), "{ended:?}");
+        assert!(ended.said.contains("stopped by"), "{ended:?}");
+        let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+        assert_eq!(axis["state"], "Standstill", "{axis}");
+        drop(brake);
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
     }
 }

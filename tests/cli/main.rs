@@ -2,7 +2,6 @@
 
 mod alone;
 mod calibrations;
-mod dead_man;
 mod demo;
 mod example;
 mod examples;
