@@ -253,7 +253,8 @@ impl Service {
         loop {
             if stop.is_requested() && !is_ending {
                 is_ending = true;
-                ask_on(&self.at, "POST", ender, "{}")?;
+                // Refused when it has just ended, unheard when the service has: the next look says which.
+                let _ = ask_on(&self.at, "POST", ender, "{}");
             }
             let wait_s = WAIT.as_secs_f64();
             let seen = ask_on(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;

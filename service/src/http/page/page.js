@@ -186,12 +186,14 @@ function button(text, act) {
   return made;
 }
 
-// A run only ever goes on: what was asked for before an event came may arrive after it.
-const ORDER = ["planned", "running", "stopping", "done", "stopped", "failed"];
+// A run only ever goes on: what was asked for before an event came may arrive after it. What is older than a state:
+const UNDER_WAY = ["planned", "running", "stopping", "paused"];
+const OLDER = { planned: [], running: ["planned"], stopping: ["planned", "running"], paused: ["planned", "stopping"],
+  done: UNDER_WAY, stopped: UNDER_WAY, failed: UNDER_WAY };
 
 function showRun(run) {
   const known = plans.get(run.id);
-  if (known && ORDER.indexOf(run.state) < Math.min(ORDER.indexOf(known.state), 3)) return;
+  if (known && OLDER[known.state].includes(run.state)) return;
   plans.set(run.id, run);
   const shown = byId(`run-${run.id}`) || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
   shown.id = `run-${run.id}`;
