@@ -12,7 +12,7 @@ use crate::peer::{Peer, can_import};
 const REQUESTS: u64 = 500;
 
 /// Where cargo puts the programs.
-fn programs() -> PathBuf {
+pub(crate) fn programs() -> PathBuf {
     let test = std::env::current_exe().expect("a process knows its program");
     let folder = test.ancestors().nth(2).expect("target/PROFILE/deps/TEST");
     for name in ["truestage", "mock-bus"] {

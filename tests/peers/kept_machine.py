@@ -114,11 +114,24 @@ class KeptMachine:
     def _serve(self, ports):
         text = (CONFIGS / "machines" / "linear.toml").read_text()
         (self.path / "machine.toml").write_text(edited(text, SHORTER + PATIENT))
-        words = ["--clock", "lockstep:clock", "--record", "recording.log", "--listen", "tcp:127.0.0.1:0"]
+        self.words = ["--clock", "lockstep:clock"]
         for name, place in ports.items():
-            words += ["--port", f"{name}={place}"]
-        (line,) = self._start(1, "truestage", "serve", "machine.toml", *words)
+            self.words += ["--port", f"{name}={place}"]
+        self._listen("tcp:127.0.0.1:0", "--record", "recording.log")
+
+    def _listen(self, place, *more):
+        (line,) = self._start(1, "truestage", "serve", "machine.toml", "--listen", place, *self.words, *more)
         self.url = "http://" + line.rsplit("tcp:", 1)[1]
+
+    def kill_service(self):
+        """The service is gone, without a word to anybody."""
+        service = self.processes.pop()
+        service.kill()
+        service.wait()
+
+    def serve_again(self):
+        """Another service, at the same place."""
+        self._listen("tcp:" + self.url.removeprefix("http://"))
 
     def _start(self, count, name, *words):
         """Starts a program; the first lines that it says."""

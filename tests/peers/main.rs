@@ -1,6 +1,6 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
 //! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
-//! schemathesis and openapi-python-client, which judge the HTTP interface.
+//! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its page.
 
 mod analog;
 mod budget;
@@ -9,6 +9,7 @@ mod drive;
 mod emulated;
 mod http;
 mod local_node;
+mod page;
 mod peer;
 mod recording;
 

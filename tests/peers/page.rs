@@ -1,0 +1,39 @@
+//! A person at the service's page, in a browser that nobody here has written.
+
+use serde_json::json;
+use tests::{Rig, rigs};
+
+use crate::http::programs;
+use crate::peer::{Peer, can_import};
+
+/// As Debian calls it.
+const BROWSER: &str = "chromium";
+
+fn has_browser() -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&folders).any(|it| it.join(BROWSER).is_file())
+}
+
+#[test]
+fn a_person_at_the_page_takes_a_machine_through_its_cycle_and_through_a_lost_connection() {
+    // Which bus the machine is on makes no difference to a page.
+    if !rigs().contains(&Rig::Pty) {
+        return;
+    }
+    if !has_browser() || !can_import("websocket") {
+        let why = "Chromium or Python's websocket-client is not installed: run tests/run";
+        return tests::not_run("a person at the service's page", why);
+    }
+    let programs = programs();
+    let report = Peer::start("page_judge.py", &[&programs.to_string_lossy(), BROWSER]).finish();
+    for step in ["zeroed", "calibrated", "zero_again", "verified"] {
+        assert_eq!(report[step], true, "{step}: {report}");
+    }
+    assert_eq!(report["errors"], json!([]), "{report}");
+    assert_eq!(report["axis"], "x · Standstill", "{report}");
+    let stood = report["true_mm"].as_f64();
+    assert!(
+        stood.is_some_and(|it| (it - 12.5).abs() < 0.003),
+        "{report}"
+    );
+}

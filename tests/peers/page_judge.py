@@ -1,0 +1,137 @@
+"""A person at the page of `truestage serve`, in headless Chromium: zero, calibrate, move, a lost connection, verify.
+
+    page_judge.py PROGRAMS CHROMIUM
+
+PROGRAMS is the folder with `truestage` and `mock-bus`. The last line is a report in JSON.
+"""
+
+import json
+import socket
+import sys
+import threading
+import time
+
+from browser import Browser
+from kept_machine import PATIENCE_S, KeptMachine, Truth, wait_for
+
+# While a person acts, the machine's time passes at a fifth of the wall's, so that a lease of ten seconds outlives a click
+# on however busy a computer; while a run is under way, as fast as the computer can.
+STEP_NS = 2_000_000
+PAUSE_S = 0.01
+STRIDE_NS = 1_000_000_000
+NEWEST = "document.querySelector('#runs article')"
+
+
+class Pace:
+    """Somebody at the machine's clock who lets time pass slowly, or does not hold it back."""
+
+    def __init__(self, clock):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(PATIENCE_S)
+        self.socket.connect(str(clock))
+        self.lines = self.socket.makefile()
+        self.now = int(self._asked("hello 1 0 a pace").split()[1])
+        self.slow = True
+        self.over = False
+        self.thread = threading.Thread(target=self._hold, daemon=True)
+        self.thread.start()
+
+    def _asked(self, line):
+        self.socket.sendall(f"{line}\n".encode())
+        return self.lines.readline()
+
+    def _hold(self):
+        while not self.over:
+            step = STEP_NS if self.slow else STRIDE_NS
+            self.now = int(self._asked(f"idle {self.now + step}").split()[1])
+            if self.slow:
+                time.sleep(PAUSE_S)
+
+    def end(self):
+        """Takes leave."""
+        self.over = True
+        self.thread.join(PATIENCE_S)
+        self.socket.sendall(b"bye\n")
+        self.socket.close()
+
+
+class Person:
+    """Who looks at the page and presses its buttons."""
+
+    def __init__(self, browser, pace):
+        self.browser = browser
+        self.pace = pace
+
+    def take_control(self):
+        if self.browser.value("document.getElementById('take').hidden"):
+            return
+        self.browser.value("document.getElementById('take').click()")
+        self.browser.wait_for("control", "document.getElementById('take').hidden")
+
+    def run(self, kind):
+        """Plans a run, starts it, and waits for its end; what the page says of it then."""
+        self.take_control()
+        before = self.browser.value(f"{NEWEST}?.id || ''")
+        self.browser.value(f"document.getElementById('kind').value = '{kind}'")
+        self.browser.value("document.querySelector('#plan button').click()")
+        self.browser.wait_for(f"the plan of a {kind}", f"({NEWEST}?.id || '') !== '{before}'")
+        self.browser.wait_for("its button", f"[...{NEWEST}.querySelectorAll('button')].some((it) => it.textContent === 'Start')")
+        self.take_control()
+        self.browser.value(f"[...{NEWEST}.querySelectorAll('button')].find((it) => it.textContent === 'Start').click()")
+        self.browser.wait_for("its begin", f"!{NEWEST}.innerText.includes('planned')")
+        self.pace.slow = False
+        ended = f"/\\n(done|stopped|failed)\\n/.test({NEWEST}.innerText + '\\n')"
+        self.browser.wait_for(f"the end of a {kind}", ended)
+        self.pace.slow = True
+        return self.browser.value(f"{NEWEST}.innerText")
+
+    def move(self, text):
+        """Moves the axis, and waits until the page says that it stands there."""
+        self.take_control()
+        self.browser.value(f"document.querySelector('#axes .go input').value = '{text}'")
+        self.browser.value("document.querySelector('#axes .go button').click()")
+        shown = "document.querySelector('#axes .position').textContent"
+        self.pace.slow = False
+        self.browser.wait_for("the motion", f"Math.abs(parseFloat({shown}) - parseFloat('{text}')) < 0.001")
+        self.pace.slow = True
+        return self.browser.value(shown)
+
+
+def commanded(kept, browser):
+    """The whole day; a report."""
+    pace = Pace(kept.clock)
+    person = Person(browser, pace)
+    browser.open(kept.url + "/")
+    state = "document.getElementById('state').textContent"
+    browser.wait_for("the machine", f"{state} === 'running'")
+    report = {"zeroed": "done" in person.run("zero"), "calibrated": "done" in person.run("calibrate")}
+    report["position"] = person.move("12.5mm")
+    report["true_mm"] = Truth(kept.clock).position_mm()
+    errors = list(browser.errors)
+    kept.kill_service()
+    browser.wait_for("word of the lost connection", f"{state}.includes('connection lost')")
+    kept.serve_again()
+    browser.wait_for("the machine again", f"{state} === 'running'")
+    # What a browser says of connections that were refused meanwhile is no fault of the page.
+    browser.errors.clear()
+    report["zero_again"] = "done" in person.run("zero")
+    verified = person.run("verify")
+    report["verified"] = "done" in verified and "within tolerance\ntrue" in verified
+    browser.value("document.getElementById('stop').click()")
+    axis = "document.querySelector('#axes h3').textContent"
+    browser.wait_for("the stop in the events", "/stop/.test(document.querySelector('#events').innerText)")
+    report["axis"] = browser.wait_for("the axis at rest", f"{axis}.includes('Standstill') && {axis}")
+    report["errors"] = errors + browser.errors
+    pace.end()
+    return report
+
+
+def main():
+    programs, chromium = sys.argv[1:]
+    with KeptMachine(programs) as kept, Browser(chromium) as browser:
+        report = commanded(kept, browser)
+        wait_for("the service", lambda: kept.ask("GET", "/v1/machine")["state"] == "running")
+        print(json.dumps(report))
+
+
+main()
