@@ -144,6 +144,134 @@ fn a_designed_shape_is_imported_from_a_file_and_one_that_cannot_be_is_refused_wi
     assert_eq!(list.iter().filter(is_kept).count(), 1, "{list:?}");
 }
 
+/// The references `record` as somebody might give them beforehand, `um` of them added to x along y.
+fn table_of(record: &serde_json::Value, um: f64) -> String {
+    let mut csv = "axis,detector,along,position_mm,value,unit\n".to_owned();
+    let values = |it: &serde_json::Value| -> Vec<f64> {
+        let each = it.as_array().expect("a list").iter();
+        each.map(number).collect()
+    };
+    let rows =
+        |csv: &mut String, head: &str, function: &serde_json::Value, per_si: f64, add: f64| {
+            let unit = if head.contains("roll") {
+                "arcsec"
+            } else {
+                "um"
+            };
+            let places = values(&function["positions_m"]).into_iter();
+            for (at, value) in places.zip(values(&function["values_si"])) {
+                let (mm, value) = (at * 1e3, value * per_si + add);
+                let _ = writeln!(csv, "{head},{mm},{value},{unit}");
+            }
+        };
+    for beam in record["beams"].as_array().expect("a list") {
+        let axis = text(&beam["axis"]);
+        let across = ["x", "y", "z"].into_iter().filter(|it| *it != axis);
+        for (k, along) in across.enumerate() {
+            let add = if (axis, along) == ("x", "y") { um } else { 0.0 };
+            let head = format!("{axis},slide,{along}");
+            rows(&mut csv, &head, &beam["slider"][k], 1e6, add);
+            let end = number(&beam["end_m"][k]) * 1e6;
+            let _ = writeln!(csv, "{axis},end,{along},,{end},um");
+        }
+    }
+    let arcsec = 180.0 * 3600.0 / core::f64::consts::PI;
+    rows(&mut csv, "x,roll,", &record["roll"], arcsec, 0.0);
+    csv
+}
+
+/// Functions for the beams of the shipped machine, and for no roll.
+fn functions_of_beams() -> String {
+    let mut functions = "schema_version = 1\n".to_owned();
+    for (axis, across, travel) in [
+        ("x", ["y", "z"], 500),
+        ("y", ["x", "z"], 400),
+        ("z", ["x", "y"], 300),
+    ] {
+        for along in across {
+            let _ = writeln!(
+                functions,
+                "[[function]]\naxis = '{axis}'\ndetector = 'end'\nalong = '{along}'\ncoefficients_um = [0]\n\
+                 [[function]]\naxis = '{axis}'\ndetector = 'slide'\nalong = '{along}'\n\
+                 coefficients_um = [1.0, 0.0, -4.0]\nscale_mm = {travel}\nfrom_mm = 0\nto_mm = {travel}"
+            );
+        }
+    }
+    functions
+}
+
+/// Nothing moves and nobody is asked: the machine was shut down.
+#[test]
+fn references_that_are_known_beforehand_are_imported_as_a_table_and_as_functions() {
+    let runs = runs();
+    let list = runs.run(&["cal", "list"]).with_code(0);
+    let list = list["calibrations"].as_array().expect("a list").clone();
+    let is_used = |it: &&serde_json::Value| it["kind"] == "beam_references" && it["active"] == true;
+    let measured = text(&list.iter().find(is_used).expect("they were taken")["id"]).to_owned();
+    let show =
+        |id: &str| runs.run(&["cal", "show", "machine.toml", id]).with_code(0)["record"].clone();
+    let import = |name: &str, file: &str| {
+        fs::write(runs.folder().join(name), file).expect("there is room");
+        runs.run(&["reference", "import", "machine.toml", name])
+    };
+    let changes_of = |changed: &serde_json::Value| -> Vec<(String, f64)> {
+        let each = changed["changes"].as_array().expect("a list").iter();
+        each.map(|it| (text(&it["reading"]).to_owned(), number(&it["change"])))
+            .collect()
+    };
+    // What was measured, given back by hand: the same references.
+    let given = import("r.csv", &table_of(&show(&measured), 0.0)).with_code(0);
+    assert_eq!(
+        (&given["given"], &given["source"]),
+        (&"table".into(), &"r.csv".into())
+    );
+    let changes = changes_of(&given);
+    assert_eq!(changes.len(), 13, "{changes:?}");
+    assert!(changes.iter().all(|(_, it)| *it < 1e-6), "{changes:?}");
+    let record = show(text(&given["references"]));
+    assert_eq!(
+        (&record["source"], &record["given"]),
+        (&"r.csv".into(), &"table".into())
+    );
+    assert_eq!(record["geometry"], show(&measured)["geometry"]);
+
+    let given = import("s.csv", &table_of(&show(&measured), 2.5)).with_code(0);
+    let words = [
+        "cal",
+        "diff",
+        "machine.toml",
+        &measured,
+        text(&given["references"]),
+    ];
+    for (reading, change) in changes_of(&runs.run(&words).with_code(0)) {
+        let expected = if reading == "x, slide along y" {
+            2.5
+        } else {
+            0.0
+        };
+        assert!((change - expected).abs() < 1e-6, "{reading}: {change}");
+    }
+
+    let mut functions = functions_of_beams();
+    check_error(
+        &import("f.toml", &functions).with_code(2),
+        &["f.toml:", "nothing is given for x, roll"],
+    );
+    functions += "[[function]]\naxis = 'x'\ndetector = 'roll'\ncoefficients_arcsec = [0.5]\nfrom_mm = 0\nto_mm = 500\n";
+    let given = import("f.toml", &functions).with_code(0);
+    assert_eq!(given["given"], "functions");
+    // Refused, and what was in use stays in use.
+    let wrong = table_of(&show(&measured), 2500.0);
+    check_error(
+        &import("w.csv", &wrong).with_code(2),
+        &["w.csv:2: x, slide along y", "can show"],
+    );
+    let list = runs.run(&["cal", "list"]).with_code(0);
+    let list = list["calibrations"].as_array().expect("a list");
+    let used = list.iter().find(is_used).expect("some are in use");
+    assert_eq!(used["id"], given["references"]);
+}
+
 /// The readings of a run as a file that somebody else might have made.
 fn csv_of(journal: &str) -> String {
     let read = read_journal::<VolumeLog>(Path::new(journal)).expect("it can be read");

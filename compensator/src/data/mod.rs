@@ -3,8 +3,9 @@
 //! Whoever holds a series knows that every number is finite and every point in its place; nothing is
 //! guessed or repaired. Each kind's file is read beside its mathematics:
 //! [`LinearSeries`](crate::error_table::LinearSeries), [`HallSeries`](crate::hall_zero::HallSeries),
-//! [`StrokeSeries`](crate::screw::StrokeSeries), [`RotarySeries`](crate::rotary::RotarySeries) and
-//! [`VolumeSeries`](crate::volumetric::VolumeSeries).
+//! [`StrokeSeries`](crate::screw::StrokeSeries), [`RotarySeries`](crate::rotary::RotarySeries),
+//! [`VolumeSeries`](crate::volumetric::VolumeSeries), [`StateSeries`](crate::volumetric::StateSeries) and
+//! [`ReferenceSeries`](crate::volumetric::ReferenceSeries).
 //!
 //! Source: the data file formats of the project's design.
 //!

@@ -24,10 +24,14 @@ mod inverse;
 pub mod model;
 pub mod online;
 mod point;
+mod polynomial;
+mod reference_series;
 mod series;
 mod state_series;
 
 pub use point::{Axis, Point, Volume, VolumeError};
+pub use polynomial::Polynomial;
+pub use reference_series::{GivenReference, ReferenceFault, ReferenceOf, ReferenceSeries};
 pub use series::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
 pub use state_series::{StateFault, StatePoint, StateSeries};
 

@@ -88,8 +88,9 @@ enum Command {
     Move(MoveArgs),
     /// Zero, then run an axis at a speed, to its soft limit, for a time, or until Ctrl-C: `truestage jog x=2mm/s`.
     Jog(jog::JogArgs),
-    /// Zero, then record the references of the detectors of three axes, for the calibration in use.
-    Reference(MachineArgs),
+    /// Zero, then record the references of the detectors of three axes, for the calibration in use; or take them
+    /// from a file (`reference import`).
+    Reference(volumetric::reference::ReferenceArgs),
     /// Zero, then do a job of one axis (`JOB.toml`), or follow a path of three axes (`PATH.csv`), corrected.
     ///
     /// A job goes to its points one after the other and waits at each for a time, for the operator or for an input,
@@ -447,7 +448,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
                 service.jog(&args, output)
             })
         }
-        Command::Reference(args) => volumetric::verbs::reference(&args, output),
+        Command::Reference(args) => volumetric::reference::run(&args, output),
         Command::Run(args) => run(args, output),
         Command::Memory(MemoryCommand::Record(args)) => {
             volumetric::part::memory_record(&args, output)

@@ -5,6 +5,7 @@
 //! | `zero` | every axis on its index pulse, one after the other |
 //! | `calibrate` | lines by interferometer and detectors, cold and warm, and what made them |
 //! | `reference` | what the detectors read when the machine is as its tables say |
+//! | `given` | the same from a file, where it is known beforehand |
 //! | `memory` | displacements that are to be kept, recorded before parts are made |
 //! | `first_part` | displacements that are to be kept, recorded while the first part is made |
 //! | `moves` | all three axes in one line, corrected |
@@ -24,6 +25,8 @@ mod dependence;
 pub(crate) mod entries;
 pub(crate) mod failure;
 pub(crate) mod first_part;
+#[cfg(feature = "program")]
+pub(crate) mod given;
 #[cfg(test)]
 mod golden;
 mod handle;
@@ -70,11 +73,17 @@ pub(crate) use entries::{
     OpticsName, VolumeCheckEntry, VolumePlanEntry, VolumeReferencesEntry,
 };
 pub(crate) use entries::{metres, point};
+#[cfg(feature = "program")]
+pub(crate) use given::GivenReferences;
+#[cfg(all(test, feature = "program"))]
+pub(crate) use given::ReferenceFunctionsConfig;
 pub(crate) use kind::KIND;
 pub(crate) use log::VolumeEntry;
 pub(crate) use memory::Remembered;
 #[cfg(feature = "program")]
 pub(crate) use memory_import::import;
+#[cfg(feature = "program")]
+pub(crate) use record::GivenName;
 pub(crate) use record::{AXES, error_name};
 pub(crate) use record::{
     AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, DriftRecord, ExpansionRecord,

@@ -3,6 +3,7 @@
 //! are to be kept (`state_memory`).
 
 mod agreement;
+mod given;
 mod warmth;
 
 use core::fmt;
@@ -18,6 +19,7 @@ use units::{Celsius, Metres, Quantity, Radians};
 use crate::store::{IdentityRecord, StoreError, short};
 
 pub(crate) use agreement::AgreementRecord;
+pub(crate) use given::GivenName;
 pub(crate) use warmth::AXES;
 pub use warmth::BendRecord;
 pub(crate) use warmth::{ExpansionRecord, UnknownRecord};
@@ -314,6 +316,9 @@ pub struct BeamReferencesContent {
     pub beams: Vec<BeamRecord>,
     /// The roll along its axis.
     pub roll: Option<FunctionRecord>,
+    /// How they were given beforehand, by the file that `source` names; `None` where detectors were read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given: Option<GivenName>,
 }
 
 impl BeamReferencesContent {
@@ -356,8 +361,11 @@ impl BeamReferencesContent {
     pub(crate) fn summary(&self) -> String {
         let axes: String = self.beams.iter().map(|it| it.axis).collect();
         let roll = if self.roll.is_some() { " and roll" } else { "" };
+        let given = self.given.map_or_else(String::new, |it| {
+            format!(", given beforehand as {}", it.words())
+        });
         format!(
-            "beams of {axes}{roll}, for geometry {}",
+            "beams of {axes}{roll}, for geometry {}{given}",
             short(&self.geometry)
         )
     }
@@ -554,6 +562,7 @@ mod tests {
                 wandered_m: None,
             }],
             roll: None,
+            given: None,
         };
         let (id, content) = stored(content);
         let drift = BeamDrift::Translating;

@@ -51,6 +51,16 @@ impl RatioCurve {
             &[per_one * -ratio_max, Metres::ZERO, per_one * ratio_max],
         )
     }
+
+    /// The lowest and the highest place on it: monotone cubics stay between their points.
+    pub fn field(&self) -> (Metres, Metres) {
+        let (first, last) = self.pieces.range();
+        let starts = self.pieces.segments().iter().map(|it| it.start);
+        let places = starts.chain([last]).map(|ratio| self.pieces.at(ratio));
+        let one = self.pieces.at(first);
+        let (low, high) = places.fold((one, one), |(low, high), it| (low.min(it), high.max(it)));
+        (Metres(low), Metres(high))
+    }
 }
 
 /// What is known of a detector.
@@ -142,6 +152,12 @@ impl BeamDetector {
     /// What is known of it.
     pub fn settings(&self) -> BeamDetectorSettings {
         self.settings.clone()
+    }
+
+    /// The lowest and the highest place that it can show, in both directions.
+    pub fn field(&self) -> [(Metres, Metres); 2] {
+        let [first, second] = &self.settings.curves;
+        [first.field(), second.field()]
     }
 
     /// The place of the beam by the newest sample, at `now`.

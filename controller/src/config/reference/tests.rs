@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use super::*;
 use crate::config::schema;
 use crate::linear::JobConfig;
+use crate::volumetric::ReferenceFunctionsConfig;
 
 const BEGIN: &str = "<!-- Written from the declarations in controller/src; `WRITE_REFERENCE=1 cargo test -p truestage --lib reference` writes it anew. -->\n";
 const END: &str = "<!-- The end of what is written from them. -->\n";
@@ -36,6 +37,7 @@ fn check(name: &str, expected: impl FnOnce(&str) -> String) {
 fn the_reference_of_all_keys_is_what_their_declarations_say() {
     let written = [
         markdown(&schema::schema()),
+        markdown(&schema::schema_of::<ReferenceFunctionsConfig>()),
         markdown(&schema::schema_of::<JobConfig>()),
     ];
     check("README.md", |seen| {
@@ -61,7 +63,9 @@ fn the_schema_for_editors_is_what_the_declarations_say() {
 
 #[test]
 fn every_key_says_what_it_means() {
-    let text = markdown(&schema::schema()) + &markdown(&schema::schema_of::<JobConfig>());
+    let text = markdown(&schema::schema())
+        + &markdown(&schema::schema_of::<JobConfig>())
+        + &markdown(&schema::schema_of::<ReferenceFunctionsConfig>());
     for line in text.lines().filter(|it| it.starts_with("| `")) {
         let meaning = line.trim_end_matches(" |").rsplit(" | ").next();
         assert!(meaning.is_some_and(|it| it.len() > 3), "{line}");

@@ -3,6 +3,7 @@
 pub(crate) mod demo;
 pub(crate) mod fit;
 pub(crate) mod part;
+pub(crate) mod reference;
 mod report;
 pub(crate) mod shown;
 #[cfg(test)]

@@ -1,11 +1,16 @@
 //! The stored errors of three axes on the screen.
 
+mod references;
+
 use serde_json::json;
 
 use crate::program::show::{Changes, Show};
 use crate::volumetric::{
     BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent,
 };
+use references::references;
+
+pub(crate) use references::reference_changes;
 
 impl Show for GeometryContent {
     fn lines(&self) -> String {
@@ -19,11 +24,11 @@ impl Show for GeometryContent {
 
 impl Show for BeamReferencesContent {
     fn lines(&self) -> String {
-        self.summary()
+        references(self)
     }
 
-    fn changes(&self, _: &Self) -> Option<Changes> {
-        None
+    fn changes(&self, after: &Self) -> Option<Changes> {
+        Some(reference_changes(self, after))
     }
 }
 

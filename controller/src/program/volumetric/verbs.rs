@@ -10,7 +10,6 @@ use machine::records::short;
 use serde_json::{Value, json};
 use units::Metres;
 
-use crate::config::MachineConfig;
 use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::operator::Terminal;
@@ -20,12 +19,11 @@ use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::UnknownRecord;
-use crate::volumetric::reference::{VolumetricReferenced, measured_geometry};
 use crate::volumetric::verify::VolumetricVerified;
 use crate::volumetric::{
     GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, WarmUp,
 };
-use crate::{Failure, Machine, config};
+use crate::{Failure, Machine};
 use machine::records::Store;
 
 /// How long the tool is seen to stand at its target.
@@ -75,54 +73,6 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
         text,
         &json!({"axes": ["x", "y", "z"], "counters": counters}),
     )
-}
-
-pub(crate) fn reference(args: &MachineArgs, output: Output) -> Ended {
-    // Before any bus: a machine of another kind would be asked for a calibration of this one's.
-    has_a_volume(&config::load(&args.config)?.config)?;
-    let ready = |_: &mut Machine, store: &Store| measured_geometry(store);
-    let run = |machine: &mut Machine, store: &Store, _| machine.volumetric()?.reference(store);
-    let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;
-    let mut value = referenced_value(&taken);
-    value["counters"] = counters;
-    output.result(&referenced_text(&taken), &value)
-}
-
-fn has_a_volume(config: &MachineConfig) -> Result<(), Failure> {
-    if config.volumetric.is_some() {
-        return Ok(());
-    }
-    Err(Failure::Usage {
-        what:
-            "`reference` is for three axes corrected throughout their volume, and this machine has \
-             no [volumetric]"
-                .into(),
-        help: "to find the origin of an axis, run `truestage zero`".into(),
-    })
-}
-
-pub(crate) fn referenced_text(taken: &VolumetricReferenced) -> String {
-    let content = &taken.references.content;
-    let axes: String = content.beams.iter().map(|it| it.axis).collect();
-    format!(
-        "references {} of the beams of {axes}{} are in use, for the errors {}",
-        short(&taken.id),
-        if content.roll.is_some() {
-            " and the roll"
-        } else {
-            ""
-        },
-        short(&content.geometry)
-    )
-}
-
-fn referenced_value(taken: &VolumetricReferenced) -> Value {
-    let temperatures = taken.references.temperatures.iter();
-    json!({
-        "references": taken.id,
-        "geometry": taken.references.content.geometry,
-        "temperatures_c": temperatures.map(|it| it.value()).collect::<Vec<_>>(),
-    })
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
@@ -403,23 +353,4 @@ fn live_value(live: &Live) -> Value {
                "u_um": live.uncertainty[k].um()})
     });
     axes.collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_machine_without_a_volume_is_told_so_and_not_asked_for_its_calibration() {
-        let judge = |text| has_a_volume(&config::parse(text, "m.toml").unwrap().config);
-        let linear = judge(include_str!("../../../../configs/machines/linear.toml"));
-        let failure = linear.unwrap_err();
-        assert_eq!(failure.exit_code(), 2);
-        let text = failure.to_string();
-        assert!(
-            text.contains("three axes") && !text.contains("calibrate"),
-            "{text}"
-        );
-        assert!(judge(include_str!("../../../../configs/machines/volumetric.toml")).is_ok());
-    }
 }
