@@ -1,5 +1,6 @@
 //! The commands as a user runs them: `mock-bus` in one process, `truestage` in others.
 
+mod align;
 mod alone;
 mod calibrations;
 mod demo;

@@ -64,7 +64,7 @@ fn small(machine: &str) -> String {
 }
 
 /// The machine, and where its files are.
-struct Live {
+pub(crate) struct Live {
     emulated: EmulatedOnPtys,
     folder: tempfile::TempDir,
     ports: Vec<String>,
@@ -73,8 +73,13 @@ struct Live {
 
 impl Live {
     fn new(rig: Rig) -> Self {
+        Self::of(rig, |text| text)
+    }
+
+    /// The same, its emulation after `change`.
+    pub(crate) fn of(rig: Rig, change: impl Fn(String) -> String) -> Self {
         let turn = one_machine();
-        let toml = VOLUMETRIC.emulated;
+        let toml = &change(VOLUMETRIC.emulated.to_owned());
         let emulated = match rig {
             Rig::Vcan => EmulatedOnPtys::in_lockstep_on_socketcan(toml, 51, INTERFACE),
             Rig::Pty | Rig::InProcess => EmulatedOnPtys::in_lockstep(toml, 51),
@@ -92,10 +97,21 @@ impl Live {
         }
     }
 
-    fn command(&self, words: &[&str]) -> Command {
+    /// Where its files are.
+    pub(crate) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub(crate) fn command(&self, words: &[&str]) -> Command {
+        let mut command = self.plain_command(words);
+        command.arg("--json");
+        command
+    }
+
+    /// Its output is for people.
+    pub(crate) fn plain_command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(program("truestage"));
-        command.current_dir(self.folder.path()).arg("--json");
-        command.args(words);
+        command.current_dir(self.folder.path()).args(words);
         let clock = self.emulated.clock().expect("it has one");
         command.arg("--clock");
         command.arg(format!("lockstep:{}", clock.display()));

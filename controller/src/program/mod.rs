@@ -1,5 +1,6 @@
 //! The command line. Its words are the cycle's own.
 
+mod align;
 mod ask;
 mod cal;
 mod check;
@@ -91,6 +92,8 @@ enum Command {
     /// Zero, then record the references of the detectors of three axes, for the calibration in use; or take them
     /// from a file (`reference import`).
     Reference(volumetric::reference::ReferenceArgs),
+    /// Show where each detector sees its beam, while you turn the adjusters. No drive is enabled and nothing moves.
+    Align(align::AlignArgs),
     /// Zero, then do a job of one axis (`JOB.toml`), or follow a path of three axes (`PATH.csv`), corrected.
     ///
     /// A job goes to its points one after the other and waits at each for a time, for the operator or for an input,
@@ -449,6 +452,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
             })
         }
         Command::Reference(args) => volumetric::reference::run(&args, output),
+        Command::Align(args) => align::run(&args, output),
         Command::Run(args) => run(args, output),
         Command::Memory(MemoryCommand::Record(args)) => {
             volumetric::part::memory_record(&args, output)

@@ -98,6 +98,35 @@ impl RollReader {
 
     /// The roll by the newest samples.
     pub(super) fn read(&mut self, observed: &Observed<'_>) -> Result<Radians, Trouble> {
+        let (volts, at) = self.volts(observed)?;
+        self.stuck.check(at, volts.map(Quantity::value))?;
+        let roll = self.roll(volts)?;
+        if let Some((before, last)) = self.last {
+            let passed = at.since(before).as_secs_f64();
+            let limit = self.noise_max.value() + self.speed_max * passed;
+            let seen = (roll - last).value().abs();
+            if seen > limit {
+                return Err(Trouble::Jumped { seen, limit });
+            }
+        }
+        self.last = Some((at, roll));
+        Ok(roll)
+    }
+
+    /// What the newest samples show by themselves, however it came about, and when they were taken.
+    #[cfg(feature = "program")]
+    pub(super) fn look(&self, observed: &Observed<'_>) -> Result<(Radians, Time), Trouble> {
+        let (volts, at) = self.volts(observed)?;
+        Ok((self.roll(volts)?, at))
+    }
+
+    fn roll(&self, volts: [Volts; 2]) -> Result<Radians, Trouble> {
+        let reading = |k: usize| Metres(volts[k].value() * self.per_volt[k]);
+        Ok(self.optics.solve(reading(0), reading(1))?.angle)
+    }
+
+    /// Both voltages, neither too old nor at an end of its converter's range.
+    fn volts(&self, observed: &Observed<'_>) -> Result<([Volts; 2], Time), Trouble> {
         let mut volts = [Volts::ZERO; 2];
         let mut at = Time::NEVER;
         for (volts, place) in volts.iter_mut().zip(&self.places) {
@@ -115,18 +144,6 @@ impl RollReader {
             *volts = channel.volts;
             at = at.min(channel.at);
         }
-        self.stuck.check(at, volts.map(Quantity::value))?;
-        let reading = |k: usize| Metres(volts[k].value() * self.per_volt[k]);
-        let roll = self.optics.solve(reading(0), reading(1))?.angle;
-        if let Some((before, last)) = self.last {
-            let passed = at.since(before).as_secs_f64();
-            let limit = self.noise_max.value() + self.speed_max * passed;
-            let seen = (roll - last).value().abs();
-            if seen > limit {
-                return Err(Trouble::Jumped { seen, limit });
-            }
-        }
-        self.last = Some((at, roll));
-        Ok(roll)
+        Ok((volts, at))
     }
 }

@@ -10,6 +10,7 @@
 //! | `first_part` | displacements that are to be kept, recorded while the first part is made |
 //! | `moves` | all three axes in one line, corrected |
 //! | `verify` | a line that no calibration uses, read with the correction on |
+//! | `sight` | what the detectors see at this moment, for whoever adjusts their beams |
 //! | `state` | what is stored, put together: errors, references, memories |
 //! | `correction` | what the cyclic engine adds to each set-point: detectors, references, memories, temperatures, the model and its inverse |
 //! | `limits` | whether the configuration lets that pass, and which limits would |
@@ -41,6 +42,8 @@ mod moves;
 pub(crate) mod record;
 pub(crate) mod reference;
 pub(crate) mod settings;
+#[cfg(feature = "program")]
+pub(crate) mod sight;
 mod sound;
 mod state;
 mod thermometers;

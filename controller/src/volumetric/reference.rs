@@ -5,7 +5,7 @@
 //! brings the slide's reading to the same place of the beam. A detector in trouble ends it; half a
 //! set of references is none.
 
-mod mean;
+pub(super) mod mean;
 
 use core::time::Duration;
 

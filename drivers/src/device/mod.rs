@@ -307,11 +307,28 @@ pub trait DisplacementInstrument: Device {
     /// What the instrument's own sensors say about its environment.
     fn environment(&self) -> Environment;
 
+    /// How strong its signal is, by what it sent last, also while it is not started; `None` for one that does
+    /// not say so.
+    fn signal(&self) -> Option<Signal> {
+        None
+    }
+
     /// Whether nobody waits for what it says at the moment: its readings may be handed over some
     /// milliseconds late, with the times at which they came.
     fn is_unhurried(&self) -> bool {
         false
     }
+}
+
+/// How strong the signal of an instrument is, in a unit of its own: more is better.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signal {
+    /// When it was said.
+    pub at: Time,
+    /// How strong.
+    pub strength: i32,
+    /// Below this it counts as lost, where that is set.
+    pub least: Option<i32>,
 }
 
 /// A displacement, not yet corrected for the medium or for temperature.

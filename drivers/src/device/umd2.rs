@@ -31,7 +31,7 @@ use super::average::{Averaging, RunningAverage};
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{
     Alarm, Device, DeviceError, DeviceName, DisplacementInstrument, DisplacementReading,
-    Environment, Identity, Seen,
+    Environment, Identity, Seen, Signal,
 };
 
 const NAME: DeviceName = DeviceName::Serial("interferometer");
@@ -479,6 +479,10 @@ impl DisplacementInstrument for Umd2 {
             return Environment::default();
         }
         self.weather.at(self.heard)
+    }
+
+    fn signal(&self) -> Option<Signal> {
+        self.weather.signal(self.settings.signal_strength_min)
     }
 
     /// It streams without end, and only a start or an average waits for its lines.

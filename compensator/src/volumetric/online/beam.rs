@@ -116,6 +116,17 @@ pub struct Sample {
     pub at: Time,
 }
 
+/// What four voltages show, whatever is wrong with them: for whoever adjusts the beam.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BeamLook {
+    /// The sum of the channels, without what they give in the dark.
+    pub light: Volts,
+    /// The place, or why there is none.
+    pub place: Result<[Metres; 2], Trouble>,
+    /// The place, or that of the field's end which the beam is beside; `None` in the dark.
+    pub nearest: Option<[Metres; 2]>,
+}
+
 /// A detector: samples in, places out.
 #[derive(Clone, Debug)]
 pub struct BeamDetector {
@@ -194,8 +205,7 @@ impl BeamDetector {
                 return Err(Trouble::Saturated { seen: *seen, limit });
             }
         }
-        let light = core::array::from_fn(|i| (channels[i] - own.dark[i]).value() * own.gain[i]);
-        let ratios = self.ratios(light)?;
+        let ratios = self.ratios(self.light(channels))?;
         let mut place = [Metres::ZERO; 2];
         for ((place, curve), seen) in place.iter_mut().zip(&own.curves).zip(ratios) {
             let (low, high) = curve.pieces.range();
@@ -205,6 +215,46 @@ impl BeamDetector {
             *place = Metres(curve.pieces.at(seen));
         }
         Ok(place)
+    }
+
+    /// What four voltages show by themselves. Allocates nothing.
+    pub fn look(&self, channels: &[Volts; 4]) -> BeamLook {
+        let light = self.light(channels);
+        let place = self.place(channels);
+        let is_dark = matches!(place, Err(Trouble::Blocked { .. }));
+        let ratios = self.bare_ratios(light);
+        let is_seen = !is_dark && ratios.iter().all(|it| it.is_finite());
+        let nearest = |k: usize| {
+            let pieces = &self.settings.curves[k].pieces;
+            let (low, high) = pieces.range();
+            Metres(pieces.at(ratios[k].clamp(low, high)))
+        };
+        BeamLook {
+            light: Volts(light.iter().sum()),
+            place,
+            nearest: is_seen.then(|| [nearest(0), nearest(1)]),
+        }
+    }
+
+    /// The place of a beam that lights all of the detector alike.
+    pub fn middle(&self) -> [Metres; 2] {
+        let curves = &self.settings.curves;
+        core::array::from_fn(|k| Metres(curves[k].pieces.at(0.0)))
+    }
+
+    /// The channels without what they give in the dark, all equally sensitive.
+    fn light(&self, channels: &[Volts; 4]) -> [f64; 4] {
+        let own = &self.settings;
+        core::array::from_fn(|i| (channels[i] - own.dark[i]).value() * own.gain[i])
+    }
+
+    /// What the channels are to each other, by the layout.
+    fn bare_ratios(&self, [a, b, c, d]: [f64; 4]) -> [f64; 2] {
+        let sum = a + b + c + d;
+        match self.settings.layout {
+            Layout::Quadrants => [(a + d - b - c) / sum, (a + b - c - d) / sum],
+            Layout::Lateral => [(a - b) / (a + b), (c - d) / (c + d)],
+        }
     }
 
     fn ratios(&self, light: [f64; 4]) -> Result<[f64; 2], Trouble> {
@@ -224,10 +274,7 @@ impl BeamDetector {
             let (seen, limit) = (Volts(sum), high);
             return Err(Trouble::Saturated { seen, limit });
         }
-        Ok(match self.settings.layout {
-            Layout::Quadrants => [(a + d - b - c) / sum, (a + b - c - d) / sum],
-            Layout::Lateral => [(a - b) / (a + b), (c - d) / (c + d)],
-        })
+        Ok(self.bare_ratios(light))
     }
 
     /// The longer nothing good was seen, the further away the next good place may be.

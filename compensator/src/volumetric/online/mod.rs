@@ -42,7 +42,9 @@ mod stuck;
 mod temperature;
 mod trouble;
 
-pub use beam::{BeamDetector, BeamDetectorSettings, Layout, RatioCurve, Sample, SettingsError};
+pub use beam::{
+    BeamDetector, BeamDetectorSettings, BeamLook, Layout, RatioCurve, Sample, SettingsError,
+};
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
 pub use lever::DetectorLever;

@@ -65,6 +65,29 @@ fn the_place_is_the_calibrated_ratio_of_the_channels() {
     check_um(seen[1], -400.0);
 }
 
+/// Ratios 0.9 and 0 of a field up to 0.8; two thirds of the light taken away; a channel at its rail.
+#[test]
+fn whoever_adjusts_a_beam_sees_the_light_and_which_way_to_go() {
+    let detector = detector(Layout::Lateral);
+    assert_eq!(detector.field(), [(um(-800.0), um(800.0)); 2]);
+    assert_eq!(detector.middle(), [um(0.0); 2]);
+    let look = |channels: [f64; 4]| detector.look(&channels.map(Volts));
+    let good = look([3.0, 1.0, 2.0, 2.0]);
+    assert_eq!(good.light, Volts(8.0));
+    assert_eq!(good.place.ok(), good.nearest);
+    let beside = look([3.8, 0.2, 2.0, 2.0]);
+    assert!(matches!(beside.place, Err(Trouble::Beside { .. })));
+    check_um(beside.nearest.unwrap()[0], 800.0);
+    check_um(beside.nearest.unwrap()[1], 0.0);
+    let blocked = look([0.3, 0.1, 0.2, 0.2]);
+    assert!(matches!(blocked.place, Err(Trouble::Blocked { .. })));
+    assert_eq!(blocked.nearest, None, "noise has no place");
+    let bright = look([9.95, 5.0, 7.0, 7.0]);
+    assert!(matches!(bright.place, Err(Trouble::Saturated { .. })));
+    assert!(bright.nearest.unwrap()[0] > Metres::ZERO);
+    assert_eq!(look([f64::NAN; 4]).nearest, None);
+}
+
 /// Dark 0.5 V everywhere, the first channel half as sensitive: (2·1.5 − 1)/4 = 1/2 again.
 #[test]
 fn dark_values_and_gains_are_taken_out_and_intensity_does_not_matter() {

@@ -2,14 +2,14 @@
 
 /// Mean and standard uncertainty of the mean.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Mean {
+pub(in crate::volumetric) struct Mean {
     count: f64,
     sum: f64,
     squares: f64,
 }
 
 impl Mean {
-    pub(super) fn add(&mut self, value: f64) {
+    pub(in crate::volumetric) fn add(&mut self, value: f64) {
         self.count += 1.0;
         let before = self.sum;
         self.sum += value;
@@ -20,11 +20,17 @@ impl Mean {
         }
     }
 
-    pub(super) fn mean(&self) -> f64 {
+    pub(in crate::volumetric) fn mean(&self) -> f64 {
         self.sum / self.count
     }
 
-    pub(super) fn u(&self) -> f64 {
+    /// The mean, once there is a value.
+    #[cfg(feature = "program")]
+    pub(in crate::volumetric) fn known(&self) -> Option<f64> {
+        (self.count > 0.0).then(|| self.mean())
+    }
+
+    pub(in crate::volumetric) fn u(&self) -> f64 {
         if self.count < 2.0 {
             return 0.0;
         }

@@ -194,6 +194,24 @@ fn a_weak_signal_counts_as_a_lost_beam() {
     assert_eq!(bench.device.latest(), None);
 }
 
+/// Whoever aligns the optics looks before anything counts.
+#[test]
+fn the_strength_of_the_signal_is_told_before_the_start_and_while_the_beam_is_lost() {
+    let mut bench = Bench::new(Umd2Settings {
+        signal_strength_min: Some(200),
+        ..Umd2Settings::default()
+    });
+    assert_eq!(bench.device.signal(), None);
+    bench.bytes(b"58 2458 0 0\n");
+    for strength in [150, 260] {
+        bench.sample.low_speed = LowSpeed::SignalStrength(strength);
+        bench.next();
+        let signal = bench.device.signal().unwrap();
+        assert_eq!((signal.strength, signal.least), (strength, Some(200)));
+    }
+    assert_eq!(bench.alarms(), []);
+}
+
 #[test]
 fn an_average_gives_mean_and_standard_deviation() {
     let mut bench = Bench::started();

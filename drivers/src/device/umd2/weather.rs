@@ -1,10 +1,10 @@
-//! What the interferometer's slow channel says about air and material.
+//! What the interferometer's slow channel says about air and material, and how strong its signal is.
 
 use core::time::Duration;
 use units::{Celsius, Pascals, RelativeHumidity, Time};
 use wire::umd2::LowSpeed;
 
-use super::super::Environment;
+use super::super::{Environment, Signal};
 
 /// The newest values and when they came. Temperature 1 is the air's, 2 the material's.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +14,7 @@ pub(super) struct Weather {
     material: Option<(Celsius, Time)>,
     pressure: Option<(Pascals, Time)>,
     humidity: Option<(RelativeHumidity, Time)>,
+    signal: Option<(i32, Time)>,
 }
 
 impl Weather {
@@ -24,7 +25,18 @@ impl Weather {
             material: None,
             pressure: None,
             humidity: None,
+            signal: None,
         }
+    }
+
+    /// How strong the signal was said to be last; below `least` it counts as lost.
+    pub(super) fn signal(&self, least: Option<i32>) -> Option<Signal> {
+        let (strength, at) = self.signal?;
+        Some(Signal {
+            at,
+            strength,
+            least,
+        })
     }
 
     /// Takes a value of the slow channel; one that no sensor can mean ends the old one's
@@ -34,6 +46,7 @@ impl Weather {
             LowSpeed::Temperature1(raw) => self.air = celsius(raw).map(|value| (value, now)),
             LowSpeed::Temperature2(raw) => self.material = celsius(raw).map(|value| (value, now)),
             LowSpeed::Pressure(raw) => self.pressure = pascals(raw).map(|value| (value, now)),
+            LowSpeed::SignalStrength(raw) => self.signal = Some((raw, now)),
             LowSpeed::Humidity(raw) => self.humidity = humidity(raw).map(|value| (value, now)),
             _ => {}
         }

@@ -1,0 +1,106 @@
+//! What detectors see, as a line for people or an object for programs.
+
+use compensator::volumetric::online::Trouble;
+use serde_json::{Value, json};
+use units::{Metres, Radians, Volts};
+
+use super::View;
+use crate::volumetric::sight::{Sight, SightReading};
+
+/// What is wrong with a detector, in two words and in one for programs.
+pub(super) const fn words(trouble: &Trouble) -> (&'static str, &'static str) {
+    match trouble {
+        Trouble::Blocked { .. } => ("BLOCKED", "blocked"),
+        Trouble::Saturated { .. } | Trouble::AtEnd { .. } => ("TOO BRIGHT", "too_bright"),
+        Trouble::Beside { .. } => ("BESIDE", "beside"),
+        Trouble::Stale { .. } => ("NO SAMPLES", "stale"),
+        Trouble::Roll(_) => ("NO ROLL", "no_roll"),
+        Trouble::Stuck { .. } => ("STUCK", "stuck"),
+        Trouble::Jumped { .. } => ("JUMPED", "jumped"),
+        Trouble::Implausible { .. } => ("NO NUMBER", "implausible"),
+    }
+}
+
+/// A value of a reading in micrometres, of a roll in arcseconds.
+pub(super) const fn in_unit(reading: &SightReading, si: f64) -> f64 {
+    match reading.along {
+        Some(_) => Metres(si).um(),
+        None => Radians(si).arcsec(),
+    }
+}
+
+/// `x slide y +12.31 z -3.02 um, 8.02 V, good`.
+fn sight_line(it: &Sight) -> String {
+    let mut text = it.name.clone();
+    for reading in &it.readings {
+        if let Some(along) = reading.along {
+            text += &format!(" {along}");
+        }
+        match reading.value {
+            Some(value) => text += &format!(" {:+.2}", in_unit(reading, value - reading.middle)),
+            None => text += " -",
+        }
+        if let Some(off) = reading.off_reference() {
+            text += &format!(" (ref {:+.2})", in_unit(reading, off));
+        }
+    }
+    text += if it.light.is_some() { " um" } else { " arcsec" };
+    if let Some(light) = it.light {
+        text += &format!(", {:.2} V", light.value());
+    }
+    let state = it.trouble.as_ref();
+    text + ", " + state.map_or("good", |trouble| words(trouble).0)
+}
+
+/// All of it in one line: from the middle of each detector, and from its nearest reference.
+pub(super) fn line(view: &View) -> String {
+    let sights = view.sights.iter().map(sight_line);
+    let signals = view.signals.iter().map(|(name, signal)| match signal {
+        Some(signal) => format!("{name} signal {}", signal.strength),
+        None => format!("{name} says nothing of its signal"),
+    });
+    let all: Vec<String> = sights.chain(signals).collect();
+    format!("{:.1} s: {}", view.seconds, all.join("; "))
+}
+
+fn reading_value(it: &SightReading) -> Value {
+    let unit = |si: f64| in_unit(it, si);
+    json!({
+        "along": it.along.map(|along| along.to_string()),
+        "unit": if it.along.is_some() { "um" } else { "arcsec" },
+        "place": it.value.map(unit),
+        "from_middle": it.value.map(|value| unit(value - it.middle)),
+        "reference": it.reference.map(|(low, high)| [unit(low), unit(high)]),
+        "from_reference": it.off_reference().map(unit),
+        "field": [unit(it.field.0), unit(it.field.1)],
+    })
+}
+
+fn sight_value(it: &Sight) -> Value {
+    let trouble = it.trouble.as_ref();
+    json!({
+        "detector": it.name,
+        "state": trouble.map_or("good", |trouble| words(trouble).1),
+        "trouble": trouble.map(ToString::to_string),
+        "sum_v": it.light.map(Volts::value),
+        "readings": it.readings.iter().map(reading_value).collect::<Vec<_>>(),
+    })
+}
+
+/// All of it for programs.
+pub(super) fn value(view: &View) -> Value {
+    let signals = view.signals.iter().map(|(name, signal)| {
+        let age = signal.map(|it| view.now.since(it.at).as_secs_f64());
+        json!({
+            "instrument": name,
+            "strength": signal.map(|it| it.strength),
+            "least": signal.and_then(|it| it.least),
+            "age_s": age,
+        })
+    });
+    json!({
+        "at_s": view.seconds,
+        "detectors": view.sights.iter().map(sight_value).collect::<Vec<_>>(),
+        "signals": signals.collect::<Vec<_>>(),
+    })
+}

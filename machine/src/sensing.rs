@@ -1,0 +1,33 @@
+//! The analog modules alone, while somebody has his hands in the machine: no drive is addressed.
+
+use crate::failure::Failure;
+use crate::machine::{Machine, Supervision};
+
+/// Starts SYNC and the analog modules of `machine`, and checks who they are. Nothing is sent to a drive, and what
+/// drives say is no alarm: they may be without power. Afterwards no axis counts as started or zeroed.
+///
+/// # Errors
+/// When a module does not answer, is another one than configured, or refuses its set-up.
+pub fn start_sensors(machine: &mut Machine) -> Result<(), Failure> {
+    machine.catch_up();
+    machine.zeroed.fill(false);
+    machine.ports.set_sync(&mut *machine.transport, true)?;
+    let modules = machine.devices.drive_count()..machine.devices.instrument_device(0);
+    let now = machine.now();
+    for at in modules.clone() {
+        machine.devices.unit_mut(at).device.start(now);
+    }
+    for at in modules {
+        machine.await_start(at)?;
+    }
+    Ok(())
+}
+
+/// Stops SYNC again.
+///
+/// # Errors
+/// When a bus does not take that.
+pub fn stop_sensors(machine: &mut Machine) -> Result<(), Failure> {
+    machine.supervision = Supervision::Off;
+    machine.ports.set_sync(&mut *machine.transport, false)
+}
