@@ -337,13 +337,20 @@ impl Volume {
             format!("x,z,{},{up}\n", TRAVEL_MM[0] * share)
         };
         let rows: String = (0..=20).map(row).collect();
-        let csv = format!("axis,along,position_mm,displacement_um\n{rows}");
+        self.remember(&format!("axis,along,position_mm,displacement_um\n{rows}"));
+    }
+
+    /// Imports a designed shape as the first memory.
+    ///
+    /// # Panics
+    /// When it cannot be stored.
+    pub fn remember(&self, csv: &str) {
         let head = RecordHead {
             axis: FIRST_MEMORY.into(),
             ..self.bench.machine.this_machine("x")
         };
         let (config, store) = (&self.bench.loaded.config, &self.bench.store);
-        good(import_memory(config, store, head, (&csv, "bow.csv")));
+        good(import_memory(config, store, head, (csv, "shape.csv")));
     }
 
     /// What its three axes do.

@@ -33,7 +33,7 @@ pub use point::{Axis, Point, Volume, VolumeError};
 pub use polynomial::Polynomial;
 pub use reference_series::{GivenReference, ReferenceFault, ReferenceOf, ReferenceSeries};
 pub use series::{VolumeFault, VolumeLine, VolumePoint, VolumeSeries};
-pub use state_series::{StateFault, StatePoint, StateSeries};
+pub use state_series::{StateFault, StatePoint, StateSeries, StateValue};
 
 use units::Metres;
 

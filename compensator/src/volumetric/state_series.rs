@@ -1,13 +1,15 @@
-//! A designed shape of three axes, to be kept as a state memory: displacements of the slides, from a file.
+//! A designed shape of three axes, to be kept as a state memory: displacements and rolls of the slides, from a file.
 //!
 //! One row a place: which axis moves, along which direction across it its slide is to be displaced, where,
 //! and by how much, counted from the references of the detectors and in the direction of the machine.
 //! Between the places of one axis and direction it is a cubic spline; beyond, the ends hold; a direction
-//! without rows is not displaced.
+//! without rows is not displaced, an axis without them not rolled. A file with rolls has columns of its own, and in
+//! place of the direction the word `roll`.
 //!
-//! Source: CN1214003A, second part: the state that a machine is built with on purpose.
+//! Source: CN1214003A, second part: the state that a machine is built with on purpose; with its seventh aspect a
+//! roll is part of it.
 
-use units::Metres;
+use units::{Metres, Radians};
 
 use crate::data::{DataError, Format, Table};
 use crate::volumetric::Axis;
@@ -18,18 +20,40 @@ const FORMAT: Format = Format {
     columns: &["axis", "along", "position_mm", "displacement_um"],
     header: "axis,along,position_mm,displacement_um",
 };
+/// With rolls.
+const WITH_ROLLS: Format = Format {
+    columns: &["axis", "along", "position_mm", "value", "unit"],
+    header: "axis,along,position_mm,value,unit",
+};
+
+/// What of a slide is to be otherwise at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StateValue {
+    /// It is displaced along this direction by so much.
+    Displacement(Axis, Metres),
+    /// It is rolled by so much.
+    Roll(Radians),
+}
+
+impl StateValue {
+    /// `along z`, or `in roll`.
+    fn what(self) -> String {
+        match self {
+            Self::Displacement(along, _) => format!("along {along}"),
+            Self::Roll(_) => "in roll".to_owned(),
+        }
+    }
+}
 
 /// One place of a designed shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatePoint {
     /// Which axis moves.
     pub axis: Axis,
-    /// The direction across it.
-    pub along: Axis,
     /// Its position.
     pub at: Metres,
-    /// By how much its slide is displaced there.
-    pub displacement: Metres,
+    /// What its slide is to be there.
+    pub value: StateValue,
     /// The line of the file it stands in, from 1.
     pub row: usize,
 }
@@ -85,12 +109,20 @@ pub enum StateFault {
         before: Metres,
     },
     /// One place alone.
-    #[error("{axis} along {along} has one place only; a shape needs two or more")]
+    #[error("{axis} {what} has one place only; a shape needs two or more")]
     Alone {
         /// Which axis.
         axis: Axis,
-        /// Which direction.
-        along: Axis,
+        /// Along which direction, or the roll.
+        what: String,
+    },
+    /// Another unit than what is displaced or rolled has.
+    #[error("`unit` is `{seen}`; convert the value, and write {expected}")]
+    Unit {
+        /// The cell.
+        seen: String,
+        /// The unit.
+        expected: &'static str,
     },
 }
 
@@ -101,15 +133,18 @@ impl StateSeries {
     }
 
     /// Reads the CSV format `axis,along,position_mm,displacement_um` (columns in any order, `#` comment
-    /// lines, decimal points).
+    /// lines, decimal points), or with rolls `axis,along,position_mm,value,unit`: `unit` is `um`, or `arcsec` where
+    /// `along` is `roll`.
     ///
     /// # Errors
     /// The first thing that is not as it should be, with `source_name`, line and column.
     pub fn from_csv(text: &str, source_name: &str) -> Result<Self, DataError<StateFault>> {
-        let table = Table::read(text, source_name, &FORMAT)?;
+        let has_rolls = has_units(text);
+        let format = if has_rolls { &WITH_ROLLS } else { &FORMAT };
+        let table = Table::read(text, source_name, format)?;
         let mut points: Vec<StatePoint> = Vec::new();
         for row in 0..table.rows() {
-            let point = read_row(&table, row)?;
+            let point = read_row(&table, row, has_rolls)?;
             let before = points.iter().rev().find(|it| it.is_with(&point));
             if let Some(before) = before.map(|it| it.at).filter(|it| *it >= point.at) {
                 let (axis, seen) = (point.axis, point.at);
@@ -120,8 +155,8 @@ impl StateSeries {
         }
         for (row, point) in points.iter().enumerate() {
             if points.iter().filter(|it| it.is_with(point)).count() < 2 {
-                let StatePoint { axis, along, .. } = *point;
-                let fault = StateFault::Alone { axis, along };
+                let (axis, what) = (point.axis, point.value.what());
+                let fault = StateFault::Alone { axis, what };
                 return Err(table.fail(row, 0, fault.into()));
             }
         }
@@ -144,10 +179,20 @@ impl StateSeries {
             let Some((low, high)) = ends else {
                 continue;
             };
+            let rolls = own.iter().filter_map(|it| match it.value {
+                StateValue::Roll(roll) => Some((it.at, roll)),
+                StateValue::Displacement(..) => None,
+            });
+            let (nodes, rolls): (Vec<Metres>, Vec<Radians>) = rolls.unzip();
+            if !nodes.is_empty() {
+                map.roll[axis.index()] = Some(Function::new(&nodes, &rolls, Shape::Spline)?);
+            }
             let [first, second] = axis.others().map(|along| {
-                let with = own.iter().filter(|it| it.along == along);
-                let (nodes, values): (Vec<Metres>, Vec<Metres>) =
-                    with.map(|it| (it.at, it.displacement)).unzip();
+                let with = own.iter().filter_map(|it| match it.value {
+                    StateValue::Displacement(own, value) if own == along => Some((it.at, value)),
+                    StateValue::Displacement(..) | StateValue::Roll(_) => None,
+                });
+                let (nodes, values): (Vec<Metres>, Vec<Metres>) = with.unzip();
                 if nodes.is_empty() {
                     return Function::new(&[low, high], &[Metres::ZERO; 2], Shape::Spline);
                 }
@@ -162,11 +207,28 @@ impl StateSeries {
 
 impl StatePoint {
     fn is_with(&self, other: &Self) -> bool {
-        (self.axis, self.along) == (other.axis, other.along)
+        let is_same = match (self.value, other.value) {
+            (StateValue::Displacement(own, _), StateValue::Displacement(other, _)) => own == other,
+            (StateValue::Roll(_), StateValue::Roll(_)) => true,
+            (StateValue::Displacement(..), StateValue::Roll(_))
+            | (StateValue::Roll(_), StateValue::Displacement(..)) => false,
+        };
+        self.axis == other.axis && is_same
     }
 }
 
-fn read_row(table: &Table<StateFault>, row: usize) -> Result<StatePoint, DataError<StateFault>> {
+/// Whether the header says that each row has a unit of its own.
+fn has_units(text: &str) -> bool {
+    let mut lines = text.lines().map(str::trim);
+    let header = lines.find(|it| !it.is_empty() && !it.starts_with('#'));
+    header.is_some_and(|it| it.split(',').any(|cell| cell.trim() == "unit"))
+}
+
+fn read_row(
+    table: &Table<StateFault>,
+    row: usize,
+    has_rolls: bool,
+) -> Result<StatePoint, DataError<StateFault>> {
     let letter = |at: usize, column: &'static str| {
         let seen = table.text(row, at);
         let axis = Axis::ALL.into_iter().find(|it| it.to_string() == seen);
@@ -175,15 +237,31 @@ fn read_row(table: &Table<StateFault>, row: usize) -> Result<StatePoint, DataErr
             table.fail(row, at, StateFault::Axis { column, seen }.into())
         })
     };
-    let (axis, along) = (letter(0, "axis")?, letter(1, "along")?);
-    if axis == along {
-        return Err(table.fail(row, 1, StateFault::Along { axis }.into()));
-    }
+    let in_unit = |expected: &'static str| match table.text(row, 4) {
+        seen if seen == expected => Ok(()),
+        seen => {
+            let seen = seen.to_owned();
+            Err(table.fail(row, 4, StateFault::Unit { seen, expected }.into()))
+        }
+    };
+    let axis = letter(0, "axis")?;
+    let value = if has_rolls && table.text(row, 1) == "roll" {
+        in_unit("arcsec")?;
+        StateValue::Roll(Radians::from_arcsec(table.number(row, 3)?))
+    } else {
+        let along = letter(1, "along")?;
+        if axis == along {
+            return Err(table.fail(row, 1, StateFault::Along { axis }.into()));
+        }
+        if has_rolls {
+            in_unit("um")?;
+        }
+        StateValue::Displacement(along, Metres::from_um(table.number(row, 3)?))
+    };
     Ok(StatePoint {
         axis,
-        along,
         at: Metres::from_mm(table.number(row, 2)?),
-        displacement: Metres::from_um(table.number(row, 3)?),
+        value,
         row: table.line(row),
     })
 }
@@ -216,6 +294,29 @@ mod tests {
         let other = "axis,along,position_m,displacement_um\nx,z,0,0\n";
         let refused = StateSeries::from_csv(other, "s").unwrap_err().to_string();
         assert!(refused.contains("position_mm"), "{refused}");
+    }
+
+    /// The unit of a row is its own; a roll is zero where there are no rows.
+    #[test]
+    fn rolls_have_columns_of_their_own() {
+        let csv = "axis,along,position_mm,value,unit\n\
+                   x,z,0,0,um\nx,roll,0,2,arcsec\nx,z,100,10,um\nx,roll,400,6,arcsec\n";
+        let (map, covers) = StateSeries::from_csv(csv, "s").unwrap().map().unwrap();
+        let roll = map.roll_at(Axis::X, Metres::from_mm(100.0)).arcsec();
+        assert!((roll - 3.0).abs() < 1e-9, "{roll}");
+        assert_eq!(map.roll_at(Axis::Y, Metres(0.1)), Radians::ZERO);
+        assert_eq!(covers[0], Some((Metres(0.0), Metres::from_mm(400.0))));
+        let refused = |rows: &str| {
+            let csv = format!("# rolls\naxis,along,position_mm,value,unit\n{rows}");
+            StateSeries::from_csv(&csv, "s").unwrap_err().to_string()
+        };
+        let said = refused("x,roll,0,1,um\n");
+        assert!(said.contains("s:3:12: `unit` is `um`"), "{said}");
+        let said = refused("x,z,0,1,mm\nx,z,5,1,um\n");
+        assert!(said.contains("write um"), "{said}");
+        let said = refused("x,roll,0,1,arcsec\n");
+        assert!(said.contains("x in roll has one place only"), "{said}");
+        check("x,roll,0,1\n", "`along` is `roll`");
     }
 
     /// Two directions at places of their own, another axis, and one that is not there.

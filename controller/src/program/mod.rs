@@ -254,7 +254,8 @@ struct ImportArgs {
     /// The machine's configuration.
     config: PathBuf,
     /// Columns axis,along,position_mm,displacement_um: by how much the slide of an axis is to be displaced
-    /// along a direction across it, counted from the references of the detectors in use.
+    /// along a direction across it, counted from the references of the detectors in use. With rolls the columns are
+    /// axis,along,position_mm,value,unit: unit is um, or arcsec where along is roll.
     file: PathBuf,
     /// Only the first: the second is the state of a part.
     #[arg(long, value_enum, default_value_t = MemoryChoice::First)]
@@ -300,8 +301,8 @@ struct RunArgs {
     /// Do not wait for the operator of a job.
     #[arg(long)]
     yes: bool,
-    /// The first of several parts: what the detectors see during this part is not corrected but
-    /// recorded as the second memory, so that all later parts are made like this one.
+    /// The first of several parts: what the detectors see during this part, displacements and rolls, is not corrected
+    /// but recorded as the second memory, so that all later parts are made like this one.
     #[arg(long)]
     first_part: bool,
 }

@@ -21,7 +21,7 @@ use compensator::volumetric::model::{
 };
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
-    MovingState,
+    MovingState, RollMonitor,
 };
 use compensator::volumetric::{Axis, NoCorrection, Point};
 use units::{Celsius, Metres, Quantity, Radians};
@@ -77,8 +77,7 @@ struct WatchedBeam {
 struct WatchedRoll {
     axis: Axis,
     reader: RollReader,
-    reference: Function<Radians>,
-    feed: Feed<Radians, 1>,
+    monitor: RollMonitor,
 }
 
 /// Corrects three axes by what is known of them and seen of them.
@@ -183,18 +182,20 @@ impl VolumetricCorrection {
     /// What the detectors say at `actual`, as it enters the model.
     fn moving_state(&mut self, observed: &Observed<'_>, actual: Point) -> MovingState {
         let mut state = MovingState::default();
-        // Tilts come first: a detector beside its slide's zero sees them too.
+        // Tilts come first: a detector beside its slide's zero sees them too, also those that are kept.
+        let mut whole = [Radians::ZERO; 3];
         if let Some(roll) = &mut self.roll {
-            let position = actual.along(roll.axis);
-            let seen = roll.reader.read(observed);
-            let beyond = seen.map(|it| [it - roll.reference.at(position)]);
-            state.roll[roll.axis.index()] = roll.feed.advance(observed.now, beyond)[0];
+            let (position, k) = (actual.along(roll.axis), roll.axis.index());
+            let read = roll.reader.read(observed);
+            let monitor = &mut roll.monitor;
+            state.roll[k] = monitor.advance(observed.now, position, read, &self.memories);
+            whole[k] = monitor.whole();
         }
         for axis in Axis::ALL {
             let Some(beam) = &mut self.beams[axis.index()] else {
                 continue;
             };
-            let (position, roll) = (actual.along(axis), state.roll[axis.index()]);
+            let (position, roll) = (actual.along(axis), whole[axis.index()]);
             let slider = sample(observed.channels, &beam.slider);
             let end = beam.end.and_then(|it| sample(observed.channels, &it));
             let seen = beam.monitor.advance(
@@ -409,10 +410,11 @@ fn watched_roll(
     reference: Option<Function<Radians>>,
 ) -> Result<WatchedRoll, VolumetricFailure> {
     let settings = confirmed_by_samples(config, feed(volumetric)?, &roll.analog);
+    let reference = reference.ok_or(VolumetricFailure::NoRollReference)?;
+    let (axis, feed) = (volume_axis(roll.axis), Feed::new(feed_settings(&settings)));
     Ok(WatchedRoll {
-        axis: volume_axis(roll.axis),
+        axis,
         reader: RollReader::new(config, roll)?,
-        reference: reference.ok_or(VolumetricFailure::NoRollReference)?,
-        feed: Feed::new(feed_settings(&settings)),
+        monitor: RollMonitor::new(axis, reference, feed),
     })
 }

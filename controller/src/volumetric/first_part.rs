@@ -1,7 +1,7 @@
-//! A first part: made with the displacements that the machine has this hour, which the second
+//! A first part: made with the displacements and rolls that the machine has this hour, which the second
 //! memory then keeps, so that all later parts are made alike (system S4).
 //!
-//! Detectors watch while it is made, but what they see is left as it is; tables, roll and
+//! Detectors watch while it is made, but what they see is left as it is; tables and
 //! temperatures are corrected as ever. The recorder belongs to the loop meanwhile, takes all its
 //! memory beforehand, and comes back when the loop is over.
 
@@ -29,7 +29,7 @@ use machine::engine::{Corrected, Correction, Observed};
 /// So many stretches may lie between two places of an axis that were met.
 const GAP_STRETCHES: f64 = 2.0;
 
-/// Corrects all but displacements, and records these.
+/// Corrects all but displacements and rolls, and records these.
 #[derive(Debug)]
 pub struct FirstPartCorrection {
     inner: VolumetricCorrection,
@@ -74,7 +74,7 @@ impl FirstPartCorrection {
             gap_max: spacing * GAP_STRETCHES,
         };
         let recorder = StateRecorder::new(&work_volume(own)?, settings)?;
-        let inner = VolumetricCorrection::new(config, state)?.leaving_displacements();
+        let inner = VolumetricCorrection::new(config, state)?.leaving_the_state();
         let (there, back) = channel();
         let listens = Arc::new(AtomicBool::new(false));
         let host = PartRecorder {
@@ -129,8 +129,8 @@ impl PartRecorder {
 }
 
 impl WorkVolume<'_> {
-    /// Makes ready for a first part: corrected by all that is stored but for displacements, which
-    /// stay as they are. The second memory in use counts for nothing: another is recorded.
+    /// Makes ready for a first part: corrected by all that is stored but for displacements and rolls,
+    /// which stay as they are. The second memory in use counts for nothing: another is recorded.
     ///
     /// # Errors
     /// When there are no references to count from, or what is stored cannot be applied.

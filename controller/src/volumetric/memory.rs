@@ -1,4 +1,4 @@
-//! State memories: displacements that are to be kept although they deviate (system S4).
+//! State memories: displacements and rolls that are to be kept although they deviate (system S4).
 //!
 //! The first memory keeps what a machine was built with, the second what the first part is made
 //! with beyond that, so that all later parts are made alike. Both can be recorded at stops along
@@ -69,6 +69,9 @@ impl WorkVolume<'_> {
             let functions = functions(&nodes, &beyond).map_err(VolumetricFailure::from)?;
             map.of[axis.index()] = Some(functions);
             covers[axis.index()] = nodes.first().copied().zip(nodes.last().copied());
+        }
+        for (axis, roll) in present_roll(&config, &state, &now)? {
+            map.roll[axis.index()] = Some(roll);
         }
         self.keep_memory(store, memory, &records, (map, covers), "memory record")
     }
@@ -221,6 +224,30 @@ fn present(
     let nodes: Vec<Metres> = nodes.collect();
     let displacements = nodes.iter().map(displacement).collect();
     Ok(Some((nodes, displacements)))
+}
+
+/// The roll beyond its reference and beyond what the first memory keeps, of the slide whose roll is read.
+fn present_roll(
+    config: &VolumetricConfig,
+    state: &VolumetricState,
+    now: &References,
+) -> Result<Option<(Axis, Function<Radians>)>, Failure> {
+    let watched = config.roll.as_ref();
+    let (Some(own), Some(record)) = (watched, &now.content.roll) else {
+        return Ok(None);
+    };
+    let axis = volume_axis(own.axis);
+    let seen = record.function::<Radians>("the present state")?;
+    let reference = state.roll.as_ref();
+    let reference = reference.ok_or(VolumetricFailure::NoRollReference)?;
+    let nodes: Vec<Metres> = seen.nodes().collect();
+    let beyond = nodes.iter().map(|at| {
+        let left = seen.at(*at) - reference.at(*at);
+        state.memories.roll_beyond_first(axis, *at, left)
+    });
+    let beyond: Vec<Radians> = beyond.collect();
+    let roll = Function::new(&nodes, &beyond, Shape::Spline);
+    Ok(Some((axis, roll.map_err(VolumetricFailure::from)?)))
 }
 
 fn functions(

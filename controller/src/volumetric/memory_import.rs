@@ -3,14 +3,15 @@
 //! It counts from the references in use, like everything that detectors see. What their machine was built
 //! with before these were taken is in the references, and no displacement.
 
-use compensator::volumetric::{StatePoint, StateSeries};
-use units::Metres;
+use compensator::volumetric::{StatePoint, StateSeries, StateValue};
+use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::memory::foreign_second;
 use crate::volumetric::reference::measured_geometry;
+use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{
     AXES, BeamReferencesContent, MemoryName, REFERENCES, Remembered, StateMemoryContent,
     VolumetricConfig, VolumetricFailure, memory_pointer,
@@ -55,12 +56,19 @@ fn references(store: &Store, series: &StateSeries) -> Result<String, Failure> {
     if content.geometry != geometry {
         return Err(none().into());
     }
-    let is_watched = |it: &&StatePoint| {
-        let letter = AXES[it.axis.index()];
-        content.beams.iter().any(|beam| beam.axis == letter)
-    };
-    match series.points().iter().find(|it| !is_watched(it)) {
-        Some(it) => Err(VolumetricFailure::NoReference { axis: it.axis }.into()),
+    let unwatched = series.points().iter().find_map(|it| match it.value {
+        StateValue::Displacement(..) => {
+            let letter = AXES[it.axis.index()];
+            let is_watched = content.beams.iter().any(|beam| beam.axis == letter);
+            (!is_watched).then_some(VolumetricFailure::NoReference { axis: it.axis })
+        }
+        StateValue::Roll(_) => {
+            let is_watched = content.roll.is_some();
+            (!is_watched).then_some(VolumetricFailure::NoRollReference)
+        }
+    });
+    match unwatched {
+        Some(failure) => Err(failure.into()),
         None => Ok(id),
     }
 }
@@ -75,20 +83,43 @@ fn judge(config: &VolumetricConfig, name: &str, it: &StatePoint) -> Result<(), F
         Err(Failure::Usage { what, help })
     };
     if !is_inside {
-        let (axis, mm) = (it.axis, units::Short(it.at.mm()));
+        let (axis, mm) = (it.axis, Short(it.at.mm()));
         return refused(
             format!("{axis} = {mm} mm is outside the work volume, {low_mm} to {high_mm} mm"),
             "are positions millimetres from the machine's zero?".into(),
         );
     }
-    let limit_um = config.compensation.displacement_max_um;
-    if it.displacement.abs() > Metres::from_um(limit_um) {
-        let um = units::Short(it.displacement.um());
-        return refused(
-            format!("a displacement of {um} um is beyond displacement_max_um, {limit_um}"),
-            "are displacements micrometres? Otherwise permit more in [volumetric.compensation]"
-                .into(),
-        );
+    match it.value {
+        StateValue::Displacement(_, displacement) => {
+            let limit_um = config.compensation.displacement_max_um;
+            if displacement.abs() <= Metres::from_um(limit_um) {
+                return Ok(());
+            }
+            let um = Short(displacement.um());
+            refused(
+                format!("a displacement of {um} um is beyond displacement_max_um, {limit_um}"),
+                "are displacements micrometres? Otherwise permit more in [volumetric.compensation]"
+                    .into(),
+            )
+        }
+        StateValue::Roll(roll) => {
+            let own = config.roll.as_ref();
+            let own = own.filter(|own| volume_axis(own.axis) == it.axis);
+            let Some(own) = own else {
+                return refused(
+                    format!("no detector sees the slide of {} roll", it.axis),
+                    "leave its rows out, or describe [volumetric.roll]".into(),
+                );
+            };
+            let limit_arcsec = own.roll_max_arcsec;
+            if roll.abs() <= Radians::from_arcsec(limit_arcsec) {
+                return Ok(());
+            }
+            let arcsec = Short(roll.arcsec());
+            refused(
+                format!("a roll of {arcsec} arcsec is beyond roll_max_arcsec, {limit_arcsec}"),
+                "are rolls arcseconds? Otherwise permit more in [volumetric.roll]".into(),
+            )
+        }
     }
-    Ok(())
 }

@@ -4,6 +4,7 @@
 
 mod agreement;
 mod given;
+mod memory;
 mod warmth;
 
 use core::fmt;
@@ -12,7 +13,7 @@ use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
 use compensator::volumetric::model::{AxisErrors, ErrorName, Squareness};
-use compensator::volumetric::online::{BeamDrift, BeamReference, StateMap};
+use compensator::volumetric::online::{BeamDrift, BeamReference};
 use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
@@ -20,6 +21,7 @@ use crate::store::{IdentityRecord, StoreError, short};
 
 pub(crate) use agreement::AgreementRecord;
 pub(crate) use given::GivenName;
+pub use memory::{MemoryName, StateMemoryContent};
 pub(crate) use warmth::AXES;
 pub use warmth::BendRecord;
 pub(crate) use warmth::{ExpansionRecord, UnknownRecord};
@@ -371,104 +373,6 @@ impl BeamReferencesContent {
     }
 }
 
-/// Which memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MemoryName {
-    /// What the machine was built with.
-    #[default]
-    First,
-    /// What the first part was made with.
-    Second,
-}
-
-impl MemoryName {
-    /// As it is called on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::First => "first",
-            Self::Second => "second",
-        }
-    }
-}
-
-/// Displacements of one axis that are to be kept.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MemoryRecord {
-    /// `x`, `y` or `z`.
-    pub axis: char,
-    /// First and second direction.
-    pub functions: [FunctionRecord; 2],
-}
-
-/// Displacements that are to be kept.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StateMemoryContent {
-    /// Which memory.
-    pub memory: MemoryName,
-    /// The name of the references from which the displacements count.
-    pub references: String,
-    /// Of a second memory: the name of the first beyond which it counts; `None` where there was
-    /// none in use.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub first: Option<String>,
-    /// By axis.
-    pub axes: Vec<MemoryRecord>,
-}
-
-impl StateMemoryContent {
-    /// The name of this kind.
-    pub const KIND: &'static str = "state_memory";
-
-    /// What `map` keeps, counted from the references of the name `references`, and from no first
-    /// memory.
-    pub fn new(memory: MemoryName, references: &str, map: &StateMap) -> Self {
-        let axes = AXES.iter().zip(&map.of).filter_map(|(axis, functions)| {
-            let [first, second] = functions.as_ref()?;
-            Some(MemoryRecord {
-                axis: *axis,
-                functions: [
-                    FunctionRecord::of("first", first),
-                    FunctionRecord::of("second", second),
-                ],
-            })
-        });
-        Self {
-            memory,
-            references: references.to_owned(),
-            first: None,
-            axes: axes.collect(),
-        }
-    }
-
-    /// The displacements, in the record `id`.
-    ///
-    /// # Errors
-    /// When an axis is none or is there twice, or nodes form no function.
-    pub fn map(&self, id: &str) -> Result<StateMap, StoreError> {
-        let mut map = StateMap::default();
-        for record in &self.axes {
-            let [first, second] = &record.functions;
-            let functions = [first.function(id)?, second.function(id)?];
-            let place = AXES.iter().position(|it| *it == record.axis);
-            let place = place.filter(|at| map.of[*at].is_none());
-            let place = place.ok_or_else(|| no_error(id, &record.axis.to_string()))?;
-            map.of[place] = Some(functions);
-        }
-        Ok(map)
-    }
-
-    /// One line about it, for lists.
-    pub(crate) fn summary(&self) -> String {
-        let axes: String = self.axes.iter().map(|it| it.axis).collect();
-        let beyond = self.first.as_deref().map(short);
-        let beyond = beyond.map_or_else(String::new, |it| format!(", beyond the first {it}"));
-        format!("{} memory of {axes}{beyond}", self.memory.name())
-    }
-}
-
 /// The error for a record with a part that three axes do not have, or that it has twice.
 fn no_error(id: &str, name: &str) -> StoreError {
     let source = format!("`{name}` is not an error of three axes, or appears twice");
@@ -477,6 +381,8 @@ fn no_error(id: &str, name: &str) -> StoreError {
 
 #[cfg(test)]
 mod tests {
+    use compensator::volumetric::online::StateMap;
+
     use super::*;
     use crate::store::{CalibrationRecord, Content, RecordHead};
     use crate::stores::store_in;
@@ -573,12 +479,39 @@ mod tests {
         let mut map = StateMap::default();
         map.of[2] = Some([function([0.0, 5e-6, 0.0]), function([0.0; 3])]);
         let content = StateMemoryContent::new(MemoryName::Second, "r", &map);
+        assert!(
+            !serde_json::to_string(&content).unwrap().contains("rolls"),
+            "as it always was"
+        );
         let (id, content) = stored(content);
         let back = content.map(&id).unwrap();
         let [first, second] = back.at(Axis::Z, Metres(0.1));
         assert!((first - Metres(5e-6)).abs() < Metres(1e-18), "{first}");
         assert_eq!(second, Metres::ZERO);
         assert_eq!(content.memory, MemoryName::Second);
+    }
+
+    #[test]
+    fn a_memory_with_rolls_comes_back_and_one_without_keeps_none() {
+        let mut map = StateMap::default();
+        let nodes = [Metres(0.0), Metres(0.5)];
+        map.roll[0] = Some(Function::new(&nodes, &[Radians(1e-5); 2], Shape::Spline).unwrap());
+        let content = StateMemoryContent::new(MemoryName::First, "r", &map);
+        assert!(
+            content.summary().contains("and the roll of x"),
+            "{}",
+            content.summary()
+        );
+        let (id, content) = stored(content);
+        let back = content.map(&id).unwrap();
+        assert!((back.roll_at(Axis::X, Metres(0.2)).value() - 1e-5).abs() < 1e-18);
+        let mut twice = content;
+        twice.rolls.push(twice.rolls[0].clone());
+        let refused = twice.map(&id).unwrap_err().to_string();
+        assert!(refused.contains("roll of x"), "{refused}");
+        let old = r#"{"memory":"second","references":"r","axes":[]}"#;
+        let old: StateMemoryContent = serde_json::from_str(old).unwrap();
+        assert!(old.map("id").unwrap().roll.iter().all(Option::is_none));
     }
 
     #[test]

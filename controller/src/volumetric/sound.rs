@@ -196,5 +196,10 @@ fn memory(it: &StateMemoryContent) -> Judged {
             function(&format!("{place}.functions[{direction}]"), it)?;
         }
     }
+    for (at, own) in it.rolls.iter().enumerate() {
+        let place = format!("rolls[{at}]");
+        letter(&format!("{place}.axis"), own.axis, &AXES)?;
+        function(&format!("{place}.roll"), &own.roll)?;
+    }
     model("axes", it.map(""))
 }

@@ -263,3 +263,52 @@ fn a_roll_is_corrected_at_a_long_tool() {
         largest(&left).um()
     );
 }
+
+/// What is left of a deliberate roll at a long tool once `keep` has made a memory of it, and the roll itself.
+fn left_of_a_kept_roll(keep: impl Fn(&mut Volume)) -> (Vec<Off>, Vec<Off>) {
+    let long = |text: String| text.edit(TOOL, "tool_offset_mm = [0.0, 0.0, -200.0]");
+    let roll = "deliberate_roll_arcsec = 5.0";
+    let mut volume = known(1, long, "deliberate_roll_arcsec = 0.0", roll);
+    let places: Vec<[f64; 3]> = (1..=5).map(|n| [f64::from(n) * 90.0, 0.0, 0.0]).collect();
+    let expected = deliberate(&volume, &places);
+    let (mut mover, _) = volume.corrected();
+    let before = volume.visit(&mut mover, &places, &mut Vec::new());
+    assert!(volume.bench.machine.now() < Time::from_seconds(BEGINS_S));
+    idle_until(&mut volume, BEGINS_S + 5.0);
+    keep(&mut volume);
+    let (mover, mut state) = volume.corrected();
+    drop(mover);
+    // A memory that was recorded also keeps by how much the slides had drifted aside by then.
+    for map in [&mut state.memories.first, &mut state.memories.second] {
+        map.iter_mut().for_each(|it| it.of = Default::default());
+    }
+    let (mut mover, state) = volume.corrected_by(state);
+    let kept = state.memories.kept_roll(Axis::X, Metres::from_mm(250.0));
+    assert!(
+        (kept.arcsec() - 5.0).abs() < 0.3,
+        "{} arcsec",
+        kept.arcsec()
+    );
+    let after = volume.visit(&mut mover, &places, &mut Vec::new());
+    (beyond(&after, &before), expected)
+}
+
+/// 5 arcsec on a tool of 200 mm, 4.8 um, that belong to the machine, or to the first part: the tool follows.
+#[test]
+fn a_roll_that_is_kept_is_not_corrected() {
+    let designed = "axis,along,position_mm,value,unit\nx,roll,0,5,arcsec\nx,roll,500,5,arcsec\n";
+    let import = |volume: &mut Volume| volume.remember(designed);
+    let record = |volume: &mut Volume| {
+        let store = volume.bench.store.clone();
+        let recorded = volume.work().record_memory(&store, MemoryName::Second);
+        assert!(good(recorded).map.roll[0].is_some());
+    };
+    let ways: [&dyn Fn(&mut Volume); 2] = [&import, &record];
+    for keep in ways {
+        let (left, expected) = left_of_a_kept_roll(keep);
+        let off = largest(&beyond(&left, &expected));
+        eprintln!("{:.3} um off {:.3} um", off.um(), largest(&expected).um());
+        assert!(largest(&expected) > Metres::from_um(4.0));
+        assert!(off <= largest(&expected) * 0.1, "{} um", off.um());
+    }
+}

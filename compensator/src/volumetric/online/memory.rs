@@ -8,22 +8,25 @@
 //! kept = first(x) + second(x)
 //!
 //! is the state the first part was really made in, whichever of the two was on at that time.
-//! With nothing else on, it is the state itself, as in the patent.
+//! With nothing else on, it is the state itself, as in the patent. A state is displacements and, where it is
+//! watched, the roll: of both a slide is displaced by what is kept, and rolled by it.
 //!
-//! Absent: the roll as a state to be kept; storage.
+//! Absent: storage.
 
-use units::Metres;
+use units::{Metres, Quantity, Radians};
 
 use super::Displacement;
 use super::reference::difference;
 use crate::volumetric::function::{Function, FunctionError, Shape};
 use crate::volumetric::{Axis, Volume};
 
-/// Sideways displacements of all axes as functions of their positions.
+/// Sideways displacements and rolls of all axes as functions of their positions.
 #[derive(Clone, Debug, Default)]
 pub struct StateMap {
     /// By axis; `None` where nothing is kept. The ends hold beyond the nodes.
     pub of: [Option<[Function<Metres>; 2]>; 3],
+    /// Likewise the rolls.
+    pub roll: [Option<Function<Radians>>; 3],
 }
 
 impl StateMap {
@@ -34,6 +37,12 @@ impl StateMap {
             .map_or([Metres::ZERO; 2], |it| {
                 [it[0].at(position), it[1].at(position)]
             })
+    }
+
+    /// The stored roll; zero where none is stored.
+    pub fn roll_at(&self, axis: Axis, position: Metres) -> Radians {
+        let roll = self.roll[axis.index()].as_ref();
+        roll.map_or(Radians::ZERO, |it| it.at(position))
     }
 }
 
@@ -55,6 +64,19 @@ impl Memories {
         };
         let (first, second) = (at(&self.first), at(&self.second));
         [first[0] + second[0], first[1] + second[1]]
+    }
+
+    /// The roll that is to be kept.
+    pub fn kept_roll(&self, axis: Axis, position: Metres) -> Radians {
+        let each = [&self.first, &self.second].into_iter().flatten();
+        let each = each.map(|it| it.roll_at(axis, position));
+        each.fold(Radians::ZERO, |sum, it| sum + it)
+    }
+
+    /// Likewise of a roll, as [`beyond_first`](Self::beyond_first).
+    pub fn roll_beyond_first(&self, axis: Axis, position: Metres, left: Radians) -> Radians {
+        let first = self.first.as_ref();
+        left - first.map_or(Radians::ZERO, |it| it.roll_at(axis, position))
     }
 
     /// What is `left` of a displacement less what the first memory keeps: what the second is to
@@ -117,19 +139,108 @@ pub enum MemoryError {
 pub type Coverage = [Option<(Metres, Metres)>; 3];
 
 /// Sums of one stretch of an axis.
-#[derive(Clone, Copy, Debug, Default)]
-struct Bin {
+#[derive(Clone, Copy, Debug)]
+struct Bin<const N: usize> {
     count: f64,
     position: f64,
-    state: [f64; 2],
+    state: [f64; N],
+}
+
+impl<const N: usize> Bin<N> {
+    const EMPTY: Self = Self {
+        count: 0.0,
+        position: 0.0,
+        state: [0.0; N],
+    };
+}
+
+/// What was recorded of N values along one axis, by stretches of equal length.
+#[derive(Clone, Debug)]
+struct Track<const N: usize> {
+    low: f64,
+    spacing: f64,
+    bins: Vec<Bin<N>>,
+}
+
+/// Means of a track, and where they are.
+struct Means<const N: usize> {
+    nodes: Vec<Metres>,
+    values: [Vec<f64>; N],
+    /// From the first to the last place that was met.
+    range: (Metres, Metres),
+}
+
+impl<const N: usize> Track<N> {
+    fn new(low: f64, spacing: f64, stretches: usize) -> Self {
+        Self {
+            low,
+            spacing,
+            bins: vec![Bin::EMPTY; stretches],
+        }
+    }
+
+    /// What is outside or no number is ignored.
+    fn record(&mut self, position: Metres, state: [f64; N]) {
+        let place = (position.value() - self.low) / self.spacing;
+        let finite = place.is_finite() && state.iter().all(|it| it.is_finite());
+        let last = self.bins.len();
+        // The end of the axis belongs to its last stretch.
+        if !finite || place < 0.0 || place > last as f64 {
+            return;
+        }
+        let bin = &mut self.bins[(place as usize).min(last - 1)];
+        bin.count += 1.0;
+        bin.position += position.value();
+        for (sum, value) in bin.state.iter_mut().zip(state) {
+            *sum += value;
+        }
+    }
+
+    /// `None` when nothing was recorded.
+    fn means(&self, axis: Axis, limit: Metres) -> Result<Option<Means<N>>, MemoryError> {
+        let met = || self.bins.iter().filter(|it| it.count > 0.0);
+        let mut nodes: Vec<Metres> = met().map(|it| Metres(it.position / it.count)).collect();
+        let mut values: [Vec<f64>; N] =
+            core::array::from_fn(|k| met().map(|it| it.state[k] / it.count).collect());
+        let Some((&from, &to)) = nodes.first().zip(nodes.last()) else {
+            return Ok(None);
+        };
+        if let Some(gap) = nodes.windows(2).find(|it| it[1] - it[0] > limit) {
+            let (from, to) = (gap[0], gap[1]);
+            return Err(MemoryError::Gap {
+                axis,
+                from,
+                to,
+                limit,
+            });
+        }
+        // An axis that stood still is kept with what it had there.
+        if nodes.len() == 1 {
+            nodes.push(from + Metres(self.spacing));
+            values.iter_mut().for_each(|it| it.push(it[0]));
+        }
+        let range = (from, to);
+        Ok(Some(Means {
+            nodes,
+            values,
+            range,
+        }))
+    }
+}
+
+impl<const N: usize> Means<N> {
+    fn function<Q: Quantity>(&self, k: usize) -> Result<Function<Q>, FunctionError> {
+        let values: Vec<Q> = self.values[k].iter().copied().map(Q::from_value).collect();
+        Function::new(&self.nodes, &values, Shape::Linear)
+    }
 }
 
 /// Records the second memory; memory is taken when it is made, none while it records.
 #[derive(Clone, Debug)]
 pub struct StateRecorder {
     settings: RecorderSettings,
-    low: [f64; 3],
-    bins: [Vec<Bin>; 3],
+    sideways: [Track<2>; 3],
+    roll: [Track<1>; 3],
 }
 
 /// So many stretches of one axis at most.
@@ -151,37 +262,39 @@ impl StateRecorder {
         if !(spacing > Metres::ZERO && gap_max > Metres::ZERO && counts.iter().all(sound)) {
             return Err(MemoryError::Settings { spacing, gap_max });
         }
+        let low = volume.low().array();
+        let of = |k: usize| (low[k], spacing.value(), counts[k] as usize);
         Ok(Self {
             settings,
-            low: volume.low().array(),
-            bins: counts.map(|it| vec![Bin::default(); it as usize]),
+            sideways: [0, 1, 2].map(|k| {
+                let (low, spacing, stretches) = of(k);
+                Track::new(low, spacing, stretches)
+            }),
+            roll: [0, 1, 2].map(|k| {
+                let (low, spacing, stretches) = of(k);
+                Track::new(low, spacing, stretches)
+            }),
         })
     }
 
-    /// Takes the state of `axis` at `position`: the current displacement less what of it is
+    /// Takes the displacement of `axis` at `position`: the current one less what of it is
     /// compensated now and less what the first memory keeps. What is outside or no number is
     /// ignored.
     pub fn record(&mut self, axis: Axis, position: Metres, left: Displacement) {
-        let k = axis.index();
-        let place = (position.value() - self.low[k]) / self.settings.spacing.value();
-        let finite = place.is_finite() && left.iter().all(|it| it.is_finite());
-        let last = self.bins[k].len();
-        // The end of the axis belongs to its last stretch.
-        if !finite || place < 0.0 || place > last as f64 {
-            return;
-        }
-        let bin = &mut self.bins[k][(place as usize).min(last - 1)];
-        bin.count += 1.0;
-        bin.position += position.value();
-        bin.state[0] += left[0].value();
-        bin.state[1] += left[1].value();
+        self.sideways[axis.index()].record(position, left.map(Metres::value));
+    }
+
+    /// Likewise its roll.
+    pub fn record_roll(&mut self, axis: Axis, position: Metres, left: Radians) {
+        self.roll[axis.index()].record(position, [left.value()]);
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
-        for bin in self.bins.iter_mut().flatten() {
-            *bin = Bin::default();
-        }
+        let sideways = self.sideways.iter_mut().flat_map(|it| &mut it.bins);
+        sideways.for_each(|it| *it = Bin::EMPTY);
+        let roll = self.roll.iter_mut().flat_map(|it| &mut it.bins);
+        roll.for_each(|it| *it = Bin::EMPTY);
     }
 
     /// Makes a memory of what was recorded, with what it covers. An axis that stood still is
@@ -191,50 +304,21 @@ impl StateRecorder {
     /// When nothing was recorded, or a stretch without states is too long.
     pub fn finish(&self) -> Result<(StateMap, Coverage), MemoryError> {
         let (mut map, mut coverage) = (StateMap::default(), Coverage::default());
+        let limit = self.settings.gap_max;
         for axis in Axis::ALL {
-            if let Some((functions, range)) = self.axis(axis)? {
-                map.of[axis.index()] = Some(functions);
-                coverage[axis.index()] = Some(range);
+            let k = axis.index();
+            if let Some(roll) = self.roll[k].means(axis, limit)? {
+                map.roll[k] = Some(roll.function(0)?);
+                coverage[k] = Some(roll.range);
+            }
+            if let Some(sideways) = self.sideways[k].means(axis, limit)? {
+                map.of[k] = Some([sideways.function(0)?, sideways.function(1)?]);
+                coverage[k] = Some(sideways.range);
             }
         }
         if coverage.iter().all(Option::is_none) {
             return Err(MemoryError::Empty);
         }
         Ok((map, coverage))
-    }
-
-    #[expect(
-        clippy::type_complexity,
-        reason = "two functions and the range they cover"
-    )]
-    fn axis(
-        &self,
-        axis: Axis,
-    ) -> Result<Option<([Function<Metres>; 2], (Metres, Metres))>, MemoryError> {
-        let bins = &self.bins[axis.index()];
-        let met = || bins.iter().filter(|it| it.count > 0.0);
-        let mut nodes: Vec<Metres> = met().map(|it| Metres(it.position / it.count)).collect();
-        let values =
-            |k: usize| -> Vec<Metres> { met().map(|it| Metres(it.state[k] / it.count)).collect() };
-        let mut values = [values(0), values(1)];
-        let Some((&from, &to)) = nodes.first().zip(nodes.last()) else {
-            return Ok(None);
-        };
-        let limit = self.settings.gap_max;
-        if let Some(gap) = nodes.windows(2).find(|it| it[1] - it[0] > limit) {
-            let (from, to) = (gap[0], gap[1]);
-            return Err(MemoryError::Gap {
-                axis,
-                from,
-                to,
-                limit,
-            });
-        }
-        if nodes.len() == 1 {
-            nodes.push(from + self.settings.spacing);
-            values.iter_mut().for_each(|it| it.push(it[0]));
-        }
-        let function = |k: usize| Function::new(&nodes, &values[k], Shape::Linear);
-        Ok(Some(([function(0)?, function(1)?], (from, to))))
     }
 }

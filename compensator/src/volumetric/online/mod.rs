@@ -22,7 +22,7 @@
 //! at the end of travel count the *beam's*. So D and E are deviations (actual − target), like
 //! everything in this package, and the compensation is −E.
 //!
-//! [`AxisMonitor`] puts the parts of one axis together.
+//! [`AxisMonitor`] puts the parts of one axis together, [`RollMonitor`] those of its roll.
 //! [`Feed`] keeps every value that comes from outside without a jump, whatever happens to the
 //! detector; [`Offset`] brings the sum onto the axes within limits of size, rate and slope.
 //!
@@ -38,6 +38,7 @@ mod monitor;
 mod offset;
 mod reference;
 mod roll;
+mod roll_monitor;
 mod stuck;
 mod temperature;
 mod trouble;
@@ -53,6 +54,7 @@ pub use monitor::{AxisMonitor, EndOfTravel};
 pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
+pub use roll_monitor::RollMonitor;
 pub use stuck::StuckWatch;
 pub use temperature::{TemperatureChannel, TemperatureSettings};
 pub use trouble::Trouble;

@@ -592,6 +592,82 @@ fn the_second_memory_keeps_what_the_first_part_was_made_with() {
     assert_eq!(coverage[1], None);
 }
 
+fn roll_of(arcsec: f64) -> Function<Radians> {
+    let nodes = [Metres(0.0), Metres(0.1)];
+    Function::new(&nodes, &[Radians::from_arcsec(arcsec); 2], Shape::Linear).unwrap()
+}
+
+/// 6 arcsec, of which the first memory keeps 2: a first part that is made with all of it is met again.
+#[test]
+fn memories_keep_the_roll_as_they_keep_displacements() {
+    let arcsec = Radians::from_arcsec;
+    let mut first = StateMap::default();
+    first.roll[1] = Some(roll_of(2.0));
+    let mut memories = Memories {
+        first: Some(first),
+        second: None,
+    };
+    let mut recorder = recorder(5.0);
+    for k in 0..=100 {
+        let at = Metres(0.1 * f64::from(k) / 100.0);
+        let beyond = memories.roll_beyond_first(Axis::Y, at, arcsec(6.0));
+        recorder.record_roll(Axis::Y, at, beyond);
+    }
+    let (second, covers) = recorder.finish().unwrap();
+    assert!(
+        covers[1].is_some() && second.of[1].is_none(),
+        "the roll alone is a state"
+    );
+    memories.second = Some(second);
+    let kept = memories.kept_roll(Axis::Y, Metres(0.04)).arcsec();
+    assert!((kept - 6.0).abs() < 1e-9, "{kept}");
+    assert_eq!(memories.kept_roll(Axis::X, Metres(0.04)), Radians::ZERO);
+}
+
+/// 1 arcsec of reference, 2 that are kept, 3 beyond: 3 are compensated, and the slide's detectors sit on 5.
+#[test]
+fn a_roll_is_compensated_beyond_what_is_kept_and_seen_whole() {
+    let arcsec = Radians::from_arcsec;
+    let mut first = StateMap::default();
+    first.roll[0] = Some(roll_of(2.0));
+    let memories = Memories {
+        first: Some(first),
+        second: None,
+    };
+    let check = |seen: Radians, expected: f64| {
+        let seen = seen.arcsec();
+        assert!(
+            (seen - expected).abs() < 1e-9,
+            "{seen}, expected {expected}"
+        );
+    };
+    let feed = || Feed::new(settings(Reaction::FadeOut(millis(10))));
+    let mut monitor = RollMonitor::new(Axis::X, roll_of(1.0), feed());
+    let mut left = monitor.clone();
+    left.leave(ms(0));
+    let read = |monitor: &mut RollMonitor, at: u64, seen| {
+        monitor.advance(ms(at), Metres(0.05), seen, &memories)
+    };
+    for at in 0..=20 {
+        read(&mut monitor, at, Ok(arcsec(6.0)));
+        read(&mut left, at, Ok(arcsec(6.0)));
+    }
+    check(read(&mut monitor, 21, Ok(arcsec(6.0))), 3.0);
+    check(monitor.whole(), 5.0);
+    check(monitor.uncompensated().unwrap(), 2.0);
+    assert_eq!(monitor.status(), FeedStatus::Good);
+    // Left as it is, and known all the same.
+    check(read(&mut left, 21, Ok(arcsec(6.0))), 0.0);
+    check(left.whole(), 5.0);
+    check(left.uncompensated().unwrap(), 5.0);
+    // Detectors that fail: what is kept is still taken to be there.
+    for at in 22..60 {
+        read(&mut monitor, at, Err(BLOCKED));
+    }
+    check(monitor.whole(), 2.0);
+    assert_eq!(monitor.uncompensated(), None);
+}
+
 #[test]
 fn a_first_part_that_left_a_stretch_out_or_was_never_made_is_refused() {
     assert_eq!(recorder(5.0).finish().map(|_| ()), Err(MemoryError::Empty));

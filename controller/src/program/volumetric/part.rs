@@ -256,11 +256,23 @@ fn kept_text(kept: &Remembered) -> String {
         Some(format!("{axis} {:.3} to {:.3} mm", from.mm(), to.mm()))
     });
     let axes: Vec<String> = axes.collect();
+    let rolls = rolls_of(kept);
+    let rolls = match rolls.is_empty() {
+        true => String::new(),
+        false => format!(", with the roll of {}", rolls.join(", ")),
+    };
     format!(
-        "recorded along {}; beyond that, the values at the ends hold{}",
+        "recorded along {}{rolls}; beyond that, the values at the ends hold{}",
         axes.join(", "),
         foreign_text(kept.foreign.as_deref())
     )
+}
+
+/// The axes whose rolls are kept.
+fn rolls_of(kept: &Remembered) -> Vec<String> {
+    let rolls = Axis::ALL.into_iter().zip(&kept.map.roll);
+    let rolls = rolls.filter(|(_, roll)| roll.is_some());
+    rolls.map(|(axis, _)| axis.to_string()).collect()
 }
 
 /// A second memory that no longer fits the first.
@@ -280,7 +292,8 @@ fn kept_value(kept: &Remembered) -> Value {
         let (from, to) = covers?;
         Some(json!({"axis": axis.to_string(), "from_mm": from.mm(), "to_mm": to.mm()}))
     });
-    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "foreign_second": kept.foreign})
+    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "rolls": rolls_of(kept),
+           "foreign_second": kept.foreign})
 }
 
 pub(crate) fn memory_import(args: &ImportArgs, output: Output) -> Ended {

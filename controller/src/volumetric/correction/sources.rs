@@ -13,18 +13,21 @@ use crate::volumetric::thermometers::Thermometers;
 use machine::engine::Source;
 
 impl VolumetricCorrection {
-    /// Watches displacements without compensating them from now on: the machine is made to be as it
-    /// is this hour. Tables, roll and temperatures go on. To be said before it is in use.
+    /// Watches displacements and rolls without compensating them from now on: the machine is made to be
+    /// as it is this hour. Tables and temperatures go on. To be said before it is in use.
     #[must_use]
-    pub fn leaving_displacements(mut self) -> Self {
+    pub fn leaving_the_state(mut self) -> Self {
+        let now = Time::ZERO;
         for beam in self.beams.iter_mut().flatten() {
-            let now = Time::ZERO;
             beam.monitor.feed_mut().disable(now, Duration::ZERO);
+        }
+        if let Some(roll) = &mut self.roll {
+            roll.monitor.leave(now);
         }
         self
     }
 
-    /// Tells `recorder` what displacements the machine was left with in the last period at
+    /// Tells `recorder` what displacements and rolls the machine was left with in the last period at
     /// `actual`, beyond what the first memory keeps. Allocates nothing.
     pub(in crate::volumetric) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
         for axis in Axis::ALL {
@@ -35,6 +38,13 @@ impl VolumetricCorrection {
             let position = actual.along(axis);
             let beyond = self.memories.beyond_first(axis, position, left);
             recorder.record(axis, position, beyond);
+        }
+        let roll = self.roll.as_ref();
+        let left = roll.and_then(|it| Some((it.axis, it.monitor.uncompensated()?)));
+        if let Some((axis, left)) = left {
+            let position = actual.along(axis);
+            let beyond = self.memories.roll_beyond_first(axis, position, left);
+            recorder.record_roll(axis, position, beyond);
         }
     }
 
@@ -48,7 +58,7 @@ impl VolumetricCorrection {
             core::iter::once((Source::Slide(axis), slider)).chain(end)
         });
         let roll = self.roll.iter();
-        let roll = roll.map(|it| (Source::Roll(it.axis), it.feed.status()));
+        let roll = roll.map(|it| (Source::Roll(it.axis), it.monitor.status()));
         let thermometers = self.thermometers.iter().flat_map(Thermometers::statuses);
         let thermometers = thermometers.enumerate();
         let thermometers = thermometers.map(|(at, it)| (Source::Thermometer(at), it));
@@ -69,7 +79,7 @@ impl VolumetricCorrection {
         if let (Some(own), Some(before)) = (&mut self.roll, &before.roll)
             && own.axis == before.axis
         {
-            own.feed.take_over(&before.feed);
+            own.monitor.take_over(&before.monitor);
         }
         if let (Some(own), Some(before)) = (&mut self.thermometers, &before.thermometers) {
             own.take_over(before);

@@ -31,8 +31,8 @@ impl VolumetricCorrection {
     /// Likewise of a roll.
     fn u_roll(&self) -> Radians {
         match &self.roll {
-            Some(roll) if roll.feed.status() == FeedStatus::Good => {
-                Radians(hypot(self.u_roll.value(), roll.feed.left().value()))
+            Some(roll) if roll.monitor.status() == FeedStatus::Good => {
+                Radians(hypot(self.u_roll.value(), roll.monitor.left().value()))
             }
             Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
             None => self.u_roll,
