@@ -131,7 +131,7 @@ fn risen(bench: &Bench, seen: &Seen) -> VolumetricState {
         let slider = [constant(first), constant(second - up)];
         Some(BeamReference::new(slider, end, drift).expect("sound"))
     });
-    let roll = config.roll.as_ref().expect("it has one");
+    let roll = config.rolls()[0].expect("it has one");
     let optics = roll_optics(roll).expect("it was checked");
     let reading = |k: usize| {
         let volts = seen.0[24 + k].expect("all have sent").volts;
@@ -141,7 +141,7 @@ fn risen(bench: &Bench, seen: &Seen) -> VolumetricState {
     let temperatures = seen.1.iter().flatten().filter_map(|it| it.celsius);
     VolumetricState {
         beams,
-        roll: Some(constant::<Radians>(angle)),
+        rolls: [Some(constant::<Radians>(angle)), None, None],
         temperatures: temperatures.collect::<Vec<Celsius>>(),
         ..VolumetricState::default()
     }
@@ -482,8 +482,9 @@ fn the_other_axes_stay_corrected() {
 fn what_a_detector_sees_of_a_roll_comes_and_goes_with_it() {
     let (mut bench, seen) = standing("fade_out");
     let mut state = risen(&bench, &seen);
-    let roll = state.roll.expect("it has one").at(PLACE[0]);
-    state.roll = Some(constant(roll - Radians(100e-6)));
+    let [roll, ..] = &mut state.rolls;
+    let seen = roll.as_ref().expect("it has one").at(PLACE[0]);
+    *roll = Some(constant(seen - Radians(100e-6)));
     let correction = VolumetricCorrection::new(&bench.loaded.config, state);
     let correction = Box::new(correction.unwrap_or_else(|it| panic!("{it}")));
     let fault = FaultConfig::lasting(x_blocked(), Duration::from_millis(2) * END_AT as u32);

@@ -85,7 +85,7 @@ pub fn nothing_known(config: &MachineConfig) -> VolumetricState {
     let roll = Function::new(&ends, &[Radians(0.0); 2], Shape::Linear);
     VolumetricState {
         beams,
-        roll: roll.ok(),
+        rolls: [roll.ok(), None, None],
         temperatures: vec![Celsius(21.0); config.temperature.len()],
         ..VolumetricState::default()
     }

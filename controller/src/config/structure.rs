@@ -53,7 +53,7 @@ fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
         let words = words.filter_map(|it| it["properties"][DEVICE]["const"].as_str());
         return name(path, value, &words.collect::<Vec<_>>(), findings);
     }
-    let schema = without_null(schema);
+    let schema = fitting(schema, value);
     if let Some(names) = names(schema) {
         return name(path, value, &names, findings);
     }
@@ -70,6 +70,18 @@ fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
             say(findings, path, cause, correction(expected, value));
         }
     }
+}
+
+/// Of a section that may be a list as well, that which `value` is.
+fn fitting<'a>(schema: &'a Schema, value: &Value) -> &'a Schema {
+    let wanted = match value {
+        Value::Table(_) => "object",
+        Value::Array(_) => "array",
+        _ => return without_null(schema),
+    };
+    let choices = schema["anyOf"].as_array();
+    let fits = choices.and_then(|it| it.iter().find(|it| type_of(it) == wanted));
+    fits.unwrap_or_else(|| without_null(schema))
 }
 
 fn in_words(expected: &str) -> &'static str {

@@ -190,7 +190,7 @@ fn check_compensation(
 
 fn check_feed(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     let detectors = volumetric.beam.each().iter().any(Option::is_some)
-        || volumetric.roll.is_some()
+        || !volumetric.roll.each().is_empty()
         || !volumetric.temperature.is_empty();
     let Some(feed) = &volumetric.feed else {
         if detectors {

@@ -5,11 +5,15 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 mod detectors;
+mod one_or_more;
 
 pub(crate) use detectors::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, LayoutName,
     RollConfig, TemperatureConfig,
 };
+pub(crate) use one_or_more::OneOrMore;
+#[cfg(test)]
+pub(crate) use one_or_more::tests::with_three_rolls;
 
 /// Three axes corrected throughout their volume (system S4).
 ///
@@ -48,8 +52,9 @@ pub struct VolumetricConfig {
     /// The reference beams, of the axes that have one.
     #[serde(default)]
     pub beam: BeamsConfig,
-    /// Two detectors that see one slide roll.
-    pub roll: Option<RollConfig>,
+    /// Two detectors that see one slide roll; a list, `[[volumetric.roll]]`, where several slides have two.
+    #[serde(default)]
+    pub roll: OneOrMore<RollConfig>,
     /// Thermometers, and what warmth does; counted from 0 in their order.
     #[serde(default)]
     pub temperature: Vec<TemperatureConfig>,
@@ -70,6 +75,14 @@ pub struct VolumetricConfig {
     pub verify: Option<VolumetricVerifyConfig>,
     /// How the errors are compensated, and the limits.
     pub compensation: VolumetricCompensationConfig,
+}
+
+impl VolumetricConfig {
+    /// The roll detectors of x, y and z.
+    pub fn rolls(&self) -> [Option<&RollConfig>; 3] {
+        let axes = [VolumeAxisName::X, VolumeAxisName::Y, VolumeAxisName::Z];
+        axes.map(|axis| self.roll.each().iter().find(|it| it.axis == axis))
+    }
 }
 
 /// One of the three directions.

@@ -31,13 +31,13 @@ use crate::volumetric::VolumetricFailure;
 use crate::volumetric::inputs::{RollReader, confirmed_by_samples, place_of_voltage, sample};
 use crate::volumetric::limits;
 use crate::volumetric::settings::{
-    beam_detector, feed_settings, influences, point_of_mm, thermal, volume_axis, volumetric_chain,
-    work_volume,
+    beam_detector, feed_settings, influences, point_of_mm, roll_max, thermal, volume_axis,
+    volumetric_chain, work_volume,
 };
 use crate::volumetric::thermometers::Thermometers;
 use crate::volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, ReactionName, RollConfig,
-    VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, OneOrMore, ReactionName,
+    RollConfig, VolumetricConfig,
 };
 use machine::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
 
@@ -54,8 +54,8 @@ pub struct VolumetricState {
     pub expansions: Vec<IdentifiedExpansion>,
     /// What the detectors of each axis read; needed for each beam of the configuration.
     pub beams: [Option<BeamReference>; 3],
-    /// What the roll detectors read along their axis; needed where there are some.
-    pub roll: Option<Function<Radians>>,
+    /// What the roll detectors of x, y and z read along their axis; needed where there are some.
+    pub rolls: [Option<Function<Radians>>; 3],
     /// What the thermometers showed, in the order of the configuration.
     pub temperatures: Vec<Celsius>,
     /// What is to be kept although it deviates.
@@ -86,7 +86,7 @@ pub struct VolumetricCorrection {
     model: VolumetricModel,
     tool: Point,
     beams: [Option<WatchedBeam>; 3],
-    roll: Option<WatchedRoll>,
+    rolls: [Option<WatchedRoll>; 3],
     thermometers: Option<Thermometers>,
     temperatures: Vec<Celsius>,
     influences: Influences,
@@ -126,10 +126,12 @@ impl VolumetricCorrection {
                 beams[axis.index()] = Some(watched_beam(config, own, beam, reference, lever)?);
             }
         }
-        let roll = match &own.roll {
-            Some(roll) => Some(watched_roll(config, own, roll, state.roll)?),
-            None => None,
-        };
+        let mut rolls = [None, None, None];
+        for ((watched, roll), reference) in rolls.iter_mut().zip(own.rolls()).zip(state.rolls) {
+            if let Some(roll) = roll {
+                *watched = Some(watched_roll(config, own, roll, reference)?);
+            }
+        }
         let thermometers = match &*own.temperature {
             [] => None,
             each => {
@@ -141,14 +143,14 @@ impl VolumetricCorrection {
             model,
             tool: point_of_mm(own.tool_offset_mm),
             beams,
-            roll,
+            rolls,
             thermometers,
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
             reaction: own.feed.as_ref().map(|it| it.reaction),
             u_displacement: u_displacement(own),
-            u_roll: own.roll.as_ref().map_or(Radians::ZERO, u_roll),
+            u_roll: u_roll(own),
         })
     }
 
@@ -164,7 +166,8 @@ impl VolumetricCorrection {
         let mut blind = config.clone();
         if let Some(own) = &mut blind.volumetric {
             own.beam = BeamsConfig::default();
-            (own.roll, own.temperature, own.bend) = (None, Vec::new(), Vec::new());
+            own.roll = OneOrMore::default();
+            (own.temperature, own.bend) = (Vec::new(), Vec::new());
         }
         let state = VolumetricState {
             axes: state.axes,
@@ -184,7 +187,7 @@ impl VolumetricCorrection {
         let mut state = MovingState::default();
         // Tilts come first: a detector beside its slide's zero sees them too, also those that are kept.
         let mut whole = [Radians::ZERO; 3];
-        if let Some(roll) = &mut self.roll {
+        for roll in self.rolls.iter_mut().flatten() {
             let (position, k) = (actual.along(roll.axis), roll.axis.index());
             let read = roll.reader.read(observed);
             let monitor = &mut roll.monitor;
@@ -306,9 +309,13 @@ fn u_displacement(config: &VolumetricConfig) -> Metres {
     each.fold(Metres::ZERO, Quantity::max)
 }
 
-fn u_roll(config: &RollConfig) -> Radians {
-    let noise_arcsec = config.noise_max_arcsec / NOISE_RANGE;
-    Radians::from_arcsec(config.standard_uncertainty_arcsec.unwrap_or(noise_arcsec))
+/// Likewise of a roll.
+fn u_roll(config: &VolumetricConfig) -> Radians {
+    let each = config.roll.each().iter().map(|it| {
+        let noise_arcsec = it.noise_max_arcsec / NOISE_RANGE;
+        Radians::from_arcsec(it.standard_uncertainty_arcsec.unwrap_or(noise_arcsec))
+    });
+    each.fold(Radians::ZERO, Quantity::max)
 }
 
 fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {
@@ -331,10 +338,7 @@ fn model(config: &VolumetricConfig, state: &VolumetricState) -> Result<Model, Vo
         thermal,
         tool_max: Metres::from_mm(config.tool_max_mm),
         displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-        roll_max: config
-            .roll
-            .as_ref()
-            .map_or(Radians::ZERO, |it| Radians::from_arcsec(it.roll_max_arcsec)),
+        roll_max: roll_max(config),
     })
 }
 

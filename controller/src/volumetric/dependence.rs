@@ -26,8 +26,16 @@ fn say_volumetric(mut place: Place<'_>, config: &MachineConfig, volumetric: &Vol
             say_beam(place.at("beam").at(axis), config, beam);
         }
     }
-    if let Some(roll) = &volumetric.roll {
-        say_roll(place.at("roll"), config, roll);
+    // That of one slide was published like this, and is the same in a list.
+    match volumetric.roll.each() {
+        [roll] => say_roll(place.at("roll"), config, roll),
+        _ => {
+            for (axis, roll) in ["x", "y", "z"].into_iter().zip(volumetric.rolls()) {
+                if let Some(roll) = roll {
+                    say_roll(place.at("roll").at(axis), config, roll);
+                }
+            }
+        }
     }
     for (number, thermometer) in volumetric.temperature.iter().enumerate() {
         let mut place = place.at(format!("temperature[{number}]"));

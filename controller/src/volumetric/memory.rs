@@ -16,7 +16,6 @@ use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::correction::{bends, lever};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::References;
-use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{AXES, MemoryName, StateMemoryContent};
 use crate::volumetric::{BeamConfig, VolumetricConfig};
 use crate::volumetric::{
@@ -70,9 +69,7 @@ impl WorkVolume<'_> {
             map.of[axis.index()] = Some(functions);
             covers[axis.index()] = nodes.first().copied().zip(nodes.last().copied());
         }
-        for (axis, roll) in present_roll(&config, &state, &now)? {
-            map.roll[axis.index()] = Some(roll);
-        }
+        map.roll = present_rolls(&config, &state, &now)?;
         self.keep_memory(store, memory, &records, (map, covers), "memory record")
     }
 
@@ -206,9 +203,13 @@ fn present(
     let (Some(seen), Some(record), Some(reference)) = (seen, record, reference) else {
         return Ok(None);
     };
-    let roll_now = now.content.roll("the present state")?;
-    let rolls = config.roll.as_ref().map(|it| volume_axis(it.axis)) == Some(axis);
-    let rolls = roll_now.zip(state.roll.as_ref()).filter(|_| rolls);
+    let [x, y, z] = now.content.rolls("the present state", config)?;
+    let roll_now = match axis {
+        Axis::X => x,
+        Axis::Y => y,
+        Axis::Z => z,
+    };
+    let rolls = roll_now.zip(state.rolls[axis.index()].as_ref());
     let roll = |at: Metres| {
         let beyond = rolls.as_ref().map(|(now, then)| now.at(at) - then.at(at));
         beyond.unwrap_or(Radians(0.0))
@@ -226,28 +227,29 @@ fn present(
     Ok(Some((nodes, displacements)))
 }
 
-/// The roll beyond its reference and beyond what the first memory keeps, of the slide whose roll is read.
-fn present_roll(
+/// The rolls beyond their references and beyond what the first memory keeps, of each slide whose roll is read.
+fn present_rolls(
     config: &VolumetricConfig,
     state: &VolumetricState,
     now: &References,
-) -> Result<Option<(Axis, Function<Radians>)>, Failure> {
-    let watched = config.roll.as_ref();
-    let (Some(own), Some(record)) = (watched, &now.content.roll) else {
-        return Ok(None);
-    };
-    let axis = volume_axis(own.axis);
-    let seen = record.function::<Radians>("the present state")?;
-    let reference = state.roll.as_ref();
-    let reference = reference.ok_or(VolumetricFailure::NoRollReference)?;
-    let nodes: Vec<Metres> = seen.nodes().collect();
-    let beyond = nodes.iter().map(|at| {
-        let left = seen.at(*at) - reference.at(*at);
-        state.memories.roll_beyond_first(axis, *at, left)
-    });
-    let beyond: Vec<Radians> = beyond.collect();
-    let roll = Function::new(&nodes, &beyond, Shape::Spline);
-    Ok(Some((axis, roll.map_err(VolumetricFailure::from)?)))
+) -> Result<[Option<Function<Radians>>; 3], Failure> {
+    let mut rolls = now.content.rolls("the present state", config)?;
+    for (axis, roll) in Axis::ALL.into_iter().zip(&mut rolls) {
+        let Some(seen) = roll else {
+            continue;
+        };
+        let reference = state.rolls[axis.index()].as_ref();
+        let reference = reference.ok_or(VolumetricFailure::NoRollReference)?;
+        let nodes: Vec<Metres> = seen.nodes().collect();
+        let beyond = nodes.iter().map(|at| {
+            let left = seen.at(*at) - reference.at(*at);
+            state.memories.roll_beyond_first(axis, *at, left)
+        });
+        let beyond: Vec<Radians> = beyond.collect();
+        let beyond = Function::new(&nodes, &beyond, Shape::Spline);
+        *roll = Some(beyond.map_err(VolumetricFailure::from)?);
+    }
+    Ok(rolls)
 }
 
 fn functions(

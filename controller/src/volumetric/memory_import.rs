@@ -11,7 +11,6 @@ use crate::failure::Failure;
 use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::memory::foreign_second;
 use crate::volumetric::reference::measured_geometry;
-use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{
     AXES, BeamReferencesContent, MemoryName, REFERENCES, Remembered, StateMemoryContent,
     VolumetricConfig, VolumetricFailure, memory_pointer,
@@ -30,7 +29,7 @@ pub fn import(
 ) -> Result<Remembered, Failure> {
     let config = machine.volumetric.as_ref().ok_or(VolumetricFailure::None)?;
     let series = StateSeries::from_csv(text, name)?;
-    let references = references(store, &series)?;
+    let references = references(config, store, &series)?;
     for point in series.points() {
         judge(config, name, point)?;
     }
@@ -47,7 +46,11 @@ pub fn import(
 }
 
 /// The name of the references in use, which watch every axis of the shape.
-fn references(store: &Store, series: &StateSeries) -> Result<String, Failure> {
+fn references(
+    config: &VolumetricConfig,
+    store: &Store,
+    series: &StateSeries,
+) -> Result<String, Failure> {
     let geometry = measured_geometry(store)?;
     let axis = series.points()[0].axis;
     let none = || VolumetricFailure::NoReference { axis };
@@ -63,7 +66,7 @@ fn references(store: &Store, series: &StateSeries) -> Result<String, Failure> {
             (!is_watched).then_some(VolumetricFailure::NoReference { axis: it.axis })
         }
         StateValue::Roll(_) => {
-            let is_watched = content.roll.is_some();
+            let is_watched = content.roll_record(config, it.axis).is_some();
             (!is_watched).then_some(VolumetricFailure::NoRollReference)
         }
     });
@@ -103,9 +106,7 @@ fn judge(config: &VolumetricConfig, name: &str, it: &StatePoint) -> Result<(), F
             )
         }
         StateValue::Roll(roll) => {
-            let own = config.roll.as_ref();
-            let own = own.filter(|own| volume_axis(own.axis) == it.axis);
-            let Some(own) = own else {
+            let Some(own) = config.rolls()[it.axis.index()] else {
                 return refused(
                     format!("no detector sees the slide of {} roll", it.axis),
                     "leave its rows out, or describe [volumetric.roll]".into(),

@@ -67,7 +67,7 @@ pub(crate) use calibrate::Scatter;
 pub(crate) use calibrate::VolumetricCalibrated;
 pub(crate) use config::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
-    FeedConfig, InfluenceConfig, LayoutName, ReactionName, RollConfig, ShapeName,
+    FeedConfig, InfluenceConfig, LayoutName, OneOrMore, ReactionName, RollConfig, ShapeName,
     TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
     VolumetricConfig, VolumetricVerifyConfig,
 };

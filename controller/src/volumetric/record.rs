@@ -5,6 +5,7 @@
 mod agreement;
 mod given;
 mod memory;
+mod rolls;
 mod warmth;
 
 use core::fmt;
@@ -22,6 +23,7 @@ use crate::store::{IdentityRecord, StoreError, short};
 pub(crate) use agreement::AgreementRecord;
 pub(crate) use given::GivenName;
 pub use memory::{MemoryName, StateMemoryContent};
+pub(crate) use rolls::RollRecord;
 pub(crate) use warmth::AXES;
 pub use warmth::BendRecord;
 pub(crate) use warmth::{ExpansionRecord, UnknownRecord};
@@ -316,8 +318,11 @@ pub struct BeamReferencesContent {
     pub geometry: String,
     /// By axis.
     pub beams: Vec<BeamRecord>,
-    /// The roll along its axis.
+    /// The roll along its axis, where only one slide's is read.
     pub roll: Option<FunctionRecord>,
+    /// The rolls, where several are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rolls: Vec<RollRecord>,
     /// How they were given beforehand, by the file that `source` names; `None` where detectors were read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub given: Option<GivenName>,
@@ -351,18 +356,10 @@ impl BeamReferencesContent {
             .map_err(|source| StoreError::model(&short(id), source))
     }
 
-    /// The reference of the roll, in the record `id`; `None` where there is none.
-    ///
-    /// # Errors
-    /// When nodes form no function.
-    pub fn roll(&self, id: &str) -> Result<Option<Function<Radians>>, StoreError> {
-        self.roll.as_ref().map(|it| it.function(id)).transpose()
-    }
-
     /// One line about it, for lists.
     pub(crate) fn summary(&self) -> String {
         let axes: String = self.beams.iter().map(|it| it.axis).collect();
-        let roll = if self.roll.is_some() { " and roll" } else { "" };
+        let roll = self.rolls_text();
         let given = self.given.map_or_else(String::new, |it| {
             format!(", given beforehand as {}", it.words())
         });
@@ -467,15 +464,13 @@ mod tests {
                 drift: None,
                 wandered_m: None,
             }],
-            roll: None,
-            given: None,
+            ..BeamReferencesContent::default()
         };
         let (id, content) = stored(content);
         let drift = BeamDrift::Translating;
         let beam = content.beam(&id, Axis::Y, drift).unwrap().unwrap();
         assert_eq!(beam.end(), [Metres(1e-5), Metres(-2e-5)]);
         assert!(content.beam(&id, Axis::X, drift).unwrap().is_none());
-        assert!(content.roll(&id).unwrap().is_none());
         let mut map = StateMap::default();
         map.of[2] = Some([function([0.0, 5e-6, 0.0]), function([0.0; 3])]);
         let content = StateMemoryContent::new(MemoryName::Second, "r", &map);

@@ -158,10 +158,9 @@ impl WorkVolume<'_> {
             self.core.enable(axis)?;
         }
         let mut thermometry = Thermometry::new(self.core.config, &config.temperature);
-        let mut content = BeamReferencesContent::default();
+        let (mut content, mut rolls) = (BeamReferencesContent::default(), Vec::new());
         for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
-            let roll = config.roll.as_ref();
-            let roll = roll.filter(|it| volume_axis(it.axis) == axis);
+            let roll = config.rolls()[axis.index()];
             if beam.is_none() && roll.is_none() {
                 continue;
             }
@@ -170,9 +169,10 @@ impl WorkVolume<'_> {
                 content.beams.push(stops.beam(axis, beam)?);
             }
             if roll.is_some() {
-                content.roll = Some(stops.roll()?);
+                rolls.push((axis, stops.roll()?));
             }
         }
+        content.set_rolls(rolls);
         if thermometry.is_empty() && !config.temperature.is_empty() {
             for still in &self.watch_at_rest(WARMTH_SAMPLES)? {
                 thermometry.add(still.now, &still.temperatures)?;

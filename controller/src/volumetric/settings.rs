@@ -11,7 +11,7 @@ use compensator::volumetric::online::{
     Reaction, RollError, RollOptics, SettingsError, TemperatureSettings,
 };
 use compensator::volumetric::{Axis, Point, Volume, VolumeError};
-use units::{Celsius, Metres, MetresPerSecond, Radians, Volts};
+use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians, Volts};
 
 use crate::hardware::CHECKED;
 use crate::volumetric::DriftRecord;
@@ -171,6 +171,13 @@ pub fn roll_optics(config: &RollConfig) -> Result<RollOptics, RollError> {
         Radians::from_degrees(config.inclination_deg),
         Radians::from_arcsec(config.roll_max_arcsec),
     )
+}
+
+/// The largest roll that any detectors may report.
+pub(crate) fn roll_max(config: &VolumetricConfig) -> Radians {
+    let each = config.roll.each().iter();
+    let each = each.map(|it| Radians::from_arcsec(it.roll_max_arcsec));
+    each.fold(Radians(0.0), Quantity::max)
 }
 
 /// What a temperature can be.

@@ -22,8 +22,7 @@ use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
 use crate::volumetric::reference::mean::Mean;
 use crate::volumetric::settings::{beam_detector, volume_axis};
 use crate::volumetric::{
-    AXES, BeamDetectorConfig, BeamReferencesContent, REFERENCES, RollConfig, VolumetricConfig,
-    VolumetricFailure,
+    AXES, BeamDetectorConfig, BeamReferencesContent, REFERENCES, RollConfig, VolumetricFailure,
 };
 
 /// What a detector sees.
@@ -118,8 +117,11 @@ impl Sights {
                 watched.push(beam_eye(config, (axis, "end"), end, known)?);
             }
         }
-        for roll in rolls(own) {
-            let known = references.and_then(|it| it.roll.as_ref());
+        for (axis, roll) in Axis::ALL.into_iter().zip(own.rolls()) {
+            let Some(roll) = roll else {
+                continue;
+            };
+            let known = references.and_then(|it| it.roll_record(own, axis));
             watched.push(roll_eye(config, roll, known.map(|it| ends(&it.values_si)))?);
         }
         Ok(Self { watched })
@@ -142,10 +144,6 @@ impl Sights {
         let each = self.watched.iter_mut();
         each.map(|it| it.look(now)).collect()
     }
-}
-
-fn rolls(config: &VolumetricConfig) -> impl Iterator<Item = &RollConfig> {
-    config.roll.iter()
 }
 
 /// The smallest and the largest.

@@ -185,6 +185,14 @@ pub(super) fn references(it: &BeamReferencesContent) -> Judged {
             number(&key, own.translation_share, &RATIO)?;
         }
     }
+    for (at, own) in it.rolls.iter().enumerate() {
+        let place = format!("rolls[{at}]");
+        letter(&format!("{place}.axis"), own.axis, &AXES)?;
+        let is_new = it.rolls[..at].iter().all(|before| before.axis != own.axis);
+        let expected = || "each axis once".to_owned();
+        is(&place, is_new, expected, || format!("`{}` again", own.axis))?;
+        function(&format!("{place}.roll"), &own.roll)?;
+    }
     it.roll.as_ref().map_or(Ok(()), |it| function("roll", it))
 }
 

@@ -122,7 +122,7 @@ impl WorkVolume<'_> {
                 .into());
             }
             state.beams = beams(&id, &references, config)?;
-            state.roll = references.roll(&id)?;
+            state.rolls = references.rolls(&id, config)?;
             records.references = Some(id);
         }
         state.memories = memories(&reader, &mut records, wanted)?;

@@ -25,6 +25,7 @@ mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
 mod volumetric_resume;
+mod volumetric_rolls;
 mod volumetric_scatter;
 mod wrong_position;
 mod zero_uncertainty;

@@ -81,7 +81,7 @@ fn volumetric(config: &MachineConfig, volumetric: &VolumetricConfig) -> String {
     for it in volumetric.beam.each() {
         text += &it.map_or_else(|| "\nno beam".into(), |it| beam(config, it));
     }
-    if let Some(it) = &volumetric.roll {
+    for it in volumetric.rolls().into_iter().flatten() {
         text += &roll(config, it);
     }
     for it in &volumetric.temperature {

@@ -84,10 +84,9 @@ fn in_use_text(id: &str, content: &BeamReferencesContent) -> String {
     format!(
         "references {} of the beams of {axes}{} are in use, for the errors {}",
         short(id),
-        if content.roll.is_some() {
-            " and the roll"
-        } else {
-            ""
+        match content.roll {
+            Some(_) => " and the roll".to_owned(),
+            None => content.rolls_text(),
         },
         short(&content.geometry)
     )

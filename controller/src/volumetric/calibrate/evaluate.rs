@@ -139,7 +139,7 @@ impl VolumetricEvaluated {
                 state.beams[axis.index()] = references.beam("these references", axis, drift)?;
             }
         }
-        state.roll = references.roll("these references")?;
+        state.rolls = references.rolls("these references", own)?;
         VolumetricCorrection::new(config, state)?;
         Ok(())
     }

@@ -12,7 +12,7 @@ use units::{Celsius, Metres, Radians};
 
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::VolumetricFailure;
-use crate::volumetric::settings::{model_limits, thermal, volumetric_chain, work_volume};
+use crate::volumetric::settings::{model_limits, roll_max, thermal, volumetric_chain, work_volume};
 
 /// A model without any table: only what is known otherwise.
 pub(super) struct Known {
@@ -36,7 +36,6 @@ impl Known {
                 }
             }
         }
-        let roll_max = config.roll.as_ref().map(|it| it.roll_max_arcsec);
         let machine = Model {
             chain: volumetric_chain(config)?,
             volume: work_volume(config)?,
@@ -45,7 +44,7 @@ impl Known {
             thermal,
             tool_max: Metres::from_mm(config.tool_max_mm),
             displacement_max: Metres::from_um(config.compensation.displacement_max_um),
-            roll_max: roll_max.map_or(Radians(0.0), Radians::from_arcsec),
+            roll_max: roll_max(config),
         };
         let model = VolumetricModel::new(machine, model_limits(&config.compensation))?;
         Ok(Self { model })

@@ -103,7 +103,7 @@ struct Session<'a> {
     own: VolumetricCalibrateConfig,
     references: References,
     beams: [Option<BeamReference>; 3],
-    roll: Option<Function<Radians>>,
+    rolls: [Option<Function<Radians>>; 3],
     known: Known,
     thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
@@ -257,13 +257,13 @@ impl WorkVolume<'_> {
                 beams[axis.index()] = references.content.beam("just taken", axis, drift)?;
             }
         }
-        let roll = references.content.roll("just taken")?;
+        let rolls = references.content.rolls("just taken", &config)?;
         Ok(Session {
             config,
             own,
             references,
             beams,
-            roll,
+            rolls,
             known,
             thermometry,
             operator,

@@ -88,8 +88,8 @@ impl Session<'_> {
     }
 
     fn roll_by_detectors(&self, axis: Axis, run: usize) -> Option<Vec<Observation>> {
-        let reference = self.roll.as_ref()?;
-        let record = self.references.content.roll.as_ref()?;
+        let reference = self.rolls[axis.index()].as_ref()?;
+        let record = self.references.content.roll_record(&self.config, axis)?;
         let stops = self.stops_at_nodes(axis, &record.positions_m);
         let u = record.standard_uncertainties_si.as_ref();
         let sense = self.known.chain().sense(axis);

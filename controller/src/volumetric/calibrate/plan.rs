@@ -10,7 +10,7 @@ use crate::volumetric::VolumetricFailure;
 use crate::volumetric::calibrate::known::expansion_plans;
 use crate::volumetric::reference::stretches;
 use crate::volumetric::settings::{
-    bend_plans, function_shape, point_of_mm, volume_axis, volumetric_chain, work_volume,
+    bend_plans, function_shape, point_of_mm, volumetric_chain, work_volume,
 };
 use crate::volumetric::{
     AXES, BendEntry, ExpansionEntry, LineEntry, OpticsName, VolumePlanEntry, metres,
@@ -32,11 +32,10 @@ pub(crate) fn volume_plan(
     let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
     let chain = volumetric_chain(config)?;
     let volume = work_volume(config)?;
-    let roll_axis = config.roll.as_ref().map(|it| volume_axis(it.axis));
     let tool = point_of_mm(config.tool_offset_mm);
     let mut tools = vec![tool];
     tools.extend(own.second_tool_offset_mm.map(point_of_mm));
-    let rolls = Axis::ALL.map(|axis| roll_axis == Some(axis));
+    let rolls = config.rolls().map(|roll| roll.is_some());
     let design = standard_design(chain, &volume, &tools, rolls);
     let nodes = nodes(config, own);
     let zero = zero_of(config);

@@ -13,7 +13,6 @@ use crate::volumetric::calibrate::Session;
 use crate::volumetric::correction::lever;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
-use crate::volumetric::settings::volume_axis;
 use crate::volumetric::{LineReadEntry, LineReadingEntry};
 use crate::volumetric::{VolumeEntry, VolumeLog};
 
@@ -115,8 +114,11 @@ impl WorkVolume<'_> {
         let seen = self.watch_at_rest(session.own.detector_samples)?;
         let mut state = MovingState::default();
         let mut shifts = [Displacement::default(); 3];
-        if let (Some(config), Some(reference)) = (&session.config.roll, &session.roll) {
-            let axis = volume_axis(config.axis);
+        for axis in Axis::ALL {
+            let own = session.config.rolls()[axis.index()];
+            let (Some(config), Some(reference)) = (own, &session.rolls[axis.index()]) else {
+                continue;
+            };
             let position = at.along(axis);
             let roll = self.roll_of(axis, position, config, &seen)?;
             state.roll[axis.index()] = roll - reference.at(position);

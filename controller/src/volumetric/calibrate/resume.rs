@@ -10,6 +10,7 @@
 use std::path::Path;
 
 use compensator::volumetric::Axis;
+use compensator::volumetric::function::Function;
 use units::{Metres, Radians};
 
 use crate::config::ConfigHash;
@@ -18,7 +19,7 @@ use crate::store::{Journal, JournalHeader, Store, StoreError, first_difference, 
 use crate::volumetric::VolumeEntry;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::reference::warmth_tolerance_k;
-use crate::volumetric::settings::{beam_drift, volume_axis};
+use crate::volumetric::settings::beam_drift;
 use crate::volumetric::{AXES, VolumeLog, VolumePlanEntry, VolumeReferencesEntry};
 use crate::volumetric::{BeamConfig, VolumetricCalibrateConfig, VolumetricConfig};
 use crate::volumetric::{References, VolumetricFailure};
@@ -121,13 +122,18 @@ impl WorkVolume<'_> {
             let Some(beam) = beam else { continue };
             within(axis, "beam", change_of_beam(axis, beam, kept, taken)?)?;
         }
-        let Some(roll) = &config.roll else {
-            return Ok(());
-        };
         // As it would show at the end of the longest tool.
         let reach = Metres::from_mm(config.tool_max_mm);
-        let seen = reach * change_of_roll(kept, taken)?.value();
-        Ok(within(volume_axis(roll.axis), "roll", seen)?)
+        let before = kept.content.rolls("the journal", config)?;
+        let now = taken.content.rolls("just taken", config)?;
+        for axis in Axis::ALL {
+            let k = axis.index();
+            if config.rolls()[k].is_some() {
+                let change = change_of_roll(before[k].as_ref(), now[k].as_ref())?;
+                within(axis, "roll", reach * change.value())?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -187,11 +193,12 @@ fn change_of_beam(
 }
 
 /// Likewise of the roll.
-fn change_of_roll(kept: &VolumeReferencesEntry, taken: &References) -> Result<Radians, Failure> {
-    let before = kept.content.roll("the journal")?;
-    let now = taken.content.roll("just taken")?;
+fn change_of_roll(
+    before: Option<&Function<Radians>>,
+    now: Option<&Function<Radians>>,
+) -> Result<Radians, VolumetricFailure> {
     let (Some(before), Some(now)) = (before, now) else {
-        return Err(VolumetricFailure::NoRollReference.into());
+        return Err(VolumetricFailure::NoRollReference);
     };
     let change = now.nodes().map(|it| (now.at(it) - before.at(it)).value());
     Ok(Radians(range(change)))

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AnalogConfig, MachineConfig};
-use crate::volumetric::settings;
+use crate::volumetric::settings::{self, volume_axis};
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, RollConfig, TemperatureConfig, VolumetricConfig,
 };
@@ -24,8 +24,17 @@ pub(crate) fn check_detectors(
 ) {
     let mut taken = BTreeSet::new();
     check_beams(findings, config, volumetric, &mut taken);
-    if let Some(roll) = &volumetric.roll {
-        let judge = &mut Judge::at("volumetric.roll".into(), findings);
+    let rolls = volumetric.roll.each();
+    for (at, roll) in rolls.iter().enumerate() {
+        let place = volumetric.roll.place("volumetric.roll", at);
+        let judge = &mut Judge::at(place, findings);
+        if rolls[..at].iter().any(|before| before.axis == roll.axis) {
+            judge.say(
+                "axis",
+                format!("the roll of {} is read twice", volume_axis(roll.axis)),
+                "give each slide two detectors at most",
+            );
+        }
         check_roll(judge, config, roll, &mut taken);
     }
     for (at, temperature) in volumetric.temperature.iter().enumerate() {

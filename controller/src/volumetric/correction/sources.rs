@@ -21,7 +21,7 @@ impl VolumetricCorrection {
         for beam in self.beams.iter_mut().flatten() {
             beam.monitor.feed_mut().disable(now, Duration::ZERO);
         }
-        if let Some(roll) = &mut self.roll {
+        for roll in self.rolls.iter_mut().flatten() {
             roll.monitor.leave(now);
         }
         self
@@ -39,9 +39,10 @@ impl VolumetricCorrection {
             let beyond = self.memories.beyond_first(axis, position, left);
             recorder.record(axis, position, beyond);
         }
-        let roll = self.roll.as_ref();
-        let left = roll.and_then(|it| Some((it.axis, it.monitor.uncompensated()?)));
-        if let Some((axis, left)) = left {
+        for roll in self.rolls.iter().flatten() {
+            let (axis, Some(left)) = (roll.axis, roll.monitor.uncompensated()) else {
+                continue;
+            };
             let position = actual.along(axis);
             let beyond = self.memories.roll_beyond_first(axis, position, left);
             recorder.record_roll(axis, position, beyond);
@@ -57,7 +58,7 @@ impl VolumetricCorrection {
             let end = end.map(|it| (Source::EndOfTravel(axis), it));
             core::iter::once((Source::Slide(axis), slider)).chain(end)
         });
-        let roll = self.roll.iter();
+        let roll = self.rolls.iter().flatten();
         let roll = roll.map(|it| (Source::Roll(it.axis), it.monitor.status()));
         let thermometers = self.thermometers.iter().flat_map(Thermometers::statuses);
         let thermometers = thermometers.enumerate();
@@ -76,10 +77,10 @@ impl VolumetricCorrection {
                 own.monitor.take_over(&before.monitor);
             }
         }
-        if let (Some(own), Some(before)) = (&mut self.roll, &before.roll)
-            && own.axis == before.axis
-        {
-            own.monitor.take_over(&before.monitor);
+        for (own, before) in self.rolls.iter_mut().zip(&before.rolls) {
+            if let (Some(own), Some(before)) = (own, before) {
+                own.monitor.take_over(&before.monitor);
+            }
         }
         if let (Some(own), Some(before)) = (&mut self.thermometers, &before.thermometers) {
             own.take_over(before);

@@ -30,13 +30,16 @@ impl VolumetricCorrection {
 
     /// Likewise of a roll.
     fn u_roll(&self) -> Radians {
-        match &self.roll {
-            Some(roll) if roll.monitor.status() == FeedStatus::Good => {
-                Radians(hypot(self.u_roll.value(), roll.monitor.left().value()))
+        let largest = self.model.machine().roll_max / 3.0_f64.sqrt();
+        let each = self.rolls.iter().flatten().map(|it| {
+            if it.monitor.status() == FeedStatus::Good {
+                let left = it.monitor.left().value();
+                Radians(hypot(self.u_roll.value(), left))
+            } else {
+                largest
             }
-            Some(_) => self.model.machine().roll_max / 3.0_f64.sqrt(),
-            None => self.u_roll,
-        }
+        });
+        each.fold(self.u_roll, Quantity::max)
     }
 
     /// The standard uncertainties at `command`.

@@ -5,7 +5,7 @@ use compensator::volumetric::{Axis, GivenReference, ReferenceOf};
 use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
-use crate::volumetric::settings::{beam_detector, volume_axis};
+use crate::volumetric::settings::beam_detector;
 use crate::volumetric::{BeamDetectorConfig, VolumetricConfig};
 
 /// At how many places between two positions a reference is compared with what its detector can show.
@@ -20,6 +20,9 @@ pub(super) struct Unfit {
 /// Every reading that needs a reference.
 fn watched(config: &VolumetricConfig) -> Vec<(Axis, ReferenceOf)> {
     let mut watched = Vec::new();
+    for (axis, roll) in Axis::ALL.into_iter().zip(config.rolls()) {
+        watched.extend(roll.map(|_| (axis, ReferenceOf::Roll)));
+    }
     for (axis, beam) in Axis::ALL.into_iter().zip(config.beam.each()) {
         let Some(beam) = beam else {
             continue;
@@ -30,8 +33,6 @@ fn watched(config: &VolumetricConfig) -> Vec<(Axis, ReferenceOf)> {
             watched.extend(across.map(|along| (axis, ReferenceOf::End(along))));
         }
     }
-    let roll = config.roll.iter();
-    watched.extend(roll.map(|it| (volume_axis(it.axis), ReferenceOf::Roll)));
     watched
 }
 
@@ -114,7 +115,7 @@ fn detector(
 /// The values that a reading can have, in SI units; `None` for a detector that cannot be.
 fn shown(config: &VolumetricConfig, axis: Axis, of: ReferenceOf) -> Option<(f64, f64)> {
     if of == ReferenceOf::Roll {
-        let largest = Radians::from_arcsec(config.roll.as_ref()?.roll_max_arcsec).value();
+        let largest = Radians::from_arcsec(config.rolls()[axis.index()]?.roll_max_arcsec).value();
         return Some((-largest, largest));
     }
     let (detector, along) = detector(config, axis, of)?;

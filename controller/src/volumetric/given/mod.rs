@@ -73,10 +73,11 @@ pub(crate) fn import(
             content.beams.push(record(axis, beam, &given)?);
         }
     }
-    let mut each = given.iter();
-    if let Some(it) = each.find(|it| it.of == ReferenceOf::Roll) {
-        content.roll = Some(function::<Radians>("roll", it)?);
+    let mut rolls = Vec::new();
+    for it in given.iter().filter(|it| it.of == ReferenceOf::Roll) {
+        rolls.push((it.axis, function::<Radians>("roll", it)?));
     }
+    content.set_rolls(rolls);
     let before = in_use(store, &content.geometry)?;
     let id = store.save(&CalibrationRecord {
         head,

@@ -104,8 +104,9 @@ fn a_table_is_in_use_with_its_origin_and_reads_as_it_was_given() {
         "{y} {z}"
     );
     assert!(beam.end().iter().all(|it| (it.um() - 7.5).abs() < 1e-9));
-    let roll = content.roll(&given.id).unwrap().unwrap();
-    assert!((roll.at(Metres(0.375)).arcsec() - 0.5).abs() < 1e-9);
+    let own = known.machine.volumetric.as_ref().unwrap();
+    let [roll, ..] = content.rolls(&given.id, own).unwrap();
+    assert!((roll.unwrap().at(Metres(0.375)).arcsec() - 0.5).abs() < 1e-9);
 }
 
 #[test]

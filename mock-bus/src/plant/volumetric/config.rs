@@ -144,8 +144,10 @@ pub struct ErrorsConfig {
     pub squareness_arcsec: f64,
     /// The x guide's deliberate bow, upwards in its middle.
     pub deliberate_bow_um: f64,
-    /// A roll of the x slide, the same everywhere.
+    /// A roll of the slide of `deliberate_roll_axis`, the same everywhere.
     pub deliberate_roll_arcsec: f64,
+    /// Which slide rolls so: 0, 1, 2.
+    pub deliberate_roll_axis: usize,
     /// Since when these two are there.
     pub deliberate_from_h: f64,
 }
@@ -160,6 +162,7 @@ impl Default for ErrorsConfig {
             squareness_arcsec: 30.0,
             deliberate_bow_um: 0.0,
             deliberate_roll_arcsec: 0.0,
+            deliberate_roll_axis: 0,
             deliberate_from_h: 0.0,
         }
     }
@@ -307,6 +310,8 @@ impl Default for BeamConfig {
 pub struct RollConfig {
     /// Which slide: 0, 1, 2.
     pub axis: usize,
+    /// Slides that have two such detectors as well, at terminals of their own.
+    pub further_axes: Vec<usize>,
     /// L, from one beam to the other.
     pub distance_mm: f64,
     /// h, from the slide's surface to the detectors' marks.
@@ -320,6 +325,7 @@ impl Default for RollConfig {
     fn default() -> Self {
         Self {
             axis: 0,
+            further_axes: Vec::new(),
             distance_mm: 300.0,
             height_mm: 20.0,
             slant_deg: 45.0,
@@ -383,6 +389,21 @@ impl VolumetricConfig {
     pub(super) fn check_numbers(&self) -> Result<(), ConfigError> {
         for (key, seen) in self.positive_numbers() {
             positive(key, seen)?;
+        }
+        let mut watched = self.roll.further_axes.iter();
+        if let Some(axis) = watched.find(|it| **it > 2 || **it == self.roll.axis) {
+            return Err(ConfigError::Value {
+                key: "roll.further_axes",
+                seen: *axis as f64,
+                expected: "axes from 0 to 2 other than roll.axis",
+            });
+        }
+        if self.errors.deliberate_roll_axis > 2 {
+            return Err(ConfigError::Value {
+                key: "deliberate_roll_axis",
+                seen: self.errors.deliberate_roll_axis as f64,
+                expected: "an axis from 0 to 2",
+            });
         }
         if self.is_a_chain() {
             return Ok(());

@@ -210,7 +210,7 @@ impl Growth {
             let sign = if stream.chance(0.5) { 1.0 } else { -1.0 };
             sign * size * stream.between(0.7, 1.3)
         };
-        let watched = config.roll.axis == axis;
+        let watched = config.roll.axis == axis || config.roll.further_axes.contains(&axis);
         let roll = Radians::from_arcsec(heat.film_roll_arcsec).value();
         Self {
             expansion_per_k: heat.scale_expansion_ppm_per_k * 1e-6,
@@ -223,10 +223,11 @@ impl Growth {
 
 impl Deliberate {
     fn of(errors: &ErrorsConfig, axis: usize) -> Self {
-        let there = if axis == 0 { 1.0 } else { 0.0 };
+        let on = |slide: usize| if axis == slide { 1.0 } else { 0.0 };
+        let roll = Radians::from_arcsec(errors.deliberate_roll_arcsec).value();
         Self {
-            bow_m: there * errors.deliberate_bow_um * 1e-6,
-            roll: there * Radians::from_arcsec(errors.deliberate_roll_arcsec).value(),
+            bow_m: on(0) * errors.deliberate_bow_um * 1e-6,
+            roll: on(errors.deliberate_roll_axis) * roll,
             from_s: errors.deliberate_from_h * 3600.0,
         }
     }

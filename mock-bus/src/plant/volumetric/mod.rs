@@ -9,6 +9,7 @@
 //! | 8·axis + 4 … 7 | the detector at the end of the beam's way, volts |
 //! | 24, 25 | the two roll detectors, volts |
 //! | 26 + 2·axis, 27 + 2·axis | over and under a guide's neutral plane, temperatures |
+//! | 32 + 2·n, 33 + 2·n | the roll detectors of further slide number n, volts; nothing where there is none |
 //!
 //! The heat follows the configured duty, not the motions made: the machine's errors are pure
 //! functions of time and of where the slides are. Absent: lost motion, dynamic errors of the
@@ -53,17 +54,18 @@ use roll::RollDetectors;
 use slide::Slide;
 
 /// How many terminals there are.
-pub(in crate::plant) const TERMINALS: usize = FIRST_TEMPERATURE + 6;
+pub(in crate::plant) const TERMINALS: usize = FIRST_FURTHER_ROLL + 4;
 const PER_AXIS: usize = 8;
 const FIRST_ROLL: usize = 3 * PER_AXIS;
 const FIRST_TEMPERATURE: usize = FIRST_ROLL + 2;
+const FIRST_FURTHER_ROLL: usize = FIRST_TEMPERATURE + 6;
 
 /// Over which a speed is taken.
 const SOON_S: f64 = 1e-3;
 
 /// Whether a temperature sensor is wired to a terminal.
 pub(in crate::plant) const fn is_temperature(terminal: usize) -> bool {
-    terminal >= FIRST_TEMPERATURE
+    terminal >= FIRST_TEMPERATURE && terminal < FIRST_FURTHER_ROLL
 }
 
 /// What is at a terminal.
@@ -93,6 +95,7 @@ pub(super) struct Volumetric {
     beams: [Beam; 3],
     roll: RollDetectors,
     roll_axis: usize,
+    further_rolls: Vec<usize>,
     sensor_offsets_k: [f64; 6],
     laser: Laser,
 }
@@ -111,6 +114,7 @@ impl Volumetric {
             beams: [0, 1, 2].map(beam),
             roll: RollDetectors::new(&config.roll),
             roll_axis: config.roll.axis,
+            further_rolls: config.roll.further_axes.clone(),
             sensor_offsets_k: [(); 6].map(|()| stream.between(-offset_k, offset_k)),
             laser: Laser::new(&config.laser, dead_path_m, seed),
         }
@@ -184,14 +188,16 @@ impl Volumetric {
         match terminal {
             0..FIRST_ROLL => Some(Signal::Voltage(self.beam_volts(terminal, now))),
             FIRST_ROLL..FIRST_TEMPERATURE => {
-                let axis = self.roll_axis;
-                let motion = self.motion(axis, self.slides[axis].scale_m(now), now);
-                // The cross-section's second direction: after the axis comes u, then v.
-                let lift_m = motion.shift[(axis + 2) % 3];
-                let volts = self.roll.volts(motion.turn[axis], lift_m);
+                let volts = self.roll_volts(self.roll_axis, now);
                 Some(Signal::Voltage(volts[terminal - FIRST_ROLL]))
             }
-            FIRST_TEMPERATURE..TERMINALS => {
+            FIRST_FURTHER_ROLL..TERMINALS => {
+                let number = terminal - FIRST_FURTHER_ROLL;
+                let axis = self.further_rolls.get(number / 2);
+                let volts = axis.map_or([0.0; 2], |axis| self.roll_volts(*axis, now));
+                Some(Signal::Voltage(volts[number % 2]))
+            }
+            FIRST_TEMPERATURE..FIRST_FURTHER_ROLL => {
                 let sensor = terminal - FIRST_TEMPERATURE;
                 let heat = self.heat.axis(sensor / 2, now);
                 let side = if sensor.is_multiple_of(2) { 0.5 } else { -0.5 };
@@ -200,6 +206,14 @@ impl Volumetric {
             }
             _ => None,
         }
+    }
+
+    /// What the roll detectors of a slide give.
+    fn roll_volts(&self, axis: usize, now: Time) -> [f64; 2] {
+        let motion = self.motion(axis, self.slides[axis].scale_m(now), now);
+        // The cross-section's second direction: after the axis comes u, then v.
+        let lift_m = motion.shift[(axis + 2) % 3];
+        self.roll.volts(motion.turn[axis], lift_m)
     }
 
     fn beam_volts(&mut self, terminal: usize, now: Time) -> f64 {

@@ -58,6 +58,11 @@ fn each(content: &BeamReferencesContent) -> Vec<Reference<'_>> {
         expected: Expected::Along(function),
         unit: ("″", ARCSEC),
     }));
+    each.extend(content.rolls.iter().map(|it| Reference {
+        name: format!("{}, {}", it.axis, ReferenceOf::Roll),
+        expected: Expected::Along(&it.roll),
+        unit: ("″", ARCSEC),
+    }));
     each
 }
 
