@@ -10,6 +10,11 @@
 //!
 //! of which the root that goes to zero with X is taken, written so that it keeps its digits.
 //!
+//! Of a rigid slide y₁ + y₂ = L·t/(1 − t·f) and y₁ − y₂ = 2v/(1 − t·f), with v its shift along the normal of its
+//! surface: of α, y₁ and y₂ two are free, and a function of all three is one of the roll and of the displacement along
+//! v. The roll turns the slide in the rigid-body model; the displacement is what the slide's beam detector reads, against
+//! a beam that an end detector watches, which nobody does with the beams here.
+//!
 //! | symbol | name here |
 //! |---|---|
 //! | α, y₁, y₂ | [`Roll`] |

@@ -739,6 +739,30 @@ proptest! {
         prop_assert!((roll.second.value() - y[1]).abs() < 1e-14);
     }
 
+    /// A surface v + u·t and beams u = ±L/2 + v·f, as a drawing has them: y₁ and y₂ are the roll and the shift again.
+    #[test]
+    fn the_offsets_of_a_rigid_slide_say_no_more_than_its_roll_and_its_shift(
+        t in -0.01_f64..0.01,
+        shift_um in -100.0_f64..100.0,
+        degrees in 20.0_f64..60.0,
+    ) {
+        let (h, base, f, v) = (0.02, 0.1, degrees.to_radians().tan(), shift_um * 1e-6);
+        prop_assume!((2.0 * h - base * f).abs() > 0.01);
+        let meets = |side: f64| (v + side * t) / (1.0 - t * f);
+        let y = [meets(base / 2.0), -meets(-base / 2.0)];
+        let x = y.map(|y| Metres((h + y) * t - y * f));
+        let optics = RollOptics::new(
+            Metres(h), Metres(base), Radians::from_degrees(degrees), Radians(0.02),
+        ).unwrap();
+        let roll = optics.solve(x[0], x[1]).unwrap();
+        let own = roll.angle.value().tan();
+        prop_assert!((own - t).abs() < 1e-12);
+        let shift = (roll.first - roll.second).value() * (1.0 - own * f) / 2.0;
+        prop_assert!((shift - v).abs() < 1e-12, "{shift} {v}");
+        let sum = (roll.first + roll.second).value();
+        prop_assert!((sum - base * own / (1.0 - own * f)).abs() < 1e-12);
+    }
+
     /// Whatever a detector does, the value given out moves no faster than the fastest of the
     /// blends and the detector itself.
     #[test]
