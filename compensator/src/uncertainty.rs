@@ -97,6 +97,19 @@ pub fn combine(contributions: &[f64]) -> f64 {
     contributions.iter().map(|u| u * u).sum::<f64>().sqrt()
 }
 
+/// The standard uncertainty of a value that is only known to the nearest multiple of `step` (GUM F.2.2.1).
+///
+/// # Example
+///
+/// ```
+/// use compensator::uncertainty::of_rounding;
+///
+/// assert!((of_rounding(10.0) - 2.887).abs() < 1e-3, "a count of 10 nm");
+/// ```
+pub fn of_rounding(step: f64) -> f64 {
+    step / 12_f64.sqrt()
+}
+
 /// The variance of a linear combination: gradient · covariance · gradientᵀ.
 ///
 /// `covariance` is square, row by row, of the gradient's length.

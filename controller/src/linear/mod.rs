@@ -22,6 +22,8 @@ mod log;
 pub(crate) mod measure;
 mod memory;
 pub(crate) mod moved;
+mod pairing;
+mod passes;
 pub(crate) mod positions;
 pub(crate) mod record;
 mod run_plan;

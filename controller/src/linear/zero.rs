@@ -9,11 +9,11 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::hall_zero::{
-    HallPoint, Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate,
-    single_threshold_zero,
+    Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
 };
+use compensator::uncertainty::{combine, of_rounding};
 use drivers::device::{AxisCommand, DriveCommand};
-use units::{Approach, Metres, MetresPerSecond, Time, Volts};
+use units::{Metres, MetresPerSecond, Volts};
 
 use crate::assemble;
 use crate::correction::Correction;
@@ -21,6 +21,7 @@ use crate::failure::Failure;
 use crate::homing;
 use crate::linear::ZeroConfig;
 use crate::linear::ZeroEntry;
+use crate::linear::passes::{SEARCHED, STEPS};
 use crate::linear::stage::LinearStage;
 use crate::linear::{LinearEntry, LinearLog};
 use crate::run::utc_now;
@@ -31,7 +32,8 @@ use machine::{STOP_LIMIT, Stage};
 /// A zero that was found.
 #[derive(Clone, Debug)]
 pub struct Zeroed {
-    /// The regression's result, in the drive's coordinates before they were set.
+    /// The regression's result, in the drive's coordinates before they were set; its standard uncertainty is
+    /// that of the drive's zero, which lies on a whole count.
     pub estimate: ZeroEstimate,
     /// The patent's search.
     pub outcome: Outcome,
@@ -61,17 +63,6 @@ const RESTING_SAMPLES: u32 = 4;
 /// A stage that is not at rest after so many times that is shaken: its passes tell how much, and a drive that
 /// takes no coordinates then says so.
 const RESTS: u32 = 10;
-/// How often both flanks are passed, half of them in reverse; two in each direction would do.
-const PASSES: u32 = 6;
-/// How long the axis stands before each pass. A pass that begins while the axis still creeps into its place
-/// shows the error of the stop before it once more, and nothing of what the axis repeats to: a servo of 5 Hz,
-/// the softest that is foreseen, is within a thousandth of its last motion after this time.
-const BETWEEN_PASSES: Duration = Duration::from_millis(250);
-/// A pass begins and ends this share of the distance of G1 and G2 beyond them.
-const PASS_MARGIN: f64 = 0.1;
-/// The steps of zeroing that progress counts: up to the search, its passes, and the new origin.
-const SEARCHED: u64 = 3;
-const STEPS: u64 = SEARCHED + PASSES as u64 + 1;
 
 impl LinearStage<'_> {
     /// Finds the origin of the axis and makes it the drive's zero; the axis is enabled and
@@ -180,91 +171,6 @@ impl LinearStage<'_> {
         }
     }
 
-    /// Passes over both flanks, forward and in reverse by turns: what lost motion and repeatability do to
-    /// an origin shows between them.
-    fn passes(
-        &mut self,
-        config: &ZeroConfig,
-        settings: &Settings,
-        outcome: &Outcome,
-    ) -> Result<Vec<Pass>, Failure> {
-        let (low, high) = pass_ends(settings, outcome);
-        let speed = self.pass_speed(config, settings, outcome);
-        self.pass(config, low, speed)?;
-        (0..PASSES)
-            .map(|number| {
-                self.rest(BETWEEN_PASSES)?;
-                let (approach, end) = match number % 2 {
-                    0 => (Approach::Forward, high),
-                    _ => (Approach::Reverse, low),
-                };
-                let points = self.pass(config, end, speed)?;
-                let done = SEARCHED + u64::from(number) + 1;
-                let observer = self.core.observer();
-                observer.progress(Stage::Zero, self.axis, done, STEPS);
-                Ok(Pass { approach, points })
-            })
-            .collect()
-    }
-
-    /// Voltages that are sampled with the position are as good at four times the speed, as a delay drops out of
-    /// the mean of both directions; those that are asked for are not, as nobody knows the delay of each. Either
-    /// is slow enough for the samples that the flanks need.
-    fn pass_speed(
-        &self,
-        config: &ZeroConfig,
-        settings: &Settings,
-        outcome: &Outcome,
-    ) -> MetresPerSecond {
-        let module = &self.core.config.analog[&config.analog];
-        let wanted = if module.poll_period() == Duration::ZERO {
-            settings.speed * 4.0
-        } else {
-            settings.speed
-        };
-        let fastest = outcome.fastest_pass(settings, self.sampling(config));
-        wanted.min(fastest)
-    }
-
-    /// How often a position and voltages that belong to it are read.
-    pub(super) fn sampling(&self, config: &ZeroConfig) -> Duration {
-        let node = self.config.node();
-        let bus = &node.expect("the check asks for a drive on CAN").bus;
-        let sync_s = self.core.config.can[bus].sync_period_ms * 1e-3;
-        let module = &self.core.config.analog[&config.analog];
-        let poll_s = module.poll_period().as_secs_f64();
-        Duration::from_secs_f64(sync_s.max(poll_s))
-    }
-
-    /// Goes to `end`; what was read on the way.
-    pub(super) fn pass(
-        &mut self,
-        config: &ZeroConfig,
-        end: Metres,
-        speed: MetresPerSecond,
-    ) -> Result<Vec<HallPoint>, Failure> {
-        let acceleration = self.core.axis_settings(self.axis)?.acceleration;
-        let command = AxisCommand::MoveTo {
-            target: end,
-            speed,
-            acceleration,
-        };
-        let mut pairing = self.pairing(config);
-        let mut points = Vec::new();
-        self.core.begin(self.axis, command)?;
-        loop {
-            let deadline = self.core.now() + Duration::from_millis(100);
-            self.core.tick(deadline)?;
-            let arrived = self.core.outcome(self.axis)?;
-            let sample = self.paired_sample(config, &mut pairing)?;
-            points.extend(sample.map(|it| it.point()));
-            if let Some(outcome) = arrived {
-                outcome?;
-                return Ok(points);
-            }
-        }
-    }
-
     /// Turns the search's wish into a profile move or a halt, when it differs from the last.
     fn obey(
         &mut self,
@@ -302,10 +208,14 @@ impl LinearStage<'_> {
         passes: &[Pass],
     ) -> Result<ZeroEstimate, Failure> {
         let refined = outcome.refine_by_passes(passes, settings);
-        let estimate = refined.map_err(|source| Failure::Refine {
+        let mut estimate = refined.map_err(|source| Failure::Refine {
             axis: self.axis.to_owned(),
             source,
         })?;
+        // The drive takes its zero in whole counts.
+        let count = self.config.motion.resolution_nm.abs() * 1e-9;
+        let of_passes = estimate.standard_uncertainty.value();
+        estimate.standard_uncertainty = Metres(combine(&[of_passes, of_rounding(count)]));
         let limit = Metres::from_um(config.standard_uncertainty_limit_um);
         if estimate.standard_uncertainty > limit {
             let seen = estimate.standard_uncertainty;
@@ -341,7 +251,7 @@ impl LinearStage<'_> {
 
     /// Stands for `span`, and longer while its samples still move: some drives say that the target is reached
     /// as soon as it is near.
-    fn rest(&mut self, span: Duration) -> Result<(), Failure> {
+    pub(super) fn rest(&mut self, span: Duration) -> Result<(), Failure> {
         for _ in 0..RESTS {
             self.core.stand_still(self.axis, span)?;
             if self.core.reading(self.axis)?.is_some_and(|it| it.at_rest) {
@@ -380,60 +290,6 @@ impl LinearStage<'_> {
             approach_m: None,
         }
     }
-
-    fn pairing(&self, config: &ZeroConfig) -> Pairing {
-        Pairing {
-            window: self.sampling(config).mul_f64(0.6),
-            used_axis: Time::ZERO,
-            used_analog: Time::ZERO,
-        }
-    }
-
-    /// The newest position and voltages that belong together and were not used before.
-    ///
-    /// On CAN both are sampled at one SYNC and arrive together; members of different SYNC
-    /// periods lie further apart than the window and are never paired.
-    fn paired_sample(
-        &self,
-        config: &ZeroConfig,
-        pairing: &mut Pairing,
-    ) -> Result<Option<Sample>, Failure> {
-        let analog = self.core.devices().analog(&config.analog)?;
-        let (Some(position), Some(voltages)) = (self.core.reading(self.axis)?, analog.reading())
-        else {
-            return Ok(None);
-        };
-        if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {
-            return Ok(None);
-        }
-        let apart = position
-            .at
-            .since(voltages.at)
-            .max(voltages.at.since(position.at));
-        if apart > pairing.window {
-            return Ok(None);
-        }
-        pairing.used_axis = position.at;
-        pairing.used_analog = voltages.at;
-        Ok(Some(Sample {
-            at: position.at.max(voltages.at),
-            position: position.position,
-            peak: voltages.volts[0],
-            slope: voltages.volts[1],
-            standing: position.standing,
-        }))
-    }
-}
-
-/// Where passes begin and end: beyond both flanks, within the bounds of the search.
-fn pass_ends(settings: &Settings, outcome: &Outcome) -> (Metres, Metres) {
-    let margin = (outcome.g2.position - outcome.g1.position) * PASS_MARGIN;
-    let low = settings.soft_min.max(Metres::ZERO - settings.search_limit);
-    let high = settings.soft_max.min(settings.search_limit);
-    (
-        low.max(outcome.g1.position - margin),
-        high.min(outcome.g2.position + margin),
-    )
 }
 
 /// The newest zero on record. A trend is worth having but never worth failing for: a journal
@@ -441,11 +297,4 @@ fn pass_ends(settings: &Settings, outcome: &Outcome) -> (Metres, Metres) {
 fn previous_zero(store: &Store, axis: &str) -> Option<ZeroEntry> {
     let path = store.newest_run("zero", axis).ok().flatten()?;
     read_journal::<LinearLog>(&path).ok()?.log.zeros.pop()
-}
-
-/// Which samples were used already.
-struct Pairing {
-    window: Duration,
-    used_axis: Time,
-    used_analog: Time,
 }

@@ -8,7 +8,7 @@ use mock_bus::plant::DriftLimits;
 use tests::{Bench, Edit, random, seeds};
 use truestage::Failure;
 use truestage::emulated::HallDrift;
-use units::Volts;
+use units::{Metres, Volts};
 
 /// Power cycles of each stage, each with sensors that drifted anew.
 const CYCLES: u64 = 3;
@@ -20,15 +20,15 @@ const DRIFT: DriftLimits = DriftLimits {
 
 /// What is drawn of a stage.
 #[derive(Clone, Copy, Debug)]
-struct Drawn {
-    repeatability_nm: f64,
-    bandwidth_hz: f64,
-    lost_motion_um: f64,
-    noise_mv: f64,
+pub(super) struct Drawn {
+    pub(super) repeatability_nm: f64,
+    pub(super) bandwidth_hz: f64,
+    pub(super) lost_motion_um: f64,
+    pub(super) noise_mv: f64,
 }
 
 impl Drawn {
-    fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut state = seed ^ 0x2E80_0000;
         let mut over = |low: f64, high: f64| low * (high / low).powf(random(&mut state));
         Self {
@@ -40,40 +40,36 @@ impl Drawn {
     }
 
     fn bench(&self, seed: u64) -> Bench {
-        let changes = [
-            (
-                "repeatability_nm = 25.0",
-                format!("repeatability_nm = {}", self.repeatability_nm),
-            ),
-            (
-                "servo_bandwidth_hz = 60.0",
-                format!("servo_bandwidth_hz = {}", self.bandwidth_hz),
-            ),
-            (
-                "\nlost_motion_um = 1.0",
-                format!("\nlost_motion_um = {}", self.lost_motion_um),
-            ),
-            ("noise_mv = 0.2", format!("noise_mv = {}", self.noise_mv)),
-        ];
-        let emulated = |text: String| {
-            let one = |text: String, (from, to): &(&str, String)| text.edit_first(from, to);
-            changes.iter().fold(text, one)
-        };
-        let machine = |text: String| {
-            // Stages that repeat to a micrometre are sound here, and soft ones are not hurried.
-            text.edit_first("uncertainty_limit_um = 0.2", "uncertainty_limit_um = 5.0")
-                .edit_first("speed_mm_per_s = 200.0", "speed_mm_per_s = 50.0")
-                .edit_first(
-                    "acceleration_mm_per_s2 = 5000.0",
-                    "acceleration_mm_per_s2 = 500.0",
-                )
-        };
-        Bench::with(seed, machine, emulated)
+        Bench::with(seed, patient, |text| self.emulated(&text))
+    }
+
+    /// The description of an emulated machine with what was drawn.
+    pub(super) fn emulated(&self, text: &str) -> String {
+        let repeats = format!("repeatability_nm = {}", self.repeatability_nm);
+        let servo = format!("servo_bandwidth_hz = {}", self.bandwidth_hz);
+        let lost = format!("\nlost_motion_um = {}", self.lost_motion_um);
+        let noise = format!("noise_mv = {}", self.noise_mv);
+        text.edit_first("repeatability_nm = 25.0", &repeats)
+            .edit_first("servo_bandwidth_hz = 60.0", &servo)
+            .edit_first("\nlost_motion_um = 1.0", &lost)
+            .edit_first("noise_mv = 0.2", &noise)
     }
 }
 
+/// The configuration of a machine that takes stages which repeat to a micrometre for sound, and does not hurry soft
+/// ones.
+pub(super) fn patient(text: String) -> String {
+    text.edit("uncertainty_limit_um = 0.2", "uncertainty_limit_um = 5.0")
+        .edit("speed_mm_per_s = 200.0", "speed_mm_per_s = 50.0")
+        .edit(
+            "acceleration_mm_per_s2 = 5000.0",
+            "acceleration_mm_per_s2 = 500.0",
+        )
+}
+
 /// Where on the scale the zero has come to lie, less where the undrifted curves have their centre; and the
-/// stated uncertainty.
+/// stated uncertainty. A zero is a count: where within that count the stage stands when it is judged is the
+/// stop's affair.
 fn zeroed(bench: &mut Bench) -> Result<(f64, f64), Failure> {
     let store = bench.store.clone();
     let zeroed = bench.machine.guarded(|machine| {
@@ -82,7 +78,8 @@ fn zeroed(bench: &mut Bench) -> Result<(f64, f64), Failure> {
     })?;
     let reading = bench.machine.reading("x")?.expect("it was read");
     let scale = bench.emulated.simulation().truth().scale_position();
-    let off = scale - reading.position;
+    let count = bench.machine.config().axis["x"].motion.resolution_nm * 1e-9;
+    let off = Metres((scale.value() / count).round() * count) - reading.position;
     let u = zeroed.estimate.standard_uncertainty;
     Ok((off.value(), u.value()))
 }

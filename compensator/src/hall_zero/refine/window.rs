@@ -5,7 +5,7 @@ use units::{Metres, Volts};
 use super::{RefineError, RefineOptions, Sensor};
 use crate::hall_zero::HallPoint;
 use crate::least_squares::{self, LeastSquaresError, powers};
-use crate::uncertainty::{mean, reduced_chi_square_limit, robust_sigma};
+use crate::uncertainty::{mean, of_rounding, reduced_chi_square_limit, robust_sigma};
 
 /// The samples with their travel per sample, and the noise of both sensors.
 pub(super) struct Data<'a> {
@@ -203,7 +203,7 @@ fn converter_noise(points: &[HallPoint], voltage: fn(&HallPoint) -> f64) -> f64 
         .filter(|it| *it > 0.0)
         .fold(f64::INFINITY, f64::min);
     if step.is_finite() {
-        step / 12_f64.sqrt()
+        of_rounding(step)
     } else {
         0.0
     }

@@ -1,0 +1,126 @@
+//! Passes over both flanks of the zero: where they begin and end, how fast they are, and what is read on the way.
+
+use core::time::Duration;
+
+use compensator::hall_zero::{HallPoint, Outcome, Pass, Settings};
+use drivers::device::AxisCommand;
+use units::{Approach, Metres, MetresPerSecond};
+
+use crate::failure::Failure;
+use crate::linear::ZeroConfig;
+use crate::linear::stage::LinearStage;
+use machine::Stage;
+
+/// How often both flanks are passed, half of them in reverse; two in each direction would do.
+const PASSES: u32 = 6;
+/// How long the axis stands before each pass. A pass that begins while the axis still creeps into its place
+/// shows the error of the stop before it once more, and nothing of what the axis repeats to: a servo of 5 Hz,
+/// the softest that is foreseen, is within a thousandth of its last motion after this time.
+pub(super) const BETWEEN_PASSES: Duration = Duration::from_millis(250);
+/// A pass begins and ends this share of the distance of G1 and G2 beyond them.
+const PASS_MARGIN: f64 = 0.1;
+/// Each pass of a direction begins by this share of the distance of two samples further in than the one before
+/// it. Without that a quiet stage is read at the very same places by all passes of a direction: the steps of the
+/// converter, and what the scale errs within one of its periods, are the same in each then, and no scatter of
+/// the passes shows them. (A share that no step and no period is a multiple of: the golden section.)
+const STAGGER: f64 = 0.382;
+/// The steps of zeroing that progress counts: up to the search, its passes, and the new origin.
+pub(super) const SEARCHED: u64 = 3;
+pub(super) const STEPS: u64 = SEARCHED + PASSES as u64 + 1;
+
+impl LinearStage<'_> {
+    /// Passes over both flanks, forward and in reverse by turns: what lost motion and repeatability do to
+    /// an origin shows between them.
+    pub(super) fn passes(
+        &mut self,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> Result<Vec<Pass>, Failure> {
+        let (low, high) = pass_ends(settings, outcome);
+        let speed = self.pass_speed(config, settings, outcome);
+        let apart = Metres(speed.value() * self.sampling(config).as_secs_f64());
+        let stagger = |number: u32| apart * (STAGGER * f64::from(number));
+        self.pass(config, low, speed)?;
+        (0..PASSES)
+            .map(|number| {
+                self.rest(BETWEEN_PASSES)?;
+                // Where one direction ends, the other one begins.
+                let (approach, end) = match number % 2 {
+                    0 => (Approach::Forward, high - stagger(number / 2)),
+                    _ => (Approach::Reverse, low + stagger(number / 2 + 1)),
+                };
+                let points = self.pass(config, end, speed)?;
+                let done = SEARCHED + u64::from(number) + 1;
+                let observer = self.core.observer();
+                observer.progress(Stage::Zero, self.axis, done, STEPS);
+                Ok(Pass { approach, points })
+            })
+            .collect()
+    }
+
+    /// The usual speed, or so slow that the flanks get the samples that they need.
+    fn pass_speed(
+        &self,
+        config: &ZeroConfig,
+        settings: &Settings,
+        outcome: &Outcome,
+    ) -> MetresPerSecond {
+        let fastest = outcome.fastest_pass(settings, self.sampling(config));
+        self.usual_pass_speed(config, settings).min(fastest)
+    }
+
+    /// Voltages that are sampled with the position are as good at four times the speed, as a delay drops out of
+    /// the mean of both directions; those that are asked for are not, as nobody knows the delay of each.
+    pub(super) fn usual_pass_speed(
+        &self,
+        config: &ZeroConfig,
+        settings: &Settings,
+    ) -> MetresPerSecond {
+        let module = &self.core.config.analog[&config.analog];
+        match module.poll_period() == Duration::ZERO {
+            true => settings.speed * 4.0,
+            false => settings.speed,
+        }
+    }
+
+    /// Goes to `end`; what was read on the way.
+    pub(super) fn pass(
+        &mut self,
+        config: &ZeroConfig,
+        end: Metres,
+        speed: MetresPerSecond,
+    ) -> Result<Vec<HallPoint>, Failure> {
+        let acceleration = self.core.axis_settings(self.axis)?.acceleration;
+        let command = AxisCommand::MoveTo {
+            target: end,
+            speed,
+            acceleration,
+        };
+        let mut pairing = self.pairing(config);
+        let mut points = Vec::new();
+        self.core.begin(self.axis, command)?;
+        loop {
+            let deadline = self.core.now() + Duration::from_millis(100);
+            self.core.tick(deadline)?;
+            let arrived = self.core.outcome(self.axis)?;
+            let sample = self.paired_sample(config, &mut pairing)?;
+            points.extend(sample.map(|it| it.point()));
+            if let Some(outcome) = arrived {
+                outcome?;
+                return Ok(points);
+            }
+        }
+    }
+}
+
+/// Where passes begin and end: beyond both flanks, within the bounds of the search.
+fn pass_ends(settings: &Settings, outcome: &Outcome) -> (Metres, Metres) {
+    let margin = (outcome.g2.position - outcome.g1.position) * PASS_MARGIN;
+    let low = settings.soft_min.max(Metres::ZERO - settings.search_limit);
+    let high = settings.soft_max.min(settings.search_limit);
+    (
+        low.max(outcome.g1.position - margin),
+        high.min(outcome.g2.position + margin),
+    )
+}
