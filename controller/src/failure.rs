@@ -11,7 +11,7 @@ use compensator::data::DataError;
 use compensator::error_table::{CompensationError, FitError};
 use compensator::hall_zero::{RefineError, SearchFailure};
 use machine::{EngineFailure, Layered};
-use units::Metres;
+use units::{Metres, Radians};
 
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
@@ -326,6 +326,22 @@ pub enum Failure {
         seen: Metres,
         /// What is allowed.
         limit: Metres,
+    },
+    /// The stage of a gantry is turned otherwise than when it was accepted.
+    #[error(
+        "gantry {gantry}: the stage stood turned by {:+.2} µrad against its angle at acceptance, the limit is \
+         {:.2} µrad; a sensor, magnets or a limit switch have moved on one side, or the stage itself: look for what \
+         was knocked or came loose, and zero again. Where the stage shall stay so, accept it anew \
+         (`angle_at_acceptance_urad` in [gantry.{gantry}])",
+        seen.value() * 1e6, limit.value() * 1e6
+    )]
+    Turned {
+        /// Which gantry.
+        gantry: String,
+        /// By how much it differs.
+        seen: Radians,
+        /// What is allowed.
+        limit: Radians,
     },
     /// A run that was stopped on request, and can be continued.
     #[error(

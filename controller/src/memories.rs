@@ -30,6 +30,24 @@ impl Memories {
         memory.downcast_mut().expect("its type is in its key")
     }
 
+    /// What is remembered of two of them, at once.
+    pub(crate) fn both<M: Memory + Default>(&mut self, names: [&str; 2]) -> [&mut M; 2] {
+        let keys = names.map(key::<M>);
+        for key in &keys {
+            self.0
+                .entry(key.clone())
+                .or_insert_with(|| Box::new(M::default()));
+        }
+        let mut found = [None, None];
+        for (key, memory) in &mut self.0 {
+            if let Some(at) = keys.iter().position(|it| it == key) {
+                let memory: &mut dyn Any = &mut **memory;
+                found[at] = memory.downcast_mut();
+            }
+        }
+        found.map(|it| it.expect("each is there, its type is in its key, and their names differ"))
+    }
+
     pub(crate) fn each(&mut self) -> impl Iterator<Item = &mut Box<dyn Memory>> {
         self.0.values_mut()
     }
@@ -65,6 +83,10 @@ mod tests {
         memories.of("x", || Tables(7));
         assert_eq!(memories.of("x", || Place(9)), &Place(3), "it was there");
         assert_eq!(memories.get("y"), None::<&Place>);
+        let [second, first] = memories.both::<Place>(["y", "x"]);
+        assert_eq!((&*first, &*second), (&Place(3), &Place(0)));
+        second.0 = 5;
+        assert_eq!(memories.get("y"), Some(&Place(5)));
         memories.each().for_each(|it| it.forget());
         assert_eq!(memories.get("x"), Some(&Place(0)));
         assert_eq!(memories.get("x"), Some(&Tables(7)));

@@ -6,6 +6,7 @@ mod calibrations;
 mod demo;
 mod example;
 mod examples;
+mod gantry;
 mod interrupted;
 mod job;
 mod jog;

@@ -38,6 +38,12 @@ pub const UVW_COPLEY: Shipped = Shipped {
     emulated: include_str!("../../configs/emulated/uvw-copley.toml"),
 };
 
+/// One stage with a linear motor and two Hall sensors on either side.
+pub const GANTRY: Shipped = Shipped {
+    machine: include_str!("../../configs/machines/gantry.toml"),
+    emulated: include_str!("../../configs/emulated/gantry.toml"),
+};
+
 /// Three axes corrected throughout their volume.
 pub const VOLUMETRIC: Shipped = Shipped {
     machine: include_str!("../../configs/machines/volumetric.toml"),

@@ -26,14 +26,17 @@
 //! A pattern that is not where the search looks for it is recognised in a pass over the travel ([`pattern`]),
 //! and its place and direction name a wrong scale or direction of the axis ([`mistake`]).
 //!
-//! Absent: motion itself (the search says where to move and when to stand), rotational degrees
-//! of freedom (zero two points), trending of the drift between zeroings.
+//! A stage with two zero points side by side has a rotation, which they tell ([`rotation`]).
+//!
+//! Absent: motion itself (the search says where to move and when to stand), trending of the drift between
+//! zeroings.
 
 mod diagnose;
 mod failure;
 mod passes;
 mod profile;
 mod refine;
+mod rotation;
 mod search;
 mod sensor;
 mod series;
@@ -47,6 +50,7 @@ pub use refine::{
     Flank, Level, Passes, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
     single_threshold_zero,
 };
+pub use rotation::{Base, Rotation, rotation};
 pub use search::{Held, Outcome, Progress, Sample, Search};
 pub use sensor::Sensor;
 pub use series::{HallPoint, HallSeries, HallSeriesError};

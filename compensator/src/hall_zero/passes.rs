@@ -66,15 +66,22 @@ pub fn refine_passes(
     let degrees_of_freedom = all.len() - 2;
     let scatter = (squares / degrees_of_freedom as f64).sqrt();
     let of_mean = (1.0 / forward.len() as f64 + 1.0 / reverse.len() as f64).sqrt() / 2.0;
-    let widened = scatter * student_limit(BEYOND_TWICE, degrees_of_freedom) / 2.0;
     let origin = (at_forward + at_reverse) / 2.0;
-    let standard_uncertainty = Metres(widened * of_mean);
+    let of_origin = Metres(scatter * of_mean);
     let told = Passes {
         lost_motion: at_forward - at_reverse,
         scatter: Metres(scatter),
+        of_origin,
         degrees_of_freedom,
     };
+    let standard_uncertainty = of_origin * widening(degrees_of_freedom);
     Ok(together(&all, origin, standard_uncertainty, told))
+}
+
+/// So many times a standard deviation with few degrees of freedom is a standard uncertainty of which twice is
+/// exceeded as rarely as that of a normal distribution.
+pub(super) fn widening(degrees_of_freedom: usize) -> f64 {
+    student_limit(BEYOND_TWICE, degrees_of_freedom) / 2.0
 }
 
 fn each(all: &[ZeroEstimate], of: impl Fn(&ZeroEstimate) -> f64) -> Vec<f64> {

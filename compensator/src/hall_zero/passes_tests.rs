@@ -1,42 +1,11 @@
 use super::*;
-use crate::hall_zero::rig::{Magnets, Noise};
-
-/// A stage as its passes see it.
-#[derive(Clone, Copy)]
-struct Stage {
-    noise_mv: f64,
-    repeatability_nm: f64,
-    lost_motion_um: f64,
-}
-
-/// Passes of a stage whose origin is at 0: each shifted by what it repeats to, and by half the lost motion.
-fn passes(stage: &Stage, count: usize, noise: &mut Noise) -> Vec<Pass> {
-    let magnets = Magnets::drifted(noise, 0.0);
-    (0..count)
-        .map(|number| {
-            let approach = [Approach::Forward, Approach::Reverse][number % 2];
-            let sign = if number % 2 == 0 { 1.0 } else { -1.0 };
-            let lost_mm = sign * stage.lost_motion_um * 0.5e-3;
-            let shift_mm = stage.repeatability_nm * 1e-6 * noise.normal() - lost_mm;
-            let point = |step: i32| {
-                let mm = sign * f64::from(step) * 5e-3;
-                let [v1, v2] = magnets.volts(mm + shift_mm);
-                HallPoint {
-                    position: Metres((mm * 1e5).round() * 1e-8),
-                    peak: Volts(v1 + stage.noise_mv * 1e-3 * noise.normal()),
-                    slope: Volts(v2 + stage.noise_mv * 1e-3 * noise.normal()),
-                }
-            };
-            let points = (-200..=200).map(point).collect();
-            Pass { approach, points }
-        })
-        .collect()
-}
+use crate::hall_zero::rig::{Noise, Passed as Stage};
 
 const STAGE: Stage = Stage {
     noise_mv: 0.2,
     repeatability_nm: 25.0,
     lost_motion_um: 1.0,
+    zero_um: 0.0,
 };
 
 #[test]
@@ -46,7 +15,7 @@ fn lost_motion_is_told_and_has_no_part_in_the_origin() {
             lost_motion_um,
             ..STAGE
         };
-        let passes = passes(&stage, 6, &mut Noise(3));
+        let passes = stage.passes(6, &mut Noise(3));
         let zero = refine_passes(&passes, &RefineOptions::default()).unwrap();
         let told = zero.passes.unwrap();
         let off = told.lost_motion - Metres::from_um(lost_motion_um);
@@ -80,10 +49,11 @@ fn judge_stages(seed: u64, count: u32) {
             noise_mv,
             repeatability_nm,
             lost_motion_um,
+            zero_um: 0.0,
         };
         let (mut covered, mut squares) = (0, 0.0);
         for _ in 0..count {
-            let passes = passes(&stage, 6, &mut noise);
+            let passes = stage.passes(6, &mut noise);
             let zero = refine_passes(&passes, &RefineOptions::default());
             let zero = zero.unwrap_or_else(|error| panic!("{noise_mv} mV: {error}"));
             let ratio = zero.origin / zero.standard_uncertainty;
@@ -113,7 +83,7 @@ fn sound_stages_counted_over_many() {
 
 #[test]
 fn one_direction_alone_says_nothing_of_lost_motion() {
-    let mut all = passes(&STAGE, 6, &mut Noise(5));
+    let mut all = STAGE.passes(6, &mut Noise(5));
     all.retain(|it| it.approach == Approach::Forward);
     let error = refine_passes(&all, &RefineOptions::default()).unwrap_err();
     let expected = RefineError::TooFewPasses {
@@ -125,7 +95,7 @@ fn one_direction_alone_says_nothing_of_lost_motion() {
 
 #[test]
 fn interference_within_a_pass_is_refused() {
-    let mut all = passes(&STAGE, 6, &mut Noise(6));
+    let mut all = STAGE.passes(6, &mut Noise(6));
     for (at, point) in all[3].points.iter_mut().enumerate() {
         point.slope += Volts(3e-3 * (at as f64 * 0.9).sin());
     }

@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use super::*;
 pub(super) use crate::noise::Noise;
-use units::{Metres, MetresPerSecond, Time, Volts};
+use units::{Approach, Metres, MetresPerSecond, Time, Volts};
 
 /// Both sensors as they are today; positions in millimetres from the true zero.
 #[derive(Clone, Copy, Debug)]
@@ -193,4 +193,40 @@ pub(super) fn sweep(
         }
     }
     points
+}
+
+/// A stage as passes see it.
+#[derive(Clone, Copy)]
+pub(super) struct Passed {
+    pub(super) noise_mv: f64,
+    pub(super) repeatability_nm: f64,
+    pub(super) lost_motion_um: f64,
+    /// Where its origin is.
+    pub(super) zero_um: f64,
+}
+
+impl Passed {
+    /// Passes of it, by turns: each shifted by what it repeats to, and by half the lost motion.
+    pub(super) fn passes(&self, count: usize, noise: &mut Noise) -> Vec<Pass> {
+        let magnets = Magnets::drifted(noise, 0.0);
+        (0..count)
+            .map(|number| {
+                let approach = [Approach::Forward, Approach::Reverse][number % 2];
+                let sign = if number % 2 == 0 { 1.0 } else { -1.0 };
+                let lost_mm = sign * self.lost_motion_um * 0.5e-3;
+                let shift_mm = self.repeatability_nm * 1e-6 * noise.normal() - lost_mm;
+                let point = |step: i32| {
+                    let mm = sign * f64::from(step) * 5e-3;
+                    let [v1, v2] = magnets.volts(mm + shift_mm - self.zero_um * 1e-3);
+                    HallPoint {
+                        position: Metres((mm * 1e5).round() * 1e-8),
+                        peak: Volts(v1 + self.noise_mv * 1e-3 * noise.normal()),
+                        slope: Volts(v2 + self.noise_mv * 1e-3 * noise.normal()),
+                    }
+                };
+                let points = (-200..=200).map(point).collect();
+                Pass { approach, points }
+            })
+            .collect()
+    }
 }

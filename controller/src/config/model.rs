@@ -10,6 +10,7 @@ use crate::hardware::analog::AnalogConfig;
 use crate::hardware::bus::{CanBus, SerialLine, Wiring};
 use crate::hardware::camera::CameraConfig;
 use crate::hardware::instrument::InstrumentConfig;
+use crate::linear::GantryConfig;
 use crate::platform::config::PlatformConfig;
 use crate::rotary::RotaryConfig;
 use crate::volumetric::VolumetricConfig;
@@ -32,6 +33,9 @@ pub struct MachineConfig {
     /// Linear axes by name. At least one axis, linear or rotary, is required.
     #[serde(default)]
     pub axis: BTreeMap<String, AxisConfig>,
+    /// Pairs of linear axes that move one stage side by side, by name; no axis may have the same one.
+    #[serde(default)]
+    pub gantry: BTreeMap<String, GantryConfig>,
     /// Rotary axes by name; no linear axis may have the same one.
     #[serde(default)]
     pub rotary: BTreeMap<String, RotaryConfig>,

@@ -50,7 +50,8 @@ impl Failure {
             | Self::Fit { .. }
             | Self::Budget { .. }
             | Self::MadeWorse { .. }
-            | Self::OutOfTolerance { .. } => 5,
+            | Self::OutOfTolerance { .. }
+            | Self::Turned { .. } => 5,
         }
     }
 }

@@ -1,12 +1,18 @@
 //! What the steps of the cycle are asked to do.
 
+mod gantry;
+
 use units::Short;
 
 use crate::assemble;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
+use crate::linear::check::gantry::check_gantries;
 use crate::linear::positions::spaced;
 use crate::linear::{CalibrateConfig, CompensationConfig, EndPolicyName, VerifyConfig, ZeroConfig};
+
+#[cfg(feature = "program")]
+pub(crate) use gantry::notes as gantry_notes;
 
 /// Positions closer than this are one.
 const STEP_MIN_MM: f64 = 1e-3;
@@ -16,6 +22,7 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     for (name, axis) in &config.axis {
         check_cycle(findings, config, name, axis);
     }
+    check_gantries(config, findings);
 }
 
 fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, axis: &AxisConfig) {

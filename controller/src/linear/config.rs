@@ -1,7 +1,11 @@
 //! The part of a configuration that is about the cycle of linear axes. Each key's suffix is its unit.
 
+mod gantry;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+pub(crate) use gantry::GantryConfig;
 
 /// The drift-free origin of an axis, by two Hall sensors (system S5).
 ///

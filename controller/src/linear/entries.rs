@@ -57,6 +57,52 @@ pub struct ZeroEntry {
     pub at_s: f64,
 }
 
+/// How far the stage of a gantry was turned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RotationEntry {
+    /// Both sides.
+    pub axes: [String; 2],
+    /// The journals of their zeros.
+    pub zeros: [String; 2],
+    /// Their zero points, each in its drive's coordinates before they became zero, metres.
+    pub origins_m: [f64; 2],
+    /// The side that is ahead at positive angles.
+    pub ahead_when_positive: String,
+    /// From the one side to the other, metres.
+    pub distance_m: f64,
+    /// Its standard uncertainty, metres.
+    pub distance_u_m: f64,
+    /// How far the stage was turned where both drives showed the same, radians.
+    pub angle_rad: f64,
+    /// Standard uncertainty of that, radians.
+    pub standard_uncertainty_rad: f64,
+    /// How well that is known; `None` for infinitely many.
+    pub degrees_of_freedom: Option<f64>,
+    /// The angle at acceptance, radians, where the configuration says it.
+    pub angle_at_acceptance_rad: Option<f64>,
+    /// How far it may differ from that, radians.
+    pub angle_limit_rad: Option<f64>,
+    /// Standard uncertainty of where the stage stands now against its zero, radians: both sides' zeros, each on a
+    /// whole count.
+    pub zero_u_rad: f64,
+    /// Monotonic time of the machine, seconds.
+    pub at_s: f64,
+}
+
+impl RotationEntry {
+    /// By how much the angle differs from that at acceptance.
+    pub fn change_rad(&self) -> Option<f64> {
+        Some(self.angle_rad - self.angle_at_acceptance_rad?)
+    }
+
+    /// Whether that is within its limit; so is what nothing is compared with.
+    pub fn is_within_limit(&self) -> bool {
+        let judged = self.change_rad().zip(self.angle_limit_rad);
+        judged.is_none_or(|(change, limit)| change.abs() <= limit)
+    }
+}
+
 /// What a job is: the first line of its journal after the header.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,13 +1,14 @@
 //! Journals of a linear axis: each line by itself, and against those before it.
 
 use machine::records::sound::{
-    ERROR_U_M, Judged, PASSES_MAX, PLACE_M, SECONDS, VOLTS, approach, as_many, counted, is, number,
-    numbers, once, optional, unsound,
+    ANGLE_RAD, ANGLE_U_RAD, ERROR_U_M, Judged, LENGTH_M, PASSES_MAX, PLACE_M, SECONDS, VOLTS,
+    approach, as_many, counted, is, number, numbers, once, optional, unsound,
 };
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
 
-use crate::linear::{JobEntry, PointEntry, ReachedEntry, WentOnEntry, ZeroEntry};
+use crate::linear::sound::FREEDOM;
+use crate::linear::{JobEntry, PointEntry, ReachedEntry, RotationEntry, WentOnEntry, ZeroEntry};
 
 /// A line of such a journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +18,8 @@ pub enum LinearEntry {
     Point(PointEntry),
     /// A zero.
     Zero(ZeroEntry),
+    /// How far the stage of a gantry was turned.
+    Rotation(RotationEntry),
     /// A run is whole, and the place of its datum still reads what it should.
     Closed(ClosureEntry),
     /// What a job is.
@@ -34,6 +37,8 @@ pub struct LinearLog {
     pub points: Vec<PointEntry>,
     /// Its zeros.
     pub zeros: Vec<ZeroEntry>,
+    /// How far a gantry's stage was turned.
+    pub rotations: Vec<RotationEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
     /// The job that was done, if it was one.
@@ -53,6 +58,7 @@ impl Log for LinearLog {
         match entry {
             LinearEntry::Point(it) => point(header, it),
             LinearEntry::Zero(it) => zero(it),
+            LinearEntry::Rotation(it) => rotation(it),
             LinearEntry::Closed(it) => it.judge(header),
             LinearEntry::Job(it) => job(self, header, it),
             LinearEntry::Reached(it) => reached(self, header, it),
@@ -64,6 +70,7 @@ impl Log for LinearLog {
         match entry {
             LinearEntry::Point(it) => self.points.push(it),
             LinearEntry::Zero(it) => self.zeros.push(it),
+            LinearEntry::Rotation(it) => self.rotations.push(it),
             LinearEntry::Closed(it) => self.closures.push(it),
             LinearEntry::Job(it) => self.job = Some(it),
             LinearEntry::Reached(it) => self.reached.push(it),
@@ -113,6 +120,28 @@ fn zero(it: &ZeroEntry) -> Judged {
     number("patent_p0_m", it.patent_p0_m, &PLACE_M)?;
     number("peak_max_v", it.peak_max_v, &VOLTS)?;
     number("mid_v", it.mid_v, &VOLTS)?;
+    number("at_s", it.at_s, &SECONDS)
+}
+
+fn rotation(it: &RotationEntry) -> Judged {
+    for origin in &it.origins_m {
+        number("origins_m", *origin, &PLACE_M)?;
+    }
+    let is_side = it.axes.contains(&it.ahead_when_positive);
+    let expected = || format!("`{}` or `{}`", it.axes[0], it.axes[1]);
+    is("ahead_when_positive", is_side, expected, || {
+        format!("`{}`", it.ahead_when_positive.escape_debug())
+    })?;
+    number("distance_m", it.distance_m, &LENGTH_M)?;
+    number("distance_u_m", it.distance_u_m, &ERROR_U_M)?;
+    number("angle_rad", it.angle_rad, &ANGLE_RAD)?;
+    let u = it.standard_uncertainty_rad;
+    number("standard_uncertainty_rad", u, &ANGLE_U_RAD)?;
+    optional("degrees_of_freedom", it.degrees_of_freedom, &FREEDOM)?;
+    let accepted = it.angle_at_acceptance_rad;
+    optional("angle_at_acceptance_rad", accepted, &ANGLE_RAD)?;
+    optional("angle_limit_rad", it.angle_limit_rad, &ANGLE_U_RAD)?;
+    number("zero_u_rad", it.zero_u_rad, &ANGLE_U_RAD)?;
     number("at_s", it.at_s, &SECONDS)
 }
 

@@ -12,6 +12,7 @@ mod datum_in_use;
 mod dependence;
 pub(crate) mod entries;
 mod finding;
+pub(crate) mod gantry;
 #[cfg(test)]
 mod golden;
 pub(crate) mod job;
@@ -50,11 +51,16 @@ pub use verify::VerifyOptions;
 // What the rest of this package uses.
 pub(crate) use calibrate::Calibrated;
 pub(crate) use config::{
-    CalibrateConfig, CompensationConfig, EndPolicyName, InterpolationName, VerifyConfig, ZeroConfig,
+    CalibrateConfig, CompensationConfig, EndPolicyName, GantryConfig, InterpolationName,
+    VerifyConfig, ZeroConfig,
 };
 pub(crate) use datum_in_use::Datum;
-pub(crate) use entries::{JobEntry, PointEntry, ReachedEntry, WentOnEntry, ZeroEntry};
+pub(crate) use entries::{
+    JobEntry, PointEntry, ReachedEntry, RotationEntry, WentOnEntry, ZeroEntry,
+};
 pub(crate) use finding::PatternFinding;
+#[cfg(feature = "program")]
+pub(crate) use gantry::GantryZeroed;
 #[cfg(test)]
 pub(crate) use job::JobConfig;
 pub(crate) use kind::KIND;

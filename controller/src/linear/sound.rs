@@ -13,7 +13,7 @@ use crate::linear::record::{BudgetRecord, CombinedRecord};
 /// What one unit of an input does.
 const SENSITIVITY: Limits = limits(-1e12, 1e12, "m or m/m per unit");
 /// How well an uncertainty is known.
-const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
+pub(super) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
 
 /// A figure that follows from others may differ by rounding.
 const ROUNDING: f64 = 1e-9;

@@ -5,12 +5,12 @@ use compensator::error_table::Compensation;
 use machine::engine::TableCorrection;
 use units::Metres;
 
-use crate::config::AxisConfig;
+use crate::config::{AxisConfig, MachineConfig};
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::handle::{Core, no_such_axis};
 use crate::linear::memory::AxisMemory;
-use crate::linear::{Course, table_correction};
+use crate::linear::{Course, GantryConfig, table_correction};
 
 /// One linear axis of a machine: its zero, its moves, its calibration and what they need to
 /// remember. [`Machine::linear`](crate::Machine::linear) gives it.
@@ -19,6 +19,8 @@ pub struct LinearStage<'m> {
     pub(crate) axis: &'m str,
     pub(crate) config: &'m AxisConfig,
     pub(crate) memory: &'m mut AxisMemory,
+    /// What is remembered of the other side, where it is one of a gantry's.
+    pub(super) other_side: Option<&'m mut AxisMemory>,
 }
 
 impl Machine {
@@ -31,8 +33,17 @@ impl Machine {
         let Some((axis, config)) = core.config.axis.get_key_value(axis) else {
             return Err(no_such_axis(axis, &core.devices().axis_names()));
         };
+        let other = gantry_of(core.config, axis).map(|(_, gantry)| gantry.other_than(axis));
+        let (memory, other_side) = match other {
+            None => (memories.of(axis, AxisMemory::default), None),
+            Some(other) => {
+                let [own, other] = memories.both([axis.as_str(), other]);
+                (own, Some(other))
+            }
+        };
         Ok(LinearStage {
-            memory: memories.of(axis, AxisMemory::default),
+            memory,
+            other_side,
             core,
             axis,
             config,
@@ -85,6 +96,16 @@ impl LinearStage<'_> {
         self.memory.course.budget = calibration.budget;
         self.memory.course.approach = calibration.approach;
     }
+}
+
+/// The gantry that `axis` is a side of, with its name.
+pub(super) fn gantry_of<'a>(
+    config: &'a MachineConfig,
+    axis: &str,
+) -> Option<(&'a str, &'a GantryConfig)> {
+    let mut all = config.gantry.iter();
+    let (name, gantry) = all.find(|(_, it)| it.axes.iter().any(|side| side == axis))?;
+    Some((name.as_str(), gantry))
 }
 
 /// A calibration that was found to belong to the stage and to keep its limits.

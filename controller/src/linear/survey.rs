@@ -9,7 +9,7 @@ use units::{Metres, MetresPerSecond};
 use crate::failure::Failure;
 use crate::linear::ZeroConfig;
 use crate::linear::finding::PatternFinding;
-use crate::linear::stage::LinearStage;
+use crate::linear::stage::{LinearStage, gantry_of};
 
 /// So many samples over the search limit, as configured: the pattern is about as wide.
 const SAMPLES_PER_LIMIT: f64 = 10.0;
@@ -26,7 +26,9 @@ impl LinearStage<'_> {
         failure: Box<SearchFailure>,
     ) -> Failure {
         let axis = self.axis.to_owned();
-        let finding = if is_worth_a_survey(&failure) {
+        // A side of a gantry does not pass over the travel alone.
+        let is_alone = gantry_of(self.core.config, self.axis).is_none();
+        let finding = if is_alone && is_worth_a_survey(&failure) {
             self.survey(config, settings)
         } else {
             Ok(None)

@@ -22,7 +22,7 @@ use crate::homing;
 use crate::linear::ZeroConfig;
 use crate::linear::ZeroEntry;
 use crate::linear::passes::{SEARCHED, STEPS};
-use crate::linear::stage::LinearStage;
+use crate::linear::stage::{LinearStage, gantry_of};
 use crate::linear::{LinearEntry, LinearLog};
 use crate::run::utc_now;
 use crate::run::{missing, note_failure};
@@ -44,6 +44,15 @@ pub struct Zeroed {
     /// The zero before it, from the newest complete journal of this axis: what the sensors
     /// have drifted since.
     pub previous: Option<ZeroEntry>,
+}
+
+/// Where an axis is when its zero begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Begins {
+    /// Nobody knows: it is referred to its limit switch first.
+    Anywhere,
+    /// Enabled, at its nominal zero.
+    AtNominal,
 }
 
 impl Zeroed {
@@ -70,15 +79,36 @@ impl LinearStage<'_> {
     ///
     /// # Errors
     /// Whatever stops the machine; a search or a regression that fails, with step and
-    /// values; an origin that is not certain enough. The axis is not zeroed then.
+    /// values; an origin that is not certain enough. The axis is not zeroed then. A side of a gantry is refused
+    /// ([`Self::zero_gantry`]): going to its limit switch alone would turn the stage.
     pub fn zero(&mut self, store: &Store) -> Result<Zeroed, Failure> {
+        self.require_alone()?;
+        self.zero_from(store, Begins::Anywhere)
+    }
+
+    /// Refuses a side of a gantry, which goes nowhere far by itself.
+    pub(super) fn require_alone(&self) -> Result<(), Failure> {
+        let Some((name, _)) = gantry_of(self.core.config, self.axis) else {
+            return Ok(());
+        };
+        Err(Failure::Usage {
+            what: format!(
+                "axis {} is a side of the gantry {name}, which it would turn on its way; nothing was moved",
+                self.axis
+            ),
+            help: format!("zero both sides together: `truestage zero --axis {name}`"),
+        })
+    }
+
+    /// The same of an axis that may be at its nominal zero already.
+    pub(super) fn zero_from(&mut self, store: &Store, begins: Begins) -> Result<Zeroed, Failure> {
         let config = self.config.zero.clone();
         let config = config.ok_or_else(|| missing(self.axis, "zero"))?;
         self.core.set_zeroed(self.axis, false)?;
         let previous = previous_zero(store, self.axis);
-        let mut journal = Journal::create(&store.runs(), &self.zero_header())?;
+        let mut journal = Journal::create(&store.runs(), &self.zero_header(self.axis))?;
         let found = self
-            .find_zero(&config, &mut journal)
+            .find_zero(&config, &mut journal, begins)
             .map_err(|failure| homing::before_zero(&self.core, self.axis, failure));
         let (outcome, estimate, entry) =
             found.inspect_err(|failure| note_failure(&mut journal, failure))?;
@@ -97,16 +127,15 @@ impl LinearStage<'_> {
         &mut self,
         config: &ZeroConfig,
         journal: &mut Journal<LinearLog>,
+        begins: Begins,
     ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, 0, STEPS);
-        self.core.enable(self.axis)?;
-        self.reference(config)?;
-        self.core
-            .observer()
-            .progress(Stage::Zero, self.axis, 1, STEPS);
-        self.travel(Metres::ZERO, Correction::Off)?;
+        match begins {
+            Begins::Anywhere => self.go_to_nominal(config)?,
+            Begins::AtNominal => {}
+        }
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, 2, STEPS);
@@ -127,13 +156,22 @@ impl LinearStage<'_> {
         Ok((outcome, estimate, entry))
     }
 
+    /// On, to the limit switch, and to the nominal zero.
+    pub(super) fn go_to_nominal(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
+        self.core.enable(self.axis)?;
+        self.reference(config)?;
+        self.core
+            .observer()
+            .progress(Stage::Zero, self.axis, 1, STEPS);
+        self.travel(Metres::ZERO, Correction::Off)?;
+        Ok(())
+    }
+
     /// Coarse reference on the negative limit switch.
     pub(super) fn reference(&mut self, config: &ZeroConfig) -> Result<(), Failure> {
         let start = homing::place(&self.core, self.axis)?;
-        let speed = MetresPerSecond(config.reference_speed_mm_per_s * 1e-3);
         let limit = self.config.reference_limit().unwrap_or_default();
-        let position = Metres::from_mm(config.negative_limit_mm);
-        let command = AxisCommand::HomeNegativeLimit { position, speed };
+        let command = to_limit_switch(config);
         let done = self.core.command(self.axis, command, "reference", limit);
         done.map_err(|failure| homing::explained(&self.core, self.axis, start, failure.into()))?;
         Ok(self.core.forget_approach(self.axis)?)
@@ -272,8 +310,9 @@ impl LinearStage<'_> {
         }
     }
 
-    fn zero_header(&self) -> JournalHeader {
-        let here = self.core.this_machine(self.axis);
+    /// The header of the journal of a zero of `axis`.
+    pub(super) fn zero_header(&self, axis: &str) -> JournalHeader {
+        let here = self.core.this_machine(axis);
         JournalHeader {
             schema_version: SCHEMA_VERSION,
             verb: "zero".into(),
@@ -289,6 +328,14 @@ impl LinearStage<'_> {
             runs: 0,
             approach_m: None,
         }
+    }
+}
+
+/// The way to the negative limit switch, which becomes the nominal place that `config` gives it.
+pub(super) fn to_limit_switch(config: &ZeroConfig) -> AxisCommand {
+    AxisCommand::HomeNegativeLimit {
+        position: Metres::from_mm(config.negative_limit_mm),
+        speed: MetresPerSecond(config.reference_speed_mm_per_s * 1e-3),
     }
 }
 

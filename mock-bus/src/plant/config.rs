@@ -10,6 +10,7 @@ pub use self::parts::{
 };
 
 use super::camera::CameraConfig;
+use super::gantry::config::GantryConfig;
 use super::mechanics::Section;
 use super::platform::config::PlatformConfig;
 use super::table::config::TableConfig;
@@ -24,6 +25,8 @@ pub struct PlantConfig {
     pub stage: StageConfig,
     /// A platform on screws in place of the stage.
     pub platform: Option<PlatformConfig>,
+    /// A stage with a motor on either side in place of the stage.
+    pub gantry: Option<GantryConfig>,
     /// A rotary table in place of the stage.
     pub table: Option<TableConfig>,
     /// Three linear axes in place of the stage.
@@ -40,8 +43,9 @@ pub struct PlantConfig {
 
 impl PlantConfig {
     /// What stands in place of the stage, of each kind.
-    pub(super) fn others(&self) -> [Option<&dyn Section>; 3] {
+    pub(super) fn others(&self) -> [Option<&dyn Section>; 4] {
         [
+            self.gantry.as_ref().map(|it| it as &dyn Section),
             self.platform.as_ref().map(|it| it as &dyn Section),
             self.table.as_ref().map(|it| it as &dyn Section),
             self.volumetric.as_ref().map(|it| it as &dyn Section),
@@ -72,7 +76,7 @@ impl PlantConfig {
             return Ok(());
         }
         Err(ConfigError::Value {
-            key: "platform and table and volumetric",
+            key: "gantry and platform and table and volumetric",
             seen: others as f64,
             expected: "at most one of them",
         })

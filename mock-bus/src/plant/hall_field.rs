@@ -112,9 +112,14 @@ impl HallField {
 
     /// The voltage at the true position, offset, gain and tilt included, noise not.
     pub(super) fn volts(&self, sensor: Sensor, position: Metres) -> f64 {
+        self.volts_drifted(&self.drift, sensor, position)
+    }
+
+    /// The same of sensors over magnets of that kind that have drifted otherwise.
+    pub(super) fn volts_drifted(&self, drift: &HallDrift, sensor: Sensor, position: Metres) -> f64 {
         let drift = match sensor {
-            Sensor::Even => self.drift.sensors[0],
-            Sensor::Odd => self.drift.sensors[1],
+            Sensor::Even => drift.sensors[0],
+            Sensor::Odd => drift.sensors[1],
         };
         let gain = 1.0 + drift.gain + drift.gain_per_m * position.value();
         let offset = self.config.offset_v + drift.offset.value();

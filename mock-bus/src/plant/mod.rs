@@ -7,6 +7,7 @@
 mod analog;
 pub mod camera;
 pub mod config;
+pub mod gantry;
 mod hall_field;
 mod instrument;
 mod machine;
@@ -26,6 +27,7 @@ use units::{Celsius, Metres, Time};
 
 pub use analog::InputFault;
 pub use camera::{Mark, Target};
+pub use gantry::GantryTruth;
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes, Scanned};
 pub use parts::pulse::{IndexPulse, ProbeEdge};
@@ -39,6 +41,7 @@ pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 use analog::Input;
 use camera::Camera;
 use config::PlantConfig;
+use gantry::Gantry;
 use hall_field::{HallField, Sensor};
 use instrument::Interferometer;
 use machine::Machine;
@@ -48,7 +51,8 @@ use stage::Stage;
 use thermal::Climate;
 use volumetric::{Sighting, Signal, TERMINALS, Volumetric};
 
-/// Inputs 0 and 1 are the Hall sensors; the others are spare. Three axes have their own.
+/// Inputs 0 and 1 are the Hall sensors, of a gantry 2 and 3 those of its second side; the others are spare. Three
+/// axes have their own.
 const ANALOG_INPUTS: usize = 8;
 /// What a resistance thermometer's input can show.
 const TEMPERATURE_RAIL_C: f64 = 850.0;
@@ -186,6 +190,13 @@ impl Plant {
     fn signal(&mut self, channel: usize) -> Option<Signal> {
         if let Some(volumetric) = self.machine.of_mut::<Volumetric>() {
             return volumetric.signal(channel, self.now);
+        }
+        if let Some(gantry) = self.machine.of::<Gantry>() {
+            let exchanged = usize::from(self.inputs_swapped && channel < 2);
+            let wired = (channel ^ exchanged, &self.hall);
+            let stage_c = self.climate.stage_temperature(self.now).value();
+            let volts = gantry.hall_volts(wired, self.now, stage_c)?;
+            return Some(Signal::Voltage(volts));
         }
         let sensor = match (channel, self.inputs_swapped) {
             (0, false) | (1, true) => Sensor::Even,

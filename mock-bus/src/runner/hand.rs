@@ -264,6 +264,14 @@ fn truth(time_s: f64, truth: &Truth<'_>) -> String {
         add("x_mm", pose.x.mm());
         add("y_mm", pose.y.mm());
         add("angle_arcsec", pose.angle.arcsec());
+    } else if let Some(gantry) = truth.gantry() {
+        for (key, at) in ["first_mm", "second_mm"]
+            .iter()
+            .zip(gantry.scale_positions())
+        {
+            add(key, at.mm());
+        }
+        add("angle_urad", gantry.angle().value() * 1e6);
     } else if let Some(table) = truth.table() {
         add("angle_deg", table.angle().degrees());
         add("plate_turned_lines", table.placement().0 as f64);

@@ -140,7 +140,9 @@ pub struct Passes {
     pub lost_motion: Metres,
     /// Standard deviation of the origin of a single pass.
     pub scatter: Metres,
-    /// Of that deviation.
+    /// Standard deviation of the origin of all passes, not widened for being known from few.
+    pub of_origin: Metres,
+    /// Of these deviations.
     pub degrees_of_freedom: usize,
 }
 

@@ -251,6 +251,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
         sections,
         calibration: Some(&story.calibrated.record.content),
         zeros,
+        rotations: Vec::new(),
         job: None,
     };
     write_page(store, &journal.header, &report::render(&page))

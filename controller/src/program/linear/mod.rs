@@ -2,6 +2,7 @@
 
 pub(crate) mod demo;
 pub(crate) mod elsewhere;
+mod gantry;
 pub(crate) mod job;
 mod moved;
 mod page;
@@ -16,13 +17,23 @@ pub(crate) mod verbs;
 use machine::records::Log;
 
 use super::show::Shown;
+use super::text::table_notes;
 use super::verbs::Verbs;
+use crate::config::MachineConfig;
+use crate::linear::check::gantry_notes;
 use crate::linear::{LinearContent, LinearLog};
+
+/// What an operator should know of linear axes and gantries that are sound.
+fn notes(config: &MachineConfig) -> Vec<String> {
+    let mut notes = table_notes(config);
+    notes.extend(gantry_notes(config));
+    notes
+}
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |_| false,
-    notes: crate::program::text::table_notes,
+    notes,
     pointers: |_| Vec::new(),
     made_together: |_, _| None,
     demos: demo::DEMOS,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use compensator::iso230::{self, Figures};
-use machine::records::read_journal;
+use machine::records::{ReadJournal, read_journal};
 
 use crate::Failure;
 use crate::linear::measure::{largest_closure, series_of};
@@ -37,14 +37,24 @@ pub(crate) fn html(path: &Path) -> Result<String, Failure> {
             .map(|(id, _)| ("calibration made".into(), id.clone())),
     );
     let page = Page {
-        title: format!("{} of axis {}", journal.header.verb, journal.header.axis),
+        title: format!("{} of {}", journal.header.verb, whose(&journal)),
         facts,
         sections,
         calibration: made.first().map(|(_, it)| &it.content),
         zeros: journal.log.zeros.clone(),
+        rotations: journal.log.rotations.clone(),
         job: Some(&journal.log),
     };
     Ok(report::render(&page))
+}
+
+/// Whose journal it is: a gantry's tells of both its sides.
+fn whose(journal: &ReadJournal<LinearLog>) -> String {
+    let name = &journal.header.axis;
+    match journal.log.rotations.is_empty() {
+        true => format!("axis {name}"),
+        false => format!("gantry {name}"),
+    }
 }
 
 /// `None` for a run with too few points for figures (a zero, or one that was interrupted).

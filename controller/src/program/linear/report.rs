@@ -1,6 +1,7 @@
 //! The page of a linear axis: facts, deviations, figures of ISO 230-2, its table and its zeros.
 
 mod deviations;
+mod gantry;
 mod job;
 mod uncertainty;
 
@@ -9,7 +10,7 @@ use core::fmt::Write as _;
 use compensator::iso230::Figures;
 use units::Metres;
 
-use crate::linear::{LinearContent, LinearLog, PointEntry, ZeroEntry};
+use crate::linear::{LinearContent, LinearLog, PointEntry, RotationEntry, ZeroEntry};
 use crate::program::page::{document, escape, facts};
 use crate::program::text;
 
@@ -37,6 +38,8 @@ pub(crate) struct Page<'a> {
     pub(crate) calibration: Option<&'a LinearContent>,
     /// Zeros found, in order.
     pub(crate) zeros: Vec<ZeroEntry>,
+    /// How far a gantry's stage was turned, each time.
+    pub(crate) rotations: Vec<RotationEntry>,
     /// The journal of a job.
     pub(crate) job: Option<&'a LinearLog>,
 }
@@ -64,6 +67,10 @@ pub(crate) fn render(page: &Page<'_>) -> String {
     if !page.zeros.is_empty() {
         html += "<h2>Zeros</h2>";
         html += &zeros(&page.zeros);
+    }
+    for rotation in &page.rotations {
+        html += "<h2>Rotation of the stage</h2>";
+        html += &gantry::html(rotation);
     }
     let note = "deviation = actual − target. Bars are mean ± 2 s at each target.";
     document(&page.title, &html, note)

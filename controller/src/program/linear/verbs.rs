@@ -9,7 +9,7 @@ use units::Metres;
 use crate::linear::VerifyOptions;
 use crate::ports::Use;
 use crate::program::json as to_json;
-use crate::program::linear::{moved, told};
+use crate::program::linear::{gantry, moved, told};
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
@@ -67,6 +67,9 @@ fn with_zeroed_axis<R>(
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "zero", Use::Motion, output)?;
+    if let Some(gantry) = gantry::asked_for(session.machine.config(), args.axis.as_deref()) {
+        return gantry::zero(session, &gantry, output);
+    }
     let axis = choose_axis(session.machine.devices().axis_names(), args)?;
     let store = session.store.clone();
     let (zeroed, counters) = session.machine.guarded(|machine| {

@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::config::error::{ConfigError, positive};
+
 /// A linear-motor stage.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -14,6 +16,42 @@ pub struct StageConfig {
     pub deviation: DeviationConfig,
     /// Its limit switches.
     pub limits: LimitConfig,
+}
+
+impl StageConfig {
+    /// Numbers that no such stage has.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let (motion, deviation) = (&self.motion, &self.deviation);
+        for (key, seen) in [
+            ("resolution_nm", self.encoder.resolution_nm),
+            ("cyclic_period_um", deviation.cyclic_period_um),
+            ("lost_motion_take_up_um", deviation.lost_motion_take_up_um),
+            ("servo_bandwidth_hz", motion.servo_bandwidth_hz),
+            (
+                "acceleration_max_m_per_s2",
+                motion.acceleration_max_m_per_s2,
+            ),
+            (
+                "friction_deceleration_m_per_s2",
+                motion.friction_deceleration_m_per_s2,
+            ),
+            (
+                "work_max_mm - work_min_mm",
+                deviation.work_max_mm - deviation.work_min_mm,
+            ),
+            (
+                "hard_stop_max_mm - start_max_mm",
+                motion.hard_stop_max_mm - motion.start_max_mm,
+            ),
+            (
+                "start_min_mm - hard_stop_min_mm",
+                motion.start_min_mm - motion.hard_stop_min_mm,
+            ),
+        ] {
+            positive(key, seen)?;
+        }
+        Ok(())
+    }
 }
 
 /// Mass, servo and mechanical ends.
