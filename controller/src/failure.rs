@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use compensator::budget::BudgetError;
 use compensator::data::DataError;
 use compensator::error_table::{CompensationError, FitError};
-use compensator::hall_zero::{RefineError, SearchFailure};
+use compensator::hall_zero::{PlanError, RefineError, SearchFailure};
 use machine::{EngineFailure, Layered};
 use units::{Metres, Radians};
 
@@ -326,6 +326,16 @@ pub enum Failure {
         seen: Metres,
         /// What is allowed.
         limit: Metres,
+    },
+    /// The curves of the Hall sensors propose nothing.
+    #[error("axis {axis}, sweep {}: {source}; nothing is proposed", sweep.display())]
+    ZeroPlan {
+        /// Which axis.
+        axis: String,
+        /// Where the sweep is.
+        sweep: PathBuf,
+        /// Why.
+        source: PlanError,
     },
     /// The stage of a gantry is turned otherwise than when it was accepted.
     #[error(

@@ -22,3 +22,4 @@ mod table;
 mod verbs;
 mod volumetric;
 mod volumetric_live;
+mod zero_plan;

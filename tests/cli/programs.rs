@@ -314,7 +314,13 @@ impl Bench {
     pub(crate) fn start_within(&self, words: &[&str], variables: &[(&str, &str)]) -> Process {
         let mut command = self.command();
         command.envs(variables.iter().copied());
-        command.arg(words[0]);
+        // `plan zero` is one verb.
+        let verb = if words.starts_with(&["plan", "zero"]) {
+            2
+        } else {
+            1
+        };
+        command.args(&words[..verb]);
         let uses_machine = [
             "scan",
             "zero",
@@ -325,7 +331,7 @@ impl Bench {
             "run",
             "serve",
         ];
-        if uses_machine.contains(&words[0]) {
+        if uses_machine.contains(&words[verb - 1]) {
             if self.is_lockstep {
                 command.args(["--clock", LOCKSTEP]);
             }
@@ -339,7 +345,7 @@ impl Bench {
                 command.args(["--port", port]);
             }
         }
-        command.args(&words[1..]);
+        command.args(&words[verb..]);
         Process::start(&mut command)
     }
 

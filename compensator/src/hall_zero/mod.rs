@@ -34,6 +34,7 @@
 mod diagnose;
 mod failure;
 mod passes;
+mod plan;
 mod profile;
 mod refine;
 mod rotation;
@@ -46,6 +47,7 @@ mod survey;
 pub use diagnose::{SensorFault, diagnose};
 pub use failure::{Reason, SearchFailure, Step};
 pub use passes::{Pass, refine_passes};
+pub use plan::{FlatLevel, PlanError, PlannedLevel, ZeroPlan, flat_level, plan_zero};
 pub use refine::{
     Flank, Level, Passes, RefineError, RefineOptions, Side, ZeroEstimate, fit_hall, refine,
     single_threshold_zero,

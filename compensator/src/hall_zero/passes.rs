@@ -21,12 +21,15 @@
 use units::{Approach, Metres, Volts};
 
 use super::refine::{Flank, Passes, RefineError, RefineOptions, ZeroEstimate, refine};
-use super::series::HallPoint;
+use super::series::{HallPoint, HallSeries};
 use crate::significance::student_limit;
 use crate::uncertainty::rms;
 
 /// A normal distribution exceeds twice its standard deviation with this probability.
 const BEYOND_TWICE: f64 = 0.0455;
+
+/// This share of its span a sweep goes back before that is a turn.
+const TURN: f64 = 0.1;
 
 /// What was read on one way over both flanks.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +38,44 @@ pub struct Pass {
     pub approach: Approach,
     /// Both voltages, in the order taken.
     pub points: Vec<HallPoint>,
+}
+
+impl Pass {
+    /// The sweep as passes in one direction each: a turn is where it goes back by more than a tenth of its span.
+    pub fn all_of(sweep: &HallSeries) -> Vec<Self> {
+        let points = sweep.points();
+        let places = || points.iter().map(|it| it.position.value());
+        let span =
+            places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
+        let (mut begin, mut extreme, mut direction) = (0, 0, 0.0);
+        let mut passes = Vec::new();
+        let mut push = |from: usize, to: usize, direction: f64| {
+            let approach = if direction < 0.0 {
+                Approach::Reverse
+            } else {
+                Approach::Forward
+            };
+            passes.push(Self {
+                approach,
+                points: points[from..=to].to_vec(),
+            });
+        };
+        for (at, place) in places().enumerate() {
+            let off = place - points[extreme].position.value();
+            let goes_on = off * direction > 0.0;
+            if goes_on {
+                extreme = at;
+            } else if off.abs() > span * TURN {
+                if direction != 0.0 {
+                    push(begin, extreme, direction);
+                    begin = extreme;
+                }
+                (direction, extreme) = (off.signum(), at);
+            }
+        }
+        push(begin, points.len() - 1, direction);
+        passes
+    }
 }
 
 /// Finds the origin in `passes`, of which there must be at least two in each direction.

@@ -102,3 +102,30 @@ fn interference_within_a_pass_is_refused() {
     let error = refine_passes(&all, &RefineOptions::default()).unwrap_err();
     assert!(matches!(error, RefineError::LackOfFit { .. }), "{error}");
 }
+
+#[test]
+fn a_sweep_is_parted_where_it_turns_and_not_where_it_trembles() {
+    let place = |um: f64| HallPoint {
+        position: Metres::from_um(um),
+        peak: Volts(1.0),
+        slope: Volts(1.0),
+    };
+    let places = [
+        0.0, -1.0, 20.0, 19.0, 60.0, 100.0, 99.0, 50.0, 51.0, 0.0, 40.0, 90.0,
+    ];
+    let sweep = HallSeries::new(places.map(place).to_vec()).unwrap();
+    let parts = Pass::all_of(&sweep);
+    let seen: Vec<_> = parts
+        .iter()
+        .map(|it| (it.approach, it.points.len()))
+        .collect();
+    let expected = [
+        (Approach::Forward, 6),
+        (Approach::Reverse, 5),
+        (Approach::Forward, 3),
+    ];
+    assert_eq!(seen, expected);
+    assert_eq!(parts[1].points[0].position, Metres::from_um(100.0));
+    let standing = HallSeries::new(vec![place(1.0); 3]).unwrap();
+    assert_eq!(Pass::all_of(&standing).len(), 1);
+}

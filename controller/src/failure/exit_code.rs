@@ -51,7 +51,8 @@ impl Failure {
             | Self::Budget { .. }
             | Self::MadeWorse { .. }
             | Self::OutOfTolerance { .. }
-            | Self::Turned { .. } => 5,
+            | Self::Turned { .. }
+            | Self::ZeroPlan { .. } => 5,
         }
     }
 }

@@ -32,6 +32,7 @@ pub(crate) mod settings;
 mod sound;
 mod stage;
 mod survey;
+pub(crate) mod sweep;
 mod table_correction;
 mod told;
 mod travel;
@@ -66,6 +67,8 @@ pub(crate) use job::JobConfig;
 pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
+#[cfg(feature = "program")]
+pub(crate) use sweep::ZeroPlanned;
 pub(crate) use table_correction::table_correction;
 #[cfg(feature = "program")]
 pub(crate) use verify::UncertaintyAtTarget;

@@ -9,7 +9,8 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::hall_zero::{
-    Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate, single_threshold_zero,
+    FlatLevel, Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate, flat_level,
+    single_threshold_zero,
 };
 use compensator::uncertainty::{combine, of_rounding};
 use drivers::device::{AxisCommand, DriveCommand};
@@ -41,6 +42,8 @@ pub struct Zeroed {
     pub journal: PathBuf,
     /// What was found now.
     pub entry: ZeroEntry,
+    /// Where Vc lies on a flat part of the curves.
+    pub flat: Option<FlatLevel>,
     /// The zero before it, from the newest complete journal of this axis: what the sensors
     /// have drifted since.
     pub previous: Option<ZeroEntry>,
@@ -110,7 +113,7 @@ impl LinearStage<'_> {
         let found = self
             .find_zero(&config, &mut journal, begins)
             .map_err(|failure| homing::before_zero(&self.core, self.axis, failure));
-        let (outcome, estimate, entry) =
+        let (outcome, estimate, entry, flat) =
             found.inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.complete()?;
         self.memory.course.zero = Some(estimate.standard_uncertainty);
@@ -119,6 +122,7 @@ impl LinearStage<'_> {
             outcome,
             journal: journal.path().to_owned(),
             entry,
+            flat,
             previous,
         })
     }
@@ -128,7 +132,7 @@ impl LinearStage<'_> {
         config: &ZeroConfig,
         journal: &mut Journal<LinearLog>,
         begins: Begins,
-    ) -> Result<(Outcome, ZeroEstimate, ZeroEntry), Failure> {
+    ) -> Result<(Outcome, ZeroEstimate, ZeroEntry, Option<FlatLevel>), Failure> {
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, 0, STEPS);
@@ -153,7 +157,8 @@ impl LinearStage<'_> {
         self.core
             .observer()
             .progress(Stage::Zero, self.axis, STEPS, STEPS);
-        Ok((outcome, estimate, entry))
+        let flat = flat_level(&passes, &estimate, settings.vc);
+        Ok((outcome, estimate, entry, flat))
     }
 
     /// On, to the limit switch, and to the nominal zero.

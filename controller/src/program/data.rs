@@ -118,12 +118,18 @@ pub(crate) enum PlanCommand {
     Rotary(super::rotary::fit::PlanArgs),
     /// Strokes that tell slope, lost motion and periodic error of a ball screw apart.
     Screw(super::platform::plan::PlanArgs),
+    /// Vc and the bands of a zero search, from the curves of the Hall sensors: measured now, or of a sweep that is
+    /// there.
+    ///
+    /// Measuring refers the axis to its limit switch and passes over the magnets; the sweep is kept.
+    Zero(super::linear::plan::PlanArgs),
 }
 
 pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
     match command {
         PlanCommand::Rotary(args) => super::rotary::fit::plan(args, output),
         PlanCommand::Screw(args) => super::platform::plan::run(args, output),
+        PlanCommand::Zero(args) => super::linear::plan::run(args, output),
     }
 }
 

@@ -29,4 +29,5 @@ mod volumetric_resume;
 mod volumetric_rolls;
 mod volumetric_scatter;
 mod wrong_position;
+mod zero_plan;
 mod zero_uncertainty;

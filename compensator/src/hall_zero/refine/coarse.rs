@@ -15,7 +15,10 @@ pub(super) fn bin_count(points: usize) -> usize {
 }
 
 /// The first place where a polyline passes `level`, by linear interpolation.
-pub(super) fn crossing(line: impl Iterator<Item = (f64, f64)>, level: f64) -> Option<f64> {
+pub(in crate::hall_zero) fn crossing(
+    line: impl Iterator<Item = (f64, f64)>,
+    level: f64,
+) -> Option<f64> {
     let mut before: Option<(f64, f64)> = None;
     for (x, v) in line {
         if let Some((x0, v0)) = before

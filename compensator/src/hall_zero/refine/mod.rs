@@ -38,7 +38,8 @@ use super::{Sensor, Settings};
 use crate::hall_zero::{HallPoint, HallSeries};
 use crate::uncertainty::{combine, rms};
 
-use coarse::{Coarse, WINDOW_SHARE, bin_count, crossing};
+pub(in crate::hall_zero) use coarse::crossing;
+use coarse::{Coarse, WINDOW_SHARE, bin_count};
 pub use error::{RefineError, Side};
 use symmetry::check_symmetry;
 use window::{Data, Window, lag};
@@ -89,11 +90,14 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
+    /// The flanks of a search are cut at this share of Vc below the peak.
+    pub(in crate::hall_zero) const CUT_SHARE: f64 = 0.7;
+
     /// For the samples of a search: the flanks are cut at 0.7 Vc below the peak, so that the
     /// search has covered both sides of the cut (it went down to Vc).
     pub fn for_search(settings: &Settings) -> Self {
         Self {
-            level: Level::BelowPeak(settings.vc * 0.7),
+            level: Level::BelowPeak(settings.vc * Self::CUT_SHARE),
             ..Self::default()
         }
     }

@@ -6,6 +6,7 @@ mod gantry;
 pub(crate) mod job;
 mod moved;
 mod page;
+pub(crate) mod plan;
 mod report;
 mod shown;
 #[cfg(test)]

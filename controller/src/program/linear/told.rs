@@ -43,14 +43,24 @@ pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
     let since = drift.map_or(String::new(), |(peak, mid)| {
         format!("\nsince the zero before: peak sensor {peak:+.1} mV, slope sensor {mid:+.1} mV")
     });
+    let flat = zeroed.flat.map_or(String::new(), |it| {
+        format!(
+            "\nwarning: level_below_peak_v lies where the curves are flat: the peak sensor climbs at {:.0} % of its \
+             steepest, the slope sensor at {:.0} % of its slope at the zero. The zero is right, and could be more \
+             certain: `truestage plan zero` proposes another level",
+            it.steepness * 100.0,
+            it.linearity * 100.0
+        )
+    });
     let value = json!({
         "axis": axis,
         "zero": to_json::zero(estimate),
+        "flat_level": zeroed.flat.map(|it| json!({"steepness": it.steepness, "linearity": it.linearity})),
         "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
         "journal": zeroed.journal,
     });
     Told {
-        text: text + &since,
+        text: text + &since + &flat,
         value,
     }
 }
