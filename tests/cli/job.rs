@@ -1,6 +1,7 @@
 //! Jobs of one axis, as a user runs them.
 
 use std::fs;
+use std::path::PathBuf;
 
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -96,23 +97,60 @@ fn refused(bench: &Bench) {
 
 /// Ctrl-C while the axis waits at a point for a time that does not end soon.
 fn interrupted(bench: &Bench) {
-    let journals = || {
-        fs::read_dir(bench.records().join("runs"))
-            .expect("there are runs")
-            .count()
-    };
     write(
         bench,
         "long.toml",
         &JOB.edit("after_s = 0.5", "after_s = 80000.0"),
     );
-    let before = journals();
+    let before = jobs(bench).len();
     let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes"]);
-    // The zero has a journal of its own.
-    process.wait_until(|| journals() >= before + 2);
+    process.wait_until(|| jobs(bench).len() > before && reached(bench) >= 2);
     process.signal(Signal::SIGINT);
     let ended = process.end();
     assert!(ended.said.contains("stopped on request"), "{ended:?}");
+    assert!(ended.said.contains("--resume continues it"), "{ended:?}");
     ended.with_code(130);
     bench.run(&["zero"]).with_code(0);
+    goes_on(bench);
+}
+
+/// It waited at the first hole: that is gone to again, and nothing else that is done.
+fn goes_on(bench: &Bench) {
+    let other = ["run", "machine.toml", "job.toml", "--resume", "--dry-run"];
+    let refused = bench.run_plainly(&other).with_code(3);
+    let said = text(&refused["error"]);
+    assert!(
+        said.contains("go_on[1] was `after 80000 s` and is now `after 0.5 s`"),
+        "{said}"
+    );
+    let planned = bench.run_plainly(&["run", "machine.toml", "long.toml", "--resume", "--dry-run"]);
+    let at = &planned.with_code(0)["goes_on"];
+    assert_eq!(
+        (&at["repetition"], &at["number"]),
+        (&Value::from(1), &Value::from(2))
+    );
+    let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes", "--resume"]);
+    process.wait_until(|| reached(bench) >= 3);
+    process.signal(Signal::SIGINT);
+    process.end().with_code(130);
+    let path = bench.run(&["run", "machine.toml", "path.csv", "--resume"]);
+    assert!(text(&path.with_code(2)["error"]).contains("this is a path"));
+}
+
+/// The journals of jobs, the newest one last.
+fn jobs(bench: &Bench) -> Vec<PathBuf> {
+    let runs = fs::read_dir(bench.records().join("runs")).expect("there are runs");
+    let paths = runs.map(|it| it.expect("a folder can be read").path());
+    let mut jobs: Vec<_> = paths
+        .filter(|it| it.to_string_lossy().contains("-run-x-"))
+        .collect();
+    jobs.sort();
+    jobs
+}
+
+/// How often the newest job has reached a point, the ones that it will go to again included.
+fn reached(bench: &Bench) -> usize {
+    let newest = jobs(bench).pop().expect("a job was begun");
+    let text = fs::read_to_string(newest).expect("a journal can be read");
+    text.matches("\"entry\":\"reached\"").count()
 }

@@ -115,6 +115,9 @@ pub struct JobEntry {
     pub settle_s: f64,
     /// Where the axis goes at the end, metres, where it is told to.
     pub end_m: Option<f64>,
+    /// When it goes on from each point, in words; empty in journals of programs that did not keep it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub go_on: Vec<String>,
 }
 
 /// A point of a job that was reached, written before the next one is wanted.

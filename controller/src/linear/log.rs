@@ -87,6 +87,12 @@ impl Log for LinearLog {
         self.closures.retain(|closure| count(closure.run) == whole);
         let is_kept = |run: u32| self.closures.iter().any(|closure| closure.run == run);
         self.points = points.into_iter().filter(|it| is_kept(it.run)).collect();
+        // A point of a job that was not left is gone to again.
+        let went_on = &self.went_on;
+        self.reached.retain(|it| {
+            let mut left = went_on.iter().map(|it| (it.repetition, it.number));
+            left.any(|stop| stop == (it.repetition, it.number))
+        });
     }
 }
 
@@ -153,6 +159,9 @@ fn job(read: &LinearLog, header: &JournalHeader, it: &JobEntry) -> Judged {
         header.targets_m.len(),
         "the targets",
     )?;
+    if !it.go_on.is_empty() {
+        as_many("go_on", it.go_on.len(), it.names.len(), "the names")?;
+    }
     counted("repetitions", it.repetitions as usize, 1..=PASSES_MAX)?;
     number("settle_s", it.settle_s, &SECONDS)?;
     optional("end_m", it.end_m, &PLACE_M)

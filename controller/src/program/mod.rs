@@ -98,7 +98,7 @@ enum Command {
     ///
     /// A job goes to its points one after the other and waits at each for a time, for the operator or for an input,
     /// as its file says; each point is in the journal with its uncertainty. It is judged whole before anything
-    /// moves; --dry-run does only that.
+    /// moves; --dry-run does only that. One that was interrupted goes on with --resume.
     ///
     /// A path has the columns time_s,x_mm,y_mm,z_mm. Between the rows each axis follows the cubic spline through them, at rest at both ends, not
     /// straight lines: at a corner, or where the rows suddenly end, it swings out. How far at most, and
@@ -301,6 +301,10 @@ struct RunArgs {
     /// Do not wait for the operator of a job.
     #[arg(long)]
     yes: bool,
+    /// Go on with the newest interrupted job of its axis, or with the journal given, at the point after the last one
+    /// that it went on from.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
+    resume: Option<PathBuf>,
     /// The first of several parts: what the detectors see during this part, displacements and rolls, is not corrected
     /// but recorded as the second memory, so that all later parts are made like this one.
     #[arg(long)]
@@ -399,6 +403,7 @@ struct ServiceArgs {
 /// The ending of its name says what is run.
 fn run(args: RunArgs, output: Output) -> output::Ended {
     let (is_first, yes, dry_run) = (args.first_part, args.yes, args.dry_run);
+    let resume = args.resume.clone();
     let (machine, path) = args.settle();
     let is_job = path
         .extension()
@@ -409,10 +414,17 @@ fn run(args: RunArgs, output: Output) -> output::Ended {
             help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
         })
     };
-    match (is_job, is_first, yes || dry_run) {
+    match (is_job, is_first, yes || dry_run || resume.is_some()) {
         (true, true, _) => usage("--first-part is for paths of three axes, and this is a job"),
-        (false, _, true) => usage("--dry-run and --yes are for jobs, and this is a path"),
-        (true, false, _) => linear::job::run(&machine, &path, JobOptions { dry_run, yes }, output),
+        (false, _, true) => usage("--dry-run, --yes and --resume are for jobs, and this is a path"),
+        (true, false, _) => {
+            let options = JobOptions {
+                dry_run,
+                yes,
+                resume,
+            };
+            linear::job::run(&machine, &path, &options, output)
+        }
         (false, _, false) => volumetric::part::run(&machine, &path, is_first, output),
     }
 }

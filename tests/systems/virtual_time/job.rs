@@ -1,6 +1,7 @@
 //! A job of one axis: points, pauses, repetitions, an end, and what ends it before (system S3, steps 4, 5 and 7).
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use machine::StopRequest;
 use machine::records::read_journal;
@@ -27,6 +28,8 @@ struct Person {
     off: Vec<f64>,
     /// Presses Ctrl-C once so many points were reached.
     stops: Option<(usize, StopRequest)>,
+    /// Goes home when asked so many times.
+    leaves_when_asked: Option<usize>,
     /// When the gauge shows something, seconds after it was come to.
     gauge_after_s: Option<f64>,
 }
@@ -39,6 +42,7 @@ impl Person {
             looks: 0,
             off: Vec::new(),
             stops: None,
+            leaves_when_asked: None,
             gauge_after_s: Some(1.0),
         }
     }
@@ -48,7 +52,12 @@ impl JobOperator for Person {
     fn ask(&mut self, text: &str) -> Result<(), Failure> {
         self.asked.push(text.to_owned());
         self.looks = 0;
-        Ok(())
+        match self.leaves_when_asked {
+            Some(count) if count == self.asked.len() => {
+                Err(Failure::Machine(machine::Failure::Interrupted))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
@@ -258,4 +267,135 @@ fn a_job_without_a_calibration_is_refused_before_anything_moves() {
     });
     assert_eq!(run.unwrap_err().exit_code(), 3);
     assert!((bench.true_position() - before).abs() < Metres::from_um(1.0));
+}
+
+/// The machine is started and zeroed again, and the job goes on with its newest journal.
+fn gone_on(bench: &mut Bench, job: &Job, person: &mut Person) -> Result<JobDone, Failure> {
+    let store = bench.store.clone();
+    let journal = newest_journal(&store.runs());
+    bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.linear("x")?.zero(&store)?;
+        machine
+            .linear("x")?
+            .resume_job(&store, job, &journal, person)
+    })
+}
+
+fn stops(done: &JobDone) -> Vec<(u32, usize)> {
+    done.reached
+        .iter()
+        .map(|it| (it.repetition, it.number.0))
+        .collect()
+}
+
+#[test]
+fn a_job_goes_on_after_the_last_point_that_it_left_with_repetitions_and_conditions() {
+    let mut bench = calibrated(15);
+    let job = job(&bench, |text| text);
+    let mut person = Person::beside(&bench);
+    let stop = bench.machine.stop_request();
+    person.stops = Some((3, stop.clone()));
+    let failure = done(&mut bench, &job, &mut person).unwrap_err();
+    assert_eq!(failure.exit_code(), 130, "{failure}");
+    // The second hole was reached and not left.
+    check_ended(&bench, 3, "stopped on request");
+    stop.flag().store(false, Ordering::Relaxed);
+
+    let mut person = Person::beside(&bench);
+    let on = gone_on(&mut bench, &job, &mut person).unwrap_or_else(|failure| panic!("{failure}"));
+    assert_eq!(on.before, 2);
+    let first = (3..=6).map(|number| (1, number));
+    let expected: Vec<_> = first.chain((1..=6).map(|number| (2, number))).collect();
+    assert_eq!(stops(&on), expected);
+    assert_eq!(person.asked.len(), 1, "{:?}", person.asked);
+    assert!(
+        person.off.iter().all(|it| it.abs() < 4.0),
+        "{:?}",
+        person.off
+    );
+    let read = read_journal::<LinearLog>(&on.journal).unwrap();
+    assert!(read.complete && read.failure.is_none());
+    assert_eq!((read.log.reached.len(), read.log.went_on.len()), (12, 12));
+    assert!(
+        bench.true_position().abs() < Metres::from_um(1.0),
+        "it ends at zero"
+    );
+
+    let refused = gone_on(&mut bench, &job, &mut person).unwrap_err();
+    assert!(refused.to_string().contains("complete"), "{refused}");
+}
+
+#[test]
+fn a_point_whose_input_did_not_come_is_gone_to_again() {
+    let mut bench = calibrated(16);
+    let job = job(&bench, |text| text);
+    let mut person = Person {
+        gauge_after_s: None,
+        ..Person::beside(&bench)
+    };
+    done(&mut bench, &job, &mut person).unwrap_err();
+    let mut person = Person::beside(&bench);
+    let on = gone_on(&mut bench, &job, &mut person).unwrap_or_else(|failure| panic!("{failure}"));
+    assert_eq!((on.before, stops(&on)[0], on.reached.len()), (5, (1, 6), 7));
+    assert_eq!(on.reached[0].name, "gauge");
+}
+
+#[test]
+fn another_job_or_another_calibration_is_not_gone_on_with_and_what_changed_is_said() {
+    let mut bench = calibrated(17);
+    let job = self::job(&bench, |text| text);
+    let mut person = Person {
+        leaves_when_asked: Some(1),
+        ..Person::beside(&bench)
+    };
+    done(&mut bench, &job, &mut person).unwrap_err();
+    let changes: [(&str, &str, &str); 5] = [
+        (
+            "after_s = 0.5",
+            "after_s = 0.75",
+            "job, go_on[1] was `after 0.5 s` and is now `after 0.75 s`",
+        ),
+        (
+            "repetitions = 2",
+            "repetitions = 3",
+            "job, repetitions was `2` and is now `3`",
+        ),
+        (
+            "position_mm = 57.25",
+            "position_mm = 57.5",
+            "targets, [5] was `0.0572",
+        ),
+        (
+            "within_s = 3.0",
+            "within_s = 4.0",
+            "within 3 s` and is now `input 0 of hall above 2 V within 4 s`",
+        ),
+        (
+            "name = \"gauge\"",
+            "name = \"gage\"",
+            "job, names[5] was `gauge` and is now `gage`",
+        ),
+    ];
+    for (from, to, says) in changes {
+        let other = self::job(&bench, |text| text.edit_first(from, to));
+        let refused = gone_on(&mut bench, &other, &mut person).unwrap_err();
+        assert_eq!(refused.exit_code(), 3, "{refused}");
+        let said = refused.to_string();
+        assert!(said.contains(says), "`{says}` is not in {said}");
+    }
+    let store = bench.store.clone();
+    let again = bench.machine.guarded(|machine| {
+        machine.start()?;
+        machine.linear("x")?.zero(&store)?;
+        machine
+            .linear("x")?
+            .calibrate(&store, &CalibrateOptions::default())
+    });
+    again.unwrap_or_else(|failure| panic!("{failure}"));
+    let refused = gone_on(&mut bench, &job, &mut person).unwrap_err();
+    assert!(
+        refused.to_string().contains("calibration was `"),
+        "{refused}"
+    );
 }

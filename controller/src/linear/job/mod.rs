@@ -11,6 +11,7 @@
 //! Absent: points of several axes at once, a speed of its own, and branches.
 
 mod config;
+pub(crate) mod kept;
 mod load;
 mod operator;
 pub(crate) mod plan;

@@ -1,15 +1,16 @@
 //! Doing a job: from point to point, each written down with its uncertainty before the next one is wanted.
 
 use core::time::Duration;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use units::{Metres, Time, Volts};
 
 use crate::failure::Failure;
+use crate::linear::job::kept::{Stop, entry_of, goes_on_at};
 use crate::linear::job::plan::{interval, uncalibrated};
 use crate::linear::job::{GoOn, Job, JobInput, JobOperator, JobPoint, Reached};
 use crate::linear::stage::LinearStage;
-use crate::linear::{JobEntry, LinearEntry, LinearLog, ReachedEntry, WentOnEntry};
+use crate::linear::{LinearEntry, LinearLog, ReachedEntry, WentOnEntry};
 use crate::run::{note_failure, utc_now};
 use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store};
 use machine::Stage;
@@ -22,7 +23,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 pub struct JobDone {
     /// The calibration that corrected it.
     pub calibration: String,
-    /// Each point as often as it was reached, in order.
+    /// How many stops had been made before it was interrupted.
+    pub before: u64,
+    /// Each point as often as it was reached since, in order.
     pub reached: Vec<Reached>,
     /// Where all of it is written down.
     pub journal: PathBuf,
@@ -48,18 +51,54 @@ impl LinearStage<'_> {
         job: &Job,
         operator: &mut dyn JobOperator,
     ) -> Result<JobDone, Failure> {
-        self.core.require_zeroed(self.axis)?;
-        let id = self.load_active(store)?;
-        let calibration = id.ok_or_else(|| uncalibrated(self.axis))?;
+        let calibration = self.calibration_of_jobs(store)?;
         let header = self.job_header(job, &calibration);
         let mut journal = Journal::create(&store.runs(), &header)?;
         journal.write(&LinearEntry::Job(entry_of(job)))?;
+        self.do_job((job, (1, 1)), calibration, operator, journal)
+    }
+
+    /// Goes on with a job whose journal ends before it: at the point after the last one that it went on from.
+    /// Without `approach_mm` of the compensation the first point is arrived at from the axis's zero, as at the
+    /// beginning of a job.
+    ///
+    /// # Errors
+    /// As [`Self::run_job`]; before anything moves, when the journal is complete or that of another job, machine or
+    /// calibration: what differs is named.
+    pub fn resume_job(
+        &mut self,
+        store: &Store,
+        job: &Job,
+        journal: &Path,
+        operator: &mut dyn JobOperator,
+    ) -> Result<JobDone, Failure> {
+        let calibration = self.calibration_of_jobs(store)?;
+        let stop = goes_on_at(journal, job, &calibration)?;
+        let header = self.job_header(job, &calibration);
+        let (journal, _) = Journal::resume(journal, &header, self.core.config_hash)?;
+        self.do_job((job, stop), calibration, operator, journal)
+    }
+
+    fn calibration_of_jobs(&mut self, store: &Store) -> Result<String, Failure> {
+        self.core.require_zeroed(self.axis)?;
+        let id = self.load_active(store)?;
+        id.ok_or_else(|| uncalibrated(self.axis))
+    }
+
+    fn do_job(
+        &mut self,
+        (job, from): (&Job, Stop),
+        calibration: String,
+        operator: &mut dyn JobOperator,
+        mut journal: Journal<LinearLog>,
+    ) -> Result<JobDone, Failure> {
         let reached = self
-            .go_through(job, operator, &mut journal)
+            .go_through((job, from), operator, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.complete()?;
         Ok(JobDone {
             calibration,
+            before: job.stops_before(from),
             reached,
             journal: journal.path().to_owned(),
         })
@@ -86,13 +125,14 @@ impl LinearStage<'_> {
 
     fn go_through(
         &mut self,
-        job: &Job,
+        (job, from): (&Job, Stop),
         operator: &mut dyn JobOperator,
         journal: &mut Journal<LinearLog>,
     ) -> Result<Vec<Reached>, Failure> {
         let mut all = Vec::new();
-        for repetition in 1..=job.repetitions {
-            for (number, point) in (1..).zip(&job.points) {
+        for repetition in from.0..=job.repetitions {
+            let begin = if repetition == from.0 { from.1 } else { 1 };
+            for (number, point) in (1..).zip(&job.points).skip(begin - 1) {
                 let moved = self.move_and_settle(point.target, job.settle)?;
                 let table = self.compensation().map(|it| it.table());
                 let reached = Reached {
@@ -106,7 +146,8 @@ impl LinearStage<'_> {
                 journal.write(&LinearEntry::Reached(reached.entry(at)))?;
                 operator.reached(&reached);
                 all.push(reached);
-                let (axis, done) = (self.axis, all.len() as u64);
+                let done = job.stops_before(from) + all.len() as u64;
+                let axis = self.axis;
                 self.core
                     .observer()
                     .progress(Stage::Job, axis, done, job.stops());
@@ -202,16 +243,6 @@ impl LinearStage<'_> {
             let next = (self.core.now() + LOOK_EVERY).min(last);
             self.core.run_until(next)?;
         }
-    }
-}
-
-/// What `job` is, for the journal.
-fn entry_of(job: &Job) -> JobEntry {
-    JobEntry {
-        names: job.points.iter().map(|it| it.name.clone()).collect(),
-        repetitions: job.repetitions,
-        settle_s: job.settle.as_secs_f64(),
-        end_m: job.end.map(Metres::value),
     }
 }
 

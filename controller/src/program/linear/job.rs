@@ -1,12 +1,13 @@
 //! `truestage run JOB.toml`: a job of one axis.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use machine::records::short;
+use machine::records::{Store, short};
 use serde_json::{Value, json};
 use units::{Metres, Short};
 
 use crate::linear::job::JobDone;
+use crate::linear::job::kept::{Stop, goes_on_at};
 use crate::linear::job::plan::PlannedPoint;
 use crate::linear::{Job, JobOperator, JobPlan, Reached};
 use crate::ports::Use;
@@ -16,38 +17,98 @@ use crate::program::json as to_json;
 use crate::program::linear::{moved, uncertainty};
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
+use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::{Failure, config};
 
 /// What is asked of a job besides doing it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct JobOptions {
     /// Judge it, and open nothing.
     pub(crate) dry_run: bool,
     /// Nobody is waited for.
     pub(crate) yes: bool,
+    /// Go on with this journal.
+    pub(crate) resume: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &MachineArgs, file: &Path, options: JobOptions, output: Output) -> Ended {
+/// A journal to go on with, and where.
+struct GoesOn {
+    journal: PathBuf,
+    at: Stop,
+}
+
+impl GoesOn {
+    fn of(
+        resume: Option<&PathBuf>,
+        store: &Store,
+        job: &Job,
+        plan: &JobPlan,
+    ) -> Result<Option<Self>, Failure> {
+        let Some(journal) = journal_to_resume(resume, store, VERB, &job.axis)? else {
+            return Ok(None);
+        };
+        let at = goes_on_at(&journal, job, &plan.calibration)?;
+        Ok(Some(Self { journal, at }))
+    }
+
+    fn text(&self, job: &Job) -> String {
+        let (repetition, number) = self.at;
+        match job.points.get(number - 1) {
+            Some(point) if repetition <= job.repetitions => format!(
+                "goes on at repetition {repetition}, point {number} ({}), after {}",
+                point.name,
+                self.journal.display()
+            ),
+            _ => format!(
+                "every point is done, but not the end, after {}",
+                self.journal.display()
+            ),
+        }
+    }
+
+    fn value(&self) -> Value {
+        let (repetition, number) = self.at;
+        json!({"repetition": repetition, "number": number, "journal": self.journal})
+    }
+}
+
+const VERB: &str = "run";
+
+pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output: Output) -> Ended {
     let text = read(file)?;
     let loaded = config::load(&args.config)?;
     let job = Job::parse(&text, &file.display().to_string(), &loaded.config)?;
-    let plan = JobPlan::of(&job, &loaded, &loaded.config.machine.store())?;
+    let store = loaded.config.machine.store();
+    let plan = JobPlan::of(&job, &loaded, &store)?;
+    let goes_on = GoesOn::of(options.resume.as_ref(), &store, &job, &plan)?;
     if options.dry_run {
-        return output.result(&planned_text(&job, &plan), &planned_value(&job, &plan));
+        let mut text = planned_text(&job, &plan);
+        text += &goes_on
+            .as_ref()
+            .map_or(String::new(), |it| format!("\n  {}", it.text(&job)));
+        let mut value = planned_value(&job, &plan);
+        value["goes_on"] = json!(goes_on.as_ref().map(GoesOn::value));
+        return output.result(&text, &value);
+    }
+    if let Some(it) = &goes_on {
+        output.note(&format!("axis {}: {}", job.axis, it.text(&job)));
     }
     let is_alone = options.yes || !job.needs_operator();
     let terminal = Terminal::new(is_alone, args.hand(), output)?;
     let mut beside = Beside { terminal, output };
-    let mut session = Session::open(args, "run", Use::Motion, output)?;
+    let mut session = Session::open(args, VERB, Use::Motion, output)?;
     let store = session.store.clone();
     let (done, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         machine.linear(&job.axis)?.load_active(&store)?;
         machine.linear(&job.axis)?.zero(&store)?;
-        let done = machine
-            .linear(&job.axis)?
-            .run_job(&store, &job, &mut beside)?;
+        let mut stage = machine.linear(&job.axis)?;
+        let journal = goes_on.as_ref().map(|it| it.journal.as_path());
+        let done = resumable(&store, VERB, &job.axis, journal, || match journal {
+            None => stage.run_job(&store, &job, &mut beside),
+            Some(journal) => stage.resume_job(&store, &job, journal, &mut beside),
+        })?;
         machine.shut_down()?;
         Ok((done, to_json::counters(&machine.devices().counters())))
     })?;
@@ -162,6 +223,12 @@ fn done_text(job: &Job, done: &JobDone) -> String {
         job.repetitions,
         short(&done.calibration)
     );
+    if done.before > 0 {
+        text += &format!(
+            ", after {} that were reached before the interruption",
+            done.before
+        );
+    }
     if let Some(most) = most {
         text += &format!("\n  at most {}", uncertainty::said(&most));
     }
@@ -185,6 +252,7 @@ fn done_value(job: &Job, done: &JobDone) -> Value {
         "axis": job.axis,
         "calibration": done.calibration,
         "repetitions": job.repetitions,
+        "points_before": done.before,
         "points": done.reached.iter().map(point).collect::<Vec<_>>(),
         "journal": done.journal,
     })
