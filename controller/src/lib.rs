@@ -93,6 +93,7 @@ pub mod for_tests {
     pub use crate::platform::moves::PoseMoved;
     pub use crate::rotary::calibrate::RotaryCalibrated;
     pub use crate::rotary::settings::rotary_settings;
+    pub use crate::rotary::sighted::{Asked, Person, Question};
     pub use crate::rotary::sweep::Sweep;
     pub use crate::rotary::verify::RotaryVerified;
     pub use crate::stores::store_in;

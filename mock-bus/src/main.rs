@@ -70,7 +70,7 @@ enum Command {
     Ctl {
         /// Where the machine listens: the PATH of its `--clock lockstep:PATH` or `--control PATH`.
         socket: PathBuf,
-        /// `turn-plate LINES`, `fix-plate OFFSET`, `place-plate OFFSET`, `set-up-line TOML`, `take-line-away`, `fault TOML`, `end-fault
+        /// `turn-plate LINES`, `fix-plate OFFSET`, `place-plate OFFSET`, `read-line NUMBER`, `set-up-line TOML`, `take-line-away`, `fault TOML`, `end-fault
         /// NUMBER`, `power off`, `power on`, or `truth`.
         #[arg(required = true, num_args = 1.., allow_hyphen_values = true)]
         words: Vec<String>,

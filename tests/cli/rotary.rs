@@ -356,3 +356,157 @@ fn the_rotary_table_shows_its_cycle() {
     ];
     demo::check("rotary", "/verified/as_found/largest_arcsec", left, 0.3);
 }
+
+/// The rotary machine with a plate of 36 lines that a person reads.
+fn sighted_machine(folder: &Path, value: &str) {
+    let sighting = format!("[rotary.c.sighting]\nvalue = \"{value}\"\nrange_arcsec = 120.0");
+    let text = tests::ROTARY
+        .machine
+        .edit(
+            "[rotary.c.line_detector]       # at the drive's touch probe 1\nedge = \"positive\"",
+            &sighting,
+        )
+        .edit("lines = 360", "lines = 36")
+        .edit("offset_lines = 200.5", "offset_lines = 20.0")
+        .edit("placements = 4 ", "offsets = [0, 1, 7, 11] ")
+        .edit("optimise = ", "# ")
+        .edit("amplification_limit = 3.0", "amplification_limit = 10.0");
+    fs::write(folder.join("machine.toml"), text).expect("a file can be written");
+}
+
+/// The placement at `offset` in a file: each line in three passes, which differ by a little.
+fn placement_file(folder: &Path, offset: usize) -> String {
+    let mut text = String::from("offset,pass,approach,line,deviation_arcsec\n");
+    for (at, pass) in ["1,+", "1,-", "2,+"].iter().enumerate() {
+        for (_, line, reading) in readings(&[offset], 0.05) {
+            let apart = 0.02 * ((7 * line + 3 * at) % 5) as f64 - 0.04;
+            text += &format!("{offset},{pass},{line},{:.6}\n", reading + apart);
+        }
+    }
+    let name = format!("at-{offset}.csv");
+    fs::write(folder.join(&name), text).expect("a file can be written");
+    name
+}
+
+#[test]
+fn a_plate_read_elsewhere_calibrates_the_table_placement_by_placement_without_its_machine() {
+    let folder = folder();
+    let folder = folder.path();
+    sighted_machine(folder, "deviation");
+    let checked = truestage(folder, &["check", "machine.toml"]).with_code(0);
+    let note = checked["notes"][0].to_string();
+    assert!(
+        note.contains("108 readings in each of 4 placements")
+            && note.contains("offset,pass,approach,line,deviation_arcsec"),
+        "{note}"
+    );
+    // Nine lines a part: 0.06″ √2 × 1.15 / 3.
+    let note = checked["notes"][1].to_string();
+    assert!(
+        note.contains("0.1 is 3.1 standard deviations") && note.contains("with 0.130"),
+        "{note}"
+    );
+    let run = |words: &[&str]| truestage(folder, &[&["calibrate", "machine.toml"], words].concat());
+    for words in [&["--yes"][..], &[]] {
+        let refused = run(words).with_code(2)["error"].to_string();
+        assert!(refused.contains("--readings"), "{refused}");
+    }
+    let later = placement_file(folder, 7);
+    let refused = run(&["--readings", &later]).with_code(2)["error"].to_string();
+    assert!(refused.contains("at-7.csv:2:1: `offset` is 7"), "{refused}");
+    assert!(
+        !folder.join("machine-data/rotary/runs").exists(),
+        "a run was begun"
+    );
+
+    let first = placement_file(folder, 0);
+    let begun = run(&["--readings", &first]).with_code(0);
+    assert_eq!(
+        (&begun["complete"], &begun["due"]["offset"]),
+        (&false.into(), &1.0.into())
+    );
+    assert!(
+        begun["due"]["task"].to_string().contains("by 1 lines"),
+        "{begun}"
+    );
+    assert_eq!(begun["placements_read"].as_array().map(Vec::len), Some(1));
+    let rest: Vec<String> = [1, 7, 11]
+        .map(|offset| placement_file(folder, offset))
+        .into();
+    let mut words = vec!["--resume"];
+    rest.iter()
+        .for_each(|it| words.extend(["--readings", it.as_str()]));
+    let done = run(&words).with_code(0);
+    assert_eq!(
+        (&done["complete"], &done["axis"]),
+        (&true.into(), &"c".into())
+    );
+    for (position, error) in numbers(&done["table_error_arcsec"]).iter().enumerate() {
+        check_near(*error, table(position), 0.2);
+    }
+    let list = truestage(folder, &["cal", "list", "machine.toml"]).with_code(0);
+    assert_eq!(list["calibrations"][0]["active"], true);
+
+    let between = placement_file(folder, 20);
+    let words = ["verify", "machine.toml", "--readings", &between];
+    let verified = truestage(folder, &words).with_code(0);
+    assert_eq!(verified["within_tolerance"], true);
+    let journal = done["journal"].as_str().expect("a path");
+    let page = truestage(folder, &["report", journal, "--output", "page.html"]);
+    page.with_code(0);
+    let page = fs::read_to_string(folder.join("page.html")).expect("it was written");
+    assert!(page.contains("by a person, with each line under the cross-hair"));
+}
+
+#[test]
+fn files_of_readings_are_for_a_plate_that_a_person_reads() {
+    let folder = folder();
+    fs::write(folder.path().join("machine.toml"), tests::ROTARY.machine)
+        .expect("it can be written");
+    let refused = truestage(
+        folder.path(),
+        &["calibrate", "machine.toml", "--readings", "a.csv"],
+    );
+    let refused = refused.with_code(2)["error"].to_string();
+    assert!(
+        refused.contains("[rotary.c.sighting] in place of"),
+        "{refused}"
+    );
+    fs::write(folder.path().join("machine.toml"), MACHINE).expect("it can be written");
+    for verb in ["calibrate", "verify"] {
+        let refused = truestage(
+            folder.path(),
+            &[verb, "machine.toml", "--readings", "a.csv"],
+        );
+        let refused = refused.with_code(2)["error"].to_string();
+        assert!(refused.contains("the plate of a rotary axis"), "{refused}");
+    }
+}
+
+/// A configuration must say once, and plainly, who reads the lines.
+#[test]
+fn who_reads_the_lines_is_said_once_and_within_reason() {
+    let folder = folder();
+    let check = |text: String, says: &str| {
+        fs::write(folder.path().join("machine.toml"), text).expect("a file can be written");
+        let refused = truestage(folder.path(), &["check", "machine.toml"]).with_code(2);
+        assert!(refused["error"].to_string().contains(says), "{refused}");
+    };
+    sighted_machine(folder.path(), "angle");
+    let sound = fs::read_to_string(folder.path().join("machine.toml")).expect("it was written");
+    let both = sound.edit(
+        "[rotary.c.sighting]",
+        "[rotary.c.line_detector]\n[rotary.c.sighting]",
+    );
+    check(both, "only one of them can read the lines");
+    check(
+        sound.edit("range_arcsec = 120.0", "range_arcsec = 9001.0"),
+        "give at most 9000.000",
+    );
+    check(sound.edit("\"angle\"", "\"angel\""), "angel");
+    let none = sound.edit(
+        "[rotary.c.sighting]\nvalue = \"angle\"\nrange_arcsec = 120.0",
+        "",
+    );
+    check(none, "`line_detector` or `sighting`");
+}

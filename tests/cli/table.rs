@@ -126,3 +126,52 @@ fn moves(bench: &Bench, id: &str) {
             .with_code(2);
     }
 }
+
+/// The hand of the emulated machine turns the plate and reads its lines; a person would type the same.
+#[test]
+fn a_plate_is_read_through_a_microscope_at_each_line_that_the_table_is_driven_to() {
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, ROTARY, |text| {
+            text.edit("lines = 360", "lines = 24")
+                .edit("    { order = 18, amplitude_arcsec = 0.3 },\n", "")
+                .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
+                .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
+        });
+        bench.configure("machine.toml", |text| {
+            text.edit(
+                "[rotary.c.line_detector]       # at the drive's touch probe 1\nedge = \"positive\"",
+                "[rotary.c.sighting]\nvalue = \"to_line\"\nrange_arcsec = 200.0",
+            )
+            .edit("lines = 360", "lines = 24")
+            .edit("closure_limit_arcsec = 0.1 ", "closure_limit_arcsec = 0.15 ")
+            .edit("offset_lines = 200.5", "offset_lines = 12.5")
+        });
+        let refused = bench.run(&["calibrate", "--yes"]).with_code(2);
+        let error = text(&refused["error"]);
+        assert!(error.contains("a person reads the lines"), "{error}");
+        let calibrated = bench.run(&["calibrate"]);
+        for says in [
+            "line 0 lies under the cross-hair at the table's angle 0.0000°",
+            "pass 1+, line 0 at 0.0000° (0 of 72 read)",
+            "pass 1-, line 23 at 345.0000° (24 of 72 read)",
+            "the placement at offset 0 is read: the plate moved by",
+        ] {
+            assert!(calibrated.said.contains(says), "`{says}`: {calibrated:?}");
+        }
+        let calibrated = calibrated.with_code(0);
+        let log = journal(&bench).expect("it was written").log;
+        assert_eq!((log.placements.len(), log.sweeps.len()), (4, 12));
+        let verified = bench.run(&["verify"]).with_code(0);
+        assert!(number(&verified["as_found"]["largest_arcsec"]) > 5.0);
+        assert!(number(&verified["as_left"]["largest_arcsec"]) < 0.3);
+        let page = [
+            "report",
+            text(&calibrated["journal"]),
+            "--output",
+            "page.html",
+        ];
+        bench.run(&page).with_code(0);
+        let page = fs::read_to_string(bench.folder().join("page.html")).unwrap();
+        assert!(page.contains("by a person, with the table at each line's nominal angle"));
+    }
+}

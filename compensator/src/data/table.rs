@@ -155,6 +155,11 @@ impl<K: Error + 'static> Table<K> {
         self.rows[row].0
     }
 
+    /// What a column is called.
+    pub(crate) fn column(&self, column: usize) -> &'static str {
+        self.format[column]
+    }
+
     /// A cell as it was written.
     pub(crate) fn text(&self, row: usize, column: usize) -> &str {
         &self.rows[row].1[column].text

@@ -40,6 +40,7 @@
 //! | `misplaced` | a plate turned otherwise than was entered |
 //! | `solver` | one evaluation after the other, until no outlier is left |
 //! | `solution`, `solve` | all of it, with uncertainties |
+//! | `sighted` | readings of one placement that a person made |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
 //!
 //! Limits: G is read at the nominal position of a line; the plate's error and the placement's
@@ -63,6 +64,7 @@ mod rates;
 mod rig;
 mod search;
 mod series;
+mod sighted;
 mod solution;
 mod solve;
 mod solver;
@@ -79,5 +81,6 @@ pub use periodic::{
 };
 pub use plan::{Criterion, PlanError, plan};
 pub use series::{Placement, RotaryFault, RotarySeries, RotarySeriesError};
+pub use sighted::{Implausible, Sighted, SightedFault, SightedPlan, SightedReading, pass_name};
 pub use solution::{Outlier, Reading, Solution, SolveError, SolveOptions};
 pub use solve::solve;

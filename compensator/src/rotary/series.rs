@@ -4,6 +4,7 @@
 //! spacings and modulo the number of lines. A line that could not be read is missing: its row is
 //! left out of the file, which is a good file all the same.
 
+use core::error::Error;
 use std::collections::{BTreeMap, BTreeSet};
 
 use units::Radians;
@@ -436,27 +437,27 @@ impl Block {
     }
 }
 
-fn whole(
-    table: &Table<RotaryFault>,
+/// A whole number below any that is a misprint.
+pub(super) fn whole<K: Error + From<RotaryFault> + 'static>(
+    table: &Table<K>,
     row: usize,
     column: usize,
-) -> Result<usize, DataError<RotaryFault>> {
-    let seen = table.text(row, column);
-    let name = FORMAT.columns[column];
+) -> Result<usize, DataError<K>> {
+    let (seen, name) = (table.text(row, column), table.column(column));
     let digits = !seen.is_empty() && seen.bytes().all(|byte| byte.is_ascii_digit());
     let number = seen.parse().ok().filter(|_| digits);
     let fault = match number {
         Some(number) if number < LINES_MAX => return Ok(number),
-        Some(seen) => Fault::from(RotaryFault::TooLarge {
+        Some(seen) => Fault::from(K::from(RotaryFault::TooLarge {
             column: name,
             seen,
             lines: LINES_MAX,
-        }),
+        })),
         None if seen.is_empty() => Fault::MissingValue { column: name },
-        None => Fault::from(RotaryFault::NotWhole {
+        None => Fault::from(K::from(RotaryFault::NotWhole {
             column: name,
             seen: seen.to_owned(),
-        }),
+        })),
     };
     Err(table.fail(row, column, fault))
 }

@@ -50,6 +50,7 @@ impl Service {
 
     pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
         refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
+        refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});
         let resume = args.resume.as_deref();
@@ -58,6 +59,7 @@ impl Service {
     }
 
     pub(crate) fn verify(&self, args: &VerifyArgs, output: Output) -> Ended {
+        refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "uncompensated": args.uncompensated});
         let resume = args.resume.as_deref();

@@ -47,6 +47,7 @@ use crate::ports::Pace;
 use kind::by_kind;
 use linear::job::JobOptions;
 use output::Output;
+use rotary::readings::ReadingsArgs;
 use verbs::Verbs;
 
 /// What a shell script learns of an end: [`crate::Failure::exit_code`].
@@ -214,6 +215,8 @@ struct CalibrateArgs {
     /// an interferometer.
     #[arg(long)]
     yes: bool,
+    #[command(flatten)]
+    readings: ReadingsArgs,
     /// Three axes: let them move to and fro for this long, then measure again what heat changed.
     #[arg(long, value_name = "MINUTES")]
     warm_up_min: Option<f64>,
@@ -232,6 +235,8 @@ struct VerifyArgs {
     /// Do not wait for the person who turns the plate of a rotary table.
     #[arg(long)]
     yes: bool,
+    #[command(flatten)]
+    readings: ReadingsArgs,
 }
 
 /// What is done with the state memories of three axes.

@@ -5,15 +5,19 @@ use std::fs::File;
 use std::io::{self, IsTerminal, Read, stdin};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use compensator::rotary::Sighted;
 use compensator::volumetric::Axis;
 use drivers::transport::live::OpenError;
 use drivers::transport::lockstep::lend_hand;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, tcflush};
+use units::Radians;
 
 use crate::Failure;
 use crate::program::output::Output;
+use crate::rotary::sighted::{Asked, Person, Question};
 use crate::rotary::{Operator, PlateMove, PlateTask};
 use crate::volumetric::{LineOperator, LineOptics, LineTask};
 
@@ -22,6 +26,10 @@ use crate::volumetric::{LineOperator, LineOptics, LineTask};
 pub(crate) struct Terminal {
     answers: Answers,
     output: Output,
+    /// Whether the run has drives, which it switches off.
+    is_driven: bool,
+    /// What was typed or answered, and not taken yet.
+    typed: String,
 }
 
 /// Who says that it has been done.
@@ -59,7 +67,38 @@ impl Terminal {
                 });
             }
         };
-        Ok(Self { answers, output })
+        Ok(Self::over(answers, output, true))
+    }
+
+    const fn over(answers: Answers, output: Output, is_driven: bool) -> Self {
+        Self {
+            answers,
+            output,
+            is_driven,
+            typed: String::new(),
+        }
+    }
+
+    /// One at which a plate is read.
+    ///
+    /// # Errors
+    /// When nobody can answer, before anything moves.
+    pub(crate) fn of_reader(
+        hand: Option<&Path>,
+        output: Output,
+        is_driven: bool,
+    ) -> Result<Self, Failure> {
+        if hand.is_none() && !stdin().is_terminal() {
+            return Err(Failure::Usage {
+                what: "a person reads the lines of the plate, and there is no terminal to ask at"
+                    .into(),
+                help: "run it in a terminal, or give what was read with --readings FILE".into(),
+            });
+        }
+        Ok(Self {
+            is_driven,
+            ..Self::new(false, hand, output)?
+        })
     }
 
     /// Asks for what `text` says, which a hand does by `words`.
@@ -72,10 +111,14 @@ impl Terminal {
         };
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
-        self.output.note(
-            "  the drives of this run are switched off, which is not a safe stop: make the machine \
-             safe first; press Enter when it is done, Ctrl-C to stop (what was read is kept)",
-        );
+        let drives = match self.is_driven {
+            true => "the drives of this run are switched off",
+            false => "this run has no drives",
+        };
+        self.output.note(&format!(
+            "  {drives}, which is not a safe stop: make the machine safe first; press Enter when it is \
+             done, Ctrl-C to stop (what was read is kept)"
+        ));
         Ok(())
     }
 
@@ -122,8 +165,13 @@ impl Terminal {
 
 impl Operator for Terminal {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
+        if let (PlateMove::TurnBy(0.0), Answers::Hand(_)) = (task.by, &self.answers) {
+            // A hand that took it up would not put it down in the same place.
+            self.output.note(&format!("> {}", task.text()));
+            return Ok(());
+        }
         let words = match task.by {
-            PlateMove::Fix => format!("fix-plate {}", task.offset),
+            PlateMove::Fix | PlateMove::FixAt { .. } => format!("fix-plate {}", task.offset),
             PlateMove::TurnBy(_) | PlateMove::TurnFrom { .. } => {
                 format!("place-plate {}", task.offset)
             }
@@ -134,6 +182,115 @@ impl Operator for Terminal {
     fn is_done(&mut self) -> Result<bool, Failure> {
         self.has_entered()
     }
+}
+
+impl Person for Terminal {
+    fn tell(&mut self, text: &str) {
+        self.output.note(text);
+    }
+
+    fn question(&mut self, question: &Question) -> Result<(), Failure> {
+        self.output.note(&format!("? {}", question.text));
+        self.typed.clear();
+        match &self.answers {
+            Answers::Nobody => Err(Failure::Usage {
+                what: "nobody is there to answer".into(),
+                help: "leave --yes out".into(),
+            }),
+            Answers::Hand(socket) => {
+                self.typed = hands_answer(socket, question)? + "\n";
+                Ok(())
+            }
+            // What was typed before must not turn the table; where nothing turns, several lines may be
+            // pasted at once.
+            Answers::Keyboard(answers) if question.turns => forget_what_was_typed(answers),
+            Answers::Keyboard(_) => Ok(()),
+        }
+    }
+
+    fn answer(&mut self) -> Result<Option<String>, Failure> {
+        if let Answers::Keyboard(answers) = &mut self.answers {
+            take_typed(answers, &mut self.typed)?;
+        }
+        let Some((line, rest)) = self.typed.split_once('\n') else {
+            return Ok(None);
+        };
+        let (line, rest) = (line.to_owned(), rest.to_owned());
+        self.typed = rest;
+        Ok(Some(line))
+    }
+
+    fn refuse(&mut self, why: &str) -> Result<(), Failure> {
+        self.output.note(&format!("  not taken: {why}"));
+        self.typed.clear();
+        match &self.answers {
+            // Lines that were pasted behind it would be taken for others.
+            Answers::Keyboard(answers) => forget_what_was_typed(answers),
+            Answers::Hand(_) | Answers::Nobody => Err(Failure::Usage {
+                what: why.to_owned(),
+                help: "the emulated machine's hand answers the same question alike".into(),
+            }),
+        }
+    }
+
+    fn wait(&mut self, at_most: Duration) {
+        let Answers::Keyboard(answers) = &self.answers else {
+            return;
+        };
+        let limit = PollTimeout::try_from(at_most).unwrap_or(PollTimeout::MAX);
+        let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
+        // Whatever ended it: whoever waits looks again.
+        let _ = poll(&mut fds, limit);
+    }
+}
+
+/// What was typed before is no answer to this.
+fn forget_what_was_typed(answers: &File) -> Result<(), Failure> {
+    tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))
+}
+
+/// Adds what has been typed since; a terminal gives whole lines.
+fn take_typed(answers: &mut File, typed: &mut String) -> Result<(), Failure> {
+    let mut fds = [PollFd::new(answers.as_fd(), PollFlags::POLLIN)];
+    if typed.contains('\n') || poll(&mut fds, PollTimeout::ZERO).unwrap_or(0) == 0 {
+        return Ok(());
+    }
+    let mut bytes = [0; 256];
+    match answers.read(&mut bytes) {
+        Ok(0) => Err(gone(&io::ErrorKind::UnexpectedEof.into())),
+        Ok(length) => {
+            typed.push_str(&String::from_utf8_lossy(&bytes[..length]));
+            Ok(())
+        }
+        Err(error) => Err(gone(&error)),
+    }
+}
+
+/// What the hand of an emulated machine reads.
+fn hands_answer(socket: &Path, question: &Question) -> Result<String, Failure> {
+    let Asked::Line {
+        line,
+        value,
+        nominal,
+    } = question.asked
+    else {
+        // It closes what it has read.
+        return Ok(String::new());
+    };
+    let seen = lend_hand(socket, &format!("read-line {line}")).map_err(OpenError::from)?;
+    let seen: serde_json::Value = serde_json::from_str(&seen).unwrap_or_default();
+    let angle = seen["angle_deg"].as_f64();
+    let typed = match value {
+        Sighted::ToLine => seen["to_line_arcsec"]
+            .as_f64()
+            .map(|it| format!("{it}arcsec")),
+        Sighted::Angle => angle.map(|it| format!("{it}deg")),
+        Sighted::Deviation => angle.map(|it| {
+            let away = Radians::from_degrees(it) - nominal;
+            format!("{}arcsec", (away - away.whole_turns()).arcsec())
+        }),
+    };
+    Ok(typed.unwrap_or_else(|| "none".to_owned()))
 }
 
 impl LineOperator for Terminal {
@@ -188,7 +345,11 @@ mod tests {
 
     /// Enter, and what the kernel needs to bring it to the other end.
     fn enter(keyboard: &mut File, terminal: &Terminal) {
-        keyboard.write_all(b"\n").unwrap();
+        type_in(keyboard, terminal, "\n");
+    }
+
+    fn type_in(keyboard: &mut File, terminal: &Terminal, text: &str) {
+        keyboard.write_all(text.as_bytes()).unwrap();
         let Answers::Keyboard(answers) = &terminal.answers else {
             panic!("it has a keyboard")
         };
@@ -201,10 +362,8 @@ mod tests {
     fn what_was_typed_before_it_was_asked_for_is_no_answer() {
         let pty = openpty(None, None).unwrap();
         let mut keyboard = File::from(pty.master);
-        let mut terminal = Terminal {
-            answers: Answers::Keyboard(File::from(pty.slave)),
-            output: Output::new(true),
-        };
+        let answers = Answers::Keyboard(File::from(pty.slave));
+        let mut terminal = Terminal::over(answers, Output::new(true), true);
         let task = PlateTask {
             axis: "c".into(),
             plate: "A7".into(),
@@ -219,5 +378,39 @@ mod tests {
         enter(&mut keyboard, &terminal);
         assert!(terminal.is_done().unwrap());
         assert!(!terminal.is_done().unwrap(), "one Enter counted twice");
+    }
+
+    fn answered(terminal: &mut Terminal) -> String {
+        loop {
+            if let Some(text) = terminal.answer().unwrap() {
+                return text;
+            }
+            terminal.wait(Duration::from_millis(PATIENCE_MS.into()));
+        }
+    }
+
+    #[test]
+    fn values_are_taken_one_by_one_and_none_that_was_typed_before_a_question_turns_the_table() {
+        let pty = openpty(None, None).unwrap();
+        let mut keyboard = File::from(pty.master);
+        let answers = Answers::Keyboard(File::from(pty.slave));
+        let mut terminal = Terminal::over(answers, Output::new(true), false);
+        let question = |turns| Question {
+            asked: Asked::Close,
+            text: "close?".into(),
+            turns,
+        };
+        terminal.question(&question(false)).unwrap();
+        assert_eq!(terminal.answer().unwrap(), None);
+        // Pasted at once, where nothing turns.
+        type_in(&mut keyboard, &terminal, "1.5arcsec\n-2arcsec\n");
+        assert_eq!(answered(&mut terminal), "1.5arcsec");
+        terminal.question(&question(false)).unwrap();
+        assert_eq!(answered(&mut terminal), "-2arcsec");
+        enter(&mut keyboard, &terminal);
+        terminal.question(&question(true)).unwrap();
+        assert_eq!(terminal.answer().unwrap(), None, "an early Enter counted");
+        type_in(&mut keyboard, &terminal, "none\n");
+        assert_eq!(answered(&mut terminal), "none");
     }
 }

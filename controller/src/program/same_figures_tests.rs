@@ -12,7 +12,7 @@ use crate::program::kind::KINDS;
 use crate::program::linear::told as linear;
 use crate::program::platform::verbs as platform;
 use crate::program::report;
-use crate::program::rotary::verbs as rotary;
+use crate::program::rotary::told as rotary;
 use crate::program::text::ROWS;
 use crate::program::volumetric::verbs as volumetric;
 use crate::rotary::{RotaryCalibrated, RotaryVerified};

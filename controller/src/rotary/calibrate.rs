@@ -5,21 +5,19 @@ use std::path::PathBuf;
 use compensator::rotary::{self, Solution, SolveOptions};
 use units::Radians;
 
-use crate::config::ConfigHash;
 use crate::failure::Failure;
 use crate::rotary::estimate::{evaluate, series};
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
-use crate::rotary::placement::{Placed, PlateRun, largest_closure};
+use crate::rotary::placed::{Placed, largest_closure};
+use crate::rotary::plate_journal::PlateJournal;
+use crate::rotary::plate_run::{DuePlacement, PlateRun};
+use crate::rotary::subject::{Subject, plate_record};
 use crate::rotary::table::RotaryTable;
-use crate::rotary::{PlateEntry, PlateLog};
-use crate::rotary::{PlatePlanEntry, RotaryContent};
-use crate::run::{CalibrateOptions, note_failure, utc_now};
-use crate::store::{
-    CalibrationRecord, InstrumentRecord, Journal, JournalHeader, ReadJournal, RecordHead,
-    SCHEMA_VERSION, Store, first_difference, not_resumable,
-};
+use crate::rotary::{PlateEntry, RotaryContent};
+use crate::run::{CalibrateOptions, missing, utc_now};
+use crate::store::{CalibrationRecord, RecordHead, Store};
 
 /// So many placements are needed before one can be told to be misplaced by the others.
 const JUDGED_MIN: usize = 3;
@@ -48,147 +46,199 @@ impl RotaryTable<'_> {
     /// error, stores and activates it, and uses it from now on.
     ///
     /// # Errors
-    /// Not zeroed; whatever stops the machine; a plate that slipped or lies elsewhere; readings
-    /// that scatter too much or determine nothing; a table beyond the limits. The calibration in
-    /// use before stays in use then.
+    /// Not zeroed, or no line detector; whatever stops the machine; a plate that slipped or lies
+    /// elsewhere; readings that scatter too much or determine nothing; a table beyond the limits. The
+    /// calibration in use before stays in use then.
     pub fn calibrate(
         &mut self,
         store: &Store,
         options: &CalibrateOptions,
         operator: &mut dyn Operator,
     ) -> Result<RotaryCalibrated, Failure> {
-        let (mut run, config) = self.plate_run()?;
-        if options.accept_drift {
-            run.closure_limit = None;
+        // What is asked of a configuration comes before what is asked of the table.
+        self.subject().plate_run()?;
+        if self.config.line_detector.is_none() {
+            return Err(missing(self.axis, "line_detector"));
         }
+        self.calibrate_by(store, options, &mut |table, run, due, journal| {
+            table.place_plate(run, due, operator)?;
+            table.read_placement(run, (due.offset, due.phase), due.done, journal)
+        })
+    }
+
+    /// The same with each placement brought about and read by `read`.
+    pub(super) fn calibrate_by(
+        &mut self,
+        store: &Store,
+        options: &CalibrateOptions,
+        read: &mut Read<'_>,
+    ) -> Result<RotaryCalibrated, Failure> {
         self.core.require_zeroed(self.axis)?;
-        let offsets: Vec<f64> = config
-            .design()?
-            .offsets()
-            .iter()
-            .map(|it| *it as f64)
-            .collect();
-        let header = self.header("calibrate", &run, None);
-        let plan = run.plan(offsets.clone());
-        let (mut journal, kept) = open(
-            store,
-            &header,
-            &plan,
-            options.resume.as_ref(),
-            self.core.config_hash,
-        )?;
-        let limit = config.amplification_limit;
-        let evaluated = self
-            .read_placements(&run, &offsets, kept, &mut journal, operator)
-            .and_then(|placed| Ok((evaluate(self.axis, &run, limit, &placed)?, placed)));
-        let (solution, placed) = evaluated.inspect_err(|it| {
-            note_failure(&mut journal, it);
+        let mut it = Calibration::begin(self.subject(), store, options)?;
+        let evaluated = self.read_all(&mut it, read).and_then(|()| it.evaluate());
+        let solution = evaluated.inspect_err(|failure| {
+            it.note(failure);
             // Offsets of a run without a calibration mean nothing to a verification.
             self.memory.plate_at = None;
         })?;
+        let (calibrated, in_use) = it.store(store, solution)?;
+        self.memory.calibration = Some(in_use);
+        Ok(calibrated)
+    }
+
+    fn read_all(&mut self, it: &mut Calibration<'_>, read: &mut Read<'_>) -> Result<(), Failure> {
+        while let Some(due) = it.due()? {
+            let placed = read(self, &it.run, &due, &mut it.journal)?;
+            it.take(placed);
+        }
+        Ok(())
+    }
+}
+
+/// Brings a placement about and reads it.
+pub(super) type Read<'a> = dyn FnMut(
+        &mut RotaryTable<'_>,
+        &PlateRun,
+        &DuePlacement,
+        &mut PlateJournal,
+    ) -> Result<Placed, Failure>
+    + 'a;
+
+/// A calibration that is under way: the placements that were read, by whomever.
+pub(crate) struct Calibration<'a> {
+    pub(super) subject: Subject<'a>,
+    pub(super) run: PlateRun,
+    amplification_limit: f64,
+    offsets: Vec<f64>,
+    pub(super) journal: PlateJournal,
+    placed: Vec<Placed>,
+}
+
+impl<'a> Calibration<'a> {
+    /// A new one, or one that is continued with its whole placements.
+    pub(super) fn begin(
+        subject: Subject<'a>,
+        store: &Store,
+        options: &CalibrateOptions,
+    ) -> Result<Self, Failure> {
+        let (mut run, config) = subject.plate_run()?;
+        if options.accept_drift {
+            run.closure_limit = None;
+        }
+        let design = config.design()?;
+        let offsets: Vec<f64> = design.offsets().iter().map(|it| *it as f64).collect();
+        let header = subject.header("calibrate", &run, None);
+        let plan = run.plan(offsets.clone());
+        let resume = options.resume.as_ref();
+        let journal = PlateJournal::open(store, &header, &plan, resume, &subject)?;
+        Ok(Self {
+            placed: journal.placed(),
+            amplification_limit: config.amplification_limit,
+            subject,
+            run,
+            offsets,
+            journal,
+        })
+    }
+
+    /// The placement that is to be read next; `None` when all are.
+    ///
+    /// # Errors
+    /// When one that was read turns out to be another one than was asked for.
+    pub(super) fn due(&mut self) -> Result<Option<DuePlacement>, Failure> {
+        // A run that was continued may have been killed between a placement and its judgement.
+        doubt(
+            self.subject.axis,
+            &self.run,
+            &self.placed,
+            &mut self.journal,
+        )?;
+        let is_read = |offset: f64| self.placed.iter().any(|it| it.offset == offset);
+        let due = (1..).zip(&self.offsets).find(|it| !is_read(*it.1));
+        let sweeps = self.run.sweeps();
+        Ok(due.map(|(number, offset)| DuePlacement {
+            offset: *offset,
+            step: (number, self.offsets.len()),
+            known: self.placed.last().map(|it| it.offset),
+            phase: self.placed.first().map(|it| it.phase),
+            done: (
+                sweeps * self.placed.len() as u32,
+                sweeps * self.offsets.len() as u32,
+            ),
+        }))
+    }
+
+    pub(super) fn take(&mut self, placed: Placed) {
+        self.placed.push(placed);
+    }
+
+    /// The placements that were read.
+    #[cfg(feature = "program")]
+    pub(crate) fn placed(&self) -> &[Placed] {
+        &self.placed
+    }
+
+    /// Says in the journal why it ended.
+    pub(super) fn note(&mut self, failure: &Failure) {
+        self.journal.note(failure);
+    }
+
+    pub(super) fn evaluate(&mut self) -> Result<Solution, Failure> {
+        self.placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
+        let (axis, limit) = (self.subject.axis, self.amplification_limit);
+        Ok(evaluate(axis, &self.run, limit, &self.placed)?)
+    }
+
+    /// Stores what the readings say, and activates it.
+    pub(super) fn store(
+        mut self,
+        store: &Store,
+        solution: Solution,
+    ) -> Result<(RotaryCalibrated, TableInUse), Failure> {
+        let placed = &self.placed;
+        let lay_at = |it: &Placed| it.stood.is_none().then(|| it.phase.value());
         let content = RotaryContent {
-            plate_phase_rad: placed.first().map(|it| it.phase.value()),
+            plate_phase_rad: placed.first().and_then(lay_at),
             ..RotaryContent::new(&solution)
         };
-        let stored = self.store_table(store, &run, &journal, content.clone());
-        let id = stored.inspect_err(|it| note_failure(&mut journal, it))?;
-        journal.complete()?;
-        Ok(RotaryCalibrated {
+        let stored = self.store_table(store, content.clone());
+        let (id, in_use) = stored.inspect_err(|it| self.journal.note(it))?;
+        self.journal.complete()?;
+        let calibrated = RotaryCalibrated {
             path: store.calibration_path(&id),
-            journal: journal.path().to_owned(),
+            journal: self.journal.path().to_owned(),
             id,
             solution,
-            closure: largest_closure(placed.iter().map(|it| it.closure)),
-            scatter: placed
+            closure: largest_closure(self.placed.iter().map(|it| it.closure)),
+            scatter: self
+                .placed
                 .iter()
                 .filter_map(|it| it.scatter)
                 .reduce(Radians::max),
             content,
-        })
-    }
-
-    fn read_placements(
-        &mut self,
-        run: &PlateRun,
-        offsets: &[f64],
-        mut placed: Vec<Placed>,
-        journal: &mut Journal<PlateLog>,
-        operator: &mut dyn Operator,
-    ) -> Result<Vec<Placed>, Failure> {
-        // A run that was continued may have been killed between a placement and its judgement.
-        doubt(self.axis, run, &placed, journal)?;
-        let total = run.sweeps() * offsets.len() as u32;
-        for (number, offset) in (1..).zip(offsets) {
-            if placed.iter().any(|it| it.offset == *offset) {
-                continue;
-            }
-            let step = (number, offsets.len());
-            let known = placed.last().map(|it| it.offset);
-            self.place_plate(run, *offset, step, known, operator)?;
-            let done = (run.sweeps() * placed.len() as u32, total);
-            let phase = placed.first().map(|it| it.phase);
-            placed.push(self.read_placement(run, (*offset, phase), done, journal)?);
-            doubt(self.axis, run, &placed, journal)?;
-        }
-        placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
-        Ok(placed)
+        };
+        Ok((calibrated, in_use))
     }
 
     fn store_table(
-        &mut self,
+        &self,
         store: &Store,
-        run: &PlateRun,
-        journal: &Journal<PlateLog>,
         content: RotaryContent,
-    ) -> Result<String, Failure> {
-        let source = journal.path().file_name().unwrap_or_default();
+    ) -> Result<(String, TableInUse), Failure> {
+        let source = self.journal.path().file_name().unwrap_or_default();
         let head = RecordHead {
             created: utc_now(),
             source: source.to_string_lossy().into_owned(),
-            instrument: plate_record(run),
-            ..self.core.this_machine(self.axis)
+            instrument: plate_record(&self.run),
+            ..self.subject.here.clone()
         };
         // Nothing is stored that cannot be applied.
-        let compensation = self.prepare(&content, "just made")?;
+        let compensation = self.subject.prepare(&content, "just made")?;
         let record = CalibrationRecord { head, content };
         let id = store.save(&record)?;
-        store.activate(self.axis, &id)?;
+        store.activate(self.subject.axis, &id)?;
         let in_use = TableInUse::new(&id, &record, compensation)?;
-        self.memory.calibration = Some(in_use);
-        Ok(id)
-    }
-
-    pub(super) fn header(
-        &self,
-        verb: &str,
-        run: &PlateRun,
-        calibration: Option<String>,
-    ) -> JournalHeader {
-        let machine = self.core.this_machine(self.axis);
-        JournalHeader {
-            schema_version: SCHEMA_VERSION,
-            verb: verb.to_owned(),
-            machine: machine.machine,
-            stage_serial: machine.stage_serial,
-            config_hash: machine.config_hash,
-            axis: self.axis.to_owned(),
-            drive: machine.drive,
-            instrument: plate_record(run),
-            started: utc_now(),
-            calibration,
-            targets_m: Vec::new(),
-            runs: run.passes,
-            approach_m: None,
-        }
-    }
-}
-
-/// The plate is what measures.
-fn plate_record(run: &PlateRun) -> InstrumentRecord {
-    InstrumentRecord {
-        name: run.plate.clone(),
-        identity: format!("plate with {} lines", run.lines),
-        ..InstrumentRecord::default()
+        Ok((id, in_use))
     }
 }
 
@@ -197,7 +247,7 @@ fn doubt(
     axis: &str,
     run: &PlateRun,
     placed: &[Placed],
-    journal: &mut Journal<PlateLog>,
+    journal: &mut PlateJournal,
 ) -> Result<(), Failure> {
     if placed.len() < JUDGED_MIN {
         return Ok(());
@@ -207,42 +257,8 @@ fn doubt(
         return Ok(());
     };
     let offset = source.offset as f64;
-    journal.write(&PlateEntry::Misplaced { offset })?;
+    journal.write(PlateEntry::Misplaced { offset })?;
     journal.flush_to_disk()?;
     let axis = axis.to_owned();
     Err(RotaryFailure::Misplaced { axis, source }.into())
-}
-
-/// A new journal, or one that is continued with its whole placements.
-fn open(
-    store: &Store,
-    header: &JournalHeader,
-    plan: &PlatePlanEntry,
-    resume: Option<&PathBuf>,
-    hash: &ConfigHash,
-) -> Result<(Journal<PlateLog>, Vec<Placed>), Failure> {
-    let Some(path) = resume else {
-        let mut journal = Journal::create(&store.runs(), header)?;
-        journal.write(&PlateEntry::PlatePlan(plan.clone()))?;
-        journal.flush_to_disk()?;
-        return Ok((journal, Vec::new()));
-    };
-    let (mut journal, read) = Journal::<PlateLog>::resume(path, header, hash)?;
-    match &read.log.plan {
-        // Killed before its second line: nothing was read yet.
-        None => journal.write(&PlateEntry::PlatePlan(plan.clone()))?,
-        Some(before) => {
-            if let Some(it) = first_difference(before, plan) {
-                return Err(not_resumable(path, "how the plate is read", it).into());
-            }
-        }
-    }
-    Ok((journal, placed_of(&read, plan.passes)))
-}
-
-fn placed_of(read: &ReadJournal<PlateLog>, passes: u32) -> Vec<Placed> {
-    let placements = read.log.placements.iter();
-    placements
-        .map(|it| Placed::of(it, &read.log.sweeps, passes))
-        .collect()
 }

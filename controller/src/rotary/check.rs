@@ -1,5 +1,7 @@
 //! Whether what is said about a rotary axis makes sense.
 
+use units::Radians;
+
 use super::line_speed;
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
@@ -42,10 +44,10 @@ fn check_cycle(
 ) {
     let mut design = None;
     if let Some(run) = &rotary.calibrate {
+        check_reader(name, rotary, run, findings);
         let judge = &mut Judge::at(format!("rotary.{name}.calibrate"), findings);
         for (section, is_there) in [
             ("zero", rotary.zero.is_some()),
-            ("line_detector", rotary.line_detector.is_some()),
             ("compensation", rotary.compensation.is_some()),
         ] {
             if !is_there {
@@ -70,6 +72,47 @@ fn check_cycle(
     }
 }
 
+/// What reads the lines: a detector or a person.
+fn check_reader(
+    name: &str,
+    rotary: &RotaryConfig,
+    run: &RotaryCalibrateConfig,
+    findings: &mut Vec<Finding>,
+) {
+    let judge = &mut Judge::at(format!("rotary.{name}.calibrate"), findings);
+    match (&rotary.line_detector, &rotary.sighting) {
+        (None, None) => judge.say(
+            "",
+            "needs the section `line_detector` or `sighting`, which reads the lines",
+            format!(
+                "add [rotary.{name}.line_detector], or [rotary.{name}.sighting] where a person reads \
+                 them, or remove [rotary.{name}.calibrate]"
+            ),
+        ),
+        (Some(_), Some(_)) => judge.say(
+            "",
+            "has both `line_detector` and `sighting`, and only one of them can read the lines",
+            format!("remove [rotary.{name}.line_detector] or [rotary.{name}.sighting]"),
+        ),
+        (None, Some(sighting)) => {
+            let most = Radians::TURN.arcsec() / 4.0 / f64::from(run.lines);
+            if sighting.range_arcsec > most {
+                let judge = &mut Judge::at(format!("rotary.{name}.sighting"), findings);
+                judge.say(
+                    "range_arcsec",
+                    format!(
+                        "{} is more than a quarter of the spacing of {} lines: one could be taken for \
+                         another",
+                        sighting.range_arcsec, run.lines
+                    ),
+                    format!("give at most {most:.3}"),
+                );
+            }
+        }
+        (Some(_), None) => {}
+    }
+}
+
 fn check_run(
     judge: &mut Judge<'_>,
     config: &MachineConfig,
@@ -83,7 +126,7 @@ fn check_run(
     }
     let speed = run.speed_deg_per_s.unwrap_or(rotary.speed_deg_per_s);
     judge.within("speed_deg_per_s", speed, 1e-3, rotary.speed_max_deg_per_s);
-    let Some(bus) = config.can.get(&rotary.node.bus) else {
+    let (Some(bus), None) = (config.can.get(&rotary.node.bus), &rotary.sighting) else {
         return;
     };
     let fits = line_speed::speed_max(run.lines, bus.sync_period_ms);

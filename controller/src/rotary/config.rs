@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use compensator::rotary::{self, Criterion, Design, PlanError};
+use compensator::rotary::{self, Criterion, Design, PlanError, Sighted};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -110,6 +110,8 @@ pub struct RotaryConfig {
     pub zero: Option<RotaryZeroConfig>,
     /// What sees the lines of a plate pass.
     pub line_detector: Option<LineDetectorConfig>,
+    /// How a person reads the lines of a plate, where no detector does.
+    pub sighting: Option<SightingConfig>,
     /// How it is calibrated.
     pub calibrate: Option<RotaryCalibrateConfig>,
     /// How it is verified.
@@ -147,6 +149,37 @@ pub struct LineDetectorConfig {
     pub input: Option<i16>,
 }
 
+/// What a person types of a line, or imports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SightedName {
+    /// The machine drives the table to the line's nominal angle before it asks; by how much the table would
+    /// have to turn on for the line to lie under the cross-hair, positive towards larger angles.
+    ToLine,
+    /// Nothing is driven; what the encoder shows with the line under the cross-hair, counted from the table's
+    /// zero.
+    Angle,
+    /// Nothing is driven; the same less the line's nominal angle.
+    Deviation,
+}
+
+/// How a person reads the lines of a plate: with a microscope, a camera or an autocollimator.
+///
+/// In place of `line_detector`. The passes are those of a detector: each line once in each pass,
+/// `calibrate.passes` forward and as many in reverse, and the first pass repeated at the end. What
+/// drifts evenly with time falls out of the mean of both directions.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SightingConfig {
+    /// What is typed of a line, or stands in a file.
+    pub value: SightedName,
+    /// How far a line may be from the median of its placement; a value farther off is refused as
+    /// mistyped. Give more than the largest errors of table and plate together: sound lines are never refused
+    /// then.
+    #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at most a quarter of the line spacing"))]
+    pub range_arcsec: f64,
+}
+
 /// What planned offsets keep small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -161,7 +194,7 @@ pub enum OptimiseName {
 /// The calibration run of a rotary axis (system S2).
 ///
 /// A plate of lines is fixed on the table and read, turned and read again; somebody turns it when
-/// asked. Needs the sections `zero`, `line_detector` and `compensation`.
+/// asked. Needs the sections `zero` and `compensation`, and one of `line_detector` and `sighting`.
 ///
 /// Two placements cannot judge each other: with two, a plate turned by a wrong number of lines is
 /// not noticed, and not one line may be missing.
@@ -187,7 +220,8 @@ pub struct RotaryCalibrateConfig {
     /// Turns over all lines in each direction and placement; the first is repeated at the end.
     #[schemars(range(min = 1, max = 1000))]
     pub passes: u32,
-    /// Of a pass, the axis's own without it; between two lines there must be two SYNC periods.
+    /// Of a pass, the axis's own without it; between two lines there must be two SYNC periods where a
+    /// detector reads them.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
     pub speed_deg_per_s: Option<f64>,
     /// Standard deviation of one line in one pass. Readings that scatter more than twice as much
@@ -205,6 +239,16 @@ pub struct RotaryCalibrateConfig {
     /// waits for a heartbeat.
     #[serde(skip)]
     planned: OnceLock<Design>,
+}
+
+impl From<SightedName> for Sighted {
+    fn from(name: SightedName) -> Self {
+        match name {
+            SightedName::ToLine => Self::ToLine,
+            SightedName::Angle => Self::Angle,
+            SightedName::Deviation => Self::Deviation,
+        }
+    }
 }
 
 impl RotaryCalibrateConfig {

@@ -16,6 +16,38 @@ pub struct PlatePlanEntry {
     pub passes: u32,
     /// Speed of a pass, radians per second.
     pub speed_rad_per_s: f64,
+    /// Where the table is while a person reads a line; `None`: a detector reads them as they pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sighted: Option<SightedAt>,
+}
+
+/// Where the table is while a person reads a line, and where its error is therefore seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SightedAt {
+    /// At the line's nominal position; how far the line is from there was read.
+    Position,
+    /// Where the line lies under the cross-hair.
+    Line,
+}
+
+/// What a person read of one line in one pass. The last one counts: a line may be read again until its
+/// placement is closed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SightedEntry {
+    /// By how many lines the plate was to be turned.
+    pub offset: f64,
+    /// Which pass of this placement, from 1; one beyond the last is the first repeated.
+    pub pass: u32,
+    /// `+` or `-`.
+    pub approach: char,
+    /// Which line of the plate.
+    pub line: u32,
+    /// Reading minus nominal at its table position, as in a pass; `None` when the line cannot be read.
+    pub deviation_rad: Option<f64>,
+    /// When, UTC, RFC 3339.
+    pub at: String,
 }
 
 /// One pass over all lines. Lists count table positions, in line spacings from the zero.

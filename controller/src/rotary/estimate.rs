@@ -14,7 +14,8 @@ use core::f64::consts::TAU;
 use units::Radians;
 
 use crate::rotary::failure::RotaryFailure;
-use crate::rotary::placement::{Placed, PlateRun};
+use crate::rotary::placed::Placed;
+use crate::rotary::plate_run::PlateRun;
 
 /// A calibration that scatters more than so many times what is stated is refused.
 const NOISE_FACTOR_MAX: f64 = 2.0;
@@ -77,7 +78,12 @@ pub(crate) fn fit(
     let read = series(axis, lines, placed)?;
     let (mut solution, mut moved) = (solve(&read)?, read.clone());
     let phase = common_phase(placed);
-    for _ in 0..ROUNDS {
+    // A table that stood at its positions showed its error there.
+    let rounds = match placed.iter().all(|it| it.stood.is_some()) {
+        true => 0,
+        false => ROUNDS,
+    };
+    for _ in 0..rounds {
         let Some(nominal) = at_nodes(&read, phase, &solution) else {
             break;
         };
@@ -139,7 +145,11 @@ fn at_nodes(read: &RotarySeries, phase: Radians, solution: &Solution) -> Option<
 }
 
 /// Before anything is fitted the directions of a pass must agree.
-fn check_passes(axis: &str, run: &PlateRun, placed: &[Placed]) -> Result<(), RotaryFailure> {
+pub(super) fn check_passes(
+    axis: &str,
+    run: &PlateRun,
+    placed: &[Placed],
+) -> Result<(), RotaryFailure> {
     let scatter = placed.iter().filter_map(|it| it.scatter);
     let seen = scatter.fold(Radians::ZERO, Radians::max);
     judge(axis, run, seen, "between the directions")

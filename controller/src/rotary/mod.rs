@@ -3,7 +3,8 @@
 //!
 //! A plate is turned by people. Each placement is asked for, read in both directions, and read
 //! once more at the end, to see that nothing moved meanwhile. What was read stands in the journal,
-//! one entry a pass; whole placements survive whatever ends the run.
+//! one entry a pass, or one a line where a person reads; whole placements survive whatever ends the run,
+//! and so does every line that a person has read.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -26,10 +27,16 @@ mod line_speed;
 mod log;
 pub(crate) mod moves;
 mod operator;
-pub(crate) mod placement;
+pub(crate) mod placed;
+mod placement;
+mod plate_journal;
+mod plate_run;
 pub(crate) mod record;
 pub(crate) mod settings;
+pub(crate) mod sighted;
+mod sighting;
 mod sound;
+pub(crate) mod subject;
 pub(crate) mod sweep;
 mod table;
 mod turn;
@@ -50,9 +57,11 @@ pub(crate) use calibrate::RotaryCalibrated;
 pub(crate) use config::{
     DirectionName, EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
     RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
-    RotaryVerifyConfig,
+    RotaryVerifyConfig, SightingConfig,
 };
-pub(crate) use entries::{JudgedEntry, PlacementEntry, PlatePlanEntry, SweepEntry};
+pub(crate) use entries::{
+    JudgedEntry, PlacementEntry, PlatePlanEntry, SightedAt, SightedEntry, SweepEntry,
+};
 pub(crate) use in_use::TableInUse;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlateEntry;

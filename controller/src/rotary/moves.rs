@@ -4,13 +4,9 @@ use compensator::rotary::PeriodicCompensation;
 use units::Radians;
 
 use crate::failure::Failure;
-use crate::rotary::RotaryContent;
 use crate::rotary::Way;
 use crate::rotary::failure::RotaryFailure;
-use crate::rotary::in_use::TableInUse;
-use crate::rotary::settings;
 use crate::rotary::table::RotaryTable;
-use crate::run::missing;
 use crate::store::Store;
 
 /// A move of a rotary axis that was made. Angles count on over the turns.
@@ -71,17 +67,10 @@ impl RotaryTable<'_> {
     /// # Errors
     /// When it is damaged, of another kind, belongs to another machine or breaks a limit.
     pub fn load_active(&mut self, store: &Store) -> Result<Option<String>, Failure> {
-        let Some(id) = store.active(self.axis)?.current else {
+        let Some(in_use) = self.subject().in_use(store)? else {
             return Ok(None);
         };
-        let record = store.load::<RotaryContent>(&id)?;
-        record.head.belongs_to(
-            &id,
-            &self.core.this_machine(self.axis),
-            self.core.config_hash,
-        )?;
-        let compensation = self.prepare(&record.content, &id)?;
-        let in_use = TableInUse::new(&id, &record, compensation)?;
+        let id = in_use.id.clone();
         self.memory.calibration = Some(in_use);
         Ok(Some(id))
     }
@@ -95,16 +84,5 @@ impl RotaryTable<'_> {
     /// Uses no calibration any more.
     pub fn forget_calibration(&mut self) {
         self.memory.calibration = None;
-    }
-
-    /// Proves that a table error can be undone within the limits of the configuration.
-    pub(super) fn prepare(
-        &self,
-        content: &RotaryContent,
-        id: &str,
-    ) -> Result<PeriodicCompensation, Failure> {
-        let config = self.config.compensation.as_ref();
-        let config = config.ok_or_else(|| missing(self.axis, "compensation"))?;
-        settings::periodic_compensation(config, self.axis, content.table(id)?)
     }
 }

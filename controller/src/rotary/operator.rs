@@ -8,6 +8,12 @@ use crate::failure::Failure;
 pub enum PlateMove {
     /// Fix it, no matter how: this is the first placement.
     Fix,
+    /// Fix it so that a person finds its lines where he is asked for them: line 0 at this table position,
+    /// in line spacings.
+    FixAt {
+        /// In lines from the table's zero.
+        offset: f64,
+    },
     /// Turn it by so many lines from where it was read last.
     TurnBy(f64),
     /// Turn it by so many lines from where it lay at an offset; it is not known where it lies now.
@@ -50,6 +56,11 @@ impl PlateTask {
         };
         let what = match self.by {
             PlateMove::Fix => "fix it on the table, in any position".to_owned(),
+            PlateMove::FixAt { offset } => format!(
+                "fix it on the table so that its line 0 lies under the cross-hair at the table's angle \
+                 {:.4}°, and its lines follow each other at growing angles",
+                offset * 360.0 / f64::from(self.lines)
+            ),
             PlateMove::TurnBy(lines) if lines.abs() < 1e-9 => "leave it where it is".to_owned(),
             PlateMove::TurnBy(lines) => turn(lines, ""),
             PlateMove::TurnFrom { offset, lines } => {
@@ -102,6 +113,10 @@ mod tests {
     #[test]
     fn a_person_is_told_how_far_and_which_way() {
         check(PlateMove::Fix, "in any position");
+        check(
+            PlateMove::FixAt { offset: 5.0 },
+            "line 0 lies under the cross-hair at the table's angle 5.0000°",
+        );
         check(PlateMove::TurnBy(73.0), "by 73 lines (73.0000°)");
         check(PlateMove::TurnBy(73.0), "at larger angles");
         check(PlateMove::TurnBy(-31.5), "by 31.5 lines (31.5000°)");

@@ -18,16 +18,18 @@ use core::f64::consts::TAU;
 use units::Radians;
 
 use crate::failure::Failure;
-use crate::rotary::JudgedEntry;
+use crate::rotary::calibrate::Read;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::operator::Operator;
-use crate::rotary::placement::{Placed, PlateRun};
+use crate::rotary::placed::Placed;
+use crate::rotary::plate_journal::PlateJournal;
+use crate::rotary::plate_run::{DuePlacement, PlateRun};
+use crate::rotary::subject::Subject;
 use crate::rotary::table::RotaryTable;
-use crate::rotary::{PlateEntry, PlateLog};
+use crate::rotary::{JudgedEntry, PlateEntry, RotaryVerifyConfig};
 use crate::run::missing;
-use crate::run::note_failure;
-use crate::store::{Journal, Store, short};
+use crate::store::{Store, short};
 use machine::Stage;
 
 /// How much better another place of the plate must fit.
@@ -111,121 +113,193 @@ impl RotaryTable<'_> {
     /// than without the calibration is one, and takes the calibration out of use.
     ///
     /// # Errors
-    /// Not zeroed; `compensated` without a calibration; another plate than the calibration's, or
-    /// one that lies elsewhere; whatever stops the machine.
+    /// Not zeroed, or no line detector; `compensated` without a calibration; another plate than the
+    /// calibration's, or one that lies elsewhere; whatever stops the machine.
     pub fn verify(
         &mut self,
         store: &Store,
         compensated: bool,
         operator: &mut dyn Operator,
     ) -> Result<RotaryVerified, Failure> {
+        if self.config.line_detector.is_none() {
+            return Err(missing(self.axis, "line_detector"));
+        }
+        self.verify_by(
+            store,
+            (compensated, None),
+            &mut |table, run, due, journal| {
+                table.place_plate(run, due, operator)?;
+                table.read_placement(run, (due.offset, due.phase), due.done, journal)
+            },
+        )
+    }
+
+    /// The same with the placement brought about and read by `read`, perhaps as a run that is continued.
+    pub(super) fn verify_by(
+        &mut self,
+        store: &Store,
+        (compensated, resume): (bool, Option<&PathBuf>),
+        read: &mut Read<'_>,
+    ) -> Result<RotaryVerified, Failure> {
         self.core.require_zeroed(self.axis)?;
-        let config = self.config.verify.clone();
-        let config = config.ok_or_else(|| missing(self.axis, "verify"))?;
-        let (run, _) = self.plate_run()?;
+        let known = self.memory.calibration.clone();
+        let mut it = Verification::begin(self.subject(), store, (compensated, known), resume)?;
+        let due = it.due();
+        let placed = read(self, &it.run, &due, &mut it.journal);
+        let placed = placed.inspect_err(|failure| it.journal.note(failure))?;
+        let verified = it.judge(store, &placed);
+        verified.inspect_err(|failure| {
+            if let Some(RotaryFailure::MadeWorse { .. }) = failure.of_kind() {
+                self.memory.calibration = None;
+            }
+        })
+    }
+}
+
+/// A verification that is under way.
+pub(crate) struct Verification<'a> {
+    pub(super) subject: Subject<'a>,
+    pub(super) run: PlateRun,
+    config: RotaryVerifyConfig,
+    known: Option<TableInUse>,
+    compensated: bool,
+    pub(super) journal: PlateJournal,
+}
+
+impl<'a> Verification<'a> {
+    /// A new one, or one that is continued; `known` is the calibration in use.
+    pub(super) fn begin(
+        subject: Subject<'a>,
+        store: &Store,
+        (compensated, known): (bool, Option<TableInUse>),
+        resume: Option<&PathBuf>,
+    ) -> Result<Self, Failure> {
+        let config = subject.config.verify.clone();
+        let config = config.ok_or_else(|| missing(subject.axis, "verify"))?;
+        let (run, _) = subject.plate_run()?;
         let run = PlateRun {
             passes: config.passes,
             stage: Stage::Verify,
             ..run
         };
-        let known = self.known_plate(&run, compensated)?;
-        let id = known
-            .as_ref()
-            .map(|it| it.id.clone())
-            .filter(|_| compensated);
-        let header = self.header("verify", &run, id);
-        let mut journal = Journal::create(&store.runs(), &header)?;
-        let offset = config.offset_lines;
+        let known = known_plate(subject.axis, known, &run, compensated)?;
+        let id = known.as_ref().map(|it| it.id.clone());
+        let header = subject.header("verify", &run, id.filter(|_| compensated));
+        let plan = run.plan(vec![config.offset_lines]);
+        let journal = PlateJournal::open(store, &header, &plan, resume, &subject)?;
+        Ok(Self {
+            subject,
+            run,
+            config,
+            known,
+            compensated,
+            journal,
+        })
+    }
+
+    /// The placement that is to be read.
+    pub(super) fn due(&self) -> DuePlacement {
         // Without a calibration any placement is as good as another.
-        let lay_at = known.as_ref().and_then(|it| it.content.offsets.first());
-        let phase = known.as_ref().and_then(|it| it.content.plate_phase_rad);
-        let places = (offset, lay_at.map(|it| f64::from(*it)), phase.map(Radians));
-        let read = self.read_verification(&run, places, &mut journal, operator);
-        let placed = read.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        if let Some(known) = &known {
-            lies_there(self.axis, known, &placed)
-                .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        let content = self.known.as_ref().map(|it| &it.content);
+        let lay_at = content.and_then(|it| it.offsets.first());
+        DuePlacement {
+            offset: self.config.offset_lines,
+            step: (1, 1),
+            known: lay_at.map(|it| f64::from(*it)),
+            phase: content.and_then(|it| it.plate_phase_rad).map(Radians),
+            done: (0, self.run.sweeps()),
         }
-        let verified = RotaryVerified {
-            offset_lines: offset,
-            found: figures(&placed, known.as_ref(), None),
-            plate_known: known.is_some(),
-            left: known
-                .as_ref()
-                .filter(|_| compensated)
-                .map(|known| figures(&placed, Some(known), Some(&known.compensation))),
-            noise: placed
-                .scatter
-                .map(|it| it / (2.0 * f64::from(run.passes)).sqrt()),
-            closure: placed.closure,
-            tolerance: Radians::from_arcsec(config.tolerance_arcsec),
-            journal: journal.path().to_owned(),
-        };
-        journal.write(&PlateEntry::Judged(verified.entry()))?;
-        self.judge_table(store, &verified)
-            .inspect_err(|failure| note_failure(&mut journal, failure))?;
-        journal.complete()?;
+    }
+
+    /// What was read, judged, written down and acted upon.
+    pub(super) fn judge(
+        mut self,
+        store: &Store,
+        placed: &Placed,
+    ) -> Result<RotaryVerified, Failure> {
+        let verified = self.judged(store, placed);
+        let verified = verified.inspect_err(|failure| self.journal.note(failure))?;
+        self.journal.complete()?;
         Ok(verified)
     }
 
-    fn read_verification(
-        &mut self,
-        run: &PlateRun,
-        (offset, lay_at, phase): (f64, Option<f64>, Option<Radians>),
-        journal: &mut Journal<PlateLog>,
-        operator: &mut dyn Operator,
-    ) -> Result<Placed, Failure> {
-        journal.write(&PlateEntry::PlatePlan(run.plan(vec![offset])))?;
-        self.place_plate(run, offset, (1, 1), lay_at, operator)?;
-        self.read_placement(run, (offset, phase), (0, run.sweeps()), journal)
-    }
-
-    /// What the calibration in use says of the plate.
-    fn known_plate(
-        &self,
-        run: &PlateRun,
-        compensated: bool,
-    ) -> Result<Option<TableInUse>, Failure> {
-        let axis = self.axis;
-        match self.memory.calibration.clone() {
-            None if compensated => Err(Failure::Usage {
-                what: format!("axis {axis} uses no calibration"),
-                help: "load or make one, or verify uncompensated".into(),
-            }),
-            // Of another plate it says nothing, and of the table as found nothing is wanted.
-            Some(known) if !compensated && !is_of(&known, run) => Ok(None),
-            Some(known) if !is_of(&known, run) => {
-                let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
-                Err(RotaryFailure::OtherPlate {
-                    axis: self.axis.to_owned(),
-                    expected: lines(&known.plate, known.content.lines),
-                    seen: lines(&run.plate, run.lines),
-                }
-                .into())
-            }
-            known => Ok(known),
+    fn judged(&mut self, store: &Store, placed: &Placed) -> Result<RotaryVerified, Failure> {
+        let axis = self.subject.axis;
+        if let Some(known) = &self.known {
+            lies_there(axis, known, placed)?;
         }
-    }
-
-    fn judge_table(&mut self, store: &Store, verified: &RotaryVerified) -> Result<(), Failure> {
-        let Some(left) = &verified.left else {
-            return Ok(());
+        let known = self.known.as_ref();
+        let verified = RotaryVerified {
+            offset_lines: self.config.offset_lines,
+            found: figures(placed, known, None),
+            plate_known: known.is_some(),
+            left: known
+                .filter(|_| self.compensated)
+                .map(|known| figures(placed, Some(known), Some(&known.compensation))),
+            noise: placed
+                .scatter
+                .map(|it| it / (2.0 * f64::from(self.run.passes)).sqrt()),
+            closure: placed.closure,
+            tolerance: Radians::from_arcsec(self.config.tolerance_arcsec),
+            journal: self.journal.path().to_owned(),
         };
-        if verified.is_within_tolerance() || left.rms <= verified.found.rms {
-            return Ok(());
-        }
-        let id = self.memory.calibration.take().map(|it| it.id);
-        if id.is_some() && store.active(self.axis)?.current == id {
-            store.retire(self.axis)?;
-        }
-        Err(RotaryFailure::MadeWorse {
-            axis: self.axis.to_owned(),
-            calibration: id.as_deref().map(short).unwrap_or_default(),
-            before: verified.found.rms,
-            after: left.rms,
-        }
-        .into())
+        self.journal.write(PlateEntry::Judged(verified.entry()))?;
+        judge_table(axis, store, known, &verified)?;
+        Ok(verified)
     }
+}
+
+/// What the calibration in use says of the plate.
+fn known_plate(
+    axis: &str,
+    in_use: Option<TableInUse>,
+    run: &PlateRun,
+    compensated: bool,
+) -> Result<Option<TableInUse>, Failure> {
+    match in_use {
+        None if compensated => Err(Failure::Usage {
+            what: format!("axis {axis} uses no calibration"),
+            help: "load or make one, or verify uncompensated".into(),
+        }),
+        // Of another plate it says nothing, and of the table as found nothing is wanted.
+        Some(known) if !compensated && !is_of(&known, run) => Ok(None),
+        Some(known) if !is_of(&known, run) => {
+            let lines = |plate: &str, lines: u32| format!("{plate} ({lines} lines)");
+            Err(RotaryFailure::OtherPlate {
+                axis: axis.to_owned(),
+                expected: lines(&known.plate, known.content.lines),
+                seen: lines(&run.plate, run.lines),
+            }
+            .into())
+        }
+        known => Ok(known),
+    }
+}
+
+/// A calibration that makes the table worse is taken out of use.
+fn judge_table(
+    axis: &str,
+    store: &Store,
+    known: Option<&TableInUse>,
+    verified: &RotaryVerified,
+) -> Result<(), Failure> {
+    let Some(left) = &verified.left else {
+        return Ok(());
+    };
+    if verified.is_within_tolerance() || left.rms <= verified.found.rms {
+        return Ok(());
+    }
+    let id = known.map(|it| it.id.clone());
+    if id.is_some() && store.active(axis)?.current == id {
+        store.retire(axis)?;
+    }
+    Err(RotaryFailure::MadeWorse {
+        axis: axis.to_owned(),
+        calibration: id.as_deref().map(short).unwrap_or_default(),
+        before: verified.found.rms,
+        after: left.rms,
+    }
+    .into())
 }
 
 /// Whether the calibration was made with the plate that is to be read.
@@ -251,8 +325,10 @@ fn angles(placed: &Placed, table: Option<&PeriodicCompensation>) -> Vec<Option<R
     let angle = |(at, reading): (usize, &Option<Radians>)| {
         let reading = (*reading)?;
         let position = TAU * at as f64 / lines as f64;
+        // Where the table's error was seen: at the line, or where the table stood.
+        let seen_at = Radians(position) + placed.stood.unwrap_or(reading);
         let corrected = match table {
-            Some(table) => table.deviation(Radians(position) + reading).ok()?,
+            Some(table) => table.deviation(seen_at).ok()?,
             None => Radians::ZERO,
         };
         Some(reading + corrected)

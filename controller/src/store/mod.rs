@@ -11,7 +11,7 @@ pub(crate) mod test_run;
 
 pub(crate) use machine::records::{
     CalibrationRecord, ClosureEntry, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord,
-    Journal, JournalHeader, Log, ReadJournal, RecordHead, SCHEMA_VERSION, Store, StoreError,
-    read_journal, short,
+    Journal, JournalHeader, Log, RecordHead, SCHEMA_VERSION, Store, StoreError, read_journal,
+    short,
 };
 pub(crate) use machine::records::{first_difference, not_resumable};

@@ -33,7 +33,7 @@ pub use instrument::{Beam, Fringes, Scanned};
 pub use parts::pulse::{IndexPulse, ProbeEdge};
 pub use parts::servo::Servo;
 pub use platform::{PlatformTruth, Pose};
-pub use table::TableTruth;
+pub use table::{Sight, TableTruth};
 pub use thermal::Environment;
 pub use truth::Truth;
 pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};

@@ -7,14 +7,14 @@
 use core::fmt::Write as _;
 
 use serde::Deserialize;
-use units::{Celsius, Metres};
+use units::{Celsius, Metres, Radians};
 
 use crate::fault::{FaultConfig, FaultId};
 use crate::plant::{LineOptics, LineSetUp, Truth};
 use crate::simulation::Simulation;
 
 /// All commands, for the refusal of an unknown one.
-pub const WORDS: &str = "turn-plate LINES | fix-plate OFFSET | place-plate OFFSET | set-up-line TOML | take-line-away | fault TOML | \
+pub const WORDS: &str = "turn-plate LINES | fix-plate OFFSET | place-plate OFFSET | read-line NUMBER | set-up-line TOML | take-line-away | fault TOML | \
                          end-fault NUMBER | power off | power on | truth";
 
 /// What a hand does.
@@ -39,6 +39,8 @@ pub enum Deed {
     FixPlate(f64),
     /// Turns the plate to the place that is called so many lines.
     PlacePlate(f64),
+    /// Reads a line of the plate through the microscope; nothing is turned.
+    ReadLine(u32),
     /// Sets a laser up along a line.
     SetUpLine(LineSetUp),
     /// Packs it up.
@@ -115,6 +117,10 @@ impl Deed {
             ("turn-plate", lines) => finite(lines).map(Self::TurnPlate),
             ("fix-plate", offset) => finite(offset).map(Self::FixPlate),
             ("place-plate", offset) => finite(offset).map(Self::PlacePlate),
+            ("read-line", number) => match number.parse() {
+                Ok(number) => Ok(Self::ReadLine(number)),
+                Err(_) => Err(format!("`{number}` is not the number of a line")),
+            },
             ("set-up-line", text) => inline::<LineWords>(text)?.set_up().map(Self::SetUpLine),
             ("take-line-away", "") => Ok(Self::TakeLineAway),
             ("fault", text) => fault(text).map(|it| Self::Fault(Box::new(it))),
@@ -170,6 +176,7 @@ impl Hands {
                     "the plate is fixed; its offset now counts as {offset}"
                 ))
             }
+            Deed::ReadLine(line) => read_line(machine, line),
             Deed::SetUpLine(line) => {
                 if machine.truth().volumetric().is_none() {
                     return Err("only a machine of three axes has lines to set up".to_owned());
@@ -213,6 +220,22 @@ impl Hands {
             "the plate was turned by {lines} lines; its offset is now {to}"
         ))
     }
+}
+
+/// What is read, as one JSON object; `null` for what cannot be seen.
+fn read_line(machine: &mut Simulation, line: u32) -> Result<String, String> {
+    has_plate(machine)?;
+    let lines = machine.truth().table().map_or(0, |it| it.lines());
+    if line as usize >= lines {
+        return Err(format!("the plate has {lines} lines, 0 to {}", lines - 1));
+    }
+    let seen = machine.sight_line(line);
+    let number = |it: Option<f64>| it.map_or("null".to_owned(), |it| it.to_string());
+    Ok(format!(
+        "{{\"to_line_arcsec\":{},\"angle_deg\":{}}}",
+        number(seen.to_line.map(Radians::arcsec)),
+        number(seen.angle.map(Radians::degrees)),
+    ))
 }
 
 fn has_plate(machine: &Simulation) -> Result<(), String> {
@@ -320,6 +343,7 @@ mod tests {
             ("power up", "power off"),
             ("fault fault = { kind = \"gremlin\" }", "gremlin"),
             ("end-fault x", "not the number"),
+            ("read-line one", "not the number of a line"),
             (
                 "set-up-line along = [0, 0, 0], optics = \"linear\"",
                 "direction",
@@ -348,6 +372,24 @@ mod tests {
         assert!(truth.contains("\"position_mm\":"), "{truth}");
         let blocked = words("fault fault = { kind = \"beam_blocked\" }");
         assert_eq!(blocked.unwrap(), "fault 0");
+    }
+
+    #[test]
+    fn a_line_is_read_where_it_is_and_smudged_ones_are_not() {
+        let clean = include_str!("../../../configs/emulated/rotary.toml");
+        let smudged = clean.replace("smudged_lines = []", "smudged_lines = [7]");
+        assert_ne!(clean, smudged);
+        let mut machine = machine(&smudged);
+        let mut hands = Hands::default();
+        let mut words = |words: &str| hands.do_words(words, &mut machine);
+        assert!(words("read-line 360").unwrap_err().contains("0 to 359"));
+        let smudged = words("read-line 7").unwrap();
+        assert_eq!(smudged, "{\"to_line_arcsec\":null,\"angle_deg\":null}");
+        let seen = words("read-line 100").unwrap();
+        assert!(
+            seen.contains("\"angle_deg\":") && !seen.ends_with("null}"),
+            "{seen}"
+        );
     }
 
     #[test]

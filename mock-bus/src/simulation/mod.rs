@@ -31,7 +31,7 @@ use wire::{Payload, Port};
 use crate::config::{ConfigError, MachineConfig};
 use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
-use crate::plant::{Plant, Truth};
+use crate::plant::{Plant, Sight, Truth};
 use log::{Direction, Log};
 use port::PortState;
 
@@ -348,6 +348,11 @@ impl Simulation {
     /// fixes it again, a little off as ever. Nothing happens on a machine without one.
     pub fn turn_plate(&mut self, lines: f64) {
         self.plant.turn_plate(lines);
+    }
+
+    /// Somebody reads a line of the table's plate through the microscope.
+    pub fn sight_line(&mut self, line: u32) -> Sight {
+        self.plant.sight_line(line)
     }
 
     /// The device called `name`, when it is a `T`: for the faults that only it knows. It is

@@ -14,6 +14,7 @@ mod platform_knowledge;
 mod platform_strokes;
 mod repeatable;
 mod rotary;
+mod rotary_sighted;
 mod rotary_table;
 mod serial_zero;
 mod survey;

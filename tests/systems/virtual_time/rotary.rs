@@ -29,12 +29,12 @@ fn bench(seed: u64) -> Bench {
     Bench::rotary(seed, |text| text, |text| text)
 }
 
-fn hand_of(emulated: &Emulated) -> Hand<'static> {
+pub(super) fn hand_of(emulated: &Emulated) -> Hand<'static> {
     let emulated = emulated.clone();
     Hand::new(move |lines| emulated.simulation_mut().turn_plate(lines))
 }
 
-fn started(bench: &mut Bench) {
+pub(super) fn started(bench: &mut Bench) {
     let result = bench
         .machine
         .start()
@@ -68,6 +68,12 @@ fn verified(bench: &mut Bench, hand: &mut Hand<'_>) -> Result<RotaryVerified, Fa
         .guarded(|machine| machine.rotary(AXIS)?.verify(&store, true, hand))
 }
 
+pub(super) fn is_enabled(emulated: &Emulated) -> bool {
+    let mut simulation = emulated.simulation_mut();
+    let drive: &mut Cia402DriveNode = simulation.node_mut("drive").unwrap();
+    drive.power_state() == PowerState::OperationEnabled
+}
+
 /// The table's true error at a reading, arcsec.
 fn true_error(bench: &Bench, reading: Radians) -> f64 {
     let simulation = bench.emulated.simulation();
@@ -89,7 +95,7 @@ fn rms(values: &[f64]) -> f64 {
 /// True angle − target, rms in arcsec, at `steps` targets of a turn, the first of them `beside` of
 /// a step from the zero, when the drive is sent what the calibration says; less the mean, for
 /// where the zero is no placement of a plate tells.
-fn residual(bench: &mut Bench, steps: u32, beside: f64) -> f64 {
+pub(super) fn residual(bench: &mut Bench, steps: u32, beside: f64) -> f64 {
     let compensation = bench.machine.rotary(AXIS).unwrap().compensation().cloned();
     let compensation = compensation.as_ref();
     let bench = &*bench;
@@ -103,7 +109,7 @@ fn residual(bench: &mut Bench, steps: u32, beside: f64) -> f64 {
 
 /// χ² of the errors of the table error by its stated uncertainty. The values of a table depend on
 /// each other; their harmonics do not. k = 0 is the zero of the scale and is left out.
-fn chi_square(bench: &Bench, calibrated: &RotaryCalibrated) -> f64 {
+pub(super) fn chi_square(bench: &Bench, calibrated: &RotaryCalibrated) -> f64 {
     let solution = &calibrated.solution;
     let lines = solution.table_error.len();
     let place = |at: usize| Radians(TAU * at as f64 / lines as f64);
@@ -609,11 +615,6 @@ fn the_drive_is_off_while_somebody_has_his_hands_in_the_machine() {
             self.2.push(is_enabled(&self.1));
             Ok(true)
         }
-    }
-    fn is_enabled(emulated: &Emulated) -> bool {
-        let mut simulation = emulated.simulation_mut();
-        let drive: &mut Cia402DriveNode = simulation.node_mut("drive").unwrap();
-        drive.power_state() == PowerState::OperationEnabled
     }
     let mut bench = bench(31);
     started(&mut bench);

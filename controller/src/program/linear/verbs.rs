@@ -82,6 +82,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     let (calibrated, counters) = with_zeroed_axis(
         &args.axis,
         "calibrate",
@@ -100,6 +101,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     let compensated = !args.uncompensated;
     let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
         let verified = machine.linear(axis)?.verify(

@@ -77,6 +77,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     whole_only(&args.axis)?;
     never_resumed(args.resume.is_some())?;
     if args.accept_drift {
@@ -96,6 +97,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     whole_only(&args.axis)?;
     never_resumed(args.resume.is_some())?;
     let compensated = !args.uncompensated;

@@ -16,10 +16,10 @@ use crate::program::demo::stand::{
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
 use crate::program::rotary::report as page;
-use crate::program::rotary::verbs::{
-    calibrated_text, calibrated_value, moved_text, moved_value, out_of_tolerance, verified_text,
-    verified_value,
+use crate::program::rotary::told::{
+    calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
 };
+use crate::program::rotary::verbs::{moved_text, moved_value};
 use crate::rotary::Way;
 use crate::rotary::moves::RotaryMoved;
 use crate::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryVerified};

@@ -3,26 +3,35 @@
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod json;
+pub(crate) mod readings;
 mod report;
 mod residuals;
 #[cfg(test)]
 mod stored_tests;
+pub(crate) mod told;
 pub(crate) mod verbs;
 
 use std::path::Path;
 
+use compensator::rotary::Sighted;
 use machine::records::{Log, read_journal};
+use units::Radians;
 
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
 use crate::Failure;
-use crate::rotary::{PlateLog, RotaryContent};
+use crate::config::MachineConfig;
+use crate::rotary::placed::closure_noise;
+use crate::rotary::{PlateLog, RotaryCalibrateConfig, RotaryContent};
+
+/// From how many standard deviations on a plate has moved that only seems to.
+const STILL: f64 = 4.0;
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |_| false,
-    notes: |_| Vec::new(),
+    notes,
     pointers: |_| Vec::new(),
     made_together: |_, _| None,
     demos: demo::DEMOS,
@@ -34,6 +43,40 @@ pub(crate) const VERBS: Verbs = Verbs {
     opened_by: PlateLog::OPENED_BY,
     page: html,
 };
+
+/// What a person who reads the plate has before him.
+fn notes(config: &MachineConfig) -> Vec<String> {
+    let read_by_people = config.rotary.iter().filter_map(|(name, it)| {
+        let (sighting, run) = (it.sighting.as_ref()?, it.calibrate.as_ref()?);
+        let placements = run.design().ok()?.offsets().len();
+        let of_one = (2 * run.passes as usize + 1) * run.lines as usize;
+        let first = format!(
+            "axis {name}: a person reads plate {}: {of_one} readings in each of {placements} placements; \
+             a file of one has the columns {}",
+            run.plate,
+            Sighted::from(sighting.value).header()
+        );
+        Some([Some(first), closure_note(name, run)])
+    });
+    read_by_people.flatten().flatten().collect()
+}
+
+/// That sound placements will be refused, where the limit is within the noise of the few lines that a person
+/// reads.
+fn closure_note(name: &str, run: &RotaryCalibrateConfig) -> Option<String> {
+    let noise = Radians::from_arcsec(run.reading_noise_arcsec);
+    let still = closure_noise(run.lines as usize, noise).arcsec();
+    let times = run.closure_limit_arcsec / still;
+    (times < STILL).then(|| {
+        format!(
+            "axis {name}: closure_limit_arcsec = {} is {times:.1} standard deviations of what the readings' \
+             own noise makes of a plate that lies still, and sound placements will be refused now and then; \
+             with {:.3} less than one in two thousand are",
+            run.closure_limit_arcsec,
+            STILL * still
+        )
+    })
+}
 
 /// The page of the journal at `path`, with what was made from it.
 fn html(path: &Path) -> Result<String, Failure> {

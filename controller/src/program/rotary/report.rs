@@ -11,9 +11,9 @@ use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts, facts_of};
 use crate::program::rotary::residuals::residuals_of;
 use crate::rotary::PlateLog;
-use crate::rotary::placement::largest_closure;
+use crate::rotary::placed::largest_closure;
 use crate::rotary::verify::RotaryFigures;
-use crate::rotary::{JudgedEntry, RotaryContent};
+use crate::rotary::{JudgedEntry, RotaryContent, SightedAt};
 
 /// So many readings that were left out are named.
 const NAMED: usize = 20;
@@ -73,9 +73,17 @@ fn facts_of_run(
         add(
             "read",
             format!(
-                "{} pass(es) in each direction at {:.3} °/s, the first repeated at the end",
+                "{} pass(es) in each direction{}, the first repeated at the end",
                 plan.passes,
-                plan.speed_rad_per_s.to_degrees()
+                match plan.sighted {
+                    None => format!(" at {:.3} °/s", plan.speed_rad_per_s.to_degrees()),
+                    Some(SightedAt::Position) => {
+                        ", by a person, with the table at each line's nominal angle".to_owned()
+                    }
+                    Some(SightedAt::Line) => {
+                        ", by a person, with each line under the cross-hair".to_owned()
+                    }
+                },
             ),
         );
     }

@@ -8,7 +8,7 @@ use units::Radians;
 
 use crate::rotary::PlateLog;
 use crate::rotary::estimate::fit;
-use crate::rotary::placement::Placed;
+use crate::rotary::placed::Placed;
 
 /// Where each reading of `journal` was made on the table, and what is left of it, all placements that are
 /// whole one after the other; `None` when they are too few, or do not part table and plate.
@@ -16,7 +16,7 @@ pub(crate) fn residuals_of(journal: &ReadJournal<PlateLog>) -> Option<Vec<(Radia
     let plan = journal.log.plan.as_ref()?;
     let placements = journal.log.placements.iter();
     let placed: Vec<Placed> = placements
-        .map(|it| Placed::of(it, &journal.log.sweeps, plan.passes))
+        .map(|it| Placed::in_plan(it, &journal.log.sweeps, plan))
         .collect();
     let options = SolveOptions {
         amplification_max: f64::INFINITY,

@@ -9,13 +9,13 @@ use crate::program::json as to_json;
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
-use crate::program::rotary::json::{arcsec, solution};
+use crate::program::rotary::json::arcsec;
+use crate::program::rotary::readings::{self, ReadBy};
+use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
 use crate::program::session::{Session, choose_axis};
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs, WayName};
 use crate::rotary::Way;
 use crate::rotary::moves::RotaryMoved;
-use crate::rotary::verify::RotaryFigures;
-use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
 use crate::run::CalibrateOptions;
 use crate::{Failure, Machine};
 use machine::records::Store;
@@ -49,8 +49,22 @@ fn with_zeroed_table<R>(
     Ok((axis, result, counters))
 }
 
+/// Who brings the plate about, and who reads it.
+enum Reader {
+    /// A detector reads what this person places.
+    Detector(Terminal),
+    /// This person does both.
+    Person(Terminal),
+}
+
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
+    let mut operator = match ReadBy::of(&args.axis, &args.readings)? {
+        ReadBy::Detector => {
+            Reader::Detector(Terminal::new(args.yes, args.axis.machine.hand(), output)?)
+        }
+        ReadBy::Driven => Reader::Person(readings::person(args.yes, &args.axis, output, true)?),
+        ReadBy::Alone => return readings::calibrate(args, output),
+    };
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
         let options = CalibrateOptions {
             resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
@@ -58,9 +72,11 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         };
         let resumed = options.resume.clone();
         resumable(store, "calibrate", axis, resumed.as_deref(), || {
-            machine
-                .rotary(axis)?
-                .calibrate(store, &options, &mut operator)
+            let mut table = machine.rotary(axis)?;
+            match &mut operator {
+                Reader::Detector(operator) => table.calibrate(store, &options, operator),
+                Reader::Person(person) => table.calibrate_sighted(store, &options, person),
+            }
         })
     };
     let (axis, calibrated, counters) =
@@ -72,42 +88,39 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
-    if args.resume.is_some() {
-        return Err(Failure::Usage {
-            what: "a rotary axis's verification cannot be resumed".into(),
-            help: "it is one placement: start it again".into(),
-        });
-    }
+    let read_by = ReadBy::of(&args.axis, &args.readings)?;
+    let mut operator = match read_by {
+        ReadBy::Detector if args.resume.is_some() => {
+            return Err(Failure::Usage {
+                what: "a rotary axis's verification cannot be resumed where a detector reads the plate"
+                    .into(),
+                help: "it is one placement: start it again".into(),
+            });
+        }
+        ReadBy::Detector => {
+            Reader::Detector(Terminal::new(args.yes, args.axis.machine.hand(), output)?)
+        }
+        ReadBy::Driven => Reader::Person(readings::person(args.yes, &args.axis, output, true)?),
+        ReadBy::Alone => return readings::verify(args, output),
+    };
     let compensated = !args.uncompensated;
-    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
         // Uncompensated, too: it knows the plate's errors.
         machine.rotary(axis)?.load_active(store)?;
-        machine
-            .rotary(axis)?
-            .verify(store, compensated, &mut operator)
+        let mut table = machine.rotary(axis)?;
+        match &mut operator {
+            Reader::Detector(operator) => table.verify(store, compensated, operator),
+            Reader::Person(person) => {
+                let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
+                resumable(store, "verify", axis, resume.as_deref(), || {
+                    table.verify_sighted(store, (compensated, resume.as_ref()), person)
+                })
+            }
+        }
     };
-    let (axis, verified, counters) =
+    let (axis, it, counters) =
         with_zeroed_table(&args.axis, "verify", Use::Measurement, output, run)?;
-    let mut value = verified_value(&verified);
-    value["axis"] = json!(axis);
-    value["counters"] = counters;
-    let text = verified_text(&verified);
-    match out_of_tolerance(&axis, &verified) {
-        Some(failure) => output.bad_result(&text, value, failure),
-        None => output.result(&text, &value),
-    }
-}
-
-/// What a verification that was to be within the tolerance failed by.
-pub(crate) fn out_of_tolerance(axis: &str, verified: &RotaryVerified) -> Option<Failure> {
-    let left = verified.left.as_ref()?;
-    let failure = RotaryFailure::OutOfTolerance {
-        axis: axis.to_owned(),
-        seen: left.largest,
-        limit: verified.tolerance,
-    };
-    (!verified.is_within_tolerance()).then(|| failure.into())
+    verified(&axis, &it, counters, output)
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
@@ -197,119 +210,6 @@ pub(crate) fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&
         "standard_uncertainty_arcsec": moved.standard_uncertainty.map(arcsec),
         "calibration": calibration,
         "corrected": calibration.is_some(),
-    })
-}
-
-pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
-    let solution = &calibrated.solution;
-    let content = &calibrated.content;
-    let u = content.uncertainty_max();
-    let u = u.map_or("unknown".to_owned(), |u| {
-        format!("{:.4}″ at most", u.arcsec())
-    });
-    let scatter = calibrated
-        .scatter
-        .map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
-    let mut text = format!(
-        "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″ at \
-         the lines, plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
-         {}\n  the plate moved by {:.3}″ at most while it was read\n  {}\n  passes in {}",
-        short(&calibrated.id),
-        solution.design.lines(),
-        solution.design.offsets(),
-        content.largest_error().arcsec(),
-        content.largest_plate_error().arcsec(),
-        content.harmonics_told(),
-        calibrated.closure.arcsec(),
-        calibrated.path.display(),
-        calibrated.journal.display(),
-    );
-    for it in &solution.outliers {
-        let (line, offset) = (it.reading.line, it.reading.offset);
-        let residual = it.residual.arcsec();
-        text += &format!(
-            "\n  left out: line {line} at offset {offset}, {residual:+.3}″ from what the others \
-             predict"
-        );
-    }
-    if !solution.missing.is_empty() {
-        text += &format!("\n  {} readings are missing", solution.missing.len());
-    }
-    text
-}
-
-pub(crate) fn calibrated_value(calibrated: &RotaryCalibrated) -> Value {
-    let mut value = solution(&calibrated.solution);
-    value["calibration"] = json!(calibrated.id);
-    value["path"] = json!(calibrated.path);
-    value["journal"] = json!(calibrated.journal);
-    value["closure_arcsec"] = json!(arcsec(calibrated.closure));
-    value["pass_scatter_arcsec"] = json!(calibrated.scatter.map(arcsec));
-    value["largest_deviation_arcsec"] = json!(arcsec(calibrated.content.largest_error()));
-    value
-}
-
-fn figures_text(title: &str, figures: &RotaryFigures) -> String {
-    format!(
-        "{title}: largest deviation {:.3}″, rms {:.3}″",
-        figures.largest.arcsec(),
-        figures.rms.arcsec()
-    )
-}
-
-pub(crate) fn verified_text(verified: &RotaryVerified) -> String {
-    let whose = if verified.plate_known {
-        ""
-    } else {
-        " (errors of table and plate together: no calibration contains this plate)"
-    };
-    let mut text = figures_text("as found", &verified.found) + whose;
-    if let Some(left) = &verified.left {
-        text += &format!(
-            "\n{} (tolerance {:.3}″)",
-            figures_text("as left", left),
-            verified.tolerance.arcsec()
-        );
-    }
-    if let Some(noise) = verified.noise {
-        text += &format!(
-            "\n  this includes the scatter of these readings, {:.3}″ rms",
-            noise.arcsec()
-        );
-    }
-    let places = if verified.offset_lines.fract() == 0.0 {
-        "at the lines"
-    } else {
-        "between the lines"
-    };
-    text + &format!(
-        "\n  plate at offset {}: places {places} of the calibration; it moved by {:.3}″\n  passes in {}",
-        verified.offset_lines,
-        verified.closure.arcsec(),
-        verified.journal.display()
-    )
-}
-
-fn figures_value(figures: &RotaryFigures) -> Value {
-    let deviations: Vec<_> = figures.deviations.iter().map(|it| it.map(arcsec)).collect();
-    json!({
-        "largest_arcsec": arcsec(figures.largest),
-        "rms_arcsec": arcsec(figures.rms),
-        "deviation_arcsec": deviations,
-    })
-}
-
-pub(crate) fn verified_value(verified: &RotaryVerified) -> Value {
-    json!({
-        "offset_lines": verified.offset_lines,
-        "plate_known": verified.plate_known,
-        "as_found": figures_value(&verified.found),
-        "as_left": verified.left.as_ref().map(figures_value),
-        "reading_noise_arcsec": verified.noise.map(arcsec),
-        "closure_arcsec": arcsec(verified.closure),
-        "tolerance_arcsec": arcsec(verified.tolerance),
-        "within_tolerance": verified.left.is_some().then(|| verified.is_within_tolerance()),
-        "journal": verified.journal,
     })
 }
 

@@ -76,6 +76,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     if args.accept_drift {
         return Err(Failure::Usage {
             what: "a calibration of three axes is not judged by its closure".into(),
@@ -202,6 +203,7 @@ pub(crate) fn found_value(found: &Identified) -> Value {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    args.readings.refuse()?;
     if args.resume.is_some() {
         return Err(Failure::Usage {
             what: "a verification of three axes cannot be resumed".into(),

@@ -21,6 +21,7 @@ fn of_a_plate_whole_placements_are_kept_that_lay_where_they_should() {
         offsets: vec![0.0, 73.0, 162.0],
         passes: 1,
         speed_rad_per_s: 1.0,
+        sighted: None,
     };
     let placed = |offset| {
         PlateEntry::Placed(PlacementEntry {

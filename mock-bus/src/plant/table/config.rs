@@ -21,6 +21,22 @@ pub struct TableConfig {
     pub plate: PlateConfig,
     /// What sees the plate's lines pass.
     pub detector: DetectorConfig,
+    /// What a person reads them with.
+    pub microscope: MicroscopeConfig,
+}
+
+/// A microscope with a cross-hair beside the table, and the person at it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MicroscopeConfig {
+    /// Standard deviation of one reading of one line.
+    pub noise_arcsec: f64,
+}
+
+impl Default for MicroscopeConfig {
+    fn default() -> Self {
+        Self { noise_arcsec: 0.05 }
+    }
 }
 
 /// Inertia and servo.

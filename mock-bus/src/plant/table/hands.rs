@@ -2,7 +2,7 @@
 
 use units::Radians;
 
-use super::Table;
+use super::{Sight, Table};
 use crate::plant::Plant;
 
 impl Plant {
@@ -11,6 +11,16 @@ impl Plant {
         if let Some(table) = self.machine.of_mut::<Table>() {
             table.turn_plate(lines);
         }
+    }
+
+    /// Somebody reads a line of the table's plate through the microscope; nothing is turned.
+    pub fn sight_line(&mut self, line: u32) -> Sight {
+        let now = self.now;
+        let Some(table) = self.machine.of_mut::<Table>() else {
+            return Sight::default();
+        };
+        let reading = table.train.mass.position_at(now);
+        table.sight(line, reading)
     }
 
     /// Covers a line of the table's plate with dirt, or wipes it.

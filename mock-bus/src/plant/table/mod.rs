@@ -18,6 +18,7 @@ pub mod config;
 mod detector;
 mod encoder_error;
 mod hands;
+mod microscope;
 mod plate;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ use std::collections::VecDeque;
 
 use units::{Radians, Time};
 
+pub use microscope::Sight;
 pub use truth::TableTruth;
 
 use crate::config::error::ConfigError;
@@ -45,6 +47,7 @@ use crate::random::Stream;
 use config::TableConfig;
 use detector::{Detector, Passage};
 use encoder_error::EncoderError;
+use microscope::Microscope;
 use plate::Plate;
 
 #[derive(Clone, Debug)]
@@ -53,6 +56,7 @@ pub(super) struct Table {
     error: EncoderError,
     plate: Plate,
     detector: Detector,
+    microscope: Microscope,
     /// What a hand does that nobody calls, in order.
     hand_lines: VecDeque<f64>,
     /// How many lines had been seen when the plate was turned last.
@@ -88,6 +92,7 @@ impl Table {
             error: EncoderError::new(encoder, &config.bearing, seed),
             plate: Plate::new(&config.plate, seed),
             detector: Detector::new(&config.detector, seed),
+            microscope: Microscope::new(&config.microscope, seed),
             hand_lines: config.plate.hand_lines.iter().copied().collect(),
             passages_before: 0,
             step: 0,

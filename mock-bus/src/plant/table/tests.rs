@@ -279,3 +279,44 @@ fn the_same_seed_gives_the_same_edges_however_often_somebody_looks() {
     assert!(once.len() > 100);
     assert_eq!(once, run(4));
 }
+
+#[test]
+fn a_person_reads_a_line_where_it_is_whether_or_not_the_table_is_turned_to_it() {
+    let mut plant = plant_of(|table| table.microscope.noise_arcsec = 0.0, 5);
+    for line in [0, 1, 100, 359] {
+        let seen = plant.sight_line(line);
+        let table = plant.truth().table().unwrap();
+        let angle = table.line_angle(line as usize);
+        let shown = seen.angle.unwrap();
+        // Where the table is when the encoder shows that.
+        let there = shown - table.encoder_error(shown) - angle;
+        assert!(
+            arcsec((there - there.whole_turns()).value()).abs() < 0.02,
+            "line {line}"
+        );
+        let away = angle - table.angle();
+        let away = away - away.whole_turns();
+        let is_near = away.value().abs() < TAU / 720.0;
+        assert_eq!(seen.to_line.is_some(), is_near, "line {line}");
+        if let Some(to_line) = seen.to_line {
+            assert!(arcsec((to_line - away).value()).abs() < 1e-6, "line {line}");
+        }
+    }
+}
+
+#[test]
+fn what_a_person_reads_scatters_as_it_is_said_and_smudged_lines_are_not_read() {
+    let mut plant = plant_of(|table| table.microscope.noise_arcsec = 0.5, 6);
+    let seen: Vec<f64> = (0..400)
+        .map(|_| plant.sight_line(17).angle.unwrap().arcsec())
+        .collect();
+    let mean = seen.iter().sum::<f64>() / 400.0;
+    let variance = seen.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / 399.0;
+    // Four standard deviations of the scatter of 400 values.
+    assert!(
+        (variance.sqrt() - 0.5).abs() < 4.0 * 0.5 / 800.0_f64.sqrt(),
+        "{variance}"
+    );
+    plant.set_line_smudged(17, true);
+    assert_eq!(plant.sight_line(17), crate::plant::Sight::default());
+}

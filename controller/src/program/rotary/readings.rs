@@ -1,0 +1,246 @@
+//! `calibrate` and `verify` of a rotary axis whose plate a person reads: at the terminal, line by line, or
+//! from files of readings.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use compensator::rotary::Sighted;
+use machine::records::{Lease, Store};
+use serde_json::{Value, json};
+
+use crate::Failure;
+use crate::config::{self, Loaded};
+use crate::program::data_file::{read, rotary_head_of};
+use crate::program::operator::Terminal;
+use crate::program::output::{Ended, Output};
+use crate::program::resume::{journal_to_resume, resumable};
+use crate::program::rotary::json::arcsec;
+use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
+use crate::program::session::choose_axis;
+use crate::program::{AxisArgs, CalibrateArgs, VerifyArgs};
+use crate::rotary::sighted::alone::{self, NextPlacement, Progress, ReadingsFile, Source};
+use crate::rotary::subject::Subject;
+use crate::run::CalibrateOptions;
+
+/// Readings that were made elsewhere.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ReadingsArgs {
+    /// A plate that a person reads (`sighting`): take the placement that is due from this file, and
+    /// the next ones from further files. The machine may be off; nothing moves.
+    #[arg(long, value_name = "FILE")]
+    readings: Vec<PathBuf>,
+}
+
+impl ReadingsArgs {
+    /// Whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.readings.is_empty()
+    }
+
+    /// # Errors
+    /// When there are some, for what has no plate.
+    pub(crate) fn refuse(&self) -> Result<(), Failure> {
+        match self.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::Usage {
+                what: "--readings is for the plate of a rotary axis".into(),
+                help: "leave it out".into(),
+            }),
+        }
+    }
+
+    fn files(&self) -> Result<Vec<ReadingsFile>, Failure> {
+        let file = |path: &PathBuf| {
+            Ok(ReadingsFile {
+                name: path.display().to_string(),
+                text: read(path)?,
+            })
+        };
+        self.readings.iter().map(file).collect()
+    }
+}
+
+/// Who reads the plate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ReadBy {
+    /// The line detector.
+    Detector,
+    /// A person, for whom the machine drives the table to each line.
+    Driven,
+    /// A person, or a file; the machine is not needed.
+    Alone,
+}
+
+impl ReadBy {
+    /// # Errors
+    /// When there is no such axis; files for a plate that a detector reads.
+    pub(crate) fn of(args: &AxisArgs, readings: &ReadingsArgs) -> Result<Self, Failure> {
+        let loaded = config::load(&args.machine.config)?;
+        let axis = axis_of(&loaded, args)?;
+        match &loaded.config.rotary[&axis].sighting {
+            None if readings.is_empty() => Ok(Self::Detector),
+            None => Err(Failure::Usage {
+                what: format!("axis {axis}: --readings, and a line detector reads its plate"),
+                help: format!(
+                    "put [rotary.{axis}.sighting] in place of [rotary.{axis}.line_detector], or leave \
+                     --readings out"
+                ),
+            }),
+            Some(it) if readings.is_empty() && Sighted::from(it.value) == Sighted::ToLine => {
+                Ok(Self::Driven)
+            }
+            Some(_) => Ok(Self::Alone),
+        }
+    }
+}
+
+fn axis_of(loaded: &Loaded, args: &AxisArgs) -> Result<String, Failure> {
+    choose_axis(loaded.config.rotary.keys().cloned().collect(), args)
+}
+
+/// The person at the terminal.
+///
+/// # Errors
+/// When there is none, before anything moves.
+pub(crate) fn person(
+    yes: bool,
+    args: &AxisArgs,
+    output: Output,
+    is_driven: bool,
+) -> Result<Terminal, Failure> {
+    if yes {
+        return Err(Failure::Usage {
+            what: "--yes, and a person reads the lines of the plate".into(),
+            help: "leave --yes out, or give what was read with --readings FILE".into(),
+        });
+    }
+    Terminal::of_reader(args.machine.hand(), output, is_driven)
+}
+
+/// The table as far as it is known without its machine, which is leased all the same: its records are
+/// written.
+struct Desk {
+    loaded: Loaded,
+    axis: String,
+    store: Store,
+    _lease: Lease,
+}
+
+impl Desk {
+    fn open(args: &AxisArgs, verb: &str) -> Result<Self, Failure> {
+        let loaded = config::load(&args.machine.config)?;
+        let axis = axis_of(&loaded, args)?;
+        let store = loaded.config.machine.store();
+        Ok(Self {
+            _lease: Lease::take(&store, verb)?,
+            loaded,
+            axis,
+            store,
+        })
+    }
+
+    fn subject(&self) -> Result<Subject<'_>, Failure> {
+        Ok(Subject {
+            axis: &self.axis,
+            config: &self.loaded.config.rotary[&self.axis],
+            hash: &self.loaded.hash,
+            here: rotary_head_of(&self.loaded, &self.axis, Path::new(""))?,
+            asked: false,
+        })
+    }
+}
+
+pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    let files = args.readings.files()?;
+    let mut person = match files.is_empty() {
+        true => Some(person(args.yes, &args.axis, output, false)?),
+        false => None,
+    };
+    let desk = Desk::open(&args.axis, "calibrate")?;
+    let (axis, store) = (desk.axis.as_str(), &desk.store);
+    let options = CalibrateOptions {
+        resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
+        accept_drift: args.accept_drift,
+    };
+    let resumed = options.resume.as_deref();
+    let progress = resumable(store, "calibrate", axis, resumed, || {
+        let source = source(&files, &mut person);
+        alone::calibrate(desk.subject()?, store, &options, source)
+    })?;
+    let (text, mut value) = match &progress {
+        Progress::Done(it) => (calibrated_text(it), calibrated_value(it)),
+        Progress::Due(it) => (next_text(it, &desk), next_value(it)),
+    };
+    value["axis"] = json!(axis);
+    value["complete"] = json!(matches!(progress, Progress::Done(_)));
+    output.result(&text, &value)
+}
+
+pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
+    let files = args.readings.files()?;
+    let mut person = match files.is_empty() {
+        true => Some(person(args.yes, &args.axis, output, false)?),
+        false => None,
+    };
+    let desk = Desk::open(&args.axis, "verify")?;
+    let (axis, store) = (desk.axis.as_str(), &desk.store);
+    let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
+    let how = (!args.uncompensated, resume.as_ref());
+    let it = resumable(store, "verify", axis, resume.as_deref(), || {
+        alone::verify(desk.subject()?, store, how, source(&files, &mut person))
+    })?;
+    verified(axis, &it, Value::Null, output)
+}
+
+fn source<'a>(files: &'a [ReadingsFile], person: &'a mut Option<Terminal>) -> Source<'a> {
+    match person {
+        Some(person) => Source::Person(person),
+        None => Source::Files(files),
+    }
+}
+
+/// What was imported, and what is to be done next.
+fn next_text(next: &NextPlacement, desk: &Desk) -> String {
+    let (_, of) = next.task.step;
+    let mut text = format!(
+        "axis {}: {} of {of} placements are read",
+        desk.axis,
+        next.read.len()
+    );
+    for (offset, closure, scatter) in &next.read {
+        let scatter = scatter.map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
+        text += &format!(
+            "\n  at offset {offset} the plate moved by {:+.3}″ while it was read; one line in one pass \
+             scatters by {scatter}",
+            closure.arcsec()
+        );
+    }
+    let sighting = desk.loaded.config.rotary[&desk.axis].sighting.as_ref();
+    let header = sighting.map_or("", |it| Sighted::from(it.value).header());
+    text + &format!(
+        "\n  next: {}\n  then continue with --resume --readings FILE (columns {header})\n  readings in {}",
+        next.task.text(),
+        next.journal.display()
+    )
+}
+
+fn next_value(next: &NextPlacement) -> Value {
+    let read = next.read.iter().map(|(offset, closure, scatter)| {
+        json!({
+            "offset": offset,
+            "closure_arcsec": arcsec(*closure),
+            "pass_scatter_arcsec": scatter.map(arcsec),
+        })
+    });
+    let (number, of) = next.task.step;
+    json!({
+        "placements_read": read.collect::<Vec<_>>(),
+        "due": {
+            "placement": number,
+            "of": of,
+            "offset": next.task.offset,
+            "task": next.task.text(),
+        },
+        "journal": next.journal,
+    })
+}

@@ -1,0 +1,21 @@
+//! Placements whose lines a person reads: typed line by line, or imported from a file (step 2 of
+//! system S2 without a detector).
+//!
+//! The passes are those of a detector; so are the journal's, the evaluation and the limits. Each value
+//! stands in the journal as soon as it was typed, and may be typed again until its placement is closed.
+//! Where nothing is driven the machine is not needed: neither its buses nor power.
+
+#[cfg(feature = "program")]
+pub(crate) mod alone;
+mod answer;
+mod dialog;
+mod driven;
+#[cfg(feature = "program")]
+mod import;
+mod person;
+mod stand;
+#[cfg(test)]
+#[cfg(feature = "program")]
+mod tests;
+
+pub use person::{Asked, Person, Question};
