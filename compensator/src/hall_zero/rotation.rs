@@ -21,13 +21,16 @@ use super::ZeroEstimate;
 use super::passes::widening;
 use crate::budget::combine_shares;
 
-/// How far both zero points are from each other, across the travel.
+/// What a rotation is counted by: how far both zero points are from each other, across the travel, and the encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Base {
     /// From the one to the other.
     pub distance: Metres,
     /// Its standard uncertainty.
     pub standard_uncertainty: Metres,
+    /// Standard uncertainty of a short length by an encoder, as a share of it: each side's zero point lies so far
+    /// from where its coordinate is 0 by its own one.
+    pub scale: f64,
 }
 
 /// How far a stage is turned where both sides show the same coordinate.
@@ -63,7 +66,8 @@ pub struct Rotation {
 ///         .collect();
 ///     refine(&points, &RefineOptions { excess_max: f64::INFINITY, ..RefineOptions::default() })
 /// };
-/// let base = Base { distance: Metres::from_mm(400.0), standard_uncertainty: Metres::from_mm(0.1) };
+/// let (distance, standard_uncertainty) = (Metres::from_mm(400.0), Metres::from_mm(0.1));
+/// let base = Base { distance, standard_uncertainty, scale: 0.0 };
 /// let turned = rotation(&side(0.0)?, &side(0.02)?, base);
 /// assert!((turned.angle.value() * 1e6 - 50.0).abs() < 0.01, "20 um over 400 mm are 50 urad");
 /// assert!((turned.standard_uncertainty.value() * 1e6 - 0.0125).abs() < 0.001, "0.1 mm of the base");
@@ -73,7 +77,14 @@ pub struct Rotation {
 pub fn rotation(ahead: &ZeroEstimate, other: &ZeroEstimate, base: Base) -> Rotation {
     let angle = (other.origin - ahead.origin) / base.distance;
     let of_base = base.standard_uncertainty * angle.abs();
-    let shares = [of_side(ahead), of_side(other), (of_base, None)];
+    let of_scale = |side: &ZeroEstimate| (side.origin.abs() * base.scale, None);
+    let shares = [
+        of_side(ahead),
+        of_side(other),
+        (of_base, None),
+        of_scale(ahead),
+        of_scale(other),
+    ];
     let combined = combine_shares(shares);
     // Truncated to a whole number, as GUM G.4.1 has it.
     let widened = combined

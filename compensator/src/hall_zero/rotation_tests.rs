@@ -43,6 +43,7 @@ fn base(u_mm: f64) -> Base {
     Base {
         distance: Metres::from_mm(DISTANCE_MM),
         standard_uncertainty: Metres::from_mm(u_mm),
+        scale: 0.0,
     }
 }
 
@@ -66,6 +67,18 @@ fn both_sides_are_known_better_than_each_and_the_distance_counts_with_the_angle(
     assert_eq!(turned.degrees_of_freedom, None);
     let u_urad = turned.standard_uncertainty.value() * 1e6;
     assert!((u_urad - 0.25).abs() < 1e-9, "{u_urad} urad");
+}
+
+/// By hand: 1000 ppm of 30 µm and of 40 µm are 30 nm and 40 nm, together 50 nm.
+#[test]
+fn encoders_that_err_count_with_how_far_each_side_is_from_its_zero_point() {
+    let by_encoders = Base {
+        scale: 1e-3,
+        ..base(0.0)
+    };
+    let turned = rotation(&side(-30.0, 0.0), &side(40.0, 0.0), by_encoders);
+    let u_nm = turned.standard_uncertainty.value() * DISTANCE_MM * 1e6;
+    assert!((u_nm - 50.0).abs() < 1e-6, "{u_nm} nm");
 }
 
 /// Noise of the sensors and repeatability of each side, nanometres; the angle, microradians.

@@ -73,6 +73,8 @@ pub struct RotationEntry {
     pub distance_m: f64,
     /// Its standard uncertainty, metres.
     pub distance_u_m: f64,
+    /// How well an encoder tells a short length, as a share of it.
+    pub scale_u: f64,
     /// How far the stage was turned where both drives showed the same, radians.
     pub angle_rad: f64,
     /// Standard uncertainty of that, radians.

@@ -186,11 +186,13 @@ impl LinearStage<'_> {
         let base = Base {
             distance: Metres::from_mm(gantry.distance_mm),
             standard_uncertainty: Metres::from_mm(gantry.distance_standard_uncertainty_mm),
+            scale: gantry.scale_standard_uncertainty_ppm * 1e-6,
         };
         let turned = rotation(ahead, behind, base);
         // How the stage stands now: what the passes of both sides tell, and that each zero lies on a whole count.
         let exact = Base {
             standard_uncertainty: Metres::ZERO,
+            scale: 0.0,
             ..base
         };
         let of_passes = rotation(ahead, behind, exact).standard_uncertainty.value();
@@ -210,6 +212,7 @@ impl LinearStage<'_> {
             ahead_when_positive: gantry.ahead_when_positive.clone(),
             distance_m: base.distance.value(),
             distance_u_m: base.standard_uncertainty.value(),
+            scale_u: base.scale,
             angle_rad: turned.angle.value(),
             standard_uncertainty_rad: turned.standard_uncertainty.value(),
             degrees_of_freedom: turned.degrees_of_freedom,

@@ -1,8 +1,8 @@
 //! Journals of a linear axis: each line by itself, and against those before it.
 
 use machine::records::sound::{
-    ANGLE_RAD, ANGLE_U_RAD, ERROR_U_M, Judged, LENGTH_M, PASSES_MAX, PLACE_M, SECONDS, VOLTS,
-    approach, as_many, counted, is, number, numbers, once, optional, unsound,
+    ANGLE_RAD, ANGLE_U_RAD, ERROR_U_M, Judged, LENGTH_M, PASSES_MAX, PLACE_M, RATIO, SECONDS,
+    VOLTS, approach, as_many, counted, is, number, numbers, once, optional, unsound,
 };
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
@@ -140,6 +140,7 @@ fn rotation(it: &RotationEntry) -> Judged {
     })?;
     number("distance_m", it.distance_m, &LENGTH_M)?;
     number("distance_u_m", it.distance_u_m, &ERROR_U_M)?;
+    number("scale_u", it.scale_u, &RATIO)?;
     number("angle_rad", it.angle_rad, &ANGLE_RAD)?;
     let u = it.standard_uncertainty_rad;
     number("standard_uncertainty_rad", u, &ANGLE_U_RAD)?;

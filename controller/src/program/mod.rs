@@ -23,6 +23,7 @@ mod report;
 mod reset;
 mod resume;
 mod rotary;
+mod run;
 #[cfg(test)]
 mod same_figures_tests;
 mod scan;
@@ -45,7 +46,6 @@ use wire::lockstep::path_of;
 use crate::Failure;
 use crate::ports::Pace;
 use kind::by_kind;
-use linear::job::JobOptions;
 use output::Output;
 use rotary::readings::ReadingsArgs;
 use verbs::Verbs;
@@ -105,7 +105,7 @@ enum Command {
     /// straight lines: at a corner, or where the rows suddenly end, it swings out. How far at most, and
     /// where, is printed before anything moves. Everything that will be driven is judged first (soft
     /// limits, speed, acceleration, jerk, calibrated volume), not only the rows.
-    Run(RunArgs),
+    Run(run::RunArgs),
     /// Record or drop a state of three axes that is kept on purpose, so that all parts are alike.
     #[command(subcommand)]
     Memory(MemoryCommand),
@@ -293,39 +293,6 @@ impl From<MemoryChoice> for crate::volumetric::MemoryName {
     }
 }
 
-/// A job or a path, and on which machine.
-#[derive(Clone, Debug, Args)]
-struct RunArgs {
-    #[command(flatten)]
-    machine: MachineArgs,
-    /// The job (`.toml`); or the path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
-    path: Option<PathBuf>,
-    /// Judge the job and say what it would do; no port is opened, nothing moves.
-    #[arg(long)]
-    dry_run: bool,
-    /// Do not wait for the operator of a job.
-    #[arg(long)]
-    yes: bool,
-    /// Go on with the newest interrupted job of its axis, or with the journal given, at the point after the last one
-    /// that it went on from.
-    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
-    resume: Option<PathBuf>,
-    /// The first of several parts: what the detectors see during this part, displacements and rolls, is not corrected
-    /// but recorded as the second memory, so that all later parts are made like this one.
-    #[arg(long)]
-    first_part: bool,
-}
-
-impl RunArgs {
-    /// `truestage run path.csv` means `./machine.toml`, as with every verb.
-    fn settle(mut self) -> (MachineArgs, PathBuf) {
-        let path = self
-            .path
-            .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
-        (self.machine, path)
-    }
-}
-
 /// Which way round a rotary axis goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum WayName {
@@ -405,35 +372,6 @@ struct ServiceArgs {
     at: String,
 }
 
-/// The ending of its name says what is run.
-fn run(args: RunArgs, output: Output) -> output::Ended {
-    let (is_first, yes, dry_run) = (args.first_part, args.yes, args.dry_run);
-    let resume = args.resume.clone();
-    let (machine, path) = args.settle();
-    let is_job = path
-        .extension()
-        .is_some_and(|it| it.eq_ignore_ascii_case("toml"));
-    let usage = |what: &str| {
-        Err(crate::Failure::Usage {
-            what: format!("{}: {what}", path.display()),
-            help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
-        })
-    };
-    match (is_job, is_first, yes || dry_run || resume.is_some()) {
-        (true, true, _) => usage("--first-part is for paths of three axes, and this is a job"),
-        (false, _, true) => usage("--dry-run, --yes and --resume are for jobs, and this is a path"),
-        (true, false, _) => {
-            let options = JobOptions {
-                dry_run,
-                yes,
-                resume,
-            };
-            linear::job::run(&machine, &path, &options, output)
-        }
-        (false, _, false) => volumetric::part::run(&machine, &path, is_first, output),
-    }
-}
-
 /// Runs the command line of this process; `keep` keeps a machine for `truestage serve`.
 pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
     let cli = Cli::parse();
@@ -471,7 +409,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         }
         Command::Reference(args) => volumetric::reference::run(&args, output),
         Command::Align(args) => align::run(&args, output),
-        Command::Run(args) => run(args, output),
+        Command::Run(args) => run::run(args, output),
         Command::Memory(MemoryCommand::Record(args)) => {
             volumetric::part::memory_record(&args, output)
         }

@@ -97,6 +97,12 @@ impl Stage {
         scale_m * (1.0 + per_k * (stage_c - REFERENCE_C))
     }
 
+    /// The true place that belongs to a scale position, without what the scale errs within its period, lost motion and
+    /// the error of a stop.
+    pub(super) fn smooth_place_m(&self, scale_m: f64, stage_c: f64) -> f64 {
+        self.grown(scale_m, stage_c) + self.field.smooth(scale_m)
+    }
+
     /// True minus scale position, fully engaged in the direction of `sign` (0: between both).
     pub(super) fn systematic_deviation_m(&self, scale_m: f64, sign: f64, stage_c: f64) -> f64 {
         self.grown(scale_m, stage_c) - scale_m + self.field.at(scale_m) + self.path.engaged_m(sign)

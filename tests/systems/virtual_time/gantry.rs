@@ -56,20 +56,19 @@ fn judged(bench: &mut Bench) -> Result<Judged, Failure> {
     let simulation = bench.emulated.simulation();
     let truth = simulation.truth().gantry().expect("it is one");
     let scales = truth.scale_positions();
-    let mut now = [0.0; 2];
-    let mut before = [0.0; 2];
+    let mut now = [Metres::ZERO; 2];
+    let mut before = [Metres::ZERO; 2];
     for side in [0, 1] {
         let axis = &it.axes[side];
         let count = bench.machine.config().axis[axis].motion.resolution_nm * 1e-9;
         let shown = bench.machine.reading(axis)?.expect("it was read").position;
         // Where on its scale the drive's zero lies: a whole count, as all that an encoder shows.
-        let zero = (scales[side].value() / count).round() * count - shown.value();
+        let zero = Metres((scales[side].value() / count).round() * count) - shown;
         now[side] = zero;
         // And where it lay before: the drive's zero was moved by whole counts.
-        before[side] = zero - (it.origins_m[side] / count).round() * count;
+        before[side] = zero - Metres((it.origins_m[side] / count).round() * count);
     }
-    let angle_at =
-        |zeros: [f64; 2]| (zeros[1] - zeros[0]) / truth.distance().value() + truth.turned().value();
+    let angle_at = |zeros: [Metres; 2]| truth.angle_at(zeros).value();
     Ok(Judged {
         angle: (it.angle_rad - angle_at(before)) / it.standard_uncertainty_rad,
         straight: angle_at(now) / it.zero_u_rad,

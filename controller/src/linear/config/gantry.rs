@@ -34,6 +34,10 @@ pub struct GantryConfig {
     /// How well a side is found again by its limit switch.
     #[schemars(range(min = 0.0, max = 10000.0))]
     pub reference_standard_uncertainty_um: f64,
+    /// How well an encoder tells a length of a fraction of a millimetre, before it is calibrated: the angle is counted by
+    /// both.
+    #[schemars(range(min = 0.0, max = 100000.0))]
+    pub scale_standard_uncertainty_ppm: f64,
     /// The angle that `zero` told when the stage was accepted; later ones are compared with it.
     #[schemars(range(min = -100000.0, max = 100000.0), extend("x-range" = "with `angle_limit_urad`, only then"))]
     pub angle_at_acceptance_urad: Option<f64>,

@@ -37,6 +37,16 @@ impl GantryTruth<'_> {
         Radians(self.gantry.turned)
     }
 
+    /// How far it is turned where the scales read so, on average: without what they err within their period, lost
+    /// motion, and the error of a stop.
+    pub fn angle_at(&self, scales: [Metres; 2]) -> Radians {
+        let [first, second] = [0, 1].map(|side| {
+            let scale_m = scales[side].value();
+            self.gantry.sides[side].smooth_place_m(scale_m, self.stage_c)
+        });
+        Radians((second - first) / self.gantry.distance_m() + self.gantry.turned)
+    }
+
     /// From the one side to the other.
     pub fn distance(&self) -> Metres {
         Metres(self.gantry.distance_m())

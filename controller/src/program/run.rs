@@ -1,0 +1,73 @@
+//! `truestage run`: a job of one axis, or a path of three.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::Failure;
+use crate::program::linear::job::{self, JobOptions};
+use crate::program::output::{Ended, Output};
+use crate::program::volumetric::part;
+use crate::program::{MachineArgs, NEWEST_RUN};
+
+/// A job or a path, and on which machine.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct RunArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// The job (`.toml`); or the path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
+    path: Option<PathBuf>,
+    /// Judge the job and say what it would do; no port is opened, nothing moves.
+    #[arg(long)]
+    dry_run: bool,
+    /// Do not wait for the operator of a job.
+    #[arg(long)]
+    yes: bool,
+    /// Go on with the newest interrupted job of its axis, or with the journal given, at the point after the last one
+    /// that it went on from.
+    #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
+    resume: Option<PathBuf>,
+    /// The first of several parts: what the detectors see during this part, displacements and rolls, is not corrected
+    /// but recorded as the second memory, so that all later parts are made like this one.
+    #[arg(long)]
+    pub(super) first_part: bool,
+}
+
+impl RunArgs {
+    /// `truestage run path.csv` means `./machine.toml`, as with every verb.
+    pub(super) fn settle(mut self) -> (MachineArgs, PathBuf) {
+        let path = self
+            .path
+            .unwrap_or_else(|| core::mem::replace(&mut self.machine.config, "machine.toml".into()));
+        (self.machine, path)
+    }
+}
+
+/// The ending of its name says what is run.
+pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
+    let (is_first, yes, dry_run) = (args.first_part, args.yes, args.dry_run);
+    let resume = args.resume.clone();
+    let (machine, path) = args.settle();
+    let is_job = path
+        .extension()
+        .is_some_and(|it| it.eq_ignore_ascii_case("toml"));
+    let usage = |what: &str| {
+        Err(Failure::Usage {
+            what: format!("{}: {what}", path.display()),
+            help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
+        })
+    };
+    match (is_job, is_first, yes || dry_run || resume.is_some()) {
+        (true, true, _) => usage("--first-part is for paths of three axes, and this is a job"),
+        (false, _, true) => usage("--dry-run, --yes and --resume are for jobs, and this is a path"),
+        (true, false, _) => {
+            let options = JobOptions {
+                dry_run,
+                yes,
+                resume,
+            };
+            job::run(&machine, &path, &options, output)
+        }
+        (false, _, false) => part::run(&machine, &path, is_first, output),
+    }
+}
