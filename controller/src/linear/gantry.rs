@@ -41,7 +41,7 @@ impl LinearStage<'_> {
     /// Finds the zero points of both sides of the gantry that this axis is a side of, and how far the stage was
     /// turned; both sides are enabled and stand at their zeros afterwards.
     ///
-    /// An angle beyond its limit is a result all the same: [`RotationEntry::is_within_limit`].
+    /// An angle beyond its limit is a result all the same: `is_within_limit` of its entry.
     ///
     /// # Errors
     /// When it is no side of a gantry; whatever stops the machine; as [`Self::zero`] of either side. Neither side is
