@@ -132,7 +132,7 @@ pub enum PlanError {
 /// let point = |step: i32| {
 ///     let mm = 0.005 * f64::from(step);
 ///     let (slope, peak) = ((1.2 * mm).sin(), (1.5 * mm).cos());
-///     let noise = 1e-4 * f64::from((step * 7919) % 13 - 6) / 4.0;
+///     let noise = 1e-4 * f64::from((step * 7).rem_euclid(13) - 6) / 4.0;
 ///     let (peak, slope) = (Volts(2.0 + 0.9 * peak + noise), Volts(2.5 + 0.7 * slope - noise));
 ///     HallPoint { position: Metres::from_mm(mm), peak, slope }
 /// };
