@@ -123,7 +123,7 @@ pub enum PlanError {
 ///
 /// # Example
 ///
-/// ```
+/// ```no_run
 /// use core::time::Duration;
 /// use compensator::hall_zero::{HallPoint, Pass, Settings, plan_zero};
 /// use units::{Approach, Metres, Volts};
