@@ -47,6 +47,49 @@ pub fn with_rare_heartbeats(text: &str) -> String {
         .edit("watch_master_ms = 500", "watch_master_ms = 7000")
 }
 
+/// An analog module for the roll detectors of two slides more, before the instrument.
+const ROLLS_OF_TWO: &str = r#"
+[analog.roll_more]
+device = "cia404"
+bus = "can0"
+node_id = 15
+channels = [0, 1, 2, 3]
+full_scale_v = [3.2, 3.2, 3.2, 3.2]
+every_syncs = 10
+heartbeat_producer_ms = 50
+heartbeat_consumer_ms = 150
+watch_master_ms = 500
+
+[analog.roll_more.identity]
+device_type = 0x0002_0194
+vendor_id = 0x7FF
+product_code = 0x40_0004
+revision = 0x1_0000
+serial_number = 4015
+
+[instrument.laser]
+"#;
+
+/// The text of the shipped machine file of three axes with roll detectors on each slide.
+///
+/// # Panics
+/// When the section of the one slide, or what it says, is not in the text.
+pub fn with_three_rolls(text: &str) -> String {
+    let start = text.find("[volumetric.roll]").expect("it has one");
+    let end = start + text[start..].find("\n\n").expect("it ends");
+    let own = &text[start..end];
+    let first = own.edit("[volumetric.roll]", "[[volumetric.roll]]");
+    let on = |axis: &str, channels: &str| {
+        first
+            .edit("axis = \"x\"", &format!("axis = \"{axis}\""))
+            .edit("roll_and_heat", "roll_more")
+            .edit("channels = [0, 1]", &format!("channels = {channels}"))
+    };
+    let all = [first.clone(), on("z", "[2, 3]"), on("y", "[0, 1]")].join("\n\n");
+    text.edit(own, &all)
+        .edit("\n[instrument.laser]\n", ROLLS_OF_TWO)
+}
+
 #[cfg(test)]
 mod tests {
     use super::Edit;

@@ -119,6 +119,9 @@ pub enum RunKind {
 }
 
 impl RunKind {
+    /// All of them.
+    pub(crate) const ALL: [Self; 3] = [Self::Zero, Self::Calibrate, Self::Verify];
+
     /// What its journals are called when a run can go on with them.
     pub(crate) const fn verb(self) -> Option<&'static str> {
         match self {

@@ -383,15 +383,14 @@ impl Kept {
     /// Runs that were interrupted before this service began can go on.
     fn offer_runs(&mut self) {
         for axis in self.machine.devices().axis_names() {
-            for kind in [RunKind::Calibrate, RunKind::Verify] {
-                let found = kind
-                    .verb()
-                    .map(|verb| self.store.interrupted_run(verb, &axis));
+            let resumable = RunKind::ALL.into_iter();
+            for (kind, verb) in resumable.filter_map(|it| Some((it, it.verb()?))) {
+                let found = self.store.interrupted_run(verb, &axis);
                 let mut keeper = self.keeper.borrow_mut();
                 match found {
-                    Some(Ok(Some(found))) => keeper.offer_run(kind, &found),
-                    Some(Err(error)) => keeper.warn(&format!("axis {axis}: {error}")),
-                    Some(Ok(None)) | None => {}
+                    Ok(Some(found)) => keeper.offer_run(kind, &found),
+                    Ok(None) => {}
+                    Err(error) => keeper.warn(&format!("axis {axis}: {error}")),
                 }
             }
         }

@@ -5,9 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use drivers::transport::Transport;
-use drivers::transport::clock::Clock;
 use drivers::transport::live::{Live, SlcanSettings};
-use drivers::transport::lockstep::Participant;
 use machine::records::{ReadJournal, read_journal};
 use nix::sys::signal::Signal;
 use tests::Rig;
@@ -117,9 +115,7 @@ fn drive_complains_of_a_silent_master(bench: &Bench) {
     const CAN: Port = Port(0);
     // The drive watches for half a second.
     const SILENCE_MAX: Duration = Duration::from_secs(1);
-    let participant = Participant::join(&bench.folder().join("clock"), "a listener");
-    let participant = participant.unwrap_or_else(|error| panic!("{error}"));
-    let builder = Live::builder(Clock::lockstep(participant));
+    let builder = Live::builder(bench.clock("a listener"));
     let endpoint = bench.port("can0");
     let (_, place) = endpoint.split_once(':').expect("KIND:PLACE");
     let builder = match bench.rig() {

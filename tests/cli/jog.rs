@@ -5,9 +5,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use drivers::transport::Transport;
-use drivers::transport::clock::Clock;
 use drivers::transport::live::Live;
-use drivers::transport::lockstep::Participant;
 use nix::sys::signal::Signal;
 use serde_json::json;
 
@@ -25,8 +23,7 @@ impl Brake {
     fn on(bench: &Bench) -> Self {
         const STEP: Duration = Duration::from_millis(5);
         const TIMES_SLOWER: u32 = 10;
-        let participant = Participant::join(&bench.folder().join("clock"), "a brake");
-        let clock = Clock::lockstep(participant.expect("it listens"));
+        let clock = bench.clock("a brake");
         let (release, released) = channel();
         let thread = thread::spawn(move || {
             let time = Live::builder(clock).build();

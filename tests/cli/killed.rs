@@ -5,9 +5,8 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use drivers::transport::Transport;
-use drivers::transport::clock::Clock;
 use drivers::transport::live::Live;
-use drivers::transport::lockstep::{Participant, lend_hand};
+use drivers::transport::lockstep::lend_hand;
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::Edit;
@@ -28,11 +27,11 @@ struct Watcher {
 
 impl Watcher {
     fn of(bench: &Bench) -> Self {
-        let clock = bench.folder().join("clock");
-        let participant = Participant::join(&clock, "a watcher").expect("it listens");
-        let time = Live::builder(Clock::lockstep(participant)).build();
-        let time = time.expect("it has no port to open");
-        Self { clock, time }
+        let time = Live::builder(bench.clock("a watcher")).build();
+        Self {
+            clock: bench.folder().join("clock"),
+            time: time.expect("it has no port to open"),
+        }
     }
 
     /// Where the stage truly is, in millimetres.

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use drivers::transport::clock::Clock;
+use drivers::transport::lockstep::Participant;
 use nix::fcntl::OFlag;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
@@ -357,6 +359,12 @@ impl Bench {
     /// Sends the emulator a signal; time stands still while it is stopped.
     pub(crate) fn signal_emulator(&self, signal: Signal) {
         self.mock.signal(signal);
+    }
+
+    /// The clock of the machine, in which somebody called `name` takes part.
+    pub(crate) fn clock(&self, name: &str) -> Clock {
+        let participant = Participant::join(&self.folder().join("clock"), name);
+        Clock::lockstep(participant.unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Asks the emulator to end, and says how it did.

@@ -123,7 +123,7 @@ pub enum PlanError {
 ///
 /// # Example
 ///
-/// ```no_run
+/// ```
 /// use core::time::Duration;
 /// use compensator::hall_zero::{HallPoint, Pass, Settings, plan_zero};
 /// use units::{Approach, Metres, Volts};
@@ -151,12 +151,13 @@ pub fn plan_zero(
     let mut levels = Vec::new();
     let mut middle = None;
     let mut refused = None;
-    let depth = Curves::of(passes, None).depth;
+    let curves = Curves::of(passes);
+    let depth = curves.depth;
     for number in 1..LEVELS {
         let share = f64::from(number) / f64::from(LEVELS);
         // In whole millivolts, as it will stand in a configuration.
         let vc = Volts((depth.value() * share * 1e3).round() * 1e-3);
-        match judged(passes, settings, vc) {
+        match judged(passes, &curves, settings, vc) {
             Ok((level, estimate)) => {
                 levels.push(level);
                 middle = middle.or(Some(estimate));
@@ -170,7 +171,7 @@ pub fn plan_zero(
         return Err(PlanError::NoZero { source });
     };
     let chosen = best(&levels)?;
-    let curves = Curves::of(passes, Some(estimate.origin));
+    let curves = curves.about(estimate.origin);
     let noise = estimate.noise_peak.max(estimate.noise_slope);
     let bands = Bands {
         noise,
@@ -184,7 +185,9 @@ pub fn plan_zero(
     Ok(ZeroPlan {
         settings: proposed,
         chosen,
-        given: judged(passes, settings, settings.vc).ok().map(|it| it.0),
+        given: judged(passes, &curves, settings, settings.vc)
+            .ok()
+            .map(|it| it.0),
         levels,
         depth,
         steepest_v_per_m: curves.steepest(),
@@ -195,6 +198,7 @@ pub fn plan_zero(
 /// What a Vc would come to, and a zero found with it.
 fn judged(
     passes: &[Pass],
+    curves: &Curves,
     settings: &Settings,
     vc: Volts,
 ) -> Result<(PlannedLevel, ZeroEstimate), RefineError> {
@@ -212,7 +216,7 @@ fn judged(
         .iter()
         .map(|it| it.standard_uncertainty.value())
         .collect();
-    let curves = Curves::of(passes, Some(first.origin));
+    let curves = curves.about(first.origin);
     let shape = curves.at_level(vc);
     let span = settings.rail_high - settings.rail_low;
     let rail_margin = curves.rail_margin(settings, vc, &shape);
@@ -264,7 +268,7 @@ pub struct FlatLevel {
 
 /// Whether the Vc of a search lies where the curves that were passed are flat.
 pub fn flat_level(passes: &[Pass], estimate: &ZeroEstimate, vc: Volts) -> Option<FlatLevel> {
-    let shape = Curves::of(passes, Some(estimate.origin)).at_level(vc);
+    let shape = Curves::of(passes).about(estimate.origin).at_level(vc);
     let steepness = (shape.steepness / STEEP_MIN).min(shape.steepness_of_cut / STEEP_CUT_MIN);
     let is_flat = steepness < 1.0 || shape.linearity < LINEAR_MIN;
     is_flat.then_some(FlatLevel {
@@ -274,6 +278,7 @@ pub fn flat_level(passes: &[Pass], estimate: &ZeroEstimate, vc: Volts) -> Option
 }
 
 /// Both curves as a plot shows them.
+#[derive(Clone)]
 struct Curves {
     bins: Vec<Bin>,
     /// Position, slope of V1, slope of V2 between bins.
@@ -292,8 +297,8 @@ struct Shape {
 }
 
 impl Curves {
-    /// About an origin; about the maximum of curve 1 without one.
-    fn of(passes: &[Pass], origin: Option<Metres>) -> Self {
+    /// About the maximum of curve 1.
+    fn of(passes: &[Pass]) -> Self {
         let points: Vec<_> = passes
             .iter()
             .flat_map(|it| it.points.iter().copied())
@@ -308,10 +313,18 @@ impl Curves {
         });
         Self {
             slopes: slopes(&bins).collect(),
-            origin: origin.map_or_else(|| bins.get(top).map_or(0.0, |it| it.x), Metres::value),
+            origin: bins.get(top).map_or(0.0, |it| it.x),
             depth: Volts(depth),
             top,
             bins,
+        }
+    }
+
+    /// The same about an origin.
+    fn about(&self, origin: Metres) -> Self {
+        Self {
+            origin: origin.value(),
+            ..self.clone()
         }
     }
 

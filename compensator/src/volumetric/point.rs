@@ -32,6 +32,23 @@ impl Axis {
             Self::Z => [Self::X, Self::Y],
         }
     }
+
+    /// The axis that is called so; `None` for anything else.
+    pub fn of_letter(letter: char) -> Option<Self> {
+        match letter {
+            'x' => Some(Self::X),
+            'y' => Some(Self::Y),
+            'z' => Some(Self::Z),
+            _ => None,
+        }
+    }
+
+    /// Likewise by a word of one letter.
+    pub(super) fn named(text: &str) -> Option<Self> {
+        let mut letters = text.chars();
+        let axis = letters.next().and_then(Self::of_letter);
+        axis.filter(|_| letters.next().is_none())
+    }
 }
 
 impl fmt::Display for Axis {

@@ -223,19 +223,15 @@ impl ReferenceSeries {
     }
 }
 
-fn axis_of(text: &str) -> Option<Axis> {
-    Axis::ALL.into_iter().find(|it| it.to_string() == text)
-}
-
 /// Which reading of which axis a row is of.
 fn reading(table: &Table<ReferenceFault>, row: usize) -> Result<(Axis, ReferenceOf), Refused> {
     let seen = |column: usize| table.text(row, column).to_owned();
-    let axis = axis_of(&seen(0)).ok_or_else(|| {
+    let axis = Axis::named(&seen(0)).ok_or_else(|| {
         let (column, seen) = ("axis", seen(0));
         table.fail(row, 0, ReferenceFault::Axis { column, seen }.into())
     })?;
     let across = || {
-        let along = axis_of(&seen(2)).filter(|it| *it != axis);
+        let along = Axis::named(&seen(2)).filter(|it| *it != axis);
         along.ok_or_else(|| {
             let seen = seen(2);
             table.fail(row, 2, ReferenceFault::Along { axis, seen }.into())

@@ -231,8 +231,7 @@ fn read_row(
 ) -> Result<StatePoint, DataError<StateFault>> {
     let letter = |at: usize, column: &'static str| {
         let seen = table.text(row, at);
-        let axis = Axis::ALL.into_iter().find(|it| it.to_string() == seen);
-        axis.ok_or_else(|| {
+        Axis::named(seen).ok_or_else(|| {
             let seen = seen.to_owned();
             table.fail(row, at, StateFault::Axis { column, seen }.into())
         })

@@ -17,10 +17,10 @@ use crate::failure::Failure;
 use crate::handle::Core;
 use crate::homing;
 use crate::linear::stage::{LinearStage, gantry_of};
-use crate::linear::zero::{Begins, to_limit_switch};
+use crate::linear::zero::{Begins, newest_zero, to_limit_switch};
 use crate::linear::{GantryConfig, LinearEntry, LinearLog, RotationEntry, Zeroed};
 use crate::run::{missing, note_failure};
-use crate::store::{Journal, Store, read_journal};
+use crate::store::{Journal, Store};
 
 /// A gantry that was zeroed.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ impl LinearStage<'_> {
     pub fn zero_gantry(&mut self, store: &Store) -> Result<GantryZeroed, Failure> {
         let own = gantry_of(self.core.config, self.axis);
         let (name, gantry) = own.ok_or_else(|| missing(self.axis, "gantry"))?;
-        let previous = previous_rotation(store, name);
+        let previous = newest_zero(store, name).and_then(|mut log| log.rotations.pop());
         let mut journal = Journal::<LinearLog>::create(&store.runs(), &self.zero_header(name))?;
         let found = self.zero_both(gantry, store);
         if found.is_err() {
@@ -222,10 +222,4 @@ impl LinearStage<'_> {
             at_s: self.core.now().seconds(),
         }
     }
-}
-
-/// The newest rotation on record; as with zeros, one that cannot be read is no reason not to zero.
-fn previous_rotation(store: &Store, gantry: &str) -> Option<RotationEntry> {
-    let path = store.newest_run("zero", gantry).ok().flatten()?;
-    read_journal::<LinearLog>(&path).ok()?.log.rotations.pop()
 }

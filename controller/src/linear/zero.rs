@@ -108,7 +108,7 @@ impl LinearStage<'_> {
         let config = self.config.zero.clone();
         let config = config.ok_or_else(|| missing(self.axis, "zero"))?;
         self.core.set_zeroed(self.axis, false)?;
-        let previous = previous_zero(store, self.axis);
+        let previous = newest_zero(store, self.axis).and_then(|mut log| log.zeros.pop());
         let mut journal = Journal::create(&store.runs(), &self.zero_header(self.axis))?;
         let found = self
             .find_zero(&config, &mut journal, begins)
@@ -344,9 +344,9 @@ pub(super) fn to_limit_switch(config: &ZeroConfig) -> AxisCommand {
     }
 }
 
-/// The newest zero on record. A trend is worth having but never worth failing for: a journal
-/// that cannot be read is no reason not to zero.
-fn previous_zero(store: &Store, axis: &str) -> Option<ZeroEntry> {
-    let path = store.newest_run("zero", axis).ok().flatten()?;
-    read_journal::<LinearLog>(&path).ok()?.log.zeros.pop()
+/// What the newest zero of an axis or a gantry has on record. A trend is worth having but never worth failing for:
+/// a journal that cannot be read is no reason not to zero.
+pub(super) fn newest_zero(store: &Store, name: &str) -> Option<LinearLog> {
+    let path = store.newest_run("zero", name).ok().flatten()?;
+    Some(read_journal::<LinearLog>(&path).ok()?.log)
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use machine::records::{AnyLog, Store, read_journal};
+use machine::records::Store;
 
 use crate::Failure;
 use crate::program::NEWEST_RUN;
@@ -27,13 +27,8 @@ pub(crate) fn journal_to_resume(
     if path.as_os_str() != NEWEST_RUN {
         return Ok(Some(path.clone()));
     }
-    let newest = store.newest_run(verb, axis)?;
-    let incomplete = match &newest {
-        Some(path) => !read_journal::<AnyLog>(path)?.complete,
-        None => false,
-    };
-    match newest.filter(|_| incomplete) {
-        Some(path) => Ok(Some(path)),
+    match store.interrupted_run(verb, axis)? {
+        Some(found) => Ok(Some(found.journal)),
         None => Err(Failure::Usage {
             what: format!("axis {axis} has no interrupted {verb} run"),
             help: "start a new one without --resume".into(),

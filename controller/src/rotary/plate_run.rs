@@ -5,9 +5,11 @@ use core::f64::consts::TAU;
 use machine::Stage;
 use units::{Radians, RadiansPerSecond};
 
+use crate::failure::Failure;
 use crate::rotary::PlatePlanEntry;
 use crate::rotary::operator::{PlateMove, PlateTask};
 use crate::rotary::sighting::Sighting;
+use crate::run::missing;
 
 /// How a plate is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +44,14 @@ pub(crate) struct DuePlacement {
 }
 
 impl PlateRun {
+    /// How a person reads it.
+    ///
+    /// # Errors
+    /// When a detector does.
+    pub(super) fn sighting(&self, axis: &str) -> Result<Sighting, Failure> {
+        self.sighting.ok_or_else(|| missing(axis, "sighting"))
+    }
+
     pub(super) fn spacing(&self) -> f64 {
         TAU / f64::from(self.lines)
     }

@@ -223,7 +223,6 @@ impl LineReadingEntry {
     /// As an identification takes it, from setting number `run` of the instrument; `None` where
     /// it says no direction.
     pub fn observation(&self, run: usize) -> Option<Observation> {
-        let about = |letter| Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
         let reading = match (self.along, self.about) {
             (Some(along), None) => Reading::Length {
                 along,
@@ -231,7 +230,7 @@ impl LineReadingEntry {
                 u: Metres(self.u_si),
             },
             (None, Some(letter)) => Reading::Angle {
-                about: about(letter)?,
+                about: Axis::of_letter(letter)?,
                 deviation: Radians(self.deviation_si),
                 u: Radians(self.u_si),
             },

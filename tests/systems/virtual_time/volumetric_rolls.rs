@@ -5,6 +5,7 @@ use core::time::Duration;
 use compensator::volumetric::Axis;
 use tests::Edit;
 use tests::volume::{Off, Volume, calm, good, largest};
+use truestage::for_tests::with_three_rolls;
 use truestage::volumetric::MemoryName;
 use units::{Metres, Time};
 
@@ -13,29 +14,7 @@ const TOOL: &str = "tool_offset_mm = [0.0, 0.0, -100.0]";
 const ON_LEVERS: &str = "tool_offset_mm = [200.0, 0.0, -150.0]";
 /// When what is deliberate begins.
 const BEGINS_S: f64 = 360.0;
-/// A further module, before the instrument.
-const MODULE: &str = r#"
-[analog.roll_more]
-device = "cia404"
-bus = "can0"
-node_id = 15
-channels = [0, 1, 2, 3]
-full_scale_v = [3.2, 3.2, 3.2, 3.2]
-every_syncs = 10
-heartbeat_producer_ms = 50
-heartbeat_consumer_ms = 150
-watch_master_ms = 500
-
-[analog.roll_more.identity]
-device_type = 0x0002_0194
-vendor_id = 0x7FF
-product_code = 0x40_0004
-revision = 0x1_0000
-serial_number = 4015
-
-[instrument.laser]
-"#;
-/// Its emulation, before the interferometer's.
+/// The further module's emulation, before the interferometer's.
 const NODE: &str = r#"
 [[nodes]]
 name = "roll_more"
@@ -52,20 +31,7 @@ resolution_bits = 16
 
 /// The machine with detectors on x, y and z.
 fn three_rolls(text: &str) -> String {
-    let start = text.find("[volumetric.roll]").expect("it has one");
-    let end = start + text[start..].find("\n\n").expect("it ends");
-    let own = &text[start..end];
-    let first = own.edit("[volumetric.roll]", "[[volumetric.roll]]");
-    let on = |axis: &str, channels: &str| {
-        first
-            .edit("axis = \"x\"", &format!("axis = \"{axis}\""))
-            .edit("roll_and_heat", "roll_more")
-            .edit("channels = [0, 1]", &format!("channels = {channels}"))
-    };
-    let all = [first.clone(), on("y", "[0, 1]"), on("z", "[2, 3]")].join("\n\n");
-    text.edit(own, &all)
-        .edit("\n[instrument.laser]\n", MODULE)
-        .edit(TOOL, ON_LEVERS)
+    with_three_rolls(text).edit(TOOL, ON_LEVERS)
 }
 
 /// With its errors known and the detectors' references taken; the slide of `axis` rolls by 5 arcsec from then on.

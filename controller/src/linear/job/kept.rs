@@ -35,11 +35,8 @@ impl GoOn {
             Self::After(span) => format!("after {} s", Short(span.as_secs_f64())),
             Self::Operator(text) => format!("operator: {text}"),
             Self::Input(input) => format!(
-                "input {} of {} {} {} V within {} s",
-                input.channel,
-                input.module,
-                if input.above { "above" } else { "below" },
-                Short(input.level.value()),
+                "{} within {} s",
+                input.with_level(Short(input.level.value())),
                 Short(input.within.as_secs_f64())
             ),
         }

@@ -17,6 +17,7 @@ mod operator;
 pub(crate) mod plan;
 mod run;
 
+use core::fmt;
 use core::time::Duration;
 
 use units::{Metres, Volts};
@@ -101,12 +102,14 @@ pub struct Reached {
 impl JobInput {
     /// `input 0 of hall above 2.000 V`.
     pub fn text(&self) -> String {
+        self.with_level(format_args!("{:.3}", self.level.value()))
+    }
+
+    /// The same, with the level written so.
+    fn with_level(&self, level: impl fmt::Display) -> String {
         let side = if self.above { "above" } else { "below" };
         let (channel, module) = (self.channel, &self.module);
-        format!(
-            "input {channel} of {module} {side} {:.3} V",
-            self.level.value()
-        )
+        format!("input {channel} of {module} {side} {level} V")
     }
 
     /// Whether `seen` is what is waited for.

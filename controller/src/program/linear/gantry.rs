@@ -50,9 +50,9 @@ pub(super) fn zero(mut session: Session, gantry: &str, output: Output) -> Ended 
     output.bad_result(&told.text, with_counters(told.value, counters), failure)
 }
 
-/// Microradians, rounded to a hundred-thousandth: beyond it is noise of the arithmetic.
+/// Microradians, rounded to a hundred-thousandth.
 fn urad(radians: f64) -> f64 {
-    (radians * 1e11).round() / 1e5 + 0.0
+    to_json::rounded(radians * 1e6, 1e5)
 }
 
 /// What its angle is compared with.

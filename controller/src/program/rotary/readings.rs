@@ -152,10 +152,7 @@ impl Desk {
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let files = args.readings.files()?;
-    let mut person = match files.is_empty() {
-        true => Some(person(args.yes, &args.axis, output, false)?),
-        false => None,
-    };
+    let mut person = reader(&files, args.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "calibrate")?;
     let (axis, store) = (desk.axis.as_str(), &desk.store);
     let options = CalibrateOptions {
@@ -178,10 +175,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let files = args.readings.files()?;
-    let mut person = match files.is_empty() {
-        true => Some(person(args.yes, &args.axis, output, false)?),
-        false => None,
-    };
+    let mut person = reader(&files, args.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "verify")?;
     let (axis, store) = (desk.axis.as_str(), &desk.store);
     let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;
@@ -190,6 +184,19 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         alone::verify(desk.subject()?, store, how, source(&files, &mut person))
     })?;
     verified(axis, &it, Value::Null, output)
+}
+
+/// Who reads where there are no files.
+fn reader(
+    files: &[ReadingsFile],
+    yes: bool,
+    args: &AxisArgs,
+    output: Output,
+) -> Result<Option<Terminal>, Failure> {
+    let is_asked = files.is_empty();
+    is_asked
+        .then(|| person(yes, args, output, false))
+        .transpose()
 }
 
 fn source<'a>(files: &'a [ReadingsFile], person: &'a mut Option<Terminal>) -> Source<'a> {

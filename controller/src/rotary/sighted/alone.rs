@@ -15,7 +15,7 @@ use crate::rotary::plate_journal::PlateJournal;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::subject::Subject;
 use crate::rotary::verify::{RotaryVerified, Verification};
-use crate::run::{CalibrateOptions, missing};
+use crate::run::CalibrateOptions;
 use crate::store::Store;
 use units::Radians;
 
@@ -79,9 +79,7 @@ fn before_anything_is_written(
     source: &Source<'_>,
 ) -> Result<(), Failure> {
     let (run, config) = subject.plate_run()?;
-    let sighting = run
-        .sighting
-        .ok_or_else(|| missing(subject.axis, "sighting"))?;
+    let sighting = run.sighting(subject.axis)?;
     if let (Source::Files([first, ..]), None) = (source, &options.resume)
         && let Some(offset) = config.design()?.offsets().first()
     {
@@ -152,7 +150,7 @@ fn imported(
     file: &ReadingsFile,
     journal: &mut PlateJournal,
 ) -> Result<Placed, Failure> {
-    let sighting = run.sighting.ok_or_else(|| missing(axis, "sighting"))?;
+    let sighting = run.sighting(axis)?;
     import(axis, (run, sighting), due.offset, file, journal)
 }
 
@@ -163,7 +161,7 @@ fn typed(
     person: &mut dyn Person,
     journal: &mut PlateJournal,
 ) -> Result<Placed, Failure> {
-    let sighting = run.sighting.ok_or_else(|| missing(axis, "sighting"))?;
+    let sighting = run.sighting(axis)?;
     if journal.so_far().sweeps_at(due.offset).next().is_some() {
         let read = format!(
             "axis {axis}, plate {}, placement {} of {}: lines of it were read already, leave it where it is",

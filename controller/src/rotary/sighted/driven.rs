@@ -11,7 +11,7 @@ use crate::rotary::plate_journal::PlateJournal;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::verify::RotaryVerified;
-use crate::run::{CalibrateOptions, missing};
+use crate::run::CalibrateOptions;
 use crate::store::Store;
 
 impl RotaryTable<'_> {
@@ -54,7 +54,7 @@ impl RotaryTable<'_> {
         person: &mut dyn Person,
         journal: &mut PlateJournal,
     ) -> Result<Placed, Failure> {
-        let sighting = run.sighting.ok_or_else(|| missing(self.axis, "sighting"))?;
+        let sighting = run.sighting(self.axis)?;
         let mut due = due.clone();
         if journal.so_far().sweeps_at(due.offset).next().is_some() {
             // Lines of it were read before somebody stopped: it lies there already.

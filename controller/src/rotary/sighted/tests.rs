@@ -62,6 +62,13 @@ fn subject(loaded: &Loaded) -> Subject<'_> {
     }
 }
 
+/// The placements that are configured.
+fn offsets(loaded: &Loaded) -> Vec<f64> {
+    let run = loaded.config.rotary["c"].calibrate.as_ref().unwrap();
+    let design = run.design().unwrap();
+    design.offsets().iter().map(|it| *it as f64).collect()
+}
+
 fn store() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();
     let store = store_in(folder.path(), "m");
@@ -335,16 +342,10 @@ fn a_line_that_is_read_from_its_position_needs_no_correction_for_where_it_is() {
     let (_folder, store) = store();
     let mut files = Vec::new();
     let mut reader = Reader::new(12);
-    let offsets = loaded.config.rotary["c"]
-        .calibrate
-        .as_ref()
-        .unwrap()
-        .design()
-        .unwrap();
-    for offset in offsets.offsets() {
-        reader.place(*offset as f64);
+    for offset in offsets(&loaded) {
+        reader.place(offset);
         reader.askew_arcsec = 9000.0;
-        files.push(reader.file(&plan(&loaded, *offset as f64), Sighted::ToLine));
+        files.push(reader.file(&plan(&loaded, offset), Sighted::ToLine));
     }
     let Progress::Done(found) = imported(&loaded, &store, None, &files).unwrap() else {
         panic!("all placements were given")
@@ -512,13 +513,7 @@ fn placements_come_file_by_file_each_when_it_is_due_and_bad_ones_change_nothing(
     let loaded = loaded("angle");
     let value = value_of(loaded.config.rotary["c"].sighting.as_ref());
     let (_folder, store) = store();
-    let design = loaded.config.rotary["c"]
-        .calibrate
-        .as_ref()
-        .unwrap()
-        .design()
-        .unwrap();
-    let offsets: Vec<f64> = design.offsets().iter().map(|it| *it as f64).collect();
+    let offsets = offsets(&loaded);
     let mut reader = Reader::new(17);
     reader.place(offsets[0]);
     let first = reader.file(&plan(&loaded, offsets[0]), value);
@@ -606,13 +601,7 @@ fn a_plate_turned_by_a_wrong_number_of_lines_is_named_and_only_that_placement_is
     let loaded = loaded("deviation");
     let (_folder, store) = store();
     let mut reader = Reader::new(19);
-    let design = loaded.config.rotary["c"]
-        .calibrate
-        .as_ref()
-        .unwrap()
-        .design()
-        .unwrap();
-    let offsets: Vec<f64> = design.offsets().iter().map(|it| *it as f64).collect();
+    let offsets = offsets(&loaded);
     let mut files = Vec::new();
     for (at, offset) in offsets.iter().enumerate() {
         reader.mistaken = if at == 1 { 1.0 } else { 0.0 };

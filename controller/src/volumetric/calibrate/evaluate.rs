@@ -17,7 +17,7 @@ use crate::volumetric::calibrate::cause::LikelyCauses;
 use crate::volumetric::calibrate::plan::axis_of;
 use crate::volumetric::settings::{beam_drift, bend_plans};
 use crate::volumetric::{
-    AXES, AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
+    AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
     LineEntry, UnknownRecord, VolumeLog, VolumePlanEntry, error_name, point,
 };
 use crate::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
@@ -242,17 +242,16 @@ fn thermal_of(
     if entry.expansions.is_empty() && entry.bends.is_empty() {
         return Some(ThermalPlan::default());
     }
-    let axis = |letter: char| Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
     let expansions = entry.expansions.iter().map(|it| {
         Some(ExpansionPlan {
-            axis: axis(it.axis)?,
+            axis: Axis::of_letter(it.axis)?,
             thermometers: it.thermometers.clone(),
         })
     });
     let bends = entry.bends.iter().map(|it| {
         Some(BendPlan {
-            axis: axis(it.axis)?,
-            towards: axis(it.towards)?,
+            axis: Axis::of_letter(it.axis)?,
+            towards: Axis::of_letter(it.towards)?,
             over: it.over,
             under: it.under,
             low: Metres(it.low_m),

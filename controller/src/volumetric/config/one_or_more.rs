@@ -38,53 +38,16 @@ impl<T> OneOrMore<T> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use crate::Edit;
     use crate::config::parse;
     use crate::config::validate::told;
+    use crate::edit::{self, Edit};
     use crate::volumetric::VolumeAxisName;
 
     const ONE: &str = include_str!("../../../../configs/machines/volumetric.toml");
-    const MODULE: &str = r#"
-[analog.roll_more]
-device = "cia404"
-bus = "can0"
-node_id = 15
-channels = [0, 1, 2, 3]
-full_scale_v = [3.2, 3.2, 3.2, 3.2]
-every_syncs = 10
-heartbeat_producer_ms = 50
-heartbeat_consumer_ms = 150
-watch_master_ms = 500
-
-[analog.roll_more.identity]
-device_type = 0x0002_0194
-vendor_id = 0x7FF
-product_code = 0x40_0004
-revision = 0x1_0000
-serial_number = 4015
-
-[instrument.laser]
-"#;
-
-    /// The section of the shipped configuration.
-    fn section() -> &'static str {
-        let start = ONE.find("[volumetric.roll]").unwrap();
-        let end = start + ONE[start..].find("\n\n").unwrap();
-        &ONE[start..end]
-    }
 
     /// The shipped configuration with roll detectors on each slide.
     pub(crate) fn with_three_rolls() -> String {
-        let first = section().edit("[volumetric.roll]", "[[volumetric.roll]]");
-        let on = |axis: &str, channels: &str| {
-            first
-                .edit("axis = \"x\"", &format!("axis = \"{axis}\""))
-                .edit("roll_and_heat", "roll_more")
-                .edit("channels = [0, 1]", &format!("channels = {channels}"))
-        };
-        let all = [first.clone(), on("z", "[2, 3]"), on("y", "[0, 1]")].join("\n\n");
-        ONE.edit(section(), &all)
-            .edit("\n[instrument.laser]\n", MODULE)
+        edit::with_three_rolls(ONE)
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use compensator::volumetric::online::StateMap;
 use serde::{Deserialize, Serialize};
 
-use super::{AXES, FunctionRecord, no_error};
+use super::{AXES, FunctionRecord, RollRecord, no_error};
 use crate::store::{StoreError, short};
 
 /// Which memory.
@@ -25,16 +25,6 @@ impl MemoryName {
             Self::Second => "second",
         }
     }
-}
-
-/// The roll of one axis that is to be kept.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MemoryRollRecord {
-    /// `x`, `y` or `z`.
-    pub axis: char,
-    /// Along its travel.
-    pub roll: FunctionRecord,
 }
 
 /// Displacements of one axis that are to be kept.
@@ -63,7 +53,7 @@ pub struct StateMemoryContent {
     pub axes: Vec<MemoryRecord>,
     /// Likewise the rolls; none in files of earlier programs, which corrected every roll.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub rolls: Vec<MemoryRollRecord>,
+    pub rolls: Vec<RollRecord>,
 }
 
 impl StateMemoryContent {
@@ -84,7 +74,7 @@ impl StateMemoryContent {
             })
         });
         let rolls = AXES.iter().zip(&map.roll).filter_map(|(axis, roll)| {
-            Some(MemoryRollRecord {
+            Some(RollRecord {
                 axis: *axis,
                 roll: FunctionRecord::of("roll", roll.as_ref()?),
             })

@@ -93,8 +93,7 @@ fn letter(axis: Axis) -> char {
 }
 
 fn axis_of(letter: char, id: &str) -> Result<Axis, StoreError> {
-    let axis = Axis::ALL.into_iter().find(|it| AXES[it.index()] == letter);
-    axis.ok_or_else(|| super::no_error(id, &letter.to_string()))
+    Axis::of_letter(letter).ok_or_else(|| super::no_error(id, &letter.to_string()))
 }
 
 impl BendRecord {

@@ -23,14 +23,14 @@ impl Keeper {
         id: &str,
     ) -> Result<(), Problem> {
         let run = self.runs.find(id)?;
-        match (run.view.state, run.view.kind) {
-            (RunState::Running, RunKind::Calibrate | RunKind::Verify) => {
+        match run.view.state {
+            RunState::Running if run.view.kind.verb().is_some() => {
                 run.is_pausing = true;
                 self.slow_down_run(machine);
                 Ok(())
             }
-            (RunState::Paused, _) => Ok(()),
-            (RunState::Running, RunKind::Zero) => Err(Problem::new(
+            RunState::Paused => Ok(()),
+            RunState::Running => Err(Problem::new(
                 Code::RunState,
                 "a zero cannot go on where it was left",
                 "abort it, and zero again",

@@ -7,7 +7,7 @@ use units::{Metres, Short};
 
 use crate::program::show::Changes;
 use crate::program::volumetric::shown::{ARCSEC, largest};
-use crate::volumetric::{AXES, BeamReferencesContent, FunctionRecord};
+use crate::volumetric::{BeamReferencesContent, FunctionRecord};
 
 /// What a reading is expected to be.
 enum Expected<'a> {
@@ -29,10 +29,7 @@ struct Reference<'a> {
 fn each(content: &BeamReferencesContent) -> Vec<Reference<'_>> {
     let mut each = Vec::new();
     for beam in &content.beams {
-        let Some(axis) = Axis::ALL
-            .into_iter()
-            .find(|it| AXES[it.index()] == beam.axis)
-        else {
+        let Some(axis) = Axis::of_letter(beam.axis) else {
             continue;
         };
         let mut add = |of: ReferenceOf, expected| {
