@@ -13,7 +13,7 @@
 //!
 //! Absent: weights (scale the rows instead), iteration, bounds.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, QR};
 
 /// Columns whose independent part is smaller than this share of their length count as
 /// dependent. Wampler1 (powers 0…5 of 0…20, one of the hardest legitimate designs) has 1e-4.
@@ -126,11 +126,12 @@ pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, Le
         }
         matrix.column_mut(column).unscale_mut(*length);
     }
-    let (q, r) = matrix.qr().unpack();
+    let qr = matrix.qr();
+    let r = qr.r();
     if let Some(column) = (0..columns).find(|&i| r[(i, i)].abs() < RANK_TOLERANCE) {
         return Err(LeastSquaresError::Dependent { column });
     }
-    let rotated = q.transpose() * DVector::from_column_slice(observed);
+    let rotated = rotated(&qr, columns, observed);
     let r_inverse = r
         .solve_upper_triangular(&DMatrix::identity(columns, columns))
         .expect("the diagonal of R was just found away from zero");
@@ -169,9 +170,9 @@ pub(crate) fn solve_what_is_told(
             .column_mut(column)
             .unscale_mut(length.max(f64::MIN_POSITIVE));
     }
-    let (q, r) = matrix.qr().unpack();
-    let rotated = q.transpose() * DVector::from_column_slice(observed);
-    let svd = r.svd(true, true);
+    let qr = matrix.qr();
+    let rotated = rotated(&qr, columns, observed);
+    let svd = qr.r().svd(true, true);
     let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
     let largest = svd.singular_values.max();
     let told: Vec<usize> = (0..columns)
@@ -211,6 +212,14 @@ pub(crate) fn solve_what_is_told(
         coefficients,
         degrees_of_freedom: rows - told.len(),
     })
+}
+
+/// Qᵀ times the observations, as many of it as there are columns. Q itself is never formed: it would take as long
+/// as the decomposition.
+fn rotated(qr: &QR<f64, Dyn, Dyn>, columns: usize, observed: &[f64]) -> DVector<f64> {
+    let mut rotated = DVector::from_column_slice(observed);
+    qr.q_tr_mul(&mut rotated);
+    rotated.rows(0, columns).into_owned()
 }
 
 fn residuals(design: &[f64], columns: usize, observed: &[f64], coefficients: &[f64]) -> Vec<f64> {

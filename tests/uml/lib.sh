@@ -46,3 +46,12 @@ need() {
     shift
     have "$command" || apt_install "$@"
 }
+
+# Where `newer-kernel` puts its own.
+newer_kernel_place() { printf '%s/target/tools/uml' "$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)"; }
+
+newer_kernel_works() {
+    local place
+    place=$(newer_kernel_place)
+    [[ $(cat "$place/works" 2>/dev/null) == "$place" ]]
+}
