@@ -90,6 +90,53 @@ pub fn with_three_rolls(text: &str) -> String {
         .edit("\n[instrument.laser]\n", ROLLS_OF_TWO)
 }
 
+/// A detector's voltage at an analog module in place of the touch probe, and a plate whose lines are 1500 arcsec wide.
+const LINE_SIGNAL: &str = r#"[rotary.c.line_signal]
+analog = "photo"
+channel = 2
+level_v = 2.2
+line = "above"
+width_arcsec = 1500.0
+
+[analog.photo]
+device = "cia404"
+bus = "can0"
+node_id = 15
+channels = [0, 2]
+full_scale_v = [5.0, 5.0]
+every_syncs = 1
+heartbeat_producer_ms = 50
+heartbeat_consumer_ms = 150
+watch_master_ms = 500
+
+[analog.photo.identity]
+device_type = 0x0002_0194
+vendor_id = 0x7FF
+product_code = 0x40_0004
+revision = 0x1_0000
+serial_number = 4015
+
+"#;
+
+/// The text of the shipped machine file of a rotary table whose plate of 72 lines passes a photodiode.
+///
+/// # Panics
+/// When the section of its detector, or what it says, is not in the text.
+pub fn with_line_signal(text: &str) -> String {
+    let start = text.find("[rotary.c.line_detector]").expect("it has one");
+    let end = start
+        + text[start..]
+            .find("[rotary.c.calibrate]")
+            .expect("it follows");
+    text.edit(&text[start..end], LINE_SIGNAL)
+        .edit("lines = 360", "lines = 72")
+        .edit(
+            "placement\nspeed_deg_per_s = 60.0",
+            "placement\nspeed_deg_per_s = 10.0",
+        )
+        .edit("offset_lines = 200.5", "offset_lines = 40.5")
+}
+
 #[cfg(test)]
 mod tests {
     use super::Edit;

@@ -56,6 +56,7 @@ mod homing;
 mod kinds;
 pub mod linear;
 mod memories;
+mod pairing;
 pub mod platform;
 pub mod ports;
 #[cfg(feature = "program")]
@@ -79,7 +80,7 @@ pub use program::{Serving, main};
 #[doc(hidden)]
 pub mod for_tests {
     pub use crate::assemble::ports as port_numbers;
-    pub use crate::edit::{Edit, with_rare_heartbeats, with_three_rolls};
+    pub use crate::edit::{Edit, with_line_signal, with_rare_heartbeats, with_three_rolls};
     pub use crate::hardware::analog::ModuleConfig;
     pub use crate::hardware::camera::CameraDevice;
     pub use crate::hardware::drive::DriveConfig;

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use drivers::device::{AxisCommand, LatchCommand, Latched, RotaryAxis};
+use drivers::device::{AxisCommand, DeviceError, LatchCommand, Latched, RotaryAxis};
 use units::{Radians, RadiansPerSecond};
 
 use crate::failure::Failure;
@@ -41,10 +41,28 @@ impl Turning<'_> {
         step: &'static str,
         limit: Duration,
     ) -> Result<(), Failure> {
+        self.begin(command)?;
+        self.machine.await_outcome(self.drive(), step, limit)
+    }
+
+    /// Gives `command` to the axis and does not wait.
+    ///
+    /// # Errors
+    /// When the machine is not started.
+    pub fn begin(&mut self, command: AxisCommand<Radians>) -> Result<(), Failure> {
         self.machine.require_supervised(self.drive())?;
         let now = self.machine.now();
         self.device_mut().command(now, command);
-        self.machine.await_outcome(self.drive(), step, limit)
+        Ok(())
+    }
+
+    /// How the command that was begun last ended; `None` while it runs, and when it has been asked for.
+    ///
+    /// # Errors
+    /// How it failed.
+    pub fn outcome(&mut self) -> Option<Result<(), Failure>> {
+        let outcome = self.device_mut().poll_outcome()?;
+        Some(outcome.map_err(|source| self.failed(source)))
     }
 
     /// Arms or disarms the touch probe.
@@ -68,16 +86,18 @@ impl Turning<'_> {
         speed: RadiansPerSecond,
     ) -> Result<(), Failure> {
         let possible = self.device().check_latch_speed(spacing, speed);
-        possible.map_err(|source| Failure::Device {
-            device: self.machine.devices.name(self.drive()),
-            source,
-        })
+        possible.map_err(|source| self.failed(source))
     }
 
     /// What the touch probe has latched and nobody took yet.
     pub fn take_latched(&mut self) -> Vec<Latched<Radians>> {
         let device = self.device_mut();
         core::iter::from_fn(|| device.poll_latched()).collect()
+    }
+
+    fn failed(&self, source: DeviceError) -> Failure {
+        let device = self.machine.devices.name(self.drive());
+        Failure::Device { device, source }
     }
 
     fn device(&self) -> &dyn RotaryAxis {

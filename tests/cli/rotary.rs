@@ -508,5 +508,5 @@ fn who_reads_the_lines_is_said_once_and_within_reason() {
         "[rotary.c.sighting]\nvalue = \"angle\"\nrange_arcsec = 120.0",
         "",
     );
-    check(none, "`line_detector` or `sighting`");
+    check(none, "`line_signal` or `sighting`");
 }

@@ -40,6 +40,7 @@
 //! | `misplaced` | a plate turned otherwise than was entered |
 //! | `solver` | one evaluation after the other, until no outlier is left |
 //! | `solution`, `solve` | all of it, with uncertainties |
+//! | `line_signal` | where lines are in the sampled signal of a detector |
 //! | `sighted` | readings of one placement that a person made |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
 //!
@@ -47,11 +48,12 @@
 //! constant shift that place, which makes an error of slope of G times shift (10″ once a turn and
 //! a plate placed 5′ askew: 0.015″). Harmonics above N/2 cannot be told from lower ones.
 //!
-//! Absent: reading the lines, turning the plate, storage.
+//! Absent: turning the plate, storage.
 
 mod closed_form;
 mod design;
 mod lanes;
+mod line_signal;
 mod majority;
 mod misplaced;
 mod missing;
@@ -74,6 +76,7 @@ pub(crate) use design::gcd;
 pub use design::{
     Design, DesignError, harmonic_max, rms_amplification_of_a_pair, rms_amplification_of_all,
 };
+pub use line_signal::{LineShape, SAMPLES_MIN, SignalLine, SignalSample, WIDTHS_APART, lines_in};
 pub use misplaced::{Misplaced, misplaced, shift_between};
 pub use periodic::{
     NotAnAngle, PeriodicCompensation, PeriodicError, PeriodicInterpolation, PeriodicLimits,

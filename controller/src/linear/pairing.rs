@@ -3,19 +3,12 @@
 use core::time::Duration;
 
 use compensator::hall_zero::Sample;
-use units::Time;
 
 use crate::config::{AxisConfig, MachineConfig};
 use crate::failure::Failure;
 use crate::linear::ZeroConfig;
 use crate::linear::stage::LinearStage;
-
-/// Which samples were used already.
-pub(super) struct Pairing {
-    window: Duration,
-    used_axis: Time,
-    used_analog: Time,
-}
+use crate::pairing::Pairing;
 
 /// How often a position of `axis` and voltages that belong to it are read for its `zero`.
 pub(super) fn sampling_of(
@@ -37,17 +30,10 @@ impl LinearStage<'_> {
     }
 
     pub(super) fn pairing(&self, config: &ZeroConfig) -> Pairing {
-        Pairing {
-            window: self.sampling(config).mul_f64(0.6),
-            used_axis: Time::ZERO,
-            used_analog: Time::ZERO,
-        }
+        Pairing::of(self.sampling(config))
     }
 
     /// The newest position and voltages that belong together and were not used before.
-    ///
-    /// On CAN both are sampled at one SYNC and arrive together; members of different SYNC
-    /// periods lie further apart than the window and are never paired.
     pub(super) fn paired_sample(
         &self,
         config: &ZeroConfig,
@@ -58,18 +44,9 @@ impl LinearStage<'_> {
         else {
             return Ok(None);
         };
-        if position.at <= pairing.used_axis || voltages.at <= pairing.used_analog {
+        if !pairing.is_pair(position.at, voltages.at) {
             return Ok(None);
         }
-        let apart = position
-            .at
-            .since(voltages.at)
-            .max(voltages.at.since(position.at));
-        if apart > pairing.window {
-            return Ok(None);
-        }
-        pairing.used_axis = position.at;
-        pairing.used_analog = voltages.at;
         Ok(Some(Sample {
             at: position.at.max(voltages.at),
             position: position.position,

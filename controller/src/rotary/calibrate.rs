@@ -57,7 +57,7 @@ impl RotaryTable<'_> {
     ) -> Result<RotaryCalibrated, Failure> {
         // What is asked of a configuration comes before what is asked of the table.
         self.subject().plate_run()?;
-        if self.config.line_detector.is_none() {
+        if !self.config.has_detector() {
             return Err(missing(self.axis, "line_detector"));
         }
         self.calibrate_by(store, options, &mut |table, run, due, journal| {

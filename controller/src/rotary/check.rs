@@ -1,11 +1,13 @@
 //! Whether what is said about a rotary axis makes sense.
 
+use compensator::rotary::{SAMPLES_MIN, WIDTHS_APART};
 use units::Radians;
 
 use super::line_speed;
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
 use crate::config::validate::drive::check_axis_name;
+use crate::hardware::analog::check_input;
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
 
 pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -31,6 +33,7 @@ pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>
                 rotary.speed_max_deg_per_s,
             );
         }
+        check_signal(name, config, rotary, findings);
         check_cycle(name, config, rotary, findings);
     }
 }
@@ -79,37 +82,84 @@ fn check_reader(
     run: &RotaryCalibrateConfig,
     findings: &mut Vec<Finding>,
 ) {
+    let readers = [
+        ("line_detector", rotary.line_detector.is_some()),
+        ("line_signal", rotary.line_signal.is_some()),
+        ("sighting", rotary.sighting.is_some()),
+    ];
+    let there: Vec<_> = readers.iter().filter(|it| it.1).map(|it| it.0).collect();
     let judge = &mut Judge::at(format!("rotary.{name}.calibrate"), findings);
-    match (&rotary.line_detector, &rotary.sighting) {
-        (None, None) => judge.say(
+    match there.as_slice() {
+        [] => judge.say(
             "",
-            "needs the section `line_detector` or `sighting`, which reads the lines",
+            "needs the section `line_detector`, `line_signal` or `sighting`, which reads the lines",
             format!(
-                "add [rotary.{name}.line_detector], or [rotary.{name}.sighting] where a person reads \
-                 them, or remove [rotary.{name}.calibrate]"
+                "add [rotary.{name}.line_detector] or [rotary.{name}.line_signal], or [rotary.{name}.sighting] \
+                 where a person reads them, or remove [rotary.{name}.calibrate]"
             ),
         ),
-        (Some(_), Some(_)) => judge.say(
+        [_] => {}
+        [first, others @ ..] => judge.say(
             "",
-            "has both `line_detector` and `sighting`, and only one of them can read the lines",
-            format!("remove [rotary.{name}.line_detector] or [rotary.{name}.sighting]"),
+            format!(
+                "has `{first}` and `{}`, and only one of them can read the lines",
+                others.join("` and `")
+            ),
+            format!("remove [rotary.{name}.{}]", others.join(&format!("] or [rotary.{name}."))),
         ),
-        (None, Some(sighting)) => {
-            let most = Radians::TURN.arcsec() / 4.0 / f64::from(run.lines);
-            if sighting.range_arcsec > most {
-                let judge = &mut Judge::at(format!("rotary.{name}.sighting"), findings);
-                judge.say(
-                    "range_arcsec",
-                    format!(
-                        "{} is more than a quarter of the spacing of {} lines: one could be taken for \
-                         another",
-                        sighting.range_arcsec, run.lines
-                    ),
-                    format!("give at most {most:.3}"),
-                );
-            }
+    }
+    let spacing = Radians::TURN.arcsec() / f64::from(run.lines);
+    if let Some(sighting) = &rotary.sighting {
+        let most = spacing / 4.0;
+        if sighting.range_arcsec > most {
+            let judge = &mut Judge::at(format!("rotary.{name}.sighting"), findings);
+            judge.say(
+                "range_arcsec",
+                format!(
+                    "{} is more than a quarter of the spacing of {} lines: one could be taken for another",
+                    sighting.range_arcsec, run.lines
+                ),
+                format!("give at most {most:.3}"),
+            );
         }
-        (Some(_), None) => {}
+    }
+}
+
+/// The input that a detector's voltage comes from, and what of it is a line.
+fn check_signal(
+    name: &str,
+    config: &MachineConfig,
+    rotary: &RotaryConfig,
+    findings: &mut Vec<Finding>,
+) {
+    let Some(signal) = &rotary.line_signal else {
+        return;
+    };
+    let judge = &mut Judge::at(format!("rotary.{name}.line_signal"), findings);
+    check_input(judge, &config.analog, (&signal.analog, signal.channel));
+    let module = config.analog.get(&signal.analog);
+    if module.is_some_and(|it| it.node().map(|node| &node.bus) != Some(&rotary.node.bus)) {
+        judge.say(
+            "analog",
+            format!(
+                "`{}` is not on the bus of the drive, `{}`: its voltages are not sampled with the angle",
+                signal.analog, rotary.node.bus
+            ),
+            format!("give an analog module on `{}`", rotary.node.bus),
+        );
+    }
+    if let Some(run) = &rotary.calibrate {
+        let most = Radians::TURN.arcsec() / f64::from(run.lines) / WIDTHS_APART;
+        if signal.width_arcsec > most {
+            judge.say(
+                "width_arcsec",
+                format!(
+                    "{} is more than a quarter of the spacing of {} lines: they run into each other",
+                    signal.width_arcsec, run.lines
+                ),
+                format!("give at most {most:.3}"),
+            );
+        }
     }
 }
 
@@ -126,7 +176,21 @@ fn check_run(
     }
     let speed = run.speed_deg_per_s.unwrap_or(rotary.speed_deg_per_s);
     judge.within("speed_deg_per_s", speed, 1e-3, rotary.speed_max_deg_per_s);
-    let (Some(bus), None) = (config.can.get(&rotary.node.bus), &rotary.sighting) else {
+    if let Some(signal) = &rotary.line_signal {
+        let fits = signal.speed_max(config, rotary);
+        if let Some(fits) = fits.filter(|fits| speed > *fits) {
+            judge.say(
+                "speed_deg_per_s",
+                format!(
+                    "a line of {} arcsec passes too fast at {speed}°/s to be sampled {SAMPLES_MIN} times",
+                    signal.width_arcsec
+                ),
+                format!("give at most {}", floored(fits)),
+            );
+        }
+    }
+    let bus = config.can.get(&rotary.node.bus);
+    let Some(bus) = bus.filter(|_| rotary.line_detector.is_some()) else {
         return;
     };
     let fits = line_speed::speed_max(run.lines, bus.sync_period_ms);
@@ -140,6 +204,11 @@ fn check_run(
             format!("give at most {fits:.3}, or shorten sync_period_ms"),
         );
     }
+}
+
+/// To three digits behind the point, and never more than it is.
+fn floored(speed: f64) -> f64 {
+    (speed * 1e3).floor() / 1e3
 }
 
 /// The offsets, when they are of use.

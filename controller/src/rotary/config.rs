@@ -110,6 +110,8 @@ pub struct RotaryConfig {
     pub zero: Option<RotaryZeroConfig>,
     /// What sees the lines of a plate pass.
     pub line_detector: Option<LineDetectorConfig>,
+    /// What sees them as a voltage, where the drive has no touch probe.
+    pub line_signal: Option<LineSignalConfig>,
     /// How a person reads the lines of a plate, where no detector does.
     pub sighting: Option<SightingConfig>,
     /// How it is calibrated.
@@ -149,6 +151,41 @@ pub struct LineDetectorConfig {
     pub input: Option<i16>,
 }
 
+/// Which side of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LineSideName {
+    /// A line raises the voltage.
+    Above,
+    /// A line lowers it.
+    Below,
+}
+
+/// A detector whose voltage shows each line of a plate pass.
+///
+/// In place of `line_detector`, with an analog module on the bus of the drive: it is sampled by the same SYNC
+/// as the angle. The place of a line is the centroid of its pulse, so that its height and the module's delay do not
+/// count (a delay drops out of the mean of both directions). A line must be seen in eight samples at least while it
+/// is beyond the level, which limits `calibrate.speed_deg_per_s`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LineSignalConfig {
+    /// The analog module that reads it.
+    #[schemars(extend("x-range" = "an `[analog.NAME]` on the bus of the drive"))]
+    pub analog: String,
+    /// The module's input.
+    #[schemars(extend("x-range" = "one of its `channels`"))]
+    pub channel: u8,
+    /// A voltage that only lines reach: half of their height.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
+    pub level_v: f64,
+    /// Where a line is: `above` it or `below`.
+    pub line: LineSideName,
+    /// How far the table turns while a line is beyond the level.
+    #[schemars(range(min = 0.001), extend("x-range" = "at most a quarter of the line spacing"))]
+    pub width_arcsec: f64,
+}
+
 /// What a person types of a line, or imports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -165,7 +202,7 @@ pub enum SightedName {
 
 /// How a person reads the lines of a plate: with a microscope, a camera or an autocollimator.
 ///
-/// In place of `line_detector`. The passes are those of a detector: each line once in each pass,
+/// In place of a detector. The passes are those of a detector: each line once in each pass,
 /// `calibrate.passes` forward and as many in reverse, and the first pass repeated at the end. What
 /// drifts evenly with time falls out of the mean of both directions.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -194,7 +231,8 @@ pub enum OptimiseName {
 /// The calibration run of a rotary axis (system S2).
 ///
 /// A plate of lines is fixed on the table and read, turned and read again; somebody turns it when
-/// asked. Needs the sections `zero` and `compensation`, and one of `line_detector` and `sighting`.
+/// asked. Needs the sections `zero` and `compensation`, and one of `line_detector`, `line_signal` and
+/// `sighting`.
 ///
 /// Two placements cannot judge each other: with two, a plate turned by a wrong number of lines is
 /// not noticed, and not one line may be missing.
@@ -239,6 +277,13 @@ pub struct RotaryCalibrateConfig {
     /// waits for a heartbeat.
     #[serde(skip)]
     planned: OnceLock<Design>,
+}
+
+impl RotaryConfig {
+    /// Whether a detector reads the lines of a plate while the table turns.
+    pub(crate) const fn has_detector(&self) -> bool {
+        self.line_detector.is_some() || self.line_signal.is_some()
+    }
 }
 
 impl From<SightedName> for Sighted {

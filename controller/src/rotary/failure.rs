@@ -3,7 +3,7 @@
 use compensator::rotary::{
     Misplaced, NotAnAngle, PeriodicError, PlanError, RotarySeriesError, SolveError,
 };
-use units::Radians;
+use units::{Radians, Volts};
 
 use crate::failure::of_kind::KindFailure;
 
@@ -175,6 +175,29 @@ pub enum RotaryFailure {
         /// How many there should be.
         lines: u32,
     },
+    /// A turn over a plate showed none of its lines as a voltage.
+    #[error(
+        "axis {axis}: none of {lines} lines was seen in a whole turn at {input}: it showed {:.3} to {:.3} V, \
+         and a line is {:.3} arcsec wide at {:.3} V; is the plate there, the detector on, and are `level_v` and \
+         `width_arcsec` those of its lines?",
+        .from.value(), .to.value(), .width.arcsec(), .level.value()
+    )]
+    NoSignal {
+        /// Which axis.
+        axis: String,
+        /// How many there should be.
+        lines: u32,
+        /// Where the detector is wired to.
+        input: String,
+        /// The lowest voltage …
+        from: Volts,
+        /// … and the highest one that was seen.
+        to: Volts,
+        /// What lines should reach.
+        level: Volts,
+        /// How wide they should be there.
+        width: Radians,
+    },
     /// A rotary table's error cannot be computed.
     #[error("{place}: {source}")]
     Unsolved {
@@ -209,7 +232,7 @@ impl KindFailure for RotaryFailure {
             | Self::LiesElsewhere { .. }
             | Self::NotAnAngle { .. }
             | Self::Compensation { .. } => 3,
-            Self::TooFewLines { .. } | Self::NoLines { .. } => 4,
+            Self::TooFewLines { .. } | Self::NoLines { .. } | Self::NoSignal { .. } => 4,
             Self::Slipped { .. }
             | Self::Noise { .. }
             | Self::Series { .. }

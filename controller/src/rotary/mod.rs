@@ -35,6 +35,7 @@ pub(crate) mod record;
 pub(crate) mod settings;
 pub(crate) mod sighted;
 mod sighting;
+mod signal;
 mod sound;
 pub(crate) mod subject;
 pub(crate) mod sweep;
@@ -55,9 +56,9 @@ pub use turn::Way;
 #[cfg(feature = "program")]
 pub(crate) use calibrate::RotaryCalibrated;
 pub(crate) use config::{
-    DirectionName, EdgeName, LineDetectorConfig, PeriodicInterpolationName, PositionRangeName,
-    RotaryCalibrateConfig, RotaryCompensationConfig, RotaryConfig, RotaryDevice,
-    RotaryVerifyConfig, SightingConfig,
+    DirectionName, EdgeName, LineDetectorConfig, LineSideName, LineSignalConfig,
+    PeriodicInterpolationName, PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig,
+    RotaryConfig, RotaryDevice, RotaryVerifyConfig, SightingConfig,
 };
 pub(crate) use entries::{
     JudgedEntry, PlacementEntry, PlatePlanEntry, SightedAt, SightedEntry, SweepEntry,

@@ -1,7 +1,7 @@
 //! One turn of a rotary axis over the lines of a plate: where each line was read.
 //!
-//! The drive latches its position at every line (its touch probe); nothing here depends on when
-//! a frame comes. Lines are told apart by where they are: each belongs to the nearest of `lines`
+//! The drive latches its position at every line (its touch probe), or a detector's voltage is sampled with the
+//! position (`signal`); nothing here depends on when a frame comes. Lines are told apart by where they are: each belongs to the nearest of `lines`
 //! equally spaced table positions, counted from the angle (the phase) that the lines have in
 //! common. Lines must therefore be off by less than a quarter of their spacing.
 
@@ -67,6 +67,37 @@ impl Sweep {
     }
 }
 
+/// A turn over all lines.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    pub(super) target: Radians,
+    pub(super) speed: RadiansPerSecond,
+    /// How long it may take.
+    pub(super) limit: Duration,
+}
+
+/// Where a detector saw something.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LineEdge {
+    pub(super) position: Radians,
+    /// So many before it were, or may have been, lost; it may be one of a scratch then.
+    pub(super) missed: u32,
+}
+
+impl From<&Latched<Radians>> for LineEdge {
+    fn from(latched: &Latched<Radians>) -> Self {
+        Self {
+            position: latched.position,
+            missed: latched.missed,
+        }
+    }
+}
+
+/// The nearest that two lines may be.
+fn spacing_min(lines: u32) -> Radians {
+    Radians(TAU / f64::from(lines) * SPACING_SHARE)
+}
+
 impl RotaryTable<'_> {
     /// Turns the table once over the plate, and a little more on both sides.
     ///
@@ -80,28 +111,42 @@ impl RotaryTable<'_> {
         let speed = options.speed.unwrap_or(usual);
         let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
         let sign = options.approach.sign();
-        let spacing = Radians(TAU / f64::from(options.lines) * SPACING_SHARE);
-        self.core
-            .turning(self.axis)?
-            .check_latch_speed(spacing, speed)?;
+        if config.line_signal.is_none() {
+            let spacing = spacing_min(options.lines);
+            let table = self.core.turning(self.axis)?;
+            table.check_latch_speed(spacing, speed)?;
+        }
         let start = self.turn_to(Radians(-sign * run_up), Way::Shortest)?;
         self.rest()?;
-        let repeat = Repeat::Continuous;
+        let first = start + Radians(sign * run_up);
+        let way = TAU + 2.0 * run_up;
+        let turn = Turn {
+            target: start + Radians(sign * way),
+            speed,
+            limit: SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value()),
+        };
+        let edges = match &config.line_signal {
+            Some(signal) => self.scan(signal, &turn, options.lines)?,
+            None => self.latch_lines(&turn, options.lines)?,
+        };
+        Ok(assign(&edges, first, options))
+    }
+
+    /// What the touch probe latches in a turn.
+    fn latch_lines(&mut self, turn: &Turn, lines: u32) -> Result<Vec<LineEdge>, Failure> {
+        let (repeat, spacing) = (Repeat::Continuous, spacing_min(lines));
         self.core
             .turning(self.axis)?
             .latch(LatchCommand::Arm { repeat, spacing })?;
-        let first = start + Radians(sign * run_up);
-        let way = TAU + 2.0 * run_up;
-        let limit = SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value());
-        self.turn(start + Radians(sign * way), speed, limit)?;
+        self.turn(turn.target, turn.speed, turn.limit)?;
         self.rest()?;
         self.core.turning(self.axis)?.latch(LatchCommand::Disarm)?;
         let latched = self.core.turning(self.axis)?.take_latched();
         if latched.is_empty() {
-            let (axis, lines) = (self.axis.to_owned(), options.lines);
+            let axis = self.axis.to_owned();
             return Err(RotaryFailure::NoLines { axis, lines }.into());
         }
-        Ok(assign(&latched, first, options))
+        Ok(latched.iter().map(LineEdge::from).collect())
     }
 
     /// Waits until the rotary axis has stood without a break, by samples that were taken since:
@@ -134,11 +179,11 @@ impl RotaryTable<'_> {
     }
 }
 
-/// Gives each latched position of one turn, which begins at `first`, to its line.
-fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) -> Sweep {
+/// Gives each position of one turn, which begins at `first`, to its line.
+fn assign(edges: &[LineEdge], first: Radians, options: &SweepOptions) -> Sweep {
     let lines = i64::from(options.lines);
     let spacing = TAU / f64::from(options.lines);
-    let phase = phase_of(latched, spacing, options.phase);
+    let phase = phase_of(edges, spacing, options.phase);
     let from = (first.value() - phase) / spacing;
     let window = match options.approach {
         Approach::Forward => from.ceil() as i64..from.ceil() as i64 + lines,
@@ -149,9 +194,9 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
         phase: Radians(phase),
         ..Sweep::default()
     };
-    let mut edges = vec![0_u32; options.lines as usize];
+    let mut counts = vec![0_u32; options.lines as usize];
     let mut unread = BTreeSet::new();
-    for edge in latched {
+    for edge in edges {
         let number = ((edge.position.value() - phase) / spacing).round();
         let off = edge.position.value() - phase - number * spacing;
         if !window.contains(&(number as i64)) {
@@ -162,7 +207,7 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
             continue;
         }
         let at = (number as i64).rem_euclid(lines) as u32;
-        edges[at as usize] += 1;
+        counts[at as usize] += 1;
         sweep.deviations[at as usize] = Some(edge.position - Radians(number * spacing));
         if edge.missed > 0 {
             // The edges before it, and perhaps the line's own by one of a scratch.
@@ -173,7 +218,7 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
             sweep.overwritten.push(at);
         }
     }
-    for (at, count) in (0_u32..).zip(&edges) {
+    for (at, count) in (0_u32..).zip(&counts) {
         match count {
             0 if unread.contains(&at) => sweep.overwritten.push(at),
             0 => sweep.missing.push(at),
@@ -190,8 +235,8 @@ fn assign(latched: &[Latched<Radians>], first: Radians, options: &SweepOptions) 
 
 /// What all positions have in common within a spacing: the direction of their mean on a circle
 /// on which one spacing is one turn.
-fn phase_of(latched: &[Latched<Radians>], spacing: f64, near: Option<Radians>) -> f64 {
-    let (sine, cosine) = latched.iter().fold((0.0, 0.0), |(sine, cosine), edge| {
+fn phase_of(edges: &[LineEdge], spacing: f64, near: Option<Radians>) -> f64 {
+    let (sine, cosine) = edges.iter().fold((0.0, 0.0), |(sine, cosine), edge| {
         let angle = TAU * edge.position.value() / spacing;
         (sine + sin(angle), cosine + cos(angle))
     });
@@ -203,14 +248,10 @@ fn phase_of(latched: &[Latched<Radians>], spacing: f64, near: Option<Radians>) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use units::{Counts, Time};
-
     const LINES: u32 = 360;
 
-    fn edge(degrees: f64) -> Latched<Radians> {
-        Latched {
-            at: Time::ZERO,
-            counts: Counts(0),
+    fn edge(degrees: f64) -> LineEdge {
+        LineEdge {
             position: Radians::from_degrees(degrees),
             missed: 0,
         }
@@ -226,7 +267,7 @@ mod tests {
     }
 
     /// Lines from -2 to 362 degrees with an error of some arc-seconds each.
-    fn plate(phase_deg: f64) -> Vec<Latched<Radians>> {
+    fn plate(phase_deg: f64) -> Vec<LineEdge> {
         let error = |line: i32| 0.008 * f64::from(line).to_radians().sin();
         let lines = (-2..=362).map(|line| edge(f64::from(line) + phase_deg + error(line)));
         lines.collect()
@@ -277,15 +318,14 @@ mod tests {
 
     #[test]
     fn lines_overwritten_unread_are_not_called_unseen() {
-        let overwrite = |latched: &mut Vec<Latched<Radians>>| {
-            let place = |degrees: f64| {
-                move |it: &Latched<Radians>| it.position.degrees().round() == degrees
-            };
+        let overwrite = |latched: &mut Vec<LineEdge>| {
+            let place =
+                |degrees: f64| move |it: &LineEdge| it.position.degrees().round() == degrees;
             latched.retain(|it| !place(51.0)(it) && !place(52.0)(it) && !place(200.0)(it));
         };
         let mut latched = plate(0.0);
         overwrite(&mut latched);
-        let mark = |latched: &mut Vec<Latched<Radians>>, degrees: f64| {
+        let mark = |latched: &mut Vec<LineEdge>, degrees: f64| {
             let at = latched
                 .iter()
                 .position(|it| it.position.degrees().round() == degrees);

@@ -48,11 +48,12 @@ use machine::Machine;
 use parts::actuator::Actuator;
 use platform::Platform;
 use stage::Stage;
+use table::Table;
 use thermal::Climate;
 use volumetric::{Sighting, Signal, TERMINALS, Volumetric};
 
-/// Inputs 0 and 1 are the Hall sensors, of a gantry 2 and 3 those of its second side; the others are spare. Three
-/// axes have their own.
+/// Inputs 0 and 1 are the Hall sensors, of a gantry 2 and 3 those of its second side; the others are spare. Of a
+/// rotary table input 0 is the photodiode over its plate. Three axes have their own.
 const ANALOG_INPUTS: usize = 8;
 /// What a resistance thermometer's input can show.
 const TEMPERATURE_RAIL_C: f64 = 850.0;
@@ -190,6 +191,9 @@ impl Plant {
     fn signal(&mut self, channel: usize) -> Option<Signal> {
         if let Some(volumetric) = self.machine.of_mut::<Volumetric>() {
             return volumetric.signal(channel, self.now);
+        }
+        if let Some(table) = self.machine.of::<Table>() {
+            return (channel == 0).then(|| Signal::Voltage(table.line_volts(self.now)));
         }
         if let Some(gantry) = self.machine.of::<Gantry>() {
             let exchanged = usize::from(self.inputs_swapped && channel < 2);

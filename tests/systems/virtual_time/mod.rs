@@ -15,6 +15,7 @@ mod platform_strokes;
 mod repeatable;
 mod rotary;
 mod rotary_sighted;
+mod rotary_signal;
 mod rotary_table;
 mod serial_zero;
 mod survey;

@@ -5,6 +5,7 @@ pub(crate) mod cia404;
 pub(crate) mod dcon;
 
 use core::time::Duration;
+use std::collections::BTreeMap;
 
 use drivers::device::AnalogInput;
 use machine::Patience;
@@ -17,6 +18,30 @@ use crate::config::judge::Judge;
 pub(crate) use cia401::Cia401Config;
 pub(crate) use cia404::Cia404Config;
 pub(crate) use dcon::DconConfig;
+
+/// Whether there is an analog module of that name, and whether it reads that `channel`.
+pub(crate) fn check_input(
+    judge: &mut Judge<'_>,
+    modules: &BTreeMap<String, AnalogConfig>,
+    (module, channel): (&str, u8),
+) {
+    judge.known("analog", module, modules, "analog module");
+    if let Some(analog) = modules.get(module)
+        && !analog.channels.contains(&channel)
+    {
+        judge.say(
+            "channel",
+            format!("`{module}` does not read channel {channel}"),
+            format!("known: {}", channels_of(analog)),
+        );
+    }
+}
+
+/// Those that a module reads, for a person.
+pub(crate) fn channels_of(module: &AnalogConfig) -> String {
+    let channels: Vec<_> = module.channels.iter().map(u8::to_string).collect();
+    channels.join(", ")
+}
 
 /// An analog module, by what `device` calls it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

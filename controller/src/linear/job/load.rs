@@ -8,6 +8,7 @@ use super::config::{GoOnConfig, JobConfig, JobPointConfig};
 use super::{GoOn, Job, JobInput, JobPoint};
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, ConfigError, MachineConfig, read};
+use crate::hardware::analog::{channels_of, check_input};
 
 /// So many points a job has at most, and an interval makes of one.
 const POINTS_MAX: usize = 100_000;
@@ -167,28 +168,14 @@ fn judge_input(
     config: &MachineConfig,
     (module, go_on): (&str, &GoOnConfig),
 ) {
-    judge.known("analog", module, &config.analog, "analog module");
-    if let Some(analog) = config.analog.get(module) {
-        let known = || {
-            analog
-                .channels
-                .iter()
-                .map(u8::to_string)
-                .collect::<Vec<_>>()
-        };
-        match go_on.channel {
-            None => judge.say(
-                "",
-                "which channel?",
-                format!("give `channel`: {}", known().join(", ")),
-            ),
-            Some(channel) if !analog.channels.contains(&channel) => judge.say(
-                "channel",
-                format!("`{module}` does not read channel {channel}"),
-                format!("known: {}", known().join(", ")),
-            ),
-            Some(_) => {}
-        }
+    match (go_on.channel, config.analog.get(module)) {
+        (Some(channel), _) => check_input(judge, &config.analog, (module, channel)),
+        (None, Some(analog)) => judge.say(
+            "",
+            "which channel?",
+            format!("give `channel`: {}", channels_of(analog)),
+        ),
+        (None, None) => judge.known("analog", module, &config.analog, "analog module"),
     }
     let levels: Vec<f64> = [go_on.above_v, go_on.below_v]
         .into_iter()

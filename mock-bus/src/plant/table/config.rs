@@ -21,8 +21,35 @@ pub struct TableConfig {
     pub plate: PlateConfig,
     /// What sees the plate's lines pass.
     pub detector: DetectorConfig,
+    /// What gives a voltage in its place.
+    pub signal: SignalConfig,
     /// What a person reads them with.
     pub microscope: MicroscopeConfig,
+}
+
+/// A photodiode behind a slit, at analog input 0: each line gives a pulse of a bell's shape.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SignalConfig {
+    /// Between the lines.
+    pub dark_v: f64,
+    /// Of a line above that.
+    pub height_v: f64,
+    /// At half of the height.
+    pub width_arcsec: f64,
+    /// From the light to the voltage.
+    pub latency_us: f64,
+}
+
+impl Default for SignalConfig {
+    fn default() -> Self {
+        Self {
+            dark_v: 0.2,
+            height_v: 4.0,
+            width_arcsec: 600.0,
+            latency_us: 50.0,
+        }
+    }
 }
 
 /// A microscope with a cross-hair beside the table, and the person at it.
@@ -222,7 +249,7 @@ impl TableConfig {
     }
 
     /// What must be more than 0 for the rest to make sense.
-    fn positive_numbers(&self) -> [(&'static str, f64); 6] {
+    fn positive_numbers(&self) -> [(&'static str, f64); 7] {
         let (motion, plate) = (&self.motion, &self.plate);
         let spacing_arcsec = 1_296_000.0 / f64::from(plate.lines);
         [
@@ -237,6 +264,7 @@ impl TableConfig {
             ),
             ("counts_per_turn", f64::from(self.encoder.counts_per_turn)),
             ("lines", f64::from(plate.lines)),
+            ("width_arcsec", self.signal.width_arcsec),
             // Lines stay in their order, and the placement is known to the line.
             (
                 "half the line spacing - error_peak_arcsec - placement_error_arcsec",

@@ -69,6 +69,15 @@ impl Detector {
         self.shifted.insert(line, shift.value());
     }
 
+    /// By how much a line is seen beside its place.
+    pub(super) fn shift_of(&self, line: u32) -> f64 {
+        self.shifted.get(&line).copied().unwrap_or(0.0)
+    }
+
+    pub(super) const fn is_dead(&self) -> bool {
+        self.dead
+    }
+
     pub(super) const fn set_dead(&mut self, dead: bool) {
         self.dead = dead;
     }
@@ -84,8 +93,7 @@ impl Detector {
             return;
         }
         self.passages += 1;
-        let shift = self.shifted.get(&passage.line).copied().unwrap_or(0.0);
-        let noise = self.noise * self.stream.gaussian() + shift;
+        let noise = self.noise * self.stream.gaussian() + self.shift_of(passage.line);
         self.pulse(passage, noise, &counts);
         if self.scratched.contains(&passage.line) {
             let behind = Radians::from_arcsec(SCRATCH_ARCSEC).value();

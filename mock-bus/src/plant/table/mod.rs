@@ -20,6 +20,7 @@ mod encoder_error;
 mod hands;
 mod microscope;
 mod plate;
+mod signal;
 #[cfg(test)]
 mod tests;
 mod truth;
@@ -49,6 +50,7 @@ use detector::{Detector, Passage};
 use encoder_error::EncoderError;
 use microscope::Microscope;
 use plate::Plate;
+use signal::Photodiode;
 
 #[derive(Clone, Debug)]
 pub(super) struct Table {
@@ -56,6 +58,7 @@ pub(super) struct Table {
     error: EncoderError,
     plate: Plate,
     detector: Detector,
+    photodiode: Photodiode,
     microscope: Microscope,
     /// What a hand does that nobody calls, in order.
     hand_lines: VecDeque<f64>,
@@ -92,6 +95,7 @@ impl Table {
             error: EncoderError::new(encoder, &config.bearing, seed),
             plate: Plate::new(&config.plate, seed),
             detector: Detector::new(&config.detector, seed),
+            photodiode: Photodiode::new(&config.signal),
             microscope: Microscope::new(&config.microscope, seed),
             hand_lines: config.plate.hand_lines.iter().copied().collect(),
             passages_before: 0,

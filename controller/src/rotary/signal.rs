@@ -1,0 +1,195 @@
+//! Lines that a detector shows as a voltage: sampled with the angle while the table turns.
+
+use core::time::Duration;
+
+use compensator::rotary::{LineShape, SAMPLES_MIN, SignalSample, lines_in};
+use drivers::device::AxisCommand;
+use units::{Radians, RadiansPerSecondSquared, Volts};
+
+use crate::config::MachineConfig;
+use crate::failure::Failure;
+use crate::pairing::Pairing;
+use crate::rotary::failure::RotaryFailure;
+use crate::rotary::sweep::{LineEdge, Turn};
+use crate::rotary::table::RotaryTable;
+use crate::rotary::{LineSideName, LineSignalConfig, RotaryConfig};
+
+/// How long the machine lives at most between two looks at the samples; each frame ends a tick.
+const TICK_MAX: Duration = Duration::from_millis(100);
+
+impl LineSignalConfig {
+    pub(super) fn shape(&self) -> LineShape {
+        LineShape {
+            level: Volts(self.level_v),
+            is_above: self.line == LineSideName::Above,
+            width: Radians::from_arcsec(self.width_arcsec),
+        }
+    }
+
+    /// How often the voltage is read together with the angle.
+    fn sampling(&self, config: &MachineConfig, rotary: &RotaryConfig) -> Option<Duration> {
+        let sync_s = config.can.get(&rotary.node.bus)?.sync_period_ms * 1e-3;
+        let every = config.analog.get(&self.analog)?.every_syncs().unwrap_or(1);
+        Some(Duration::from_secs_f64(sync_s * f64::from(every)))
+    }
+
+    /// The fastest turn, in degrees a second, at which enough samples fall into a line; `None` without bus or module.
+    pub(super) fn speed_max(&self, config: &MachineConfig, rotary: &RotaryConfig) -> Option<f64> {
+        let sampling_s = self.sampling(config, rotary)?.as_secs_f64();
+        Some(self.width_arcsec / 3600.0 / (SAMPLES_MIN * sampling_s))
+    }
+
+    /// Which of the module's readings it is.
+    fn place(&self, config: &MachineConfig) -> Option<usize> {
+        let channels = &config.analog.get(&self.analog)?.channels;
+        channels.iter().position(|it| *it == self.channel)
+    }
+}
+
+impl RotaryTable<'_> {
+    /// What the detector shows in a turn.
+    pub(super) fn scan(
+        &mut self,
+        signal: &LineSignalConfig,
+        turn: &Turn,
+        lines: u32,
+    ) -> Result<Vec<LineEdge>, Failure> {
+        let samples = self.sample_turn(signal, turn)?;
+        let found = lines_in(&samples, &signal.shape());
+        if found.is_empty() {
+            return Err(self.nothing_seen(signal, &samples, lines));
+        }
+        let edges = found.iter().map(|it| LineEdge {
+            position: it.position,
+            missed: u32::from(!it.is_whole),
+        });
+        Ok(edges.collect())
+    }
+
+    fn sample_turn(
+        &mut self,
+        signal: &LineSignalConfig,
+        turn: &Turn,
+    ) -> Result<Vec<SignalSample>, Failure> {
+        let config = self.core.config;
+        let sampling = signal.sampling(config, self.config).unwrap_or_default();
+        let place = signal.place(config).unwrap_or_default();
+        let mut pairing = Pairing::of(sampling);
+        let mut samples = Vec::new();
+        let acceleration = self.config.acceleration_deg_per_s2.to_radians();
+        let begun = self.core.now();
+        self.core.turning(self.axis)?.begin(AxisCommand::MoveTo {
+            target: turn.target,
+            speed: turn.speed,
+            acceleration: RadiansPerSecondSquared(acceleration),
+        })?;
+        loop {
+            let deadline = self.core.now() + TICK_MAX;
+            self.core.tick(deadline)?;
+            let arrived = self.core.turning(self.axis)?.outcome();
+            samples.extend(self.sample(signal, place, &mut pairing)?);
+            if let Some(outcome) = arrived {
+                outcome?;
+                return Ok(samples);
+            }
+            let waited = self.core.now().since(begun);
+            if waited > self.core.patience().of(turn.limit) {
+                return Err(Failure::Machine(machine::Failure::Overdue {
+                    device: self.axis.to_owned(),
+                    step: "turning over the plate",
+                    waited,
+                }));
+            }
+        }
+    }
+
+    /// The newest angle and voltage, when they belong together and are new.
+    fn sample(
+        &self,
+        signal: &LineSignalConfig,
+        place: usize,
+        pairing: &mut Pairing,
+    ) -> Result<Option<SignalSample>, Failure> {
+        let devices = self.core.devices();
+        let angle = devices.rotary_reading(self.axis)?;
+        let analog = devices.analog(&signal.analog)?;
+        let (Some(angle), Some(voltages)) = (angle, analog.reading()) else {
+            return Ok(None);
+        };
+        if !pairing.is_pair(angle.at, voltages.at) {
+            return Ok(None);
+        }
+        Ok(voltages.volts.get(place).map(|seen| SignalSample {
+            position: angle.position,
+            signal: *seen,
+        }))
+    }
+
+    fn nothing_seen(
+        &self,
+        signal: &LineSignalConfig,
+        samples: &[SignalSample],
+        lines: u32,
+    ) -> Failure {
+        let seen = || samples.iter().map(|it| it.signal.value());
+        RotaryFailure::NoSignal {
+            axis: self.axis.to_owned(),
+            lines,
+            input: format!("input {} of {}", signal.channel, signal.analog),
+            from: Volts(seen().fold(f64::INFINITY, f64::min)),
+            to: Volts(seen().fold(f64::NEG_INFINITY, f64::max)),
+            level: Volts(signal.level_v),
+            width: Radians::from_arcsec(signal.width_arcsec),
+        }
+        .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::validate::told;
+    use crate::edit::{Edit, with_line_signal};
+
+    const TABLE: &str = include_str!("../../../configs/machines/rotary.toml");
+
+    #[test]
+    fn what_cannot_be_read_is_refused_with_what_would_fit() {
+        let sound = with_line_signal(TABLE);
+        let check = |from: &str, to: &str, key: &str, says: &str| {
+            told::check(&sound, from, to, &format!("rotary.c.{key}"), says);
+        };
+        check(
+            "\"photo\"",
+            "\"foto\"",
+            "line_signal.analog",
+            "no analog module `foto`",
+        );
+        check(
+            "channel = 2",
+            "channel = 3",
+            "line_signal.channel",
+            "does not read channel 3",
+        );
+        check(
+            "arcsec = 1500.0",
+            "arcsec = 4501.0",
+            "line_signal.width_arcsec",
+            "more than a quarter",
+        );
+        let speed = "placement\nspeed_deg_per_s = 10.0";
+        let fast = speed.edit("10.0", "10.5");
+        check(
+            speed,
+            &fast,
+            "calibrate.speed_deg_per_s",
+            "too fast at 10.5",
+        );
+        let both = "[rotary.c.line_detector]\n\n[rotary.c.line_signal]";
+        check(
+            "[rotary.c.line_signal]",
+            both,
+            "calibrate",
+            "`line_detector` and `line_signal`",
+        );
+    }
+}

@@ -1,0 +1,124 @@
+//! A rotary table whose plate passes a photodiode at an analog input: judged by the plant's truth.
+
+use mock_bus::fault::{Fault, FaultConfig};
+use tests::{Bench, Edit, Hand};
+use truestage::for_tests::{RotaryCalibrated, with_line_signal};
+use truestage::rotary::RotaryFailure;
+use truestage::{CalibrateOptions, Failure};
+
+use super::rotary::{chi_square, hand_of, residual, started};
+
+const AXIS: &str = "c";
+const LINES: u32 = 72;
+/// What the touch probe reaches.
+const LIMIT_ARCSEC: f64 = 0.04;
+const TABLES: u64 = 6;
+
+const NODE: &str = r#"[[nodes]]
+name = "photo"
+port = "can0"
+[nodes.device]
+kind = "cia404_analog"
+node_id = 15
+identity = { vendor_id = 0x7FF, product_code = 0x40_0004, revision = 0x1_0000, serial_number = 4015 }
+plant_channels = [1, 2, 0, 3]
+full_scale_v = 5.0
+resolution_bits = 16
+
+[plant.table.signal]
+width_arcsec = 1500.0
+latency_us = 400.0
+
+[plant.table.motion]"#;
+
+/// A plate of 72 lines on a table without harmonics that these cannot see.
+fn bench(seed: u64) -> Bench {
+    let emulated = |text: String| {
+        text.edit("lines = 360", "lines = 72")
+            .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
+            .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
+            .edit("[plant.table.motion]", NODE)
+    };
+    Bench::rotary(seed, |text| with_line_signal(&text), emulated)
+}
+
+fn calibrate(bench: &mut Bench, hand: &mut Hand<'_>) -> Result<RotaryCalibrated, Failure> {
+    let store = bench.store.clone();
+    let options = CalibrateOptions::default();
+    bench
+        .machine
+        .guarded(|machine| machine.rotary(AXIS)?.calibrate(&store, &options, hand))
+}
+
+fn inject(bench: &Bench, fault: Fault) {
+    let fault = FaultConfig::permanent(fault);
+    let injected = bench.emulated.simulation_mut().inject(fault);
+    injected.expect("a fault of this machine");
+}
+
+#[test]
+fn tables_read_by_a_photodiode_are_as_right_as_by_the_touch_probe_and_as_sure_as_they_say() {
+    let (mut seen, mut expected, mut variance) = (0.0, 0.0, 0.0);
+    for seed in 1..=TABLES {
+        let mut bench = bench(seed);
+        started(&mut bench);
+        let mut hand = hand_of(&bench.emulated);
+        let it = calibrate(&mut bench, &mut hand)
+            .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        let left = [
+            residual(&mut bench, LINES, 0.0),
+            residual(&mut bench, LINES, 0.5),
+        ];
+        println!("seed {seed}: left {left:.4?} arcsec rms");
+        assert!(
+            left.iter().all(|it| *it <= LIMIT_ARCSEC),
+            "seed {seed}: {left:?}"
+        );
+        let terms = f64::from(LINES - 1);
+        let freedom = it.solution.degrees_of_freedom as f64;
+        seen += chi_square(&bench, &it);
+        expected += terms * freedom / (freedom - 2.0);
+        variance += 2.0 * terms + 2.0 * terms * terms / freedom;
+    }
+    // Both sides, 1 % together.
+    let tolerance = 2.576 * f64::sqrt(variance);
+    println!("χ² {seen:.0}, expected {expected:.0} ± {tolerance:.0} (1 %)");
+    assert!((seen - expected).abs() <= tolerance, "χ² = {seen}");
+}
+
+#[test]
+fn its_verification_is_within_tolerance_between_the_lines_and_a_smudged_line_is_no_harm() {
+    let mut bench = bench(21);
+    started(&mut bench);
+    inject(&bench, Fault::LineSmudged { line: 17 });
+    let mut hand = hand_of(&bench.emulated);
+    calibrate(&mut bench, &mut hand).unwrap_or_else(|failure| panic!("{failure}"));
+    let left = residual(&mut bench, LINES, 0.0);
+    assert!(left <= LIMIT_ARCSEC, "{left}");
+    let store = bench.store.clone();
+    let verified = bench
+        .machine
+        .guarded(|machine| machine.rotary(AXIS)?.verify(&store, true, &mut hand));
+    let it = verified.unwrap_or_else(|failure| panic!("{failure}"));
+    assert!(it.is_within_tolerance());
+}
+
+#[test]
+fn a_detector_that_shows_no_lines_is_told_with_what_it_shows() {
+    let mut bench = bench(22);
+    started(&mut bench);
+    inject(&bench, Fault::DetectorDead);
+    let mut hand = hand_of(&bench.emulated);
+    let failure = calibrate(&mut bench, &mut hand).unwrap_err();
+    let told = failure.to_string();
+    assert!(
+        matches!(
+            failure.of_kind(),
+            Some(RotaryFailure::NoSignal { lines: 72, .. })
+        ),
+        "{told}"
+    );
+    for part in ["input 2 of photo", "0.199 to 0.201 V", "at 2.200 V"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+}
