@@ -1,7 +1,7 @@
 //! A machine is used by one program at a time.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Seek, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use nix::fcntl::{Flock, FlockArg};
 
@@ -48,13 +48,7 @@ impl Lease {
             .map_err(io_error("open", &path))?;
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
             Ok(mut lock) => {
-                let owner = format!("truestage {verb}, process {}\n", std::process::id());
-                // Over what a killed program has left, and only then the rest of that: whoever looks meanwhile is
-                // told a name.
-                let written = lock.write_all(owner.as_bytes());
-                written
-                    .and_then(|()| lock.set_len(owner.len() as u64))
-                    .map_err(io_error("write", &path))?;
+                name_owner(&mut lock, verb).map_err(io_error("write", &path))?;
                 Ok(Self { lock })
             }
             Err((mut file, _)) => {
@@ -81,11 +75,25 @@ impl Lease {
     /// When the lock file cannot be written.
     pub fn announce(&self, places: &[String]) -> io::Result<()> {
         let mut file: &File = &self.lock;
-        for place in places {
-            writeln!(file, "{PLACE}{place}")?;
-        }
-        Ok(())
+        let lines: String = places.iter().map(|it| format!("{PLACE}{it}\n")).collect();
+        file.write_all(lines.as_bytes())
     }
+}
+
+/// In one piece over all that a killed program has left, and shortened only then: whoever looks meanwhile is told a
+/// name, and not that its bearer listens where the dead one did.
+fn name_owner(file: &mut File, verb: &str) -> io::Result<()> {
+    let owner = format!("truestage {verb}, process {}\n", std::process::id());
+    let left = file.metadata()?.len() as usize;
+    file.write_all(over(&owner, left).as_bytes())?;
+    file.set_len(owner.len() as u64)?;
+    file.seek(SeekFrom::Start(owner.len() as u64))?;
+    Ok(())
+}
+
+/// The owner's line, and empty ones over the rest of so many bytes.
+fn over(owner: &str, left: usize) -> String {
+    format!("{owner:\n<left$}")
 }
 
 #[cfg(test)]
@@ -140,6 +148,29 @@ mod tests {
             said,
             format!("truestage move, process {}\n", std::process::id())
         );
+    }
+
+    /// Before the file is shortened: who waits for the next service to listen must not take the dead one's word for
+    /// its own.
+    #[test]
+    fn at_no_moment_does_the_next_owner_listen_where_a_killed_one_did() {
+        let left = format!("truestage serve, process 17\n{PLACE}unix:/run/a\n");
+        for owner in [
+            "truestage serve, process 4\n",
+            "truestage calibrate, process 123456\n",
+        ] {
+            let mut said = left.clone().into_bytes();
+            let over = over(owner, said.len());
+            let beyond = said.split_off(over.len().min(said.len()));
+            let between = [over.as_bytes(), &beyond].concat();
+            let between = String::from_utf8(between).unwrap();
+            assert!(
+                between.starts_with(owner) && !between.contains(PLACE),
+                "{between}"
+            );
+        }
+        let long = "x".repeat(100);
+        assert_eq!(over(&long, 3), long, "nothing of a longer name is lost");
     }
 
     #[test]
