@@ -16,20 +16,22 @@
 
 use core::f64::consts::PI;
 
+use core::time::Duration;
+
 use units::portable::cos;
-use units::{Radians, Volts};
+use units::{Radians, Time, Volts};
 
 /// So many samples must fall into a line's width.
 pub const SAMPLES_MIN: f64 = 8.0;
 /// Lines must be apart by so many widths: the window of one ends where the next one may begin.
 pub const WIDTHS_APART: f64 = 4.0;
-/// The window reaches so many widths to both sides.
-const REACH: f64 = 2.0;
+/// The window reaches so many widths to both sides, and nothing is told of a line that lacks a part of it.
+const REACH: f64 = WIDTHS_APART / 2.0;
 /// A pulse whose width at the level is off by more than this factor is no line: dirt, a scratch, an end of the turn.
 const WIDTH_FACTOR: f64 = 1.5;
 /// Pulses nearer to each other than this share of the width are one.
 const SAME_SHARE: f64 = 0.125;
-/// Beyond this multiple of the usual distance of two samples, one in between was lost.
+/// Beyond this multiple of the time between two samples, one in between was lost.
 const GAP: f64 = 1.5;
 /// Each round leaves about 0.4 of what the place is off by.
 const ROUNDS: usize = 40;
@@ -39,6 +41,8 @@ const SETTLED: f64 = 1e-9;
 /// Position and voltage of one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignalSample {
+    /// When.
+    pub at: Time,
     /// Where the table was.
     pub position: Radians,
     /// What the detector gave.
@@ -54,6 +58,8 @@ pub struct LineShape {
     pub is_above: bool,
     /// How far the table turns meanwhile.
     pub width: Radians,
+    /// From one sample to the next.
+    pub sampling: Duration,
 }
 
 /// A line that was seen.
@@ -71,31 +77,55 @@ pub struct SignalLine {
 /// # Example
 ///
 /// ```
+/// use core::time::Duration;
 /// use compensator::rotary::{LineShape, SignalSample, lines_in};
-/// use units::{Radians, Volts};
+/// use units::{Radians, Time, Volts};
 ///
 /// // A line at 0.5003 rad, 2 mrad wide, seen every half milliradian.
 /// let pulse = |at: f64| 5.0 * (-((at - 0.5003) / 0.85e-3).powi(2) / 2.0).exp();
 /// let samples: Vec<_> = (0..2000)
-///     .map(|step| f64::from(step) * 0.5e-3)
-///     .map(|at| SignalSample { position: Radians(at), signal: Volts(0.1 + pulse(at)) })
+///     .map(|step| (step, f64::from(step) * 0.5e-3))
+///     .map(|(step, at)| SignalSample {
+///         at: Time::ZERO + step * Duration::from_millis(5),
+///         position: Radians(at),
+///         signal: Volts(0.1 + pulse(at)),
+///     })
 ///     .collect();
-/// let shape = LineShape { level: Volts(2.5), is_above: true, width: Radians(2e-3) };
+/// let shape = LineShape {
+///     level: Volts(2.5),
+///     is_above: true,
+///     width: Radians(2e-3),
+///     sampling: Duration::from_millis(5),
+/// };
 /// let lines = lines_in(&samples, &shape);
 /// assert_eq!(lines.len(), 1);
 /// assert!((lines[0].position.value() - 0.5003).abs() < 1e-8);
 /// ```
 pub fn lines_in(samples: &[SignalSample], shape: &LineShape) -> Vec<SignalLine> {
     let points = ascending(samples, shape);
-    let usual = usual_distance(&points);
-    let pulses = pulses(&points, shape.width.value());
-    let lines = pulses.filter_map(|middle| line_at(&points, middle, shape.width.value(), usual));
+    let width = shape.width.value();
+    let is_line = |(begin, end): &(f64, f64)| {
+        let seen = end - begin;
+        seen < width * WIDTH_FACTOR && seen * WIDTH_FACTOR > width
+    };
+    let pulses = pulses(&points, width).into_iter().filter(is_line);
+    let lines = pulses.filter_map(|(a, b)| line_at(&points, (a + b) / 2.0, shape));
     lines.collect()
+}
+
+/// How wide what is beyond the level is, in the middle of all that is; `None` when nothing is. For a person who has
+/// to set `width`.
+pub fn width_seen(samples: &[SignalSample], shape: &LineShape) -> Option<Radians> {
+    let pulses = pulses(&ascending(samples, shape), shape.width.value());
+    let mut widths: Vec<f64> = pulses.into_iter().map(|(a, b)| b - a).collect();
+    widths.sort_by(f64::total_cmp);
+    widths.get(widths.len() / 2).copied().map(Radians)
 }
 
 /// Position, and by how much the signal is beyond the level.
 #[derive(Clone, Copy, Debug)]
 struct Point {
+    time: Time,
     at: f64,
     over: f64,
 }
@@ -103,24 +133,23 @@ struct Point {
 fn ascending(samples: &[SignalSample], shape: &LineShape) -> Vec<Point> {
     let sign = if shape.is_above { 1.0 } else { -1.0 };
     let point = |it: &SignalSample| Point {
+        time: it.at,
         at: it.position.value(),
         over: sign * (it.signal - shape.level).value(),
     };
     let mut points: Vec<Point> = samples.iter().map(point).collect();
+    // Equal positions keep their order, which must be that of the others.
+    if let [first, .., last] = points.as_slice()
+        && first.at > last.at
+    {
+        points.reverse();
+    }
     points.sort_by(|a, b| a.at.total_cmp(&b.at));
     points
 }
 
-/// The median distance of neighbours: of a turn, most is at one speed.
-fn usual_distance(points: &[Point]) -> f64 {
-    let apart = points.windows(2).map(|pair| pair[1].at - pair[0].at);
-    let mut apart: Vec<f64> = apart.collect();
-    apart.sort_by(f64::total_cmp);
-    apart.get(apart.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// The middles of what is beyond the level for about a line's width.
-fn pulses(points: &[Point], width: f64) -> impl Iterator<Item = f64> {
+/// Where what is beyond the level begins and ends.
+fn pulses(points: &[Point], width: f64) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     let mut begin = None;
     for pair in points.windows(2) {
@@ -144,18 +173,12 @@ fn pulses(points: &[Point], width: f64) -> impl Iterator<Item = f64> {
             _ => {}
         }
     }
-    let is_line = move |(begin, end): &(f64, f64)| {
-        let seen = end - begin;
-        seen < width * WIDTH_FACTOR && seen * WIDTH_FACTOR > width
-    };
     found
-        .into_iter()
-        .filter(is_line)
-        .map(|(a, b)| (a + b) / 2.0)
 }
 
 /// The centroid under a window about itself.
-fn line_at(points: &[Point], middle: f64, width: f64, usual: f64) -> Option<SignalLine> {
+fn line_at(points: &[Point], middle: f64, shape: &LineShape) -> Option<SignalLine> {
+    let width = shape.width.value();
     let reach = REACH * width;
     let mut centre = middle;
     for _ in 0..ROUNDS {
@@ -170,9 +193,12 @@ fn line_at(points: &[Point], middle: f64, width: f64, usual: f64) -> Option<Sign
         return None;
     }
     let window = within(points, centre, reach)?;
-    let is_whole = window
-        .windows(2)
-        .all(|pair| pair[1].at - pair[0].at < GAP * usual);
+    let longest = shape.sampling.mul_f64(GAP);
+    let apart = |pair: &[Point]| {
+        let [a, b] = [pair[0].time, pair[1].time];
+        a.since(b).max(b.since(a))
+    };
+    let is_whole = window.windows(2).all(|pair| apart(pair) <= longest);
     Some(SignalLine {
         position: Radians(centre),
         is_whole,
@@ -214,7 +240,9 @@ mod tests {
         level: Volts(2.5),
         is_above: true,
         width: Radians(WIDTH),
+        sampling: SAMPLING,
     };
+    const SAMPLING: Duration = Duration::from_millis(5);
     /// Full width at half of the height.
     const SIGMA: f64 = WIDTH / 2.354_820_045;
 
@@ -233,8 +261,9 @@ mod tests {
         let step = share * WIDTH;
         let count = (0.2 / step) as u32;
         (0..count)
-            .map(|number| start + f64::from(number) * step)
-            .map(|at| SignalSample {
+            .map(|number| (number, start + f64::from(number) * step))
+            .map(|(number, at)| SignalSample {
+                at: Time::ZERO + number * SAMPLING,
                 position: Radians(at),
                 signal: Volts(0.2 + 5.0 * lines.iter().map(|it| pulse(at - it)).sum::<f64>()),
             })
@@ -282,6 +311,22 @@ mod tests {
             ..SHAPE
         };
         assert!(off(&samples, &dark, 0.1) < 1e-6);
+    }
+
+    /// A slow turn, or a coarse encoder: some samples are at the same count.
+    #[test]
+    fn rounded_positions_are_no_lost_samples_either_way() {
+        let mut samples = seen(0.1, 0.0, &[0.1], gaussian);
+        let count = 0.08 * WIDTH;
+        for it in &mut samples {
+            it.position = Radians((it.position.value() / count).round() * count);
+        }
+        // Half a count.
+        assert!(off(&samples, &SHAPE, 0.1) < 0.04);
+        samples.reverse();
+        assert!(off(&samples, &SHAPE, 0.1) < 0.04);
+        let seen = width_seen(&samples, &SHAPE).unwrap().value() / WIDTH;
+        assert!((seen - 1.0).abs() < 0.1, "{seen}");
     }
 
     #[test]

@@ -76,7 +76,9 @@ pub(crate) use design::gcd;
 pub use design::{
     Design, DesignError, harmonic_max, rms_amplification_of_a_pair, rms_amplification_of_all,
 };
-pub use line_signal::{LineShape, SAMPLES_MIN, SignalLine, SignalSample, WIDTHS_APART, lines_in};
+pub use line_signal::{
+    LineShape, SAMPLES_MIN, SignalLine, SignalSample, WIDTHS_APART, lines_in, width_seen,
+};
 pub use misplaced::{Misplaced, misplaced, shift_between};
 pub use periodic::{
     NotAnAngle, PeriodicCompensation, PeriodicError, PeriodicInterpolation, PeriodicLimits,

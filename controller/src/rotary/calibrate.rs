@@ -16,7 +16,7 @@ use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::subject::{Subject, plate_record};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlateEntry, RotaryContent};
-use crate::run::{CalibrateOptions, missing, utc_now};
+use crate::run::{CalibrateOptions, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store};
 
 /// So many placements are needed before one can be told to be misplaced by the others.
@@ -57,9 +57,7 @@ impl RotaryTable<'_> {
     ) -> Result<RotaryCalibrated, Failure> {
         // What is asked of a configuration comes before what is asked of the table.
         self.subject().plate_run()?;
-        if !self.config.has_detector() {
-            return Err(missing(self.axis, "line_detector"));
-        }
+        self.require_detector()?;
         self.calibrate_by(store, options, &mut |table, run, due, journal| {
             table.place_plate(run, due, operator)?;
             table.read_placement(run, (due.offset, due.phase), due.done, journal)

@@ -148,6 +148,18 @@ fn check_signal(
             format!("give an analog module on `{}`", rotary.node.bus),
         );
     }
+    let place = module.and_then(|it| it.channels.iter().position(|it| *it == signal.channel));
+    let full_scale = place.and_then(|at| module?.full_scale_v.get(at).copied());
+    if let Some(most) = full_scale.filter(|most| signal.level_v.abs() >= *most) {
+        judge.say(
+            "level_v",
+            format!(
+                "{} is not below the largest voltage of the input, {most}",
+                signal.level_v
+            ),
+            "give half of the height of a line",
+        );
+    }
     if let Some(run) = &rotary.calibrate {
         let most = Radians::TURN.arcsec() / f64::from(run.lines) / WIDTHS_APART;
         if signal.width_arcsec > most {

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::config::{HomeOffsetName, OptionCodesConfig};
 use crate::hardware::node::NodeConfig;
 
-/// The kinds of drive of a rotary axis: those with a touch probe.
+/// The kinds of drive of a rotary axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RotaryDevice {
@@ -259,7 +259,7 @@ pub struct RotaryCalibrateConfig {
     #[schemars(range(min = 1, max = 1000))]
     pub passes: u32,
     /// Of a pass, the axis's own without it; between two lines there must be two SYNC periods where a
-    /// detector reads them.
+    /// touch probe reads them, and in a line eight samples where its voltage is sampled.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
     pub speed_deg_per_s: Option<f64>,
     /// Standard deviation of one line in one pass. Readings that scatter more than twice as much

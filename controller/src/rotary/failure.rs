@@ -3,7 +3,7 @@
 use compensator::rotary::{
     Misplaced, NotAnAngle, PeriodicError, PlanError, RotarySeriesError, SolveError,
 };
-use units::{Radians, Volts};
+use units::Radians;
 
 use crate::failure::of_kind::KindFailure;
 
@@ -15,10 +15,11 @@ pub enum RotaryFailure {
         "axis {axis}: only {seen} of {lines} lines were read in one pass, at least {wanted} are \
          needed; {}",
         if *overwritten > 0 {
-            format!("{overwritten} were overwritten before they were read: turn slower \
-                     (speed_deg_per_s), or give the computer less to do")
+            format!("{overwritten} were lost before they were read: give computer and bus less to do; a touch \
+                     probe loses fewer when the table turns slower (speed_deg_per_s)")
         } else {
-            "clean the plate, focus the detector".to_owned()
+            "clean the plate, focus the detector; a detector with a voltage also needs the `level_v` and \
+             `width_arcsec` of its lines".to_owned()
         }
     )]
     TooFewLines {
@@ -177,10 +178,10 @@ pub enum RotaryFailure {
     },
     /// A turn over a plate showed none of its lines as a voltage.
     #[error(
-        "axis {axis}: none of {lines} lines was seen in a whole turn at {input}: it showed {:.3} to {:.3} V, \
-         and a line is {:.3} arcsec wide at {:.3} V; is the plate there, the detector on, and are `level_v` and \
+        "axis {axis}: none of {lines} lines was seen in a whole turn at {input}: it showed {showed}, and a line \
+         should be {:.1} arcsec wide there; is the plate there, the detector on, and are `level_v` and \
          `width_arcsec` those of its lines?",
-        .from.value(), .to.value(), .width.arcsec(), .level.value()
+        .width.arcsec()
     )]
     NoSignal {
         /// Which axis.
@@ -189,14 +190,23 @@ pub enum RotaryFailure {
         lines: u32,
         /// Where the detector is wired to.
         input: String,
-        /// The lowest voltage …
-        from: Volts,
-        /// … and the highest one that was seen.
-        to: Volts,
-        /// What lines should reach.
-        level: Volts,
-        /// How wide they should be there.
+        /// Which voltages, and how wide what was beyond the level.
+        showed: String,
+        /// How wide lines should be there.
         width: Radians,
+    },
+    /// A turn in which lines would not be sampled often enough.
+    #[error(
+        "axis {axis}: {seen_deg_per_s:.3}°/s is too fast for each line to be sampled often enough, at most \
+         {most_deg_per_s:.3}°/s fits (speed_deg_per_s)"
+    )]
+    TooFast {
+        /// Which axis.
+        axis: String,
+        /// What was asked for.
+        seen_deg_per_s: f64,
+        /// What fits.
+        most_deg_per_s: f64,
     },
     /// A rotary table's error cannot be computed.
     #[error("{place}: {source}")]
@@ -227,7 +237,10 @@ pub enum RotaryFailure {
 impl KindFailure for RotaryFailure {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::OtherPlate { .. } | Self::Unsolved { .. } | Self::MisplacedInData { .. } => 2,
+            Self::OtherPlate { .. }
+            | Self::Unsolved { .. }
+            | Self::MisplacedInData { .. }
+            | Self::TooFast { .. } => 2,
             Self::Misplaced { .. }
             | Self::LiesElsewhere { .. }
             | Self::NotAnAngle { .. }

@@ -125,7 +125,7 @@ impl RotaryTable<'_> {
             }
             again += 1;
             self.core.observer().warning(&format!(
-                "axis {}: {} of {lines} lines were overwritten before they were read; the pass is \
+                "axis {}: {} of {lines} lines were lost before they were read; the pass is \
                  made again",
                 self.axis,
                 sweep.overwritten.len()
@@ -167,13 +167,11 @@ impl RotaryTable<'_> {
         // Of many lost by chance, some are lost in every pass by chance.
         if !again.is_empty() && unread * 20 < total {
             let names = names(first, &again);
-            say(format!(
-                "overwritten unread in every pass (a scratch?): {names}"
-            ));
+            say(format!("lost unread in every pass (a scratch?): {names}"));
         }
         if unread > 0 {
             say(format!(
-                "{unread} of {total} readings were overwritten before they were read: the computer is \
+                "{unread} of {total} readings were lost before they were read: the computer is \
                  busy, or the table too fast"
             ));
         }

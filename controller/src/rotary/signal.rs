@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
-use compensator::rotary::{LineShape, SAMPLES_MIN, SignalSample, lines_in};
-use drivers::device::AxisCommand;
-use units::{Radians, RadiansPerSecondSquared, Volts};
+use compensator::rotary::{
+    LineShape, SAMPLES_MIN, SignalSample, WIDTHS_APART, lines_in, width_seen,
+};
+use units::{Radians, RadiansPerSecond, Volts};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
@@ -13,13 +14,17 @@ use crate::rotary::failure::RotaryFailure;
 use crate::rotary::sweep::{LineEdge, Turn};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{LineSideName, LineSignalConfig, RotaryConfig};
+use crate::run::missing;
 
+/// So many samples more than the window of the first and the last line are taken.
+const SPARE_SAMPLES: f64 = 4.0;
 /// How long the machine lives at most between two looks at the samples; each frame ends a tick.
 const TICK_MAX: Duration = Duration::from_millis(100);
 
 impl LineSignalConfig {
-    pub(super) fn shape(&self) -> LineShape {
+    fn shape(&self, sampling: Duration) -> LineShape {
         LineShape {
+            sampling,
             level: Volts(self.level_v),
             is_above: self.line == LineSideName::Above,
             width: Radians::from_arcsec(self.width_arcsec),
@@ -39,6 +44,14 @@ impl LineSignalConfig {
         Some(self.width_arcsec / 3600.0 / (SAMPLES_MIN * sampling_s))
     }
 
+    /// How far the table turns at `speed` before the first line may come.
+    pub(super) fn run_up(&self, table: &RotaryTable<'_>, speed: RadiansPerSecond) -> Radians {
+        let sampling = self.sampling(table.core.config, table.config);
+        let spare_s = sampling.unwrap_or_default().as_secs_f64() * SPARE_SAMPLES;
+        Radians::from_arcsec(self.width_arcsec * WIDTHS_APART / 2.0)
+            + Radians(speed.value() * spare_s)
+    }
+
     /// Which of the module's readings it is.
     fn place(&self, config: &MachineConfig) -> Option<usize> {
         let channels = &config.analog.get(&self.analog)?.channels;
@@ -47,6 +60,15 @@ impl LineSignalConfig {
 }
 
 impl RotaryTable<'_> {
+    /// # Errors
+    /// When no detector reads lines while the table turns.
+    pub(super) fn require_detector(&self) -> Result<(), Failure> {
+        match self.config.has_detector() {
+            true => Ok(()),
+            false => Err(missing(self.axis, "line_detector` or `line_signal")),
+        }
+    }
+
     /// What the detector shows in a turn.
     pub(super) fn scan(
         &mut self,
@@ -54,10 +76,12 @@ impl RotaryTable<'_> {
         turn: &Turn,
         lines: u32,
     ) -> Result<Vec<LineEdge>, Failure> {
+        let sampling = signal.sampling(self.core.config, self.config);
+        let shape = signal.shape(sampling.unwrap_or_default());
         let samples = self.sample_turn(signal, turn)?;
-        let found = lines_in(&samples, &signal.shape());
+        let found = lines_in(&samples, &shape);
         if found.is_empty() {
-            return Err(self.nothing_seen(signal, &samples, lines));
+            return Err(self.nothing_seen(signal, &samples, lines, &shape));
         }
         let edges = found.iter().map(|it| LineEdge {
             position: it.position,
@@ -72,17 +96,15 @@ impl RotaryTable<'_> {
         turn: &Turn,
     ) -> Result<Vec<SignalSample>, Failure> {
         let config = self.core.config;
-        let sampling = signal.sampling(config, self.config).unwrap_or_default();
         let place = signal.place(config).unwrap_or_default();
-        let mut pairing = Pairing::of(sampling);
+        // Whatever the module leaves out, both are of one SYNC.
+        let sync_s = config.can[&self.config.node.bus].sync_period_ms * 1e-3;
+        let mut pairing = Pairing::of(Duration::from_secs_f64(sync_s));
         let mut samples = Vec::new();
-        let acceleration = self.config.acceleration_deg_per_s2.to_radians();
+        let limit = self.core.patience().of(turn.limit);
         let begun = self.core.now();
-        self.core.turning(self.axis)?.begin(AxisCommand::MoveTo {
-            target: turn.target,
-            speed: turn.speed,
-            acceleration: RadiansPerSecondSquared(acceleration),
-        })?;
+        let command = self.move_command(turn.target, turn.speed);
+        self.core.turning(self.axis)?.begin(command)?;
         loop {
             let deadline = self.core.now() + TICK_MAX;
             self.core.tick(deadline)?;
@@ -92,12 +114,11 @@ impl RotaryTable<'_> {
                 outcome?;
                 return Ok(samples);
             }
-            let waited = self.core.now().since(begun);
-            if waited > self.core.patience().of(turn.limit) {
+            if self.core.now().since(begun) > limit {
                 return Err(Failure::Machine(machine::Failure::Overdue {
                     device: self.axis.to_owned(),
-                    step: "turning over the plate",
-                    waited,
+                    step: "move",
+                    waited: limit,
                 }));
             }
         }
@@ -122,6 +143,7 @@ impl RotaryTable<'_> {
         Ok(voltages.volts.get(place).map(|seen| SignalSample {
             position: angle.position,
             signal: *seen,
+            at: voltages.at,
         }))
     }
 
@@ -130,15 +152,23 @@ impl RotaryTable<'_> {
         signal: &LineSignalConfig,
         samples: &[SignalSample],
         lines: u32,
+        shape: &LineShape,
     ) -> Failure {
         let seen = || samples.iter().map(|it| it.signal.value());
+        let (from, to) = (seen().reduce(f64::min), seen().reduce(f64::max));
+        let level = format!("beyond {:.3} V", signal.level_v);
+        let beyond = match width_seen(samples, shape) {
+            Some(width) => format!("{level} for {:.1} arcsec", width.arcsec()),
+            None => format!("never {level}"),
+        };
         RotaryFailure::NoSignal {
             axis: self.axis.to_owned(),
             lines,
             input: format!("input {} of {}", signal.channel, signal.analog),
-            from: Volts(seen().fold(f64::INFINITY, f64::min)),
-            to: Volts(seen().fold(f64::NEG_INFINITY, f64::max)),
-            level: Volts(signal.level_v),
+            showed: from.zip(to).map_or_else(
+                || "no voltage that came with an angle".to_owned(),
+                |(from, to)| format!("{from:.3} to {to:.3} V, {beyond}"),
+            ),
             width: Radians::from_arcsec(signal.width_arcsec),
         }
         .into()
@@ -169,6 +199,12 @@ mod tests {
             "channel = 3",
             "line_signal.channel",
             "does not read channel 3",
+        );
+        check(
+            "level_v = 2.2",
+            "level_v = 5.0",
+            "line_signal.level_v",
+            "largest voltage",
         );
         check(
             "arcsec = 1500.0",

@@ -14,6 +14,7 @@ use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
 
 use crate::failure::Failure;
+use crate::rotary::LineSignalConfig;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::line_speed::SPACING_SHARE;
 use crate::rotary::table::RotaryTable;
@@ -109,9 +110,14 @@ impl RotaryTable<'_> {
         let usual = RadiansPerSecond(config.speed_deg_per_s.to_radians());
         let acceleration = config.acceleration_deg_per_s2.to_radians();
         let speed = options.speed.unwrap_or(usual);
-        let run_up = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
+        let steady = speed.value() * (speed.value() / (2.0 * acceleration) + STEADY.as_secs_f64());
+        let signal = config.line_signal.as_ref();
+        let of_signal = signal.map_or(Radians::ZERO, |it| it.run_up(self, speed));
+        let run_up = steady + of_signal.value();
         let sign = options.approach.sign();
-        if config.line_signal.is_none() {
+        if let Some(signal) = signal {
+            self.check_sampling(signal, speed)?;
+        } else {
             let spacing = spacing_min(options.lines);
             let table = self.core.turning(self.axis)?;
             table.check_latch_speed(spacing, speed)?;
@@ -125,11 +131,29 @@ impl RotaryTable<'_> {
             speed,
             limit: SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value()),
         };
-        let edges = match &config.line_signal {
+        let edges = match signal {
             Some(signal) => self.scan(signal, &turn, options.lines)?,
             None => self.latch_lines(&turn, options.lines)?,
         };
         Ok(assign(&edges, first, options))
+    }
+
+    fn check_sampling(
+        &self,
+        signal: &LineSignalConfig,
+        speed: RadiansPerSecond,
+    ) -> Result<(), Failure> {
+        let most = signal.speed_max(self.core.config, self.config);
+        // What a file says in degrees comes back from radians a rounding larger.
+        match most.filter(|most| speed.value().to_degrees() > most * (1.0 + 1e-9)) {
+            None => Ok(()),
+            Some(most_deg_per_s) => Err(RotaryFailure::TooFast {
+                axis: self.axis.to_owned(),
+                seen_deg_per_s: speed.value().to_degrees(),
+                most_deg_per_s,
+            }
+            .into()),
+        }
     }
 
     /// What the touch probe latches in a turn.

@@ -94,16 +94,24 @@ impl RotaryTable<'_> {
         speed: RadiansPerSecond,
         limit: Duration,
     ) -> Result<(), Failure> {
-        let config = self.config;
-        let command = AxisCommand::MoveTo {
-            target,
-            speed,
-            acceleration: RadiansPerSecondSquared(config.acceleration_deg_per_s2.to_radians()),
-        };
+        let command = self.move_command(target, speed);
         Ok(self
             .core
             .turning(self.axis)?
             .command(command, "move", limit)?)
+    }
+
+    pub(super) fn move_command(
+        &self,
+        target: Radians,
+        speed: RadiansPerSecond,
+    ) -> AxisCommand<Radians> {
+        let acceleration = self.config.acceleration_deg_per_s2.to_radians();
+        AxisCommand::MoveTo {
+            target,
+            speed,
+            acceleration: RadiansPerSecondSquared(acceleration),
+        }
     }
 
     /// Where the drive says that the zeroed table is.

@@ -121,9 +121,7 @@ impl RotaryTable<'_> {
         compensated: bool,
         operator: &mut dyn Operator,
     ) -> Result<RotaryVerified, Failure> {
-        if !self.config.has_detector() {
-            return Err(missing(self.axis, "line_detector"));
-        }
+        self.require_detector()?;
         self.verify_by(
             store,
             (compensated, None),

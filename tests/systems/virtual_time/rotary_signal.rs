@@ -3,8 +3,9 @@
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::{Bench, Edit, Hand};
 use truestage::for_tests::{RotaryCalibrated, with_line_signal};
-use truestage::rotary::RotaryFailure;
+use truestage::rotary::{RotaryFailure, SweepOptions};
 use truestage::{CalibrateOptions, Failure};
+use units::{Approach, RadiansPerSecond};
 
 use super::rotary::{chi_square, hand_of, residual, started};
 
@@ -31,14 +32,15 @@ latency_us = 400.0
 
 [plant.table.motion]"#;
 
+fn emulated(text: String) -> String {
+    text.edit("lines = 360", "lines = 72")
+        .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
+        .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
+        .edit("[plant.table.motion]", NODE)
+}
+
 /// A plate of 72 lines on a table without harmonics that these cannot see.
 fn bench(seed: u64) -> Bench {
-    let emulated = |text: String| {
-        text.edit("lines = 360", "lines = 72")
-            .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
-            .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
-            .edit("[plant.table.motion]", NODE)
-    };
     Bench::rotary(seed, |text| with_line_signal(&text), emulated)
 }
 
@@ -118,7 +120,42 @@ fn a_detector_that_shows_no_lines_is_told_with_what_it_shows() {
         ),
         "{told}"
     );
-    for part in ["input 2 of photo", "0.199 to 0.201 V", "at 2.200 V"] {
+    for part in ["input 2 of photo", "0.2", "never beyond 2.200 V"] {
         assert!(told.contains(part), "{part}: {told}");
+    }
+}
+
+/// However slow the turn and however seldom the module samples: no line lacks a part of its window, and no voltage goes
+/// with another angle.
+#[test]
+fn a_slow_turn_and_a_module_that_leaves_syncs_out_see_every_line_and_a_fast_turn_is_refused() {
+    for (every, deg_per_s) in [(1, 1.0), (2, 5.0)] {
+        let machine = |text: String| {
+            with_line_signal(&text)
+                .edit("every_syncs = 1", &format!("every_syncs = {every}"))
+                .edit(
+                    "placement\nspeed_deg_per_s = 10.0",
+                    "placement\nspeed_deg_per_s = 5.0",
+                )
+        };
+        let mut bench = Bench::rotary(23, machine, emulated);
+        started(&mut bench);
+        let mut sweep = |approach, deg: Option<f64>| {
+            let options = SweepOptions {
+                lines: LINES,
+                approach,
+                speed: deg.map(|it| RadiansPerSecond(it.to_radians())),
+                phase: None,
+            };
+            bench
+                .machine
+                .guarded(|machine| machine.rotary(AXIS)?.sweep(&options))
+        };
+        for approach in [Approach::Forward, Approach::Reverse] {
+            let it = sweep(approach, Some(deg_per_s)).unwrap_or_else(|failure| panic!("{failure}"));
+            assert_eq!(it.read(), LINES as usize, "{approach:?}: {:?}", it.missing);
+        }
+        let failure = sweep(Approach::Forward, None).unwrap_err().to_string();
+        assert!(failure.contains("30.000°/s is too fast"), "{failure}");
     }
 }

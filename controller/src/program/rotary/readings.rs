@@ -77,12 +77,17 @@ impl ReadBy {
     pub(crate) fn of(args: &AxisArgs, readings: &ReadingsArgs) -> Result<Self, Failure> {
         let loaded = config::load(&args.machine.config)?;
         let axis = axis_of(&loaded, args)?;
-        match &loaded.config.rotary[&axis].sighting {
+        let rotary = &loaded.config.rotary[&axis];
+        let section = match rotary.line_signal {
+            Some(_) => "line_signal",
+            None => "line_detector",
+        };
+        match &rotary.sighting {
             None if readings.is_empty() => Ok(Self::Detector),
             None => Err(Failure::Usage {
                 what: format!("axis {axis}: --readings, and a line detector reads its plate"),
                 help: format!(
-                    "put [rotary.{axis}.sighting] in place of [rotary.{axis}.line_detector], or leave \
+                    "put [rotary.{axis}.sighting] in place of [rotary.{axis}.{section}], or leave \
                      --readings out"
                 ),
             }),
