@@ -148,7 +148,7 @@ fn check_signal(
             format!("give an analog module on `{}`", rotary.node.bus),
         );
     }
-    let place = module.and_then(|it| it.channels.iter().position(|it| *it == signal.channel));
+    let place = signal.place(config);
     let full_scale = place.and_then(|at| module?.full_scale_v.get(at).copied());
     if let Some(most) = full_scale.filter(|most| signal.level_v.abs() >= *most) {
         judge.say(

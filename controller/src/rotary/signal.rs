@@ -53,7 +53,7 @@ impl LineSignalConfig {
     }
 
     /// Which of the module's readings it is.
-    fn place(&self, config: &MachineConfig) -> Option<usize> {
+    pub(super) fn place(&self, config: &MachineConfig) -> Option<usize> {
         let channels = &config.analog.get(&self.analog)?.channels;
         channels.iter().position(|it| *it == self.channel)
     }

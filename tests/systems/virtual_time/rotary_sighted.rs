@@ -8,12 +8,12 @@ use truestage::for_tests::{Asked, Person, Question, RotaryCalibrated};
 use truestage::rotary::{Operator, PlateMove, PlateTask};
 use truestage::{CalibrateOptions, Failure, Machine};
 
-use super::rotary::{chi_square, hand_of, is_enabled, residual, started};
+use super::rotary::{
+    LIMIT_ARCSEC, check_tables, hand_of, is_enabled, residual, started, with_few_lines,
+};
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;
-/// What the touch probe reaches.
-const LIMIT_ARCSEC: f64 = 0.04;
 const TABLES: u64 = 6;
 
 /// A plate of 72 lines on a table without harmonics that these cannot see.
@@ -28,12 +28,7 @@ fn bench(seed: u64) -> Bench {
         .edit("closure_limit_arcsec = 0.1 ", "closure_limit_arcsec = 0.15 ")
         .edit("offset_lines = 200.5", "offset_lines = 40.5")
         };
-    let emulated = |text: String| {
-        text.edit("lines = 360", "lines = 72")
-            .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
-            .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
-    };
-    Bench::rotary(seed, machine, emulated)
+    Bench::rotary(seed, machine, |text| with_few_lines(&text))
 }
 
 /// Turns the plate and reads its lines.
@@ -124,33 +119,15 @@ fn calibrate(
 
 #[test]
 fn tables_read_through_a_microscope_are_as_right_as_by_the_touch_probe_and_as_sure_as_they_say() {
-    let (mut seen, mut expected, mut variance) = (0.0, 0.0, 0.0);
-    for seed in 1..=TABLES {
+    check_tables((TABLES, LINES), |seed| {
         let mut bench = bench(seed);
         started(&mut bench);
         let mut person = AtTheMicroscope::of(&bench);
         let it = calibrate(&mut bench, &CalibrateOptions::default(), &mut person)
             .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
         assert!(person.was_safe, "seed {seed}");
-        let left = [
-            residual(&mut bench, LINES, 0.0),
-            residual(&mut bench, LINES, 0.5),
-        ];
-        println!("seed {seed}: left {left:.4?} arcsec rms");
-        assert!(
-            left.iter().all(|it| *it <= LIMIT_ARCSEC),
-            "seed {seed}: {left:?}"
-        );
-        let terms = f64::from(LINES - 1);
-        let freedom = it.solution.degrees_of_freedom as f64;
-        seen += chi_square(&bench, &it);
-        expected += terms * freedom / (freedom - 2.0);
-        variance += 2.0 * terms + 2.0 * terms * terms / freedom;
-    }
-    // Both sides, 1 % together.
-    let tolerance = 2.576 * f64::sqrt(variance);
-    println!("χ² {seen:.0}, expected {expected:.0} ± {tolerance:.0} (1 %)");
-    assert!((seen - expected).abs() <= tolerance, "χ² = {seen}");
+        (bench, it)
+    });
 }
 
 /// Hours later, in another process, which knows nothing but the journal.

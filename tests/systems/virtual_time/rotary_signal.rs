@@ -7,12 +7,10 @@ use truestage::rotary::{RotaryFailure, SweepOptions};
 use truestage::{CalibrateOptions, Failure};
 use units::{Approach, RadiansPerSecond};
 
-use super::rotary::{chi_square, hand_of, residual, started};
+use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, residual, started, with_few_lines};
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;
-/// What the touch probe reaches.
-const LIMIT_ARCSEC: f64 = 0.04;
 const TABLES: u64 = 6;
 
 const NODE: &str = r#"[[nodes]]
@@ -33,10 +31,7 @@ latency_us = 400.0
 [plant.table.motion]"#;
 
 fn emulated(text: String) -> String {
-    text.edit("lines = 360", "lines = 72")
-        .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
-        .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
-        .edit("[plant.table.motion]", NODE)
+    with_few_lines(&text).edit("[plant.table.motion]", NODE)
 }
 
 /// A plate of 72 lines on a table without harmonics that these cannot see.
@@ -60,32 +55,14 @@ fn inject(bench: &Bench, fault: Fault) {
 
 #[test]
 fn tables_read_by_a_photodiode_are_as_right_as_by_the_touch_probe_and_as_sure_as_they_say() {
-    let (mut seen, mut expected, mut variance) = (0.0, 0.0, 0.0);
-    for seed in 1..=TABLES {
+    check_tables((TABLES, LINES), |seed| {
         let mut bench = bench(seed);
         started(&mut bench);
         let mut hand = hand_of(&bench.emulated);
         let it = calibrate(&mut bench, &mut hand)
             .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
-        let left = [
-            residual(&mut bench, LINES, 0.0),
-            residual(&mut bench, LINES, 0.5),
-        ];
-        println!("seed {seed}: left {left:.4?} arcsec rms");
-        assert!(
-            left.iter().all(|it| *it <= LIMIT_ARCSEC),
-            "seed {seed}: {left:?}"
-        );
-        let terms = f64::from(LINES - 1);
-        let freedom = it.solution.degrees_of_freedom as f64;
-        seen += chi_square(&bench, &it);
-        expected += terms * freedom / (freedom - 2.0);
-        variance += 2.0 * terms + 2.0 * terms * terms / freedom;
-    }
-    // Both sides, 1 % together.
-    let tolerance = 2.576 * f64::sqrt(variance);
-    println!("χ² {seen:.0}, expected {expected:.0} ± {tolerance:.0} (1 %)");
-    assert!((seen - expected).abs() <= tolerance, "χ² = {seen}");
+        (bench, it)
+    });
 }
 
 #[test]
