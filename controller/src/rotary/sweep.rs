@@ -1,9 +1,9 @@
 //! One turn of a rotary axis over the lines of a plate: where each line was read.
 //!
 //! The drive latches its position at every line (its touch probe), or a detector's voltage is sampled with the
-//! position (`signal`); nothing here depends on when a frame comes. Lines are told apart by where they are: each belongs to the nearest of `lines`
-//! equally spaced table positions, counted from the angle (the phase) that the lines have in
-//! common. Lines must therefore be off by less than a quarter of their spacing.
+//! position (`signal`); nothing here depends on when a frame comes. Lines are told apart by where they are: each
+//! belongs to the nearest of `lines` equally spaced table positions, counted from the angle (the phase) that the lines
+//! have in common. Lines must therefore be off by less than a quarter of their spacing.
 
 use core::f64::consts::TAU;
 use core::time::Duration;
