@@ -137,6 +137,69 @@ pub fn with_line_signal(text: &str) -> String {
         .edit("offset_lines = 200.5", "offset_lines = 40.5")
 }
 
+/// A camera in the place of a detector of four channels; AXIS, NAME, KEY, ROTATION and PLACE are filled in.
+const SPOT_CAMERA: &str = r#"
+[serial.NAME_AXIS]
+path = "/dev/NAME_AXIS"
+baud_bit_per_s = 115200
+
+[camera.NAME_AXIS]
+device = "in_sight"
+line = "NAME_AXIS"
+job = "spot.job"
+result_cell = "C7"
+length_um_per_unit = 1.0
+angle_arcsec_per_unit = 1.0
+rotation_deg = ROTATION
+targets = 1
+score_min_percent = 60.0
+rejects_max = 0
+inspection_timeout_ms = 200.0
+standard_uncertainty_um = 0.1
+standard_uncertainty_arcsec = 0.0
+
+[volumetric.beam.AXIS.KEY_camera]
+camera = "NAME_AXIS"
+PLACE
+field_um = [250.0, 250.0]
+age_max_ms = 450.0
+speed_max_um_per_s = 100.0
+noise_max_um = 3.0
+"#;
+
+/// The text of the shipped machine file of three axes with cameras, on the slide and at the end, that see the beams along
+/// `axes`.
+///
+/// # Panics
+/// When one of their detectors is not in the text.
+pub fn with_spot_cameras(text: &str, axes: &[&str]) -> String {
+    let mut text = text.to_owned();
+    for axis in axes {
+        // A picture is noisier than the mean of as many samples as there are meanwhile.
+        let section = format!("\n[volumetric.beam.{axis}]\n");
+        let start = text.find(&section).expect("it has one");
+        let (before, rest) = text.split_at(start);
+        let own = "standard_uncertainty_um = 0.1";
+        text = before.to_owned() + &rest.edit_first(own, "standard_uncertainty_um = 0.2");
+        // A slide that goes one way sees its spot go the other way.
+        for (key, name, rotation) in [("slider", "slide", "180.0"), ("end", "end", "0.0")] {
+            let head = format!("\n[volumetric.beam.{axis}.{key}]\n");
+            let start = text.find(&head).expect("it has one");
+            let rest = &text[start + 1..];
+            let own = &text[start..start + 1 + rest.find("\n[").unwrap_or(rest.len())];
+            let place = own.lines().find(|line| line.starts_with("place_mm"));
+            let camera = SPOT_CAMERA
+                .edit("AXIS", axis)
+                .edit("NAME", name)
+                .edit("KEY", key)
+                .edit("ROTATION", rotation)
+                .edit("PLACE", place.unwrap_or_default());
+            text = text.edit(own, "") + &camera;
+        }
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::Edit;

@@ -80,7 +80,9 @@ pub use program::{Serving, main};
 #[doc(hidden)]
 pub mod for_tests {
     pub use crate::assemble::ports as port_numbers;
-    pub use crate::edit::{Edit, with_line_signal, with_rare_heartbeats, with_three_rolls};
+    pub use crate::edit::{
+        Edit, with_line_signal, with_rare_heartbeats, with_spot_cameras, with_three_rolls,
+    };
     pub use crate::hardware::analog::ModuleConfig;
     pub use crate::hardware::camera::CameraDevice;
     pub use crate::hardware::drive::DriveConfig;

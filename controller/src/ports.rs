@@ -188,7 +188,12 @@ fn endpoints(
     let machines_own = |name: &String| {
         let mut analogs = config.analog.values();
         let mut axes = config.axis.values();
-        analogs.any(|it| it.port() == name) || axes.any(|it| it.port() == name)
+        // A camera that sees a beam is part of the machine; one that sees a platform is brought along.
+        let cameras = config.camera.iter();
+        let mut detectors = cameras.filter(|(camera, _)| config.is_detector(camera));
+        analogs.any(|it| it.port() == name)
+            || axes.any(|it| it.port() == name)
+            || detectors.any(|(_, it)| it.line == *name)
     };
     let lines = config
         .serial

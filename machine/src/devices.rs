@@ -11,6 +11,7 @@ use units::{Radians, Time};
 use wire::{Payload, Port, Ports};
 
 use crate::failure::Failure;
+use crate::lookout::Lookout;
 use crate::parts::Camera;
 use crate::unit::Unit;
 
@@ -21,6 +22,8 @@ pub struct Devices {
     pub(crate) analogs: Vec<Unit<dyn AnalogInput>>,
     pub(crate) instruments: Vec<Unit<dyn DisplacementInstrument>>,
     pub(crate) cameras: Vec<Camera>,
+    /// By the numbers of the cameras.
+    pub(crate) lookouts: Vec<Lookout>,
 }
 
 /// Any device, with its port.

@@ -17,6 +17,7 @@ use crate::bus_watch::BusWatch;
 use crate::devices::Devices;
 use crate::failure::Failure;
 use crate::host_watch::HostWatch;
+use crate::lookout::Lookout;
 use crate::notices::Notices;
 use crate::observer::Observer;
 use crate::outbox::Outbox;
@@ -118,12 +119,14 @@ impl Machine {
                 rotaries: parts.rotaries,
                 analogs: parts.analogs,
                 instruments: parts.instruments,
+                lookouts: vec![Lookout::default(); parts.cameras.len()],
                 cameras: parts.cameras,
             },
             settings,
             ports: Ports {
                 buses: parts.buses,
                 lines: parts.lines,
+                is_synchronous: false,
             },
             patience: parts.patience,
             transport,
@@ -242,24 +245,27 @@ impl Machine {
     }
 
     /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
-    /// moves. Instruments and cameras are started when a procedure first needs them: a machine
+    /// moves. Instruments, and cameras that are no detectors, are started when a procedure first needs them: a machine
     /// in production may have none.
     ///
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
     pub fn start(&mut self) -> Result<(), Failure> {
         self.catch_up();
+        self.devices.lookouts.fill(Lookout::default());
         self.zeroed.fill(false);
         self.approach.iter_mut().for_each(ApproachTracker::forget);
         self.ports.set_sync(&mut *self.transport, true)?;
         let machine_devices = self.devices.instrument_device(0);
+        let detectors = self.devices.detector_cameras();
         let now = self.now();
-        for at in 0..machine_devices {
+        for at in (0..machine_devices).chain(detectors.iter().copied()) {
             self.devices.unit_mut(at).device.start(now);
         }
-        for at in 0..machine_devices {
+        for at in (0..machine_devices).chain(detectors) {
             self.await_start(at)?;
         }
+        self.devices.open_lookouts();
         self.supervision = Supervision::On;
         Ok(())
     }

@@ -113,4 +113,6 @@ pub struct Camera {
     pub inspection_timeout: Duration,
     /// How many pictures of one pose may be rejected.
     pub rejects_max: u32,
+    /// Whether it sees the spot of a beam, all the time; otherwise it is started when a procedure first needs it.
+    pub is_detector: bool,
 }

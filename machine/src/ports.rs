@@ -14,6 +14,8 @@ pub(crate) struct Ports {
     pub(crate) buses: Vec<Bus>,
     /// The names of the serial lines.
     pub(crate) lines: BTreeMap<Port, String>,
+    /// Whether the transport sends SYNC.
+    pub(crate) is_synchronous: bool,
 }
 
 impl Ports {
@@ -26,7 +28,12 @@ impl Ports {
     }
 
     /// Lets `transport` send SYNC on every bus, or on none.
-    pub(crate) fn set_sync(&self, transport: &mut dyn Transport, on: bool) -> Result<(), Failure> {
+    pub(crate) fn set_sync(
+        &mut self,
+        transport: &mut dyn Transport,
+        on: bool,
+    ) -> Result<(), Failure> {
+        self.is_synchronous = on;
         for bus in &self.buses {
             let period = on.then_some(bus.sync_period);
             transport

@@ -29,7 +29,7 @@ impl Machine {
     }
 
     /// Rests for `span`: every axis is switched off and no SYNC is sent, while heartbeats go on, so
-    /// that each drive keeps its origin. Then SYNC runs again and every device must have sent.
+    /// that each drive keeps its origin. Then SYNC runs again and every axis and module must have sent.
     ///
     /// # Errors
     /// When an axis cannot be disabled, a bus fails, somebody asks to stop, or a device is silent

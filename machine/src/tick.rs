@@ -40,6 +40,8 @@ impl Machine {
             self.take(&arrival)?;
         }
         self.fire_deadlines(now);
+        let wanted = self.ports.is_synchronous;
+        self.devices.keep_looking(now, wanted, &mut self.notices);
         self.send_pending()?;
         self.judge_alarms()?;
         if self.supervision != Supervision::Stopping && self.stop.is_requested() {

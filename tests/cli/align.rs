@@ -8,7 +8,7 @@ use nix::pty::openpty;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use tests::{Edit, Rig};
+use tests::{Edit, Rig, with_emulated_spot_cameras, with_spot_cameras};
 
 use crate::programs::{live_rigs, number, text};
 use crate::volumetric_live::Live;
@@ -110,6 +110,34 @@ fn each_detector_says_what_is_wrong_with_its_beam_and_which_way_it_is() {
         let bright = number(&detector(&seen, "y end")["sum_v"]);
         assert!(bright > 11.0, "{bright} V");
         assert_eq!(seen["signals"][0]["instrument"], "laser");
+    }
+}
+
+/// The detectors of x are cameras on serial lines; its beam is blocked behind the slide.
+#[test]
+fn cameras_say_where_the_spot_is_or_that_there_is_none() {
+    for rig in live_rigs() {
+        let live = Live::shaped(
+            rig,
+            |text| with_spot_cameras(&text, &["x"]),
+            |text| with_emulated_spot_cameras(&text, &["x"]) + TROUBLED,
+        );
+        let words = ["align", "machine.toml", "--for", "2s"];
+        let (printed, code) = ended(start(&mut live.command(&words), Stdio::piped()));
+        assert_eq!(code, Some(0), "{printed}");
+        let seen = objects(&printed).pop().expect("one a second");
+        let slide = detector(&seen, "x slide");
+        assert_eq!(slide["state"], "good", "{slide}");
+        assert!(slide["sum_v"].is_null(), "{slide}");
+        for (reading, along) in slide["readings"].as_array().unwrap().iter().zip(["y", "z"]) {
+            assert_eq!(text(&reading["along"]), along);
+            let place = number(&reading["from_middle"]);
+            assert!(place.abs() < 100.0 && place != 0.0, "{reading}");
+            assert_eq!(number(&reading["field"][1]), 250.0);
+        }
+        let end = detector(&seen, "x end");
+        assert_eq!(end["state"], "no_spot", "{end}");
+        assert!(end["readings"][0]["place"].is_null(), "{end}");
     }
 }
 

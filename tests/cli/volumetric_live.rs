@@ -78,6 +78,15 @@ impl Live {
 
     /// The same, its emulation after `change`.
     pub(crate) fn of(rig: Rig, change: impl Fn(String) -> String) -> Self {
+        Self::shaped(rig, |text| text, change)
+    }
+
+    /// The same, its small configuration after `shape` too.
+    pub(crate) fn shaped(
+        rig: Rig,
+        shape: impl Fn(String) -> String,
+        change: impl Fn(String) -> String,
+    ) -> Self {
         let turn = one_machine();
         let toml = &change(VOLUMETRIC.emulated.to_owned());
         let emulated = match rig {
@@ -86,7 +95,7 @@ impl Live {
         };
         let emulated = emulated.unwrap_or_else(|error| panic!("{error}"));
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let machine = small(VOLUMETRIC.machine);
+        let machine = shape(small(VOLUMETRIC.machine));
         fs::write(folder.path().join("machine.toml"), machine).expect("there is room");
         let ports = ports(&emulated);
         Self {

@@ -123,7 +123,8 @@ fn risen(bench: &Bench, seen: &Seen) -> VolumetricState {
     let beams = Axis::ALL.map(|axis| {
         let at = axis.index();
         let beam = config.beam.each()[at].expect("it has one");
-        let [first, second] = place(detector(&beam.slider), 8 * at, seen);
+        let slide = beam.slider.as_ref().expect("it has one");
+        let [first, second] = place(detector(slide), 8 * at, seen);
         let up = if axis == Axis::X { RISEN } else { Metres::ZERO };
         let end = detector(beam.end.as_ref().expect("it has one"));
         let end = place(end, 8 * at + 4, seen);

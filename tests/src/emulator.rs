@@ -106,6 +106,14 @@ impl Setup {
         Self::of(ROTARY, seed)
     }
 
+    /// With both texts changed as a whole.
+    #[must_use]
+    pub fn shaped(mut self, machine: fn(String) -> String, emulated: fn(String) -> String) -> Self {
+        self.machine.push(Change::By(machine));
+        self.emulated.push(Change::By(emulated));
+        self
+    }
+
     /// On another SocketCAN interface than the usual one.
     #[must_use]
     pub const fn interface(mut self, name: &'static str) -> Self {

@@ -453,6 +453,7 @@ impl Volume {
                     actual: &target,
                     channels: &[],
                     temperatures: &[],
+                    spots: &[],
                 });
                 let command = core::array::from_fn(|k| target[k] + corrected.offset[k]);
                 let (is, should) = (truth.tool_point_for(command), truth.nominal_for(target));

@@ -1,11 +1,12 @@
 //! The rotary table's whole cycle, the same on every bus.
 
-use tests::{Emulator, Hand, Setup, Stand, on_every_rig};
+use tests::{Emulator, Hand, Setup, Stand, on_every_rig, with_emulated_line_signal};
 use truestage::CalibrateOptions;
 use truestage::Failure;
 use truestage::emulated::HallDrift;
-use truestage::rotary::Way;
-use units::Radians;
+use truestage::for_tests::with_line_signal;
+use truestage::rotary::{SweepOptions, Way};
+use units::{Approach, Radians, RadiansPerSecond};
 
 const AXIS: &str = "c";
 const SEED: u64 = 41;
@@ -63,6 +64,30 @@ fn cycle(stand: &mut Stand) -> Result<(), Failure> {
 #[test]
 fn the_whole_cycle_brings_the_table_within_three_tenths_of_an_arcsecond_on_every_bus() {
     on_every_rig(&slow(Setup::rotary(SEED)), cycle);
+}
+
+/// Voltage and angle of one SYNC go together whatever carries them.
+fn sweep_by_photodiode(stand: &mut Stand) -> Result<(), Failure> {
+    let mut table = stand.machine.rotary(AXIS)?;
+    table.zero()?;
+    for approach in [Approach::Forward, Approach::Reverse] {
+        let options = SweepOptions {
+            lines: 72,
+            approach,
+            speed: Some(RadiansPerSecond(10_f64.to_radians())),
+            phase: None,
+        };
+        let seen = table.sweep(&options)?;
+        assert_eq!(seen.read(), 72, "{approach:?}: {:?}", seen.missing);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_plate_that_passes_a_photodiode_is_read_alike_on_every_bus() {
+    let setup =
+        Setup::rotary(SEED).shaped(|text| with_line_signal(&text), with_emulated_line_signal);
+    on_every_rig(&setup, sweep_by_photodiode);
 }
 
 /// As slow as a host needs that runs it much faster than real time, and has other things to do; and

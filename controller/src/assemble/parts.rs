@@ -69,6 +69,7 @@ pub(crate) fn parts(loaded: &Loaded) -> Parts {
                 },
                 inspection_timeout: it.inspection_timeout(),
                 rejects_max: it.rejects_max,
+                is_detector: config.is_detector(name),
             })
             .collect(),
         patience,

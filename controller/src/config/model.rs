@@ -1,5 +1,6 @@
 //! The configuration file's structure, version 1. Each key's suffix is its unit.
 
+use core::time::Duration;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -75,5 +76,19 @@ impl MachineConfig {
             can: &self.can,
             serial: &self.serial,
         }
+    }
+
+    /// How long a picture of the slowest camera that sees a beam may take; nothing without one.
+    pub(crate) fn longest_picture(&self) -> Duration {
+        let detectors = self.camera.iter();
+        let detectors = detectors.filter(|(name, _)| self.is_detector(name));
+        let pictures = detectors.map(|(_, camera)| camera.inspection_timeout());
+        pictures.max().unwrap_or_default()
+    }
+
+    /// Whether the camera `name` sees the spot of a beam, all the time.
+    pub(crate) fn is_detector(&self, name: &str) -> bool {
+        let of_volume = self.volumetric.iter().flat_map(VolumetricConfig::cameras);
+        of_volume.map(|it| &it.camera).any(|it| it == name)
     }
 }

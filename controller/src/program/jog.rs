@@ -14,6 +14,7 @@ use crate::program::MachineArgs;
 use crate::program::json::counters;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::Session;
+use crate::program::span::span_of;
 use crate::{Failure, Machine};
 
 /// Which axis, which way, how fast and for how long.
@@ -24,9 +25,9 @@ pub(crate) struct JogArgs {
     /// How fast, and with its sign which way: `x=2mm/s`, `x=-500um/s`; at most the usual speed of the axis.
     #[arg(value_name = "AXIS=SPEED")]
     target: Option<String>,
-    /// End after so many seconds; without it, at the soft limit or with Ctrl-C.
-    #[arg(long = "for", value_name = "SECONDS")]
-    seconds: Option<f64>,
+    /// End after so long: `2s`, `1.5min`; without it, at the soft limit or with Ctrl-C.
+    #[arg(long = "for", value_name = "TIME", value_parser = span_of)]
+    span: Option<Duration>,
 }
 
 /// What was asked for.
@@ -49,26 +50,14 @@ impl JogArgs {
     }
 
     /// # Errors
-    /// When it is not said which axis and how fast, or for no possible time.
+    /// When it is not said which axis and how fast.
     pub(crate) fn jog(&self) -> Result<Jog, Failure> {
         let text = self.target.as_deref().unwrap_or_default();
         let (axis, speed) = axis_speed(text)?;
-        let duration = match self.seconds {
-            None => None,
-            Some(seconds) if seconds > 0.0 && seconds < 1e6 => {
-                Some(Duration::from_secs_f64(seconds))
-            }
-            Some(seconds) => {
-                return Err(Failure::Usage {
-                    what: format!("--for {seconds} is no time to move for"),
-                    help: "give seconds above 0 and below a million: --for 2.5".into(),
-                });
-            }
-        };
         Ok(Jog {
             axis,
             speed,
-            duration,
+            duration: self.span,
         })
     }
 }

@@ -8,6 +8,7 @@ mod data;
 mod data_file;
 mod demo;
 mod exchange;
+mod explain;
 mod jog;
 mod json;
 mod kept;
@@ -30,6 +31,7 @@ mod scan;
 mod serve;
 mod session;
 mod show;
+mod span;
 #[cfg(test)]
 mod stored_tests;
 mod targets;
@@ -125,6 +127,8 @@ enum Command {
         #[command(flatten)]
         by: data::MeasuredBy,
     },
+    /// Say what a code means, what it mostly comes from and what to do: `truestage explain 0x8611`.
+    Explain(explain::ExplainArgs),
     /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
     Serve(ServeArgs),
     /// What a machine that is kept by a service does, and its axes.
@@ -423,6 +427,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => data::plan(&command, output),
         Command::Iso230 { data, by } => data::iso230(&data, &by, output),
+        Command::Explain(args) => explain::run(&args, output),
         Command::Status(service) => ask::status(&service, output),
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),

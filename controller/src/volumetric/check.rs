@@ -9,7 +9,7 @@ use crate::config::judge::{Finding, Judge};
 use crate::volumetric::check::detectors::check_detectors;
 use crate::volumetric::settings;
 use crate::volumetric::{ReactionName, VolumetricConfig};
-use machine::engine::{CHANNELS_MAX, THERMOMETERS_MAX};
+use machine::engine::{CHANNELS_MAX, SPOTS_MAX, THERMOMETERS_MAX};
 
 pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let Some(volumetric) = &config.volumetric else {
@@ -323,14 +323,13 @@ fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
     for (what, seen, limit) in [
         ("voltages", voltages, CHANNELS_MAX),
         ("thermometers", sensors, THERMOMETERS_MAX),
+        ("cameras", config.camera.len(), SPOTS_MAX),
     ] {
         if seen > limit {
             judge.say(
                 "",
-                format!(
-                    "all modules together have {seen} {what}, the correction reads at most {limit}"
-                ),
-                "list only the channels that are used",
+                format!("there are {seen} {what} altogether, the correction reads at most {limit}"),
+                "list only what is used",
             );
         }
     }
@@ -338,8 +337,10 @@ fn check_room(judge: &mut Judge<'_>, config: &MachineConfig) {
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
     use crate::config::parse;
     use crate::config::validate::told;
+    use crate::edit::with_spot_cameras;
 
     const VOLUMETRIC: &str = include_str!("../../../configs/machines/volumetric.toml");
 
@@ -398,6 +399,34 @@ mod tests {
         let key = ".compensation.rate_limit_um_per_s";
         let from = "\nrate_limit_um_per_s = 2000.0";
         check(from, "\nrate_limit_um_per_s = 2001.0", key, "axis x");
+    }
+
+    /// The finding in the section of x's slide's camera, or another place of its beam.
+    #[track_caller]
+    fn check_camera(from: &str, to: &str, key: &str, says: &str) {
+        let text = with_spot_cameras(VOLUMETRIC, &["x"]);
+        told::check(&text, from, to, &format!("volumetric.beam.x{key}"), says);
+    }
+
+    #[test]
+    fn cameras_that_cannot_be_are_found_where_they_stand() {
+        let text = with_spot_cameras(VOLUMETRIC, &["x", "y", "z"]);
+        parse(&text, "volumetric.toml").unwrap_or_else(|error| panic!("{error}"));
+        let slide = "\ncamera = \"slide_x\"";
+        let key = ".slider_camera.camera";
+        check_camera(slide, "\ncamera = \"side_x\"", key, "`side_x`");
+        check_camera(slide, "\ncamera = \"end_x\"", key, "another beam");
+        let end = "rotation_deg = 180.0\ntargets = 1";
+        check_camera(end, "rotation_deg = 180.0\ntargets = 2", key, "targets");
+        let both = "\n[volumetric.beam.y]\n";
+        let (start, end) = (
+            "\n[volumetric.beam.y.slider]\n",
+            "\n[volumetric.beam.y.end]\n",
+        );
+        let own = &VOLUMETRIC[VOLUMETRIC.find(start).unwrap()..VOLUMETRIC.find(end).unwrap()];
+        let second = own.edit("beam.y", "beam.x").edit("beams_y", "beams_x");
+        let key = ".slider_camera";
+        check_camera(both, &format!("{second}{both}"), key, "two detectors");
     }
 
     #[test]

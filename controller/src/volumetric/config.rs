@@ -8,8 +8,8 @@ mod detectors;
 mod one_or_more;
 
 pub(crate) use detectors::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, LayoutName,
-    RollConfig, TemperatureConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, CurvePointConfig, DetectorConfig,
+    LayoutName, PICTURE_PERIODS_MAX, RollConfig, SpotCameraConfig, TemperatureConfig,
 };
 pub(crate) use one_or_more::OneOrMore;
 #[cfg(test)]
@@ -82,6 +82,12 @@ impl VolumetricConfig {
     pub fn rolls(&self) -> [Option<&RollConfig>; 3] {
         let axes = [VolumeAxisName::X, VolumeAxisName::Y, VolumeAxisName::Z];
         axes.map(|axis| self.roll.each().iter().find(|it| it.axis == axis))
+    }
+
+    /// The cameras that see beams.
+    pub(crate) fn cameras(&self) -> impl Iterator<Item = &SpotCameraConfig> {
+        let beams = self.beam.each().into_iter().flatten();
+        beams.flat_map(BeamConfig::cameras)
     }
 }
 
@@ -189,7 +195,7 @@ pub struct FeedConfig {
     /// How long the way to a detector that comes (back) takes.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub blend_s: f64,
-    /// Good samples in a row before it is believed.
+    /// Good samples in a row, of a camera pictures, before it is believed.
     #[schemars(range(min = 1, max = 1000000))]
     pub confirm: u32,
     /// Time constant against noise.

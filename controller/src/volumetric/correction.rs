@@ -6,11 +6,15 @@
 //! slews from one correction to the next; that the rate is enough at the axes' full speed is proven
 //! when the correction is made. Nothing is allocated in a period.
 //!
-//! The detectors' positions are those of the last SYNC although their samples may be some SYNCs
-//! old: a reference is wrong by its slope times the way since then.
+//! The positions of detectors with channels are those of the last SYNC although their samples may be some SYNCs
+//! old: a reference is wrong by its slope times the way since then. A picture is some tenths of a second old: its position
+//! is where the axis was when it was asked for ([`trail`]).
 
 mod sources;
+mod trail;
 mod uncertainty;
+
+use trail::Trail;
 
 use core::any::Any;
 
@@ -28,15 +32,17 @@ use units::{Celsius, Metres, Quantity, Radians};
 
 use crate::config::MachineConfig;
 use crate::volumetric::VolumetricFailure;
-use crate::volumetric::inputs::{RollReader, confirmed_by_samples, place_of_voltage, sample};
+use crate::volumetric::inputs::{
+    DetectorPlace, RollReader, confirmed_by_samples, feed_of, slide_of,
+};
 use crate::volumetric::limits;
 use crate::volumetric::settings::{
-    beam_detector, feed_settings, influences, point_of_mm, roll_max, thermal, volume_axis,
-    volumetric_chain, work_volume,
+    eye, feed_settings, influences, point_of_mm, roll_max, thermal, volume_axis, volumetric_chain,
+    work_volume,
 };
 use crate::volumetric::thermometers::Thermometers;
 use crate::volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamsConfig, BendConfig, FeedConfig, OneOrMore, ReactionName,
+    BeamConfig, BeamsConfig, BendConfig, DetectorConfig, FeedConfig, OneOrMore, ReactionName,
     RollConfig, VolumetricConfig,
 };
 use machine::engine::{AXES_MAX, Corrected, Correction, Lack, Observed, PerAxis, Validity};
@@ -62,14 +68,16 @@ pub struct VolumetricState {
     pub memories: Memories,
 }
 
-/// One beam, and where its detectors' channels stand.
+/// One beam, and where what its detectors show stands.
 #[derive(Clone, Debug)]
 struct WatchedBeam {
     monitor: AxisMonitor,
-    slider: [usize; 4],
-    end: Option<[usize; 4]>,
+    slider: DetectorPlace,
+    end: Option<DetectorPlace>,
     /// Where the detector sits on the slide: there it sees the slide's tilts too.
     lever: DetectorLever,
+    /// Where the axis was when the slide's detector saw what it showed last.
+    position: Metres,
 }
 
 /// The roll of one slide.
@@ -91,6 +99,8 @@ pub struct VolumetricCorrection {
     temperatures: Vec<Celsius>,
     influences: Influences,
     memories: Memories,
+    /// Where the axes were when pictures were taken.
+    trail: Trail,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
     /// Of a displacement by detectors that are believed.
@@ -119,7 +129,7 @@ impl VolumetricCorrection {
                 let reference = reference.ok_or(VolumetricFailure::NoReference { axis })?;
                 let lever = lever(
                     axis,
-                    beam,
+                    slide_of(beam)?,
                     &model.machine().thermal.bends,
                     &state.temperatures,
                 );
@@ -148,6 +158,7 @@ impl VolumetricCorrection {
             temperatures: state.temperatures,
             influences: influences(&own.influence)?,
             memories: state.memories,
+            trail: Trail::default(),
             reaction: own.feed.as_ref().map(|it| it.reaction),
             u_displacement: u_displacement(own),
             u_roll: u_roll(own),
@@ -185,6 +196,7 @@ impl VolumetricCorrection {
     /// What the detectors say at `actual`, as it enters the model.
     fn moving_state(&mut self, observed: &Observed<'_>, actual: Point) -> MovingState {
         let mut state = MovingState::default();
+        self.trail.note(observed.now, actual);
         // Tilts come first: a detector beside its slide's zero sees them too, also those that are kept.
         let mut whole = [Radians::ZERO; 3];
         for roll in self.rolls.iter_mut().flatten() {
@@ -198,9 +210,11 @@ impl VolumetricCorrection {
             let Some(beam) = &mut self.beams[axis.index()] else {
                 continue;
             };
-            let (position, roll) = (actual.along(axis), whole[axis.index()]);
-            let slider = sample(observed.channels, &beam.slider);
-            let end = beam.end.and_then(|it| sample(observed.channels, &it));
+            let slider = beam.slider.shown(observed);
+            let end = beam.end.and_then(|it| it.shown(observed));
+            let position = self.trail.position(axis, slider.as_ref(), actual);
+            beam.position = position;
+            let roll = whole[axis.index()];
             let seen = beam.monitor.advance(
                 observed.now,
                 position,
@@ -303,8 +317,8 @@ fn per_axis(point: Point) -> PerAxis<Metres> {
 fn u_displacement(config: &VolumetricConfig) -> Metres {
     let beams = config.beam.each().into_iter().flatten();
     let each = beams.map(|it| {
-        let noise_um = it.slider.noise_max_um / NOISE_RANGE;
-        Metres::from_um(it.standard_uncertainty_um.unwrap_or(noise_um))
+        let noise_um = it.on_the_slide().map_or(0.0, |it| it.noise_max_um());
+        Metres::from_um(it.standard_uncertainty_um.unwrap_or(noise_um / NOISE_RANGE))
     });
     each.fold(Metres::ZERO, Quantity::max)
 }
@@ -345,11 +359,11 @@ fn model(config: &VolumetricConfig, state: &VolumetricState) -> Result<Model, Vo
 /// Where the detector on the slide of `axis` sits, and what tilts that slide beyond `references`.
 pub(super) fn lever(
     axis: Axis,
-    beam: &BeamConfig,
+    detector: DetectorConfig<'_>,
     bends: &[ThermalBend],
     references: &[Celsius],
 ) -> DetectorLever {
-    let place = point_of_mm(beam.slider.place_mm);
+    let place = point_of_mm(detector.place_mm());
     DetectorLever::new(axis, place, bends, references)
 }
 
@@ -380,30 +394,22 @@ fn watched_beam(
 ) -> Result<WatchedBeam, VolumetricFailure> {
     let axis = lever.axis();
     let common = feed(volumetric)?;
-    let places = |it: &BeamDetectorConfig| {
-        it.channels
-            .map(|channel| place_of_voltage(config, &it.analog, channel))
-    };
-    let detector = |it: &BeamDetectorConfig| {
-        beam_detector(it).map_err(|source| VolumetricFailure::Detector { axis, source })
-    };
-    let feed = |it: &BeamDetectorConfig| {
-        let settings = confirmed_by_samples(config, common, &it.analog);
-        Feed::new(feed_settings(&settings))
-    };
-    let end = match &beam.end {
+    let detector = |it| eye(it).map_err(|source| VolumetricFailure::Detector { axis, source });
+    let feed = |it| Feed::new(feed_settings(&feed_of(config, common, it)));
+    let end = match beam.at_the_end() {
         Some(it) => Some(EndOfTravel {
             detector: detector(it)?,
             feed: feed(it),
         }),
         None => None,
     };
-    let slider = detector(&beam.slider)?;
+    let slide = slide_of(beam)?;
     Ok(WatchedBeam {
-        monitor: AxisMonitor::new(axis, slider, end, reference, feed(&beam.slider)),
-        slider: places(&beam.slider),
-        end: beam.end.as_ref().map(places),
+        monitor: AxisMonitor::new(axis, detector(slide)?, end, reference, feed(slide)),
+        slider: DetectorPlace::of(config, slide),
+        end: beam.at_the_end().map(|it| DetectorPlace::of(config, it)),
         lever,
+        position: Metres(0.0),
     })
 }
 

@@ -5,8 +5,8 @@ use crate::config::MachineConfig;
 use crate::config::dependence::devices::say_module;
 use crate::config::dependence::text::{Place, by_its_word};
 use crate::volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, LayoutName, RollConfig, VolumeAxisName,
-    VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, LayoutName, RollConfig, SpotCameraConfig,
+    VolumeAxisName, VolumetricConfig,
 };
 
 pub(crate) fn depends(config: &MachineConfig, top: &mut Place<'_>) {
@@ -49,12 +49,36 @@ fn say_beam(mut place: Place<'_>, config: &MachineConfig, beam: &BeamConfig) {
     place.say("source_mm", beam.source_mm);
     place.say("end_mm", beam.end_mm);
     place.say("translation_share", beam.translation_share);
-    say_detector(place.at("slider"), config, &beam.slider);
     // Where it sits is in the tables that it told, and taken off what it says later; nothing is taken
     // off what the other one says.
-    place.at("slider").say("place_mm", beam.slider.place_mm);
+    if let Some(slider) = &beam.slider {
+        say_detector(place.at("slider"), config, slider);
+        place.at("slider").say("place_mm", slider.place_mm);
+    }
+    if let Some(slider) = &beam.slider_camera {
+        say_spot(place.at("slider_camera"), config, slider);
+        place.at("slider_camera").say("place_mm", slider.place_mm);
+    }
     if let Some(end) = &beam.end {
         say_detector(place.at("end"), config, end);
+    }
+    if let Some(end) = &beam.end_camera {
+        say_spot(place.at("end_camera"), config, end);
+    }
+}
+
+/// What a camera reads depends on which one it is, and on what turns its numbers into places.
+fn say_spot(mut place: Place<'_>, config: &MachineConfig, spot: &SpotCameraConfig) {
+    // Its name may change.
+    if let Some(camera) = config.camera.get(&spot.camera) {
+        let keys = camera.keys();
+        place.say("line", &camera.line);
+        for (key, said) in camera.teaching() {
+            place.say(key, said);
+        }
+        place.say("length_um_per_unit", keys.length_um_per_unit);
+        place.say("rotation_deg", keys.rotation.degrees());
+        place.say("mirrored", keys.mirrored);
     }
 }
 

@@ -175,7 +175,8 @@ pub enum VolumetricFailure {
         geometry: String,
     },
     /// Samples that do not come.
-    #[error("the measuring modules sent {seen} of {expected} samples in {:.1} s; do they sample (every_syncs)?",
+    #[error("measuring modules and cameras sent {seen} of {expected} samples in {:.1} s; do the modules sample (every_syncs), and do the \
+        cameras take pictures?",
         waited.as_secs_f64())]
     NoSamples {
         /// How many came.

@@ -2,12 +2,12 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::{RollOptics, Sample, StuckWatch, Trouble};
+use compensator::volumetric::online::{RollOptics, Sample, Shown, StuckWatch, Trouble};
 use units::{Metres, Quantity, Radians, Time, Volts};
 
 use crate::config::{AnalogConfig, MachineConfig};
 use crate::volumetric::settings::roll_optics;
-use crate::volumetric::{FeedConfig, RollConfig};
+use crate::volumetric::{BeamConfig, DetectorConfig, FeedConfig, RollConfig};
 use machine::engine::{Channel, Observed};
 
 use crate::volumetric::VolumetricFailure;
@@ -37,8 +37,51 @@ fn place(
     before + within.unwrap_or(own.len())
 }
 
+/// The detector on the slide.
+pub(super) fn slide_of(beam: &BeamConfig) -> Result<DetectorConfig<'_>, VolumetricFailure> {
+    let section = "beam.slider";
+    let missing = VolumetricFailure::NotConfigured { section };
+    beam.on_the_slide().ok_or(missing)
+}
+
+/// Where what a detector shows stands among all that is observed.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum DetectorPlace {
+    /// Four channels.
+    Channels([usize; 4]),
+    /// A camera.
+    Spot(usize),
+}
+
+impl DetectorPlace {
+    pub(super) fn of(config: &MachineConfig, detector: DetectorConfig<'_>) -> Self {
+        match detector {
+            DetectorConfig::Channels(own) => {
+                let place = |channel| place_of_voltage(config, &own.analog, channel);
+                Self::Channels(own.channels.map(place))
+            }
+            // The engine lists the cameras in the order of their names.
+            DetectorConfig::Camera(own) => {
+                let before = config.camera.keys().take_while(|it| **it != own.camera);
+                Self::Spot(before.count())
+            }
+        }
+    }
+
+    /// What it shows; `None` before the first sample or picture.
+    pub(super) fn shown(&self, observed: &Observed<'_>) -> Option<Shown> {
+        match self {
+            Self::Channels(places) => sample(observed.channels, places).map(Shown::from),
+            Self::Spot(place) => {
+                let spot = observed.spots.get(*place).copied().flatten();
+                spot.map(Shown::Camera)
+            }
+        }
+    }
+}
+
 /// Four voltages of one moment; `None` before the first sample.
-pub(super) fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Option<Sample> {
+fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Option<Sample> {
     let mut sample = Sample {
         channels: [Volts::ZERO; 4],
         at: Time::NEVER,
@@ -49,6 +92,18 @@ pub(super) fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Optio
         sample.at = sample.at.min(channel.at);
     }
     Some(sample)
+}
+
+/// A feed of `detector`: that of a camera is given each picture once.
+pub(super) fn feed_of(
+    config: &MachineConfig,
+    feed: &FeedConfig,
+    detector: DetectorConfig<'_>,
+) -> FeedConfig {
+    match detector {
+        DetectorConfig::Channels(own) => confirmed_by_samples(config, feed, &own.analog),
+        DetectorConfig::Camera(_) => feed.clone(),
+    }
 }
 
 /// A feed counts what it is given: a module that samples every n SYNCs gives the same n times.

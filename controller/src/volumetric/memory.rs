@@ -15,6 +15,7 @@ use crate::run::utc_now;
 use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::correction::{bends, lever};
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::inputs::slide_of;
 use crate::volumetric::reference::References;
 use crate::volumetric::{AXES, MemoryName, StateMemoryContent};
 use crate::volumetric::{BeamConfig, VolumetricConfig};
@@ -214,7 +215,12 @@ fn present(
         let beyond = rolls.as_ref().map(|(now, then)| now.at(at) - then.at(at));
         beyond.unwrap_or(Radians(0.0))
     };
-    let lever = lever(axis, beam, &bends(config, state)?, &state.temperatures);
+    let lever = lever(
+        axis,
+        slide_of(beam)?,
+        &bends(config, state)?,
+        &state.temperatures,
+    );
     let shift = reference.beam_shift(seen.end());
     let displacement = |at: &Metres| {
         let whole = reference.displacement(*at, seen.slider(*at), shift);

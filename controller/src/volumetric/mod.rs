@@ -67,9 +67,10 @@ pub(crate) use calibrate::Scatter;
 pub(crate) use calibrate::VolumetricCalibrated;
 pub(crate) use config::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
-    FeedConfig, InfluenceConfig, LayoutName, OneOrMore, ReactionName, RollConfig, ShapeName,
-    TemperatureConfig, VolumeAxisName, VolumetricCalibrateConfig, VolumetricCompensationConfig,
-    VolumetricConfig, VolumetricVerifyConfig,
+    DetectorConfig, FeedConfig, InfluenceConfig, LayoutName, OneOrMore, PICTURE_PERIODS_MAX,
+    ReactionName, RollConfig, ShapeName, SpotCameraConfig, TemperatureConfig, VolumeAxisName,
+    VolumetricCalibrateConfig, VolumetricCompensationConfig, VolumetricConfig,
+    VolumetricVerifyConfig,
 };
 pub(crate) use entries::{
     BendEntry, ExpansionEntry, LineEntry, LineReadEntry, LineReadingEntry, LineVoidEntry,

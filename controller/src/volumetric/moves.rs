@@ -268,6 +268,7 @@ fn settling(config: &VolumetricConfig, machine: &MachineConfig) -> Duration {
     let every = machine.analog.values();
     let every = every.filter_map(|it| it.every_syncs()).max().unwrap_or(1);
     let sample_s = period_ms.fold(0.0, f64::max) * 1e-3 * f64::from(every);
+    let sample_s = sample_s.max(machine.longest_picture().as_secs_f64());
     let confirmed_s = f64::from(feed.confirm) * sample_s;
     Duration::from_secs_f64(confirmed_s + feed.blend_s + SMOOTHINGS * feed.smoothing_s)
 }

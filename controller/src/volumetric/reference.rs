@@ -11,7 +11,7 @@ use core::time::Duration;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::online::{BeamDetector, Displacement, Trouble};
+use compensator::volumetric::online::{Displacement, Spot, Trouble};
 use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use crate::config::MachineConfig;
@@ -19,19 +19,21 @@ use crate::failure::Failure;
 use crate::run::utc_now;
 use crate::store::{CalibrationRecord, RecordHead, Store, short};
 use crate::volumetric::handle::WorkVolume;
-use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
-use crate::volumetric::settings::{beam_detector, beam_drift, drift_record, volume_axis};
+use crate::volumetric::inputs::{DetectorPlace, RollReader, slide_of};
+use crate::volumetric::settings::{beam_drift, drift_record, eye, volume_axis};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AXES, BeamRecord, BeamReferencesContent, FunctionRecord};
-use crate::volumetric::{BeamConfig, BeamDetectorConfig, RollConfig, VolumetricConfig};
+use crate::volumetric::{BeamConfig, DetectorConfig, RollConfig, VolumetricConfig};
 use crate::volumetric::{GEOMETRY, GeometryContent, REFERENCES, VolumetricFailure};
 use machine::Stage;
-use machine::engine::{CHANNELS_MAX, Channel, Observed, THERMOMETERS_MAX, ThermometerSample};
+use machine::engine::{
+    CHANNELS_MAX, Channel, Observed, SPOTS_MAX, THERMOMETERS_MAX, ThermometerSample,
+};
 use mean::Mean;
 
 /// How long an axis stands before its detectors count.
 const REST: Duration = Duration::from_millis(50);
-/// How long one sample may take to come.
+/// How long one sample may take to come; a picture may take longer by what its camera is given.
 const SAMPLE_LIMIT: Duration = Duration::from_millis(500);
 /// Samples of the thermometers by which the machine's warmth is judged.
 const WARMTH_SAMPLES: u32 = 10;
@@ -68,6 +70,7 @@ pub(super) struct Still {
     pub(super) now: Time,
     channels: [Option<Channel>; CHANNELS_MAX],
     pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+    spots: [Option<Spot>; SPOTS_MAX],
 }
 
 impl Still {
@@ -78,6 +81,7 @@ impl Still {
             actual: &[],
             channels: &self.channels,
             temperatures: &self.temperatures,
+            spots: &self.spots,
         }
     }
 }
@@ -214,11 +218,11 @@ impl WorkVolume<'_> {
             };
             stops.nodes.push(node);
             if let Some(beam) = beam {
-                let place = |it: &BeamDetectorConfig, what| {
+                let place = |it: DetectorConfig<'_>, what| {
                     place_of_beam(machine, axis, it, &seen, |source| blind(what, source))
                 };
-                stops.slider.push(place(&beam.slider, ON_THE_SLIDE)?);
-                if let Some(end) = &beam.end {
+                stops.slider.push(place(slide_of(beam)?, ON_THE_SLIDE)?);
+                if let Some(end) = beam.at_the_end() {
                     stops.end.push(place(end, AT_THE_END)?);
                 }
             }
@@ -244,7 +248,7 @@ impl WorkVolume<'_> {
         beam: &BeamConfig,
         seen: &[Still],
     ) -> Result<(Displacement, Option<Displacement>), VolumetricFailure> {
-        let place = |it: &BeamDetectorConfig, what| {
+        let place = |it: DetectorConfig<'_>, what| {
             let blind = |source| VolumetricFailure::Blind {
                 axis,
                 at,
@@ -254,8 +258,8 @@ impl WorkVolume<'_> {
             let means = place_of_beam(self.core.config, axis, it, seen, blind)?;
             Ok::<_, VolumetricFailure>(means.map(|it| Metres(it.mean())))
         };
-        let slider = place(&beam.slider, ON_THE_SLIDE)?;
-        let end = beam.end.as_ref().map(|it| place(it, AT_THE_END));
+        let slider = place(slide_of(beam)?, ON_THE_SLIDE)?;
+        let end = beam.at_the_end().map(|it| place(it, AT_THE_END));
         Ok((slider, end.transpose()?))
     }
 
@@ -278,11 +282,12 @@ impl WorkVolume<'_> {
         Ok(Radians(mean.mean()))
     }
 
-    /// So many samples of all modules, each newer than the one before, while nothing moves.
+    /// So many samples of all modules and cameras, each newer than the one before, while nothing moves.
     pub(super) fn watch_at_rest(&mut self, samples: u32) -> Result<Vec<Still>, Failure> {
         let expected = samples as usize;
         let started = self.core.now();
-        let limit = self.core.patience().of(SAMPLE_LIMIT);
+        let limit = SAMPLE_LIMIT + self.core.config.longest_picture();
+        let limit = self.core.patience().of(limit);
         let mut seen: Vec<Still> = Vec::with_capacity(expected);
         let (mut last, mut deadline) = (started, started + limit);
         while seen.len() < expected {
@@ -298,8 +303,10 @@ impl WorkVolume<'_> {
             }
             self.core.tick(deadline)?;
             let devices = self.core.devices();
-            let newest = (devices.analogs()).map(|it| it.last_sample().unwrap_or(Time::ZERO));
-            if newest.min().unwrap_or(Time::ZERO) <= last {
+            let samples = devices.analogs().map(|it| it.last_sample());
+            let newest = samples.chain(devices.newest_spots());
+            let newest = newest.map(|it| it.unwrap_or(Time::ZERO)).min();
+            if newest.unwrap_or(Time::ZERO) <= last {
                 continue;
             }
             (last, deadline) = (self.core.now(), self.core.now() + limit);
@@ -307,9 +314,11 @@ impl WorkVolume<'_> {
                 now: last,
                 channels: [None; CHANNELS_MAX],
                 temperatures: [None; THERMOMETERS_MAX],
+                spots: [None; SPOTS_MAX],
             };
             devices.hear_channels(&mut still.channels);
             devices.hear_temperatures(&mut still.temperatures);
+            devices.hear_spots(&mut still.spots);
             seen.push(still);
         }
         Ok(seen)
@@ -338,20 +347,16 @@ fn stops_along(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> Vec<Metre
 fn place_of_beam(
     machine: &MachineConfig,
     axis: Axis,
-    config: &BeamDetectorConfig,
+    config: DetectorConfig<'_>,
     seen: &[Still],
     blind: impl Fn(Trouble) -> VolumetricFailure,
 ) -> Result<[Mean; 2], VolumetricFailure> {
-    let places = config
-        .channels
-        .map(|channel| place_of_voltage(machine, &config.analog, channel));
-    let detector = beam_detector(config);
-    let mut detector: BeamDetector =
-        detector.map_err(|source| VolumetricFailure::Detector { axis, source })?;
+    let place = DetectorPlace::of(machine, config);
+    let mut eye = eye(config).map_err(|source| VolumetricFailure::Detector { axis, source })?;
     let mut means = [Mean::default(); 2];
     for still in seen {
-        let sample = sample(&still.channels, &places);
-        let place = detector.read(still.now, sample.as_ref()).map_err(&blind)?;
+        let shown = place.shown(&still.observed());
+        let place = eye.read(still.now, shown.as_ref()).map_err(&blind)?;
         for (mean, place) in means.iter_mut().zip(place) {
             mean.add(place.value());
         }
@@ -449,9 +454,9 @@ impl Stops {
         Ok(BeamRecord {
             axis: AXES[axis.index()],
             slider: [function(0)?, function(1)?],
-            end_m: config.end.as_ref().map(|_| end),
+            end_m: config.at_the_end().map(|_| end),
             drift: drift_record(config),
-            wandered_m: config.end.as_ref().map(|_| {
+            wandered_m: config.at_the_end().map(|_| {
                 let of = |k: usize| self.end.iter().map(move |it| it[k].mean() - end[k]);
                 [of(0).collect(), of(1).collect()]
             }),

@@ -7,8 +7,9 @@ use compensator::volumetric::function::{Function, FunctionError, Shape};
 use compensator::volumetric::identify::BendPlan;
 use compensator::volumetric::model::{Chain, ChainError, Thermal, ThermalChannel};
 use compensator::volumetric::online::{
-    BeamDetector, BeamDetectorSettings, BeamDrift, FeedSettings, Influences, Layout, RatioCurve,
-    Reaction, RollError, RollOptics, SettingsError, TemperatureSettings,
+    BeamDetector, BeamDetectorSettings, BeamDrift, Eye, FeedSettings, Influences, Layout,
+    RatioCurve, Reaction, RollError, RollOptics, SettingsError, SpotCamera, SpotSettings,
+    TemperatureSettings,
 };
 use compensator::volumetric::{Axis, Point, Volume, VolumeError};
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians, Volts};
@@ -16,9 +17,9 @@ use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians, Volts};
 use crate::hardware::CHECKED;
 use crate::volumetric::DriftRecord;
 use crate::volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, FeedConfig, InfluenceConfig, LayoutName,
-    ReactionName, RollConfig, ShapeName, TemperatureConfig, VolumeAxisName,
-    VolumetricCompensationConfig, VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, DetectorConfig, FeedConfig, InfluenceConfig,
+    LayoutName, ReactionName, RollConfig, ShapeName, SpotCameraConfig, TemperatureConfig,
+    VolumeAxisName, VolumetricCompensationConfig, VolumetricConfig,
 };
 
 /// A detector of the configuration that cannot be.
@@ -104,6 +105,32 @@ pub fn beam_detector(config: &BeamDetectorConfig) -> Result<BeamDetector, BeamDe
         noise_max: Metres::from_um(config.noise_max_um),
         stuck_samples: config.stuck_samples,
         curves: curves(config)?,
+    })?)
+}
+
+/// What sees a beam, and has seen nothing yet.
+///
+/// # Errors
+/// When its curve, its field or its limits cannot be.
+pub(crate) fn eye(config: DetectorConfig<'_>) -> Result<Eye, BeamDetectorError> {
+    match config {
+        DetectorConfig::Channels(own) => Ok(beam_detector(own)?.into()),
+        DetectorConfig::Camera(own) => Ok(Eye::Camera(spot_camera(own)?)),
+    }
+}
+
+/// Likewise a camera.
+///
+/// # Errors
+/// When its field or its limits cannot be.
+pub(crate) fn spot_camera(config: &SpotCameraConfig) -> Result<SpotCamera, BeamDetectorError> {
+    Ok(SpotCamera::new(SpotSettings {
+        field: config
+            .field_um
+            .map(|um| (Metres::from_um(-um), Metres::from_um(um))),
+        age_max: millis(config.age_max_ms),
+        speed_max: MetresPerSecond(config.speed_max_um_per_s * 1e-6),
+        noise_max: Metres::from_um(config.noise_max_um),
     })?)
 }
 
@@ -218,7 +245,8 @@ pub(crate) fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Ther
 pub(crate) fn bend_plans(config: &VolumetricConfig) -> Vec<BendPlan> {
     let place = |axis: Axis| {
         let beam = config.beam.each()[axis.index()];
-        beam.map(|it| point_of_mm(it.slider.place_mm))
+        let detector = beam.and_then(BeamConfig::on_the_slide);
+        detector.map(|it| point_of_mm(it.place_mm()))
     };
     let each = config.bend.iter().map(|it| BendPlan {
         seen_from: place(volume_axis(it.axis)),

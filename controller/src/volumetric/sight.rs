@@ -10,7 +10,7 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::{BeamDetector, Trouble};
+use compensator::volumetric::online::{BeamDetector, Shown, SpotCamera, Trouble};
 use compensator::volumetric::{Axis, ReferenceOf};
 use machine::engine::Observed;
 use units::{Metres, Radians, Time, Volts};
@@ -18,11 +18,11 @@ use units::{Metres, Radians, Time, Volts};
 use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
 use crate::store::{RecordHead, Store};
-use crate::volumetric::inputs::{RollReader, place_of_voltage, sample};
+use crate::volumetric::inputs::{DetectorPlace, RollReader, slide_of};
 use crate::volumetric::reference::mean::Mean;
-use crate::volumetric::settings::{beam_detector, volume_axis};
+use crate::volumetric::settings::{beam_detector, spot_camera, volume_axis};
 use crate::volumetric::{
-    AXES, BeamDetectorConfig, BeamReferencesContent, REFERENCES, RollConfig, VolumetricFailure,
+    AXES, BeamReferencesContent, DetectorConfig, REFERENCES, RollConfig, VolumetricFailure,
 };
 
 /// What a detector sees.
@@ -30,12 +30,19 @@ use crate::volumetric::{
 pub(crate) struct Sight {
     /// `x slide`, `y end`, `x roll`.
     pub(crate) name: String,
-    /// The sum of its voltages; `None` for a roll.
+    /// The sum of its voltages; `None` for a camera or a roll.
     pub(crate) light: Option<Volts>,
     /// What it reads: two directions, or a roll.
     pub(crate) readings: Vec<SightReading>,
     /// Why there is no value, by the newest sample.
     pub(crate) trouble: Option<Trouble>,
+}
+
+impl Sight {
+    /// Whether this is a roll, and no beam.
+    pub(crate) fn is_roll(&self) -> bool {
+        self.readings.iter().all(|it| it.along.is_none())
+    }
 }
 
 /// One reading of a detector, in metres, of a roll in radians.
@@ -64,17 +71,21 @@ impl SightReading {
 }
 
 /// How a detector is read.
-enum Eye {
+enum Watch {
     Beam {
         detector: Box<BeamDetector>,
-        places: [usize; 4],
+        place: DetectorPlace,
+    },
+    Spot {
+        camera: SpotCamera,
+        place: DetectorPlace,
     },
     Roll(RollReader),
 }
 
 /// A detector, and what it has shown since the last look.
 struct Watched {
-    eye: Eye,
+    eye: Watch,
     age_max: Duration,
     sight: Sight,
     newest: Option<Time>,
@@ -110,8 +121,8 @@ impl Sights {
             let letter = AXES[axis.index()];
             let known = references.and_then(|it| it.beams.iter().find(|it| it.axis == letter));
             let slide = known.map(|it| [0, 1].map(|k| ends(&it.slider[k].values_si)));
-            watched.push(beam_eye(config, (axis, "slide"), &beam.slider, slide)?);
-            if let Some(end) = &beam.end {
+            watched.push(beam_eye(config, (axis, "slide"), slide_of(beam)?, slide)?);
+            if let Some(end) = beam.at_the_end() {
                 let known = known.and_then(|it| it.end_m);
                 let known = known.map(|it| it.map(|place| (place, place)));
                 watched.push(beam_eye(config, (axis, "end"), end, known)?);
@@ -156,12 +167,24 @@ fn ends(values: &[f64]) -> (f64, f64) {
 fn beam_eye(
     config: &MachineConfig,
     (axis, whose): (Axis, &'static str),
-    own: &BeamDetectorConfig,
+    own: DetectorConfig<'_>,
     references: Option<[(f64, f64); 2]>,
 ) -> Result<Watched, VolumetricFailure> {
-    let detector =
-        beam_detector(own).map_err(|source| VolumetricFailure::Detector { axis, source })?;
-    let (field, middle) = (detector.field(), detector.middle());
+    let refused = |source| VolumetricFailure::Detector { axis, source };
+    let place = DetectorPlace::of(config, own);
+    let (eye, field, middle) = match own {
+        DetectorConfig::Channels(own) => {
+            let detector = Box::new(beam_detector(own).map_err(refused)?);
+            let (field, middle) = (detector.field(), detector.middle());
+            (Watch::Beam { detector, place }, field, middle)
+        }
+        DetectorConfig::Camera(own) => {
+            let camera = spot_camera(own).map_err(refused)?;
+            // Where it was taught.
+            let middle = [Metres(0.0); 2];
+            (Watch::Spot { camera, place }, camera.field(), middle)
+        }
+    };
     let reading = |k: usize| SightReading {
         along: Some(axis.others()[k]),
         field: (field[k].0.value(), field[k].1.value()),
@@ -176,12 +199,7 @@ fn beam_eye(
         readings: vec![reading(0), reading(1)],
         trouble: None,
     };
-    let place = |channel| place_of_voltage(config, &own.analog, channel);
-    let eye = Eye::Beam {
-        detector: Box::new(detector),
-        places: own.channels.map(place),
-    };
-    Ok(Watched::new(eye, own.age_max_ms, sight))
+    Ok(Watched::new(eye, own.age_max_ms(), sight))
 }
 
 fn roll_eye(
@@ -203,12 +221,12 @@ fn roll_eye(
         }],
         trouble: None,
     };
-    let eye = Eye::Roll(RollReader::new(config, own)?);
+    let eye = Watch::Roll(RollReader::new(config, own)?);
     Ok(Watched::new(eye, own.age_max_ms, sight))
 }
 
 impl Watched {
-    fn new(eye: Eye, age_max_ms: f64, sight: Sight) -> Self {
+    fn new(eye: Watch, age_max_ms: f64, sight: Sight) -> Self {
         Self {
             eye,
             age_max: Duration::from_secs_f64(age_max_ms * 1e-3),
@@ -221,8 +239,8 @@ impl Watched {
 
     fn hear(&mut self, observed: &Observed<'_>) {
         match &self.eye {
-            Eye::Beam { detector, places } => {
-                let Some(sample) = sample(observed.channels, places) else {
+            Watch::Beam { detector, place } => {
+                let Some(Shown::Channels(sample)) = place.shown(observed) else {
                     return;
                 };
                 if self.newest.is_some_and(|before| sample.at <= before) {
@@ -234,7 +252,25 @@ impl Watched {
                 let place = look.place.map(|it| it.map(Metres::value));
                 self.take(place, look.nearest.map(|it| it.map(Metres::value)));
             }
-            Eye::Roll(reader) => match reader.look(observed) {
+            Watch::Spot { camera, place } => {
+                let Some(Shown::Camera(spot)) = place.shown(observed) else {
+                    return;
+                };
+                if self.newest.is_some_and(|before| spot.at <= before) {
+                    return;
+                }
+                self.newest = Some(spot.at);
+                let field = camera.field();
+                let nearest = |place: [Metres; 2]| {
+                    core::array::from_fn(|k| {
+                        let (low, high) = field[k];
+                        place[k].value().clamp(low.value(), high.value())
+                    })
+                };
+                let place = camera.place(&spot).map(|it| it.map(Metres::value));
+                self.take(place, spot.place.map(nearest));
+            }
+            Watch::Roll(reader) => match reader.look(observed) {
                 Ok((roll, at)) => {
                     if self.newest.is_some_and(|before| at <= before) {
                         return;

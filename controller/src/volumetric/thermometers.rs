@@ -273,6 +273,7 @@ mod tests {
                     actual: &[],
                     channels: &[],
                     temperatures: &temperatures,
+                    spots: &[],
                 };
                 let before = core::mem::take(&mut self.shown);
                 self.shown = self.thermometers.advance(&observed).to_vec();
@@ -351,6 +352,7 @@ mod tests {
                 actual: &[],
                 channels: &[],
                 temperatures: &last,
+                spots: &[],
             };
             let shown = warm.thermometers.advance(&observed);
             assert!(shown.iter().all(|it| *it == shown[0]), "{shown:?}");

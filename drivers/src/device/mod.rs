@@ -354,6 +354,9 @@ pub trait PoseInstrument: Device {
     /// The last pose, `None` before the first and after a measurement that failed: a picture
     /// that was judged bad never becomes a number.
     fn pose(&self) -> Option<PoseReading>;
+
+    /// When the last picture was asked for, whether it was good or not.
+    fn asked(&self) -> Time;
 }
 
 /// Where a body was seen, in the machine's frame, from where the instrument was taught.

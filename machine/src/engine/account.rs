@@ -2,6 +2,7 @@
 //! observer.
 
 use compensator::apply::Alarm;
+use compensator::volumetric::online::Spot;
 use units::{Metres, Time};
 
 use super::PerAxis;
@@ -54,6 +55,7 @@ pub(super) struct Heard<'a> {
     pub(super) actual: PerAxis<Option<Metres>>,
     pub(super) channels: &'a [Option<Channel>],
     pub(super) temperatures: &'a [Option<ThermometerSample>],
+    pub(super) spots: &'a [Option<Spot>],
 }
 
 /// One period of the loop, for an observer.

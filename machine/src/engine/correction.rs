@@ -9,6 +9,7 @@ use core::any::Any;
 use core::time::Duration;
 
 use compensator::apply::{Alarm, SlewedCorrection};
+use compensator::volumetric::online::Spot;
 use units::{Celsius, Metres, Time, Volts};
 
 use super::cause::Cause;
@@ -19,6 +20,9 @@ use super::{AXES_MAX, Lack, PerAxis};
 pub const CHANNELS_MAX: usize = 32;
 /// Thermometers that a correction sees at most.
 pub const THERMOMETERS_MAX: usize = 32;
+
+/// Cameras that a correction sees at most.
+pub const SPOTS_MAX: usize = 8;
 
 /// One analog channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +58,8 @@ pub struct Observed<'a> {
     pub channels: &'a [Option<Channel>],
     /// The thermometers of the same modules, likewise.
     pub temperatures: &'a [Option<ThermometerSample>],
+    /// What each camera that is a detector showed last, in the order of the cameras' names.
+    pub spots: &'a [Option<Spot>],
 }
 
 /// How far a correction can be relied upon now.

@@ -152,6 +152,7 @@ impl Core {
             actual: &self.actual[..self.axes],
             channels: heard.channels,
             temperatures: heard.temperatures,
+            spots: heard.spots,
         };
         let (offset, refused) = self.applied.advance(&observed);
         if let Some(cause) = refused {

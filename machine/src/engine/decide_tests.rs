@@ -76,6 +76,7 @@ impl Bench {
             actual: self.heard(),
             channels: &[],
             temperatures: &[],
+            spots: &[],
         };
         let set_point = self.engine.core.step(&heard)?;
         self.sent.push(set_point);

@@ -28,11 +28,13 @@ pub(super) fn heard<'a>(
     }
     devices.hear_channels(&mut seats.channels);
     devices.hear_temperatures(&mut seats.temperatures);
+    devices.hear_spots(&mut seats.spots);
     Heard {
         now,
         actual,
         channels: &seats.channels,
         temperatures: &seats.temperatures,
+        spots: &seats.spots,
     }
 }
 

@@ -46,8 +46,8 @@ use units::{Metres, MetresPerSecond};
 pub use account::{Counts, Live, State};
 pub use cause::Cause;
 pub use correction::{
-    CHANNELS_MAX, Channel, Corrected, Correction, NoCorrection, Observed, THERMOMETERS_MAX,
-    ThermometerSample, Validity,
+    CHANNELS_MAX, Channel, Corrected, Correction, NoCorrection, Observed, SPOTS_MAX,
+    THERMOMETERS_MAX, ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, CsvPath, Departure, read_path};
 pub use failure::EngineFailure;

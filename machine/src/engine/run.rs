@@ -269,6 +269,10 @@ impl Run<'_> {
         self.hear_answers(synced)?;
         let answered = self.machine.now();
         self.machine.fire_deadlines(answered);
+        let machine = &mut *self.machine;
+        machine
+            .devices
+            .keep_looking(answered, true, &mut machine.notices);
         self.machine.judge_alarms()?;
         let engine = &mut *self.engine;
         let late_answers = engine.timing.late_answers;

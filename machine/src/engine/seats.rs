@@ -1,9 +1,11 @@
 //! Where the engine's axes are among the machine's devices.
 
+use compensator::volumetric::online::Spot;
 use wire::Port;
 
 use super::{
-    AXES_MAX, CHANNELS_MAX, Channel, Engine, PerAxis, THERMOMETERS_MAX, ThermometerSample,
+    AXES_MAX, CHANNELS_MAX, Channel, Engine, PerAxis, SPOTS_MAX, THERMOMETERS_MAX,
+    ThermometerSample,
 };
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -17,6 +19,7 @@ pub(super) struct Seats {
     pub(super) buses: Vec<Port>,
     pub(super) channels: [Option<Channel>; CHANNELS_MAX],
     pub(super) temperatures: [Option<ThermometerSample>; THERMOMETERS_MAX],
+    pub(super) spots: [Option<Spot>; SPOTS_MAX],
 }
 
 impl Seats {
@@ -31,6 +34,7 @@ impl Seats {
             buses: machine.ports.buses.iter().map(|it| it.port).collect(),
             channels: [None; CHANNELS_MAX],
             temperatures: [None; THERMOMETERS_MAX],
+            spots: [None; SPOTS_MAX],
         })
     }
 

@@ -38,6 +38,7 @@ use super::{AXES_MAX, Corrected, Correction, Observed, Validity};
 ///     now: Time::ZERO,
 ///     nominal: &place,
 ///     actual: &place,
+///     spots: &[],
 ///     channels: &[],
 ///     temperatures: &[],
 /// });
@@ -141,6 +142,7 @@ mod tests {
             now: Time::ZERO,
             nominal: &nominal,
             actual: &nominal,
+            spots: &[],
             channels: &[],
             temperatures: &[],
         })

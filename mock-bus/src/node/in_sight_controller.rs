@@ -23,7 +23,7 @@ use units::portable::{atan2, sin_cos};
 use super::{Node, Section};
 use crate::config::error::{ConfigError, positive};
 use crate::plant::config::PlantConfig;
-use crate::plant::{Mark, Plant};
+use crate::plant::{Mark, Plant, Scene};
 use crate::random::Stream;
 
 /// How the system and its job are set.
@@ -43,6 +43,8 @@ pub struct InSightControllerConfig {
     pub length_unit_um: f64,
     /// The job's unit of the angle.
     pub angle_unit_arcsec: f64,
+    /// What its cameras look at.
+    pub looks_at: Scene,
     /// Whether it goes online by itself when it has booted.
     pub online_at_start: bool,
     /// From power-on until it listens.
@@ -90,6 +92,7 @@ impl Default for InSightControllerConfig {
             result_cell: Cell::new('C', 7).expect("C7 is a cell"),
             length_unit_um: 1.0,
             angle_unit_arcsec: 1.0,
+            looks_at: Scene::Marks,
             online_at_start: true,
             boot_ms: 1500.0,
             reply_ms: 2.0,
@@ -277,12 +280,12 @@ impl InSightControllerNode {
             Doing::Nothing => {}
             Doing::Answering { answer, .. } => self.say(answer),
             Doing::Triggered { .. } => {
-                plant.open_shutter();
+                plant.open_shutter(self.config.looks_at);
                 let shutters_close = self.after(now, self.config.exposure_ms, 0.0);
                 self.doing = Doing::Exposing { shutters_close };
             }
             Doing::Exposing { .. } => {
-                let picture = self.judge(&plant.close_shutter());
+                let picture = self.judge(&plant.close_shutter(self.config.looks_at));
                 let (ms, jitter_ms) = (self.config.processing_ms, self.config.processing_jitter_ms);
                 let done = self.after(now, ms, jitter_ms);
                 self.doing = Doing::Judging { done, picture };
@@ -311,7 +314,8 @@ impl InSightControllerNode {
         let count = next_count(self.result.count);
         let score = found.iter().map(|mark| mark.likeness * 100.0);
         let score = score.fold(100.0, f64::min);
-        if found.len() < marks.len() || found.len() < 2 {
+        let least = self.config.looks_at.least();
+        if found.len() < marks.len() || found.len() < least {
             return Inspection {
                 count,
                 found: found.len() as u32,
@@ -379,7 +383,8 @@ fn motion(marks: &[Mark]) -> [f64; 3] {
 }
 
 impl Section for InSightControllerConfig {
-    fn check(&self, _: &PlantConfig) -> Result<(), ConfigError> {
+    fn check(&self, plant: &PlantConfig) -> Result<(), ConfigError> {
+        plant.check_scene(self.looks_at)?;
         positive("length_unit_um", self.length_unit_um)?;
         positive("angle_unit_arcsec", self.angle_unit_arcsec)?;
         positive("exposure_ms", self.exposure_ms)

@@ -11,6 +11,7 @@ use crate::random::Stream;
 use serde::Deserialize;
 use units::portable::{hypot, sin_cos};
 
+use super::picture::Mark;
 use super::platform::Pose;
 
 /// A clean, standing mark looks this much like the taught one.
@@ -59,17 +60,6 @@ pub enum Target {
     Covered,
     /// Not there.
     Absent,
-}
-
-/// A mark in a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mark {
-    /// Its place in metres in the cameras' common frame.
-    pub place_m: [f64; 2],
-    /// Where it would be with the platform where it was built.
-    pub built_m: [f64; 2],
-    /// How like the taught mark it looks, 0 to 1.
-    pub likeness: f64,
 }
 
 #[derive(Clone, Debug)]

@@ -12,6 +12,7 @@ pub use self::parts::{
 use super::camera::CameraConfig;
 use super::gantry::config::GantryConfig;
 use super::mechanics::Section;
+use super::picture::Scene;
 use super::platform::config::PlatformConfig;
 use super::table::config::TableConfig;
 use super::volumetric::config::VolumetricConfig;
@@ -67,6 +68,19 @@ impl PlantConfig {
             positive("field_mm", self.camera.field_mm)?;
         }
         self.is_one_machine()
+    }
+
+    /// What a camera looks at must be there.
+    pub(crate) fn check_scene(&self, scene: Scene) -> Result<(), ConfigError> {
+        match scene {
+            Scene::Marks => Ok(()),
+            Scene::Beam { axis: 0..=2, .. } if self.volumetric.is_some() => Ok(()),
+            Scene::Beam { axis, .. } => Err(ConfigError::Value {
+                key: "looks_at.beam.axis",
+                seen: axis as f64,
+                expected: "an axis from 0 to 2 of [plant.volumetric]",
+            }),
+        }
     }
 
     /// A machine is one thing or the other.

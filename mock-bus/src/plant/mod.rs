@@ -13,6 +13,7 @@ mod instrument;
 mod machine;
 mod mechanics;
 mod parts;
+mod picture;
 pub mod platform;
 mod stage;
 pub mod table;
@@ -26,12 +27,13 @@ mod tests;
 use units::{Celsius, Metres, Time};
 
 pub use analog::InputFault;
-pub use camera::{Mark, Target};
+pub use camera::Target;
 pub use gantry::GantryTruth;
 pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes, Scanned};
 pub use parts::pulse::{IndexPulse, ProbeEdge};
 pub use parts::servo::Servo;
+pub use picture::{BeamPlace, Mark, Scene};
 pub use platform::{PlatformTruth, Pose};
 pub use table::{Sight, TableTruth};
 pub use thermal::Environment;
@@ -268,14 +270,29 @@ impl Plant {
         }
     }
 
-    /// The cameras over the platform begin to take their pictures.
-    pub fn open_shutter(&mut self) {
-        self.camera.open_shutter(self.pose());
+    /// The cameras that look at `scene` begin to take their pictures.
+    pub fn open_shutter(&mut self, scene: Scene) {
+        let now = self.now;
+        match scene {
+            Scene::Marks => self.camera.open_shutter(self.pose()),
+            Scene::Beam { axis, at } => {
+                if let Some(volumetric) = self.machine.of_mut::<Volumetric>() {
+                    volumetric.open_shutter(axis, at, now);
+                }
+            }
+        }
     }
 
-    /// The pictures are taken: each mark, `None` where it is not in its picture.
-    pub fn close_shutter(&mut self) -> Vec<Option<Mark>> {
-        self.camera.close_shutter(self.pose())
+    /// The pictures are taken: each mark, `None` where it is not in its picture. A beam has one, its spot.
+    pub fn close_shutter(&mut self, scene: Scene) -> Vec<Option<Mark>> {
+        let now = self.now;
+        match scene {
+            Scene::Marks => self.camera.close_shutter(self.pose()),
+            Scene::Beam { axis, at } => {
+                let volumetric = self.machine.of_mut::<Volumetric>();
+                vec![volumetric.and_then(|it| it.close_shutter(axis, at, now))]
+            }
+        }
     }
 
     /// What carries the marks; on a machine without a platform they stand.

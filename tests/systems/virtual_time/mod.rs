@@ -21,6 +21,7 @@ mod serial_zero;
 mod survey;
 mod table_uncertainty;
 mod volumetric;
+mod volumetric_cameras;
 mod volumetric_cause;
 mod volumetric_cold;
 mod volumetric_day;

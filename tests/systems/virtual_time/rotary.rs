@@ -180,13 +180,6 @@ pub(super) fn check_tables(
     check_sureness(&(1..=tables).map(of_one).collect::<Vec<_>>());
 }
 
-/// The emulated table with a plate of 72 lines and without the harmonics that these cannot see.
-pub(super) fn with_few_lines(text: &str) -> String {
-    text.edit("lines = 360", "lines = 72")
-        .edit("    { order = 36, amplitude_arcsec = 0.4 },\n", "")
-        .edit("    { order = 72, amplitude_arcsec = 0.2 },\n", "")
-}
-
 struct Judged {
     found: f64,
     at_lines: f64,

@@ -2,15 +2,13 @@
 
 use core::time::Duration;
 
-use tests::{Bench, Edit, Hand};
+use tests::{Bench, Edit, Hand, with_few_lines};
 use truestage::emulated::Emulated;
 use truestage::for_tests::{Asked, Person, Question, RotaryCalibrated};
 use truestage::rotary::{Operator, PlateMove, PlateTask};
 use truestage::{CalibrateOptions, Failure, Machine};
 
-use super::rotary::{
-    LIMIT_ARCSEC, check_tables, hand_of, is_enabled, residual, started, with_few_lines,
-};
+use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, is_enabled, residual, started};
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;

@@ -1,42 +1,25 @@
 //! A rotary table whose plate passes a photodiode at an analog input: judged by the plant's truth.
 
 use mock_bus::fault::{Fault, FaultConfig};
-use tests::{Bench, Edit, Hand};
+use tests::{Bench, Edit, Hand, with_emulated_line_signal};
 use truestage::for_tests::{RotaryCalibrated, with_line_signal};
 use truestage::rotary::{RotaryFailure, SweepOptions};
 use truestage::{CalibrateOptions, Failure};
 use units::{Approach, RadiansPerSecond};
 
-use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, residual, started, with_few_lines};
+use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, residual, started};
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;
 const TABLES: u64 = 6;
 
-const NODE: &str = r#"[[nodes]]
-name = "photo"
-port = "can0"
-[nodes.device]
-kind = "cia404_analog"
-node_id = 15
-identity = { vendor_id = 0x7FF, product_code = 0x40_0004, revision = 0x1_0000, serial_number = 4015 }
-plant_channels = [1, 2, 0, 3]
-full_scale_v = 5.0
-resolution_bits = 16
-
-[plant.table.signal]
-width_arcsec = 1500.0
-latency_us = 400.0
-
-[plant.table.motion]"#;
-
-fn emulated(text: String) -> String {
-    with_few_lines(&text).edit("[plant.table.motion]", NODE)
-}
-
 /// A plate of 72 lines on a table without harmonics that these cannot see.
 fn bench(seed: u64) -> Bench {
-    Bench::rotary(seed, |text| with_line_signal(&text), emulated)
+    Bench::rotary(
+        seed,
+        |text| with_line_signal(&text),
+        with_emulated_line_signal,
+    )
 }
 
 fn calibrate(bench: &mut Bench, hand: &mut Hand<'_>) -> Result<RotaryCalibrated, Failure> {
@@ -115,7 +98,7 @@ fn a_slow_turn_and_a_module_that_leaves_syncs_out_see_every_line_and_a_fast_turn
                     "placement\nspeed_deg_per_s = 5.0",
                 )
         };
-        let mut bench = Bench::rotary(23, machine, emulated);
+        let mut bench = Bench::rotary(23, machine, with_emulated_line_signal);
         started(&mut bench);
         let mut sweep = |approach, deg: Option<f64>| {
             let options = SweepOptions {

@@ -82,6 +82,11 @@ impl EmergencyCode {
         self.0 >> 8 == 0
     }
 
+    /// Every code that has a name here, or the first one of a class that has.
+    pub fn named() -> impl Iterator<Item = Self> {
+        NAMES.iter().map(|(_, value, _)| Self(*value))
+    }
+
     /// What the standards call it.
     pub fn name(self) -> &'static str {
         NAMES

@@ -25,6 +25,9 @@ macro_rules! abort_codes {
         }
 
         impl AbortCode {
+            /// Every code that CiA 301 names, in its order.
+            pub const ALL: &[Self] = &[$(Self::$name,)*];
+
             /// From the number on the wire.
             pub const fn from_raw(raw: u32) -> Self {
                 match raw {

@@ -1,7 +1,7 @@
 //! The position of a beam on a four-channel detector, or why it cannot be determined.
 //!
-//! Source: CN1214003A uses a beam splitter and a two-dimensional CCD; a detector with four
-//! analog channels says the same through the ratio of its currents. For a lateral-effect
+//! Source: CN1214003A uses a beam splitter and a two-dimensional CCD ([`SpotCamera`](super::SpotCamera)); a detector
+//! with four analog channels says the same through the ratio of its currents. For a lateral-effect
 //! detector the ratio (a − b)/(a + b) of two opposite electrodes is proportional to the place,
 //! for four quadrants the ratio of the halves is a monotone function of it (textbooks on
 //! position sensitive detectors); a measured curve from ratio to place covers both.
@@ -13,6 +13,7 @@ use core::time::Duration;
 
 use units::{Metres, MetresPerSecond, Quantity, Time, Volts};
 
+use super::jump::JumpWatch;
 use super::{StuckWatch, Trouble};
 use crate::volumetric::function::{FunctionError, Pieces, Shape};
 
@@ -102,6 +103,18 @@ pub enum SettingsError {
         /// Upper limit.
         high: Volts,
     },
+    /// A field that is none.
+    #[error(
+        "beam detector: a field from {} to {} leaves nothing to see",
+        low,
+        high
+    )]
+    Field {
+        /// Its lower end.
+        low: Metres,
+        /// Its upper end.
+        high: Metres,
+    },
     /// A gain, a speed or a noise that is not positive, or a value that is no number.
     #[error("beam detector: gains, speed and noise must be positive numbers, dark values finite")]
     NotPositive,
@@ -131,7 +144,7 @@ pub struct BeamLook {
 #[derive(Clone, Debug)]
 pub struct BeamDetector {
     settings: BeamDetectorSettings,
-    last: Option<(Time, [Metres; 2])>,
+    jump: JumpWatch,
     stuck: StuckWatch<4>,
 }
 
@@ -155,8 +168,8 @@ impl BeamDetector {
         }
         Ok(Self {
             stuck: StuckWatch::new(settings.stuck_samples),
+            jump: JumpWatch::new(settings.speed_max, settings.noise_max),
             settings,
-            last: None,
         })
     }
 
@@ -186,8 +199,7 @@ impl BeamDetector {
         // Rails and darkness stand still as well, and say more.
         let place = self.place(&sample.channels)?;
         stuck?;
-        self.check_jump(sample.at, place)?;
-        self.last = Some((sample.at, place));
+        self.jump.check(sample.at, place)?;
         Ok(place)
     }
 
@@ -275,21 +287,5 @@ impl BeamDetector {
             return Err(Trouble::Saturated { seen, limit });
         }
         Ok(self.bare_ratios(light))
-    }
-
-    /// The longer nothing good was seen, the further away the next good place may be.
-    fn check_jump(&self, at: Time, place: [Metres; 2]) -> Result<(), Trouble> {
-        let Some((before, last)) = self.last else {
-            return Ok(());
-        };
-        let seconds = at.since(before).as_secs_f64();
-        let limit = self.settings.noise_max + Metres(self.settings.speed_max.value() * seconds);
-        let change = |k: usize| (place[k] - last[k]).abs();
-        let seen = change(0).max(change(1));
-        if seen > limit {
-            let (seen, limit) = (seen.value(), limit.value());
-            return Err(Trouble::Jumped { seen, limit });
-        }
-        Ok(())
     }
 }

@@ -84,12 +84,12 @@ impl Bench {
         };
         let reference = BeamReference::new([zero(), zero()], [Metres::ZERO; 2], drift).unwrap();
         let end = EndOfTravel {
-            detector: detector(),
+            detector: detector().into(),
             feed: Feed::new(settings()),
         };
         let feed = Feed::new(settings());
         Self {
-            monitor: AxisMonitor::new(Axis::X, detector(), Some(end), reference, feed),
+            monitor: AxisMonitor::new(Axis::X, detector().into(), Some(end), reference, feed),
             memories: Memories::default(),
             state: seed,
             seconds: 0.0,
@@ -122,11 +122,11 @@ impl Bench {
         }
         let noise = 0.35 * even(&mut self.state);
         let end = sample(now, [self.beam_um(END_M) + noise, 0.0]);
-        let (slider, end) = (Some(&slider), Some(&end));
+        let (slider, end) = (Shown::from(slider), Shown::from(end));
         self.monitor.advance(
             now,
             Metres(x),
-            (slider, end),
+            (Some(&slider), Some(&end)),
             [Metres(0.0); 2],
             &self.memories,
         )[0]
@@ -149,6 +149,54 @@ impl Bench {
         // The other parts follow over the day.
         self.seconds += 8.0 * 3600.0 / f64::from(PARTS);
     }
+}
+
+/// However often it is heard: three pictures are needed, and what they show is not smoothed between them.
+#[test]
+fn a_picture_counts_once() {
+    let camera = SpotCamera::new(SpotSettings {
+        field: [(um(-200.0), um(200.0)); 2],
+        age_max: Duration::from_millis(400),
+        speed_max: MetresPerSecond(1e-3),
+        noise_max: um(5.0),
+    });
+    let zero = || Function::constant(Metres(0.0), Metres(TRAVEL_M), Metres::ZERO).unwrap();
+    let drift = BeamDrift::Translating;
+    let reference = BeamReference::new([zero(), zero()], [Metres::ZERO; 2], drift).unwrap();
+    let (eye, feed) = (Eye::Camera(camera.unwrap()), Feed::new(settings()));
+    let mut monitor = AxisMonitor::new(Axis::X, eye, None, reference, feed);
+    let memories = Memories::default();
+    // A picture every 70 ms, heard every 10 ms.
+    let mut hear = |cycle: u32, seen_um: f64| {
+        let at = |cycle: u32| Time::from_seconds(f64::from(cycle) * CYCLE);
+        let (place, asked) = (Some([um(seen_um), um(0.0)]), at(cycle / 7 * 7));
+        let shown = Shown::Camera(Spot { at: asked, place });
+        let none = [Metres(0.0); 2];
+        let given = monitor.advance(
+            at(cycle + 1),
+            Metres(0.1),
+            (Some(&shown), None),
+            none,
+            &memories,
+        );
+        (given[0].um(), monitor.status().0)
+    };
+    for cycle in 7..21 {
+        let (given, status) = hear(cycle, 10.0);
+        assert_eq!((given, status), (0.0, FeedStatus::Waiting(None)), "{cycle}");
+    }
+    for cycle in 21..140 {
+        assert_eq!(hear(cycle, 10.0).1, FeedStatus::Good, "{cycle}");
+    }
+    // By one picture 70 ms later with a time constant of 100 ms: 7/17 of the way, and no more until the next one.
+    for cycle in 140..147 {
+        let (given, _) = hear(cycle, 12.0);
+        assert!(
+            (given - 10.0 - 2.0 * 7.0 / 17.0).abs() < 1e-9,
+            "{cycle}: {given}"
+        );
+    }
+    assert!(hear(147, 12.0).0 > 11.2);
 }
 
 #[test]

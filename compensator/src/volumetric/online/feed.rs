@@ -157,6 +157,12 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         self.give(now)
     }
 
+    /// Gives out the values at `now` while nothing new has come: the value taken last is neither counted nor smoothed
+    /// again.
+    pub fn repeat(&mut self, now: Time) -> [Q; N] {
+        self.give(now)
+    }
+
     /// Switches off: the values fade to zero over `fade`, whatever the detector says.
     pub fn disable(&mut self, now: Time, fade: Duration) {
         self.state = State::Off;

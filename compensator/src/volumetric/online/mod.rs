@@ -6,7 +6,7 @@
 //! | symbol | name here |
 //! |---|---|
 //! | x_c, y_c, z_c | positions by the scales, [`Point`](super::Point) |
-//! | y_bc(x_c), z_bc(x_c) … | readings of the slider's detector, [`BeamDetector::read`] |
+//! | y_bc(x_c), z_bc(x_c) … | readings of the slider's detector, [`BeamDetector::read`], [`SpotCamera::read`] |
 //! | y_br(x_c), z_br(x_c) … | [`BeamReference::slider`] |
 //! | y_ce(x), z_ce(x); y_re(x), z_re(x) | readings at the end of travel; [`BeamReference::end`] |
 //! | D_y(x_c), D_z(x_c) …; D_ye(x) … | [`Displacement`]; [`BeamReference::beam_shift`] |
@@ -30,8 +30,10 @@
 //! their error is in the model's tables).
 
 mod beam;
+mod eye;
 mod feed;
 mod influence;
+mod jump;
 mod lever;
 mod memory;
 mod monitor;
@@ -39,6 +41,7 @@ mod offset;
 mod reference;
 mod roll;
 mod roll_monitor;
+mod spot;
 mod stuck;
 mod temperature;
 mod trouble;
@@ -46,6 +49,7 @@ mod trouble;
 pub use beam::{
     BeamDetector, BeamDetectorSettings, BeamLook, Layout, RatioCurve, Sample, SettingsError,
 };
+pub use eye::{Eye, Shown};
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
 pub use lever::DetectorLever;
@@ -55,6 +59,7 @@ pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
 pub use roll_monitor::RollMonitor;
+pub use spot::{Spot, SpotCamera, SpotSettings};
 pub use stuck::StuckWatch;
 pub use temperature::{TemperatureChannel, TemperatureSettings};
 pub use trouble::Trouble;

@@ -7,14 +7,14 @@
 use units::{Metres, Time};
 
 use super::reference::difference;
-use super::{BeamDetector, BeamReference, Displacement, Feed, FeedStatus, Memories, Sample};
+use super::{BeamReference, Displacement, Eye, Feed, FeedStatus, Memories, Shown, Trouble};
 use crate::volumetric::Axis;
 
 /// The sideways displacement of one slider, watched by its beam.
 #[derive(Clone, Debug)]
 pub struct AxisMonitor {
     axis: Axis,
-    slider: BeamDetector,
+    slider: Eye,
     end: Option<EndOfTravel>,
     reference: BeamReference,
     feed: Feed<Metres, 2>,
@@ -26,7 +26,7 @@ pub struct AxisMonitor {
 #[derive(Clone, Debug)]
 pub struct EndOfTravel {
     /// The detector.
-    pub detector: BeamDetector,
+    pub detector: Eye,
     /// How its shift is kept from jumping.
     pub feed: Feed<Metres, 2>,
 }
@@ -36,7 +36,7 @@ impl AxisMonitor {
     /// travel; `feed` keeps what is given out from jumping.
     pub fn new(
         axis: Axis,
-        slider: BeamDetector,
+        slider: Eye,
         end: Option<EndOfTravel>,
         reference: BeamReference,
         feed: Feed<Metres, 2>,
@@ -51,7 +51,7 @@ impl AxisMonitor {
         }
     }
 
-    /// Takes the newest samples of both detectors at `now`, with the axis at `position`, and
+    /// Takes what both detectors showed last at `now`, with the axis at `position` when the slider's did, and
     /// gives out its displacement less what `memories` keep: what is to be compensated. `lever` is
     /// what the detector sees of its slide's tilts ([`DetectorLever`](super::DetectorLever)), which
     /// is no displacement.
@@ -59,14 +59,14 @@ impl AxisMonitor {
         &mut self,
         now: Time,
         position: Metres,
-        (slider, end): (Option<&Sample>, Option<&Sample>),
+        (slider, end): (Option<&Shown>, Option<&Shown>),
         lever: Displacement,
         memories: &Memories,
     ) -> Displacement {
         let shift = self.end.as_mut().map(|own| {
             let seen = own.detector.read(now, end);
-            own.feed
-                .advance(now, seen.map(|it| self.reference.beam_shift(it)))
+            let shift = seen.map(|it| self.reference.beam_shift(it));
+            passed_on(&mut own.feed, now, shift, own.detector.repeats())
         });
         let shift = shift.unwrap_or([Metres::ZERO; 2]);
         let seen = self.slider.read(now, slider);
@@ -74,7 +74,7 @@ impl AxisMonitor {
         let seen = seen.map(|it| difference(it, lever));
         self.displacement = seen.ok();
         let error = seen.map(|it| memories.error(self.axis, position, it));
-        self.feed.advance(now, error)
+        passed_on(&mut self.feed, now, error, self.slider.repeats())
     }
 
     /// Announces that what is given out will jump although nothing moved: memories changed.
@@ -132,5 +132,18 @@ impl AxisMonitor {
     /// The feed, to switch it on or off.
     pub fn feed_mut(&mut self) -> &mut Feed<Metres, 2> {
         &mut self.feed
+    }
+}
+
+/// What `feed` makes of a value, which `repeats` the one before it where nothing new has been seen.
+fn passed_on(
+    feed: &mut Feed<Metres, 2>,
+    now: Time,
+    value: Result<Displacement, Trouble>,
+    repeats: bool,
+) -> Displacement {
+    match value {
+        Ok(_) if repeats => feed.repeat(now),
+        value => feed.advance(now, value),
     }
 }

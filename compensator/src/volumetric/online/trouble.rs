@@ -3,7 +3,7 @@
 use core::num::NonZeroU32;
 use core::time::Duration;
 
-use units::Volts;
+use units::{Metres, Volts};
 
 use super::RollError;
 
@@ -64,6 +64,22 @@ pub enum Trouble {
         low: f64,
         /// Highest calibrated ratio.
         high: f64,
+    },
+    /// The camera found no spot that it accepts.
+    #[error("the camera finds no spot in its picture: is the beam blocked, or beside the field?")]
+    Unseen,
+    /// The spot is beyond what the camera is used for.
+    #[error(
+        "the spot is outside the camera's field: {:.1} um, from {:.1} to {:.1} um expected",
+        seen.um(), low.um(), high.um()
+    )]
+    BesideField {
+        /// Where it is.
+        seen: Metres,
+        /// Where the field begins.
+        low: Metres,
+        /// Where it ends.
+        high: Metres,
     },
     /// Changed faster than anything there can move.
     #[error("the value changed by {seen:e}, at most {limit:e} is possible in that time (SI units)")]

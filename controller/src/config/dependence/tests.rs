@@ -1,6 +1,7 @@
 use super::*;
 use crate::Edit;
 use crate::config::parse;
+use crate::edit::with_spot_cameras;
 use crate::kinds::KINDS;
 
 const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
@@ -160,6 +161,28 @@ fn no_name_can_write_a_line() {
 fn the_name_of_a_module_may_change() {
     let renamed = VOLUMETRIC.edit("beams_x", "first_beams");
     assert_eq!(hash(VOLUMETRIC), hash(&renamed));
+}
+
+/// Its name may change; not which one it is, what it was taught, and how its numbers become places.
+#[test]
+fn references_by_a_camera_depend_on_what_it_was_taught() {
+    let text = with_spot_cameras(VOLUMETRIC, &["x"]);
+    let usual = hash(&text);
+    assert_ne!(usual, hash(VOLUMETRIC));
+    let renamed = text.edit("[camera.slide_x]", "[camera.looks]");
+    let renamed = renamed.edit("camera = \"slide_x\"", "camera = \"looks\"");
+    assert_eq!(usual, hash(&renamed));
+    for (from, to) in [
+        ("job = \"spot.job\"", "job = \"point.job\""),
+        (
+            "job = \"spot.job\"",
+            "job = \"spot.job\"\nserial_number = \"7\"",
+        ),
+        ("rotation_deg = 180.0", "rotation_deg = 90.0"),
+        ("length_um_per_unit = 1.0", "length_um_per_unit = 1.5"),
+    ] {
+        assert_ne!(usual, hash(&text.edit_first(from, to)), "{to}");
+    }
 }
 
 #[test]

@@ -98,8 +98,10 @@ fn beam(config: &MachineConfig, beam: &BeamConfig) -> String {
         BeamDriftName::Mixed => "Mixed",
     });
     let drift = (drift, beam.source_mm, beam.end_mm, beam.translation_share);
-    let end = beam.end.as_ref().map(|it| detector(config, it));
-    let (slider, place_mm) = (detector(config, &beam.slider), beam.slider.place_mm);
+    // Cameras came with version 2: nothing of this version belongs to a machine that has one.
+    let of = |it: &Option<BeamDetectorConfig>| it.as_ref().map(|it| detector(config, it));
+    let (slider, end) = (of(&beam.slider).unwrap_or_default(), of(&beam.end));
+    let place_mm = beam.on_the_slide().map_or([0.0; 3], |it| it.place_mm());
     format!("\nbeam {drift:?} {slider} {place_mm:?} {end:?}")
 }
 

@@ -101,6 +101,15 @@ impl Family for InSightConfig {
             angle_arcsec_per_unit: self.angle_arcsec_per_unit,
             rotation: Radians::from_degrees(self.rotation_deg),
             mirrored: self.mirrored,
+            targets: self.targets,
         }
+    }
+
+    fn teaching(&self) -> Vec<(&'static str, Option<&str>)> {
+        vec![
+            ("serial_number", self.serial_number.as_deref()),
+            ("job", Some(&self.job)),
+            ("result_cell", Some(&self.result_cell)),
+        ]
     }
 }

@@ -38,6 +38,9 @@ pub(crate) trait Family {
 
     /// What turns its numbers into poses.
     fn keys(&self) -> CameraKeys;
+
+    /// Which camera it must be and what it was taught, by the names of the keys.
+    fn teaching(&self) -> Vec<(&'static str, Option<&str>)>;
 }
 
 /// What turns a camera's numbers into poses: the keys of this name.
@@ -47,6 +50,8 @@ pub(crate) struct CameraKeys {
     pub(crate) angle_arcsec_per_unit: f64,
     pub(crate) rotation: Radians,
     pub(crate) mirrored: bool,
+    /// Marks that a good picture shows.
+    pub(crate) targets: u32,
 }
 
 impl CameraDevice {
@@ -93,6 +98,11 @@ impl CameraConfig {
     /// What turns its numbers into poses.
     pub(crate) fn keys(&self) -> CameraKeys {
         self.device.family().keys()
+    }
+
+    /// Which camera it must be and what it was taught, by the names of the keys: its places count from that.
+    pub(crate) fn teaching(&self) -> Vec<(&'static str, Option<&str>)> {
+        self.device.family().teaching()
     }
 
     /// Judges what its keys must keep to together.

@@ -12,7 +12,8 @@ pub(super) const fn words(trouble: &Trouble) -> (&'static str, &'static str) {
     match trouble {
         Trouble::Blocked { .. } => ("BLOCKED", "blocked"),
         Trouble::Saturated { .. } | Trouble::AtEnd { .. } => ("TOO BRIGHT", "too_bright"),
-        Trouble::Beside { .. } => ("BESIDE", "beside"),
+        Trouble::Beside { .. } | Trouble::BesideField { .. } => ("BESIDE", "beside"),
+        Trouble::Unseen => ("NO SPOT", "no_spot"),
         Trouble::Stale { .. } => ("NO SAMPLES", "stale"),
         Trouble::Roll(_) => ("NO ROLL", "no_roll"),
         Trouble::Stuck { .. } => ("STUCK", "stuck"),
@@ -44,7 +45,7 @@ fn sight_line(it: &Sight) -> String {
             text += &format!(" (ref {:+.2})", in_unit(reading, off));
         }
     }
-    text += if it.light.is_some() { " um" } else { " arcsec" };
+    text += if it.is_roll() { " arcsec" } else { " um" };
     if let Some(light) = it.light {
         text += &format!(", {:.2} V", light.value());
     }

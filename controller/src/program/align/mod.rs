@@ -10,7 +10,7 @@ use std::io::{IsTerminal, Write, stdout};
 
 use clap::Args;
 use drivers::device::Signal;
-use machine::engine::{CHANNELS_MAX, Observed};
+use machine::engine::{CHANNELS_MAX, Observed, SPOTS_MAX};
 use machine::{start_sensors, stop_sensors};
 use units::Time;
 
@@ -18,6 +18,7 @@ use crate::ports::Use;
 use crate::program::MachineArgs;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
+use crate::program::span::span_of;
 use crate::volumetric::sight::{Sight, Sights, references_in_use};
 use crate::{Failure, Machine, config};
 
@@ -41,28 +42,6 @@ pub(crate) struct AlignArgs {
     /// be there. A machine without beams shows that alone.
     #[arg(long)]
     instruments: bool,
-}
-
-/// A time in words: `10s`, `1.5min`, `1h`.
-fn span_of(text: &str) -> Result<Duration, String> {
-    let form = || "write a time with its unit: 10s, 5min, 1h".to_owned();
-    let digits = text
-        .find(|c: char| c.is_ascii_alphabetic())
-        .ok_or_else(form)?;
-    let (number, unit) = text.split_at(digits);
-    let unit_s = match unit {
-        "s" => 1.0,
-        "min" => 60.0,
-        "h" => 3600.0,
-        _ => return Err(form()),
-    };
-    let number: f64 = number.parse().map_err(|_| form())?;
-    let seconds = Duration::try_from_secs_f64(number * unit_s).map_err(|_| form())?;
-    if seconds.is_zero() {
-        Err(form())
-    } else {
-        Ok(seconds)
-    }
 }
 
 /// All that is shown at one moment.
@@ -170,14 +149,16 @@ impl Align {
     fn watch(&mut self, machine: &mut Machine, until: Time) -> Result<(), Failure> {
         while machine.now() < until {
             machine.tick(until)?;
-            let mut channels = [None; CHANNELS_MAX];
+            let (mut channels, mut spots) = ([None; CHANNELS_MAX], [None; SPOTS_MAX]);
             machine.devices().hear_channels(&mut channels);
+            machine.devices().hear_spots(&mut spots);
             self.sights.hear(&Observed {
                 now: machine.now(),
                 nominal: &[],
                 actual: &[],
                 channels: &channels,
                 temperatures: &[],
+                spots: &spots,
             });
         }
         Ok(())
@@ -207,24 +188,5 @@ impl Align {
         let mut out = stdout().lock();
         // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
         let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_time_has_a_unit() {
-        for (text, seconds) in [("10s", 10.0), ("1.5min", 90.0), ("2h", 7200.0)] {
-            assert_eq!(
-                span_of(text),
-                Ok(Duration::from_secs_f64(seconds)),
-                "{text}"
-            );
-        }
-        for text in ["10", "s", "0s", "-1s", "10 days", "1e400s"] {
-            assert!(span_of(text).unwrap_err().contains("10s"), "{text}");
-        }
     }
 }

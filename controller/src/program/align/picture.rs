@@ -121,7 +121,8 @@ fn state(sight: &Sight) -> String {
     let state = state.map_or("good", |trouble| words(trouble).0);
     match sight.light {
         Some(light) => format!("{:.2} V {state}", light.value()),
-        None => format!("arcsec {state}"),
+        None if sight.is_roll() => format!("arcsec {state}"),
+        None => state.to_owned(),
     }
 }
 

@@ -54,7 +54,7 @@ impl Session<'_> {
         run: usize,
     ) -> Option<Vec<Observation>> {
         let reference = self.beams[axis.index()].as_ref()?;
-        let beam = self.config.beam.each()[axis.index()]?;
+        let beam = self.config.beam.each()[axis.index()]?.on_the_slide()?;
         let record = self.references.content.beams.iter();
         let letter = ['x', 'y', 'z'][axis.index()];
         let record = record.clone().find(|it| it.axis == letter)?;
@@ -75,7 +75,7 @@ impl Session<'_> {
             let carried = chain.lever(axis, at, Point::ZERO);
             Observation {
                 at,
-                tool: point_of_mm(beam.slider.place_mm) - carried,
+                tool: point_of_mm(beam.place_mm()) - carried,
                 run,
                 reading: Reading::Length {
                     along: direction,

@@ -12,6 +12,7 @@ use crate::store::Journal;
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::correction::lever;
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::inputs::slide_of;
 use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
 use crate::volumetric::{LineReadEntry, LineReadingEntry};
 use crate::volumetric::{VolumeEntry, VolumeLog};
@@ -135,7 +136,11 @@ impl WorkVolume<'_> {
             shifts[axis.index()] = shift;
             // How guides bend is still to be found: what the detector sees of that is part of the
             // unknown (`BendPlan::seen_from`).
-            let tilts = lever(axis, beam, &[], &[]).seen(position, state.roll[axis.index()], &[]);
+            let tilts = lever(axis, slide_of(beam)?, &[], &[]).seen(
+                position,
+                state.roll[axis.index()],
+                &[],
+            );
             let whole = reference.displacement(position, places.0, shift);
             state.sideways[axis.index()] = core::array::from_fn(|k| whole[k] - tilts[k]);
         }

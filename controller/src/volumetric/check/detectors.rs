@@ -4,9 +4,12 @@ use std::collections::BTreeSet;
 
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AnalogConfig, MachineConfig};
+use crate::hardware::camera::CameraConfig;
+use crate::volumetric::PICTURE_PERIODS_MAX;
 use crate::volumetric::settings::{self, volume_axis};
 use crate::volumetric::{
-    BeamConfig, BeamDetectorConfig, BeamDriftName, RollConfig, TemperatureConfig, VolumetricConfig,
+    BeamConfig, BeamDetectorConfig, BeamDriftName, RollConfig, SpotCameraConfig, TemperatureConfig,
+    VolumetricConfig,
 };
 
 /// An analog input, by the names of module and quantity and its channel.
@@ -55,12 +58,116 @@ fn check_beams<'a>(
         };
         let at = format!("volumetric.beam.{axis}");
         check_drift(&mut Judge::at(at.clone(), findings), beam);
-        let judge = &mut Judge::at(format!("{at}.slider"), findings);
-        check_detector(judge, config, &beam.slider, taken);
-        if let Some(end) = &beam.end {
-            let judge = &mut Judge::at(format!("{at}.end"), findings);
-            check_detector(judge, config, end, taken);
+        check_places(&mut Judge::at(at.clone(), findings), beam);
+        for (key, detector) in [("slider", &beam.slider), ("end", &beam.end)] {
+            let judge = &mut Judge::at(format!("{at}.{key}"), findings);
+            if let Some(detector) = detector {
+                check_detector(judge, config, detector, taken);
+            }
         }
+        let cameras = [
+            ("slider_camera", &beam.slider_camera),
+            ("end_camera", &beam.end_camera),
+        ];
+        for (key, camera) in cameras {
+            let judge = &mut Judge::at(format!("{at}.{key}"), findings);
+            if let Some(camera) = camera {
+                check_camera(judge, config, volumetric, camera);
+            }
+        }
+    }
+}
+
+/// One detector on the slide, one at the end at most.
+fn check_places(judge: &mut Judge<'_>, beam: &BeamConfig) {
+    let help = "keep one of them";
+    match (&beam.slider, &beam.slider_camera) {
+        (None, None) => judge.say(
+            "slider",
+            "nothing on the slide sees this beam",
+            "add `slider`, a detector of four channels, or `slider_camera`",
+        ),
+        (Some(_), Some(_)) => judge.say("slider_camera", "the slide has two detectors", help),
+        (Some(_), None) | (None, Some(_)) => {}
+    }
+    if beam.end.is_some() && beam.end_camera.is_some() {
+        judge.say("end_camera", "the end has two detectors", help);
+    }
+}
+
+/// A camera must be there, belong to one place, and find one spot.
+fn check_camera(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+    spot: &SpotCameraConfig,
+) {
+    judge.known("camera", &spot.camera, &config.camera, "camera");
+    let Some(camera) = config.camera.get(&spot.camera) else {
+        return;
+    };
+    let same = volumetric.cameras().filter(|it| it.camera == spot.camera);
+    if same.count() > 1 {
+        judge.say(
+            "camera",
+            format!("camera {} sees another beam already", spot.camera),
+            "each place needs a camera of its own",
+        );
+    }
+    let targets = camera.keys().targets;
+    if targets != 1 {
+        judge.say(
+            "camera",
+            format!("camera.{}.targets is {}", spot.camera, targets),
+            "a beam has one spot: give `targets = 1`",
+        );
+    }
+    check_picture(judge, config, volumetric, (spot, camera));
+    if let Err(error) = settings::spot_camera(spot) {
+        judge.say("", error.to_string(), "");
+    }
+}
+
+/// A picture must be believed for as long as it may take, and no longer than it is known where the axes were; and one
+/// that is bad must not count as trouble that lasts.
+fn check_picture(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+    (spot, camera): (&SpotCameraConfig, &CameraConfig),
+) {
+    let picture_ms = camera.inspection_timeout_ms;
+    let named = format!("camera.{}.inspection_timeout_ms", spot.camera);
+    if spot.age_max_ms < picture_ms {
+        judge.say(
+            "age_max_ms",
+            format!("{} ms, but {named} is {picture_ms} ms", spot.age_max_ms),
+            format!("give at least {picture_ms}, or lower {named}"),
+        );
+    }
+    let periods = config.can.values().map(|it| it.sync_period_ms);
+    let known_ms = periods.fold(f64::INFINITY, f64::min) * PICTURE_PERIODS_MAX as f64;
+    if spot.age_max_ms > known_ms {
+        judge.say(
+            "age_max_ms",
+            format!(
+                "{} ms, but where the axes were is known for {known_ms} ms",
+                spot.age_max_ms
+            ),
+            format!("give at most {known_ms}"),
+        );
+    }
+    let feed = volumetric.feed.as_ref();
+    if let Some(feed) = feed.filter(|it| it.patience_ms < picture_ms) {
+        judge.say(
+            "camera",
+            format!(
+                "{named} is {picture_ms} ms, and [volumetric.feed] has a patience of {} ms: one bad picture would count as \
+                 trouble that lasts",
+                feed.patience_ms
+            ),
+            format!("lower {named}, or raise patience_ms"),
+        );
     }
 }
 

@@ -58,10 +58,77 @@ pub struct BeamConfig {
     /// how the beam is taken to move leave of it.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub standard_uncertainty_um: Option<f64>,
-    /// The detector on the slide.
-    pub slider: BeamDetectorConfig,
+    /// The detector on the slide, of four channels.
+    #[schemars(extend("x-range" = "this or `slider_camera`"))]
+    pub slider: Option<BeamDetectorConfig>,
+    /// The detector on the slide, a camera behind a beam splitter.
+    #[schemars(extend("x-range" = "this or `slider`"))]
+    pub slider_camera: Option<SpotCameraConfig>,
     /// The detector behind the travel, which sees the beam's own drift.
+    #[schemars(extend("x-range" = "not together with `end_camera`"))]
     pub end: Option<BeamDetectorConfig>,
+    /// The same, a camera.
+    pub end_camera: Option<SpotCameraConfig>,
+}
+
+/// What sees a beam at one place.
+#[derive(Clone, Copy, Debug)]
+pub enum DetectorConfig<'a> {
+    /// Four channels.
+    Channels(&'a BeamDetectorConfig),
+    /// A camera.
+    Camera(&'a SpotCameraConfig),
+}
+
+impl<'a> DetectorConfig<'a> {
+    /// Of what is given for one place.
+    fn of(
+        channels: Option<&'a BeamDetectorConfig>,
+        camera: Option<&'a SpotCameraConfig>,
+    ) -> Option<Self> {
+        channels.map(Self::Channels).or(camera.map(Self::Camera))
+    }
+
+    /// Where it sits when all axes are at 0, in millimetres from the machine's zero.
+    pub const fn place_mm(&self) -> [f64; 3] {
+        match self {
+            Self::Channels(it) => it.place_mm,
+            Self::Camera(it) => it.place_mm,
+        }
+    }
+
+    /// How far apart two readings of one place can be, in micrometres.
+    pub const fn noise_max_um(&self) -> f64 {
+        match self {
+            Self::Channels(it) => it.noise_max_um,
+            Self::Camera(it) => it.noise_max_um,
+        }
+    }
+
+    /// How old a reading may be, in milliseconds.
+    pub const fn age_max_ms(&self) -> f64 {
+        match self {
+            Self::Channels(it) => it.age_max_ms,
+            Self::Camera(it) => it.age_max_ms,
+        }
+    }
+}
+
+impl BeamConfig {
+    /// The detector on the slide; there is one in a configuration that was checked.
+    pub fn on_the_slide(&self) -> Option<DetectorConfig<'_>> {
+        DetectorConfig::of(self.slider.as_ref(), self.slider_camera.as_ref())
+    }
+
+    /// The detector at the end of the beam.
+    pub fn at_the_end(&self) -> Option<DetectorConfig<'_>> {
+        DetectorConfig::of(self.end.as_ref(), self.end_camera.as_ref())
+    }
+
+    /// The cameras that see it.
+    pub fn cameras(&self) -> impl Iterator<Item = &SpotCameraConfig> {
+        self.slider_camera.iter().chain(&self.end_camera)
+    }
 }
 
 /// How four channels belong to two directions.
@@ -140,6 +207,41 @@ pub struct BeamDetectorConfig {
     /// than it converts.
     #[schemars(range(min = 10, max = 1000000))]
     pub stuck_samples: Option<NonZeroU32>,
+}
+
+/// How many periods of SYNC it is known where the axes were: half a second at 2 ms. No picture may be older.
+pub(crate) const PICTURE_PERIODS_MAX: usize = 255;
+
+/// A camera that sees the spot of a beam behind a beam splitter (CN1214003A, claim 10).
+///
+/// It takes one picture after the other as long as SYNC runs; what a picture shows counts for where the axis was
+/// when the picture was asked for. Its job finds one target, the spot. Turn its frame with `rotation_deg` and `mirrored`
+/// of its section, so that x and y are the first and second direction, the other two axes in the order x, y, z. The
+/// slider's place is that of the *slide* (a slide that goes one way sees its spot go the other way: turned by 180
+/// degrees), that of the end camera is the *beam's*. How uncertain a place is says the beam's `standard_uncertainty_um`, or
+/// else a third of `noise_max_um`; that of the camera's own section counts for poses.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpotCameraConfig {
+    /// What finds the spot.
+    #[schemars(extend("x-range" = "a `[camera.NAME]` of its own, with `targets = 1`"))]
+    pub camera: String,
+    /// Where the camera's splitter sits when all axes are at 0, measured from the machine's zero, as for a detector of four
+    /// channels.
+    #[serde(default)]
+    pub place_mm: [f64; 3],
+    /// How far the spot may be from where the camera was taught, in the first and second direction; beyond is not believed.
+    #[schemars(inner(range(min = 1.0, max = 100000.0)))]
+    pub field_um: [f64; 2],
+    /// An older picture says nothing about now.
+    #[schemars(range(min = 20.0, max = 60000.0))]
+    pub age_max_ms: f64,
+    /// How fast a place can change; more is not believed.
+    #[schemars(extend("x-above" = 0.0))]
+    pub speed_max_um_per_s: f64,
+    /// How far apart two pictures of one place can be; more is not believed.
+    #[schemars(extend("x-above" = 0.0))]
+    pub noise_max_um: f64,
 }
 
 const fn equal() -> [f64; 4] {

@@ -31,13 +31,13 @@ impl VolumetricCorrection {
     /// `actual`, beyond what the first memory keeps. Allocates nothing.
     pub(in crate::volumetric) fn record(&self, actual: Point, recorder: &mut StateRecorder) {
         for axis in Axis::ALL {
-            let beam = self.beams[axis.index()].as_ref();
-            let Some(left) = beam.and_then(|it| it.monitor.uncompensated()) else {
+            let Some(beam) = &self.beams[axis.index()] else {
                 continue;
             };
-            let position = actual.along(axis);
-            let beyond = self.memories.beyond_first(axis, position, left);
-            recorder.record(axis, position, beyond);
+            if let Some(left) = beam.monitor.uncompensated() {
+                let beyond = self.memories.beyond_first(axis, beam.position, left);
+                recorder.record(axis, beam.position, beyond);
+            }
         }
         for roll in self.rolls.iter().flatten() {
             let (axis, Some(left)) = (roll.axis, roll.monitor.uncompensated()) else {
@@ -72,6 +72,7 @@ impl VolumetricCorrection {
         let Some(before) = before.downcast_ref::<Self>() else {
             return;
         };
+        self.trail = before.trail.clone();
         for (own, before) in self.beams.iter_mut().zip(&before.beams) {
             if let (Some(own), Some(before)) = (own, before) {
                 own.monitor.take_over(&before.monitor);

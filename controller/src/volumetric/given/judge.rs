@@ -5,8 +5,8 @@ use compensator::volumetric::{Axis, GivenReference, ReferenceOf};
 use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
-use crate::volumetric::settings::beam_detector;
-use crate::volumetric::{BeamDetectorConfig, VolumetricConfig};
+use crate::volumetric::settings::eye;
+use crate::volumetric::{DetectorConfig, VolumetricConfig};
 
 /// At how many places between two positions a reference is compared with what its detector can show.
 const BETWEEN: usize = 8;
@@ -29,7 +29,7 @@ fn watched(config: &VolumetricConfig) -> Vec<(Axis, ReferenceOf)> {
         };
         let across = axis.others();
         watched.extend(across.map(|along| (axis, ReferenceOf::Slide(along))));
-        if beam.end.is_some() {
+        if beam.at_the_end().is_some() {
             watched.extend(across.map(|along| (axis, ReferenceOf::End(along))));
         }
     }
@@ -103,11 +103,11 @@ fn detector(
     config: &VolumetricConfig,
     axis: Axis,
     of: ReferenceOf,
-) -> Option<(&BeamDetectorConfig, Axis)> {
+) -> Option<(DetectorConfig<'_>, Axis)> {
     let beam = config.beam.each()[axis.index()]?;
     match of {
-        ReferenceOf::Slide(along) => Some((&beam.slider, along)),
-        ReferenceOf::End(along) => Some((beam.end.as_ref()?, along)),
+        ReferenceOf::Slide(along) => Some((beam.on_the_slide()?, along)),
+        ReferenceOf::End(along) => Some((beam.at_the_end()?, along)),
         ReferenceOf::Roll => None,
     }
 }
@@ -120,7 +120,7 @@ fn shown(config: &VolumetricConfig, axis: Axis, of: ReferenceOf) -> Option<(f64,
     }
     let (detector, along) = detector(config, axis, of)?;
     let place = axis.others().iter().position(|it| *it == along)?;
-    let (low, high) = beam_detector(detector).ok()?.field()[place];
+    let (low, high) = eye(detector).ok()?.field()[place];
     Some((low.value(), high.value()))
 }
 

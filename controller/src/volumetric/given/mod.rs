@@ -118,7 +118,7 @@ fn record(
             function::<Metres>("first", along_first)?,
             function::<Metres>("second", along_second)?,
         ],
-        end_m: match (&beam.end, end(first), end(second)) {
+        end_m: match (beam.at_the_end(), end(first), end(second)) {
             (None, ..) => None,
             (Some(_), Some(first), Some(second)) => Some([first, second]),
             (Some(_), ..) => return Err(none),

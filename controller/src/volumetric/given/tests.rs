@@ -3,6 +3,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::config::parse;
+use crate::edit::with_spot_cameras;
 use crate::stores::store_in;
 use crate::volumetric::{GEOMETRY, GeometryContent, GivenName};
 
@@ -107,6 +108,21 @@ fn a_table_is_in_use_with_its_origin_and_reads_as_it_was_given() {
     let own = known.machine.volumetric.as_ref().unwrap();
     let [roll, ..] = content.rolls(&given.id, own).unwrap();
     assert!((roll.unwrap().at(Metres(0.375)).arcsec() - 0.5).abs() < 1e-9);
+}
+
+/// The end's reading counts, whatever reads it.
+#[test]
+fn what_cameras_read_is_given_alike() {
+    let mut known = known();
+    let text = with_spot_cameras(CONFIG, &["x"]);
+    known.machine = parse(&text, "m.toml").unwrap().config;
+    let given = known.import(&table([-10.0, 40.0]), "r.csv").unwrap();
+    let beam = given.content.beams.iter().find(|it| it.axis == 'x');
+    let end_m = beam.unwrap().end_m.expect("it was given");
+    assert!(
+        end_m.iter().all(|it| (it - 7.5e-6).abs() < 1e-15),
+        "{end_m:?}"
+    );
 }
 
 #[test]

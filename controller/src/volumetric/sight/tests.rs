@@ -50,6 +50,7 @@ impl Bench {
             actual: &[],
             channels: &self.channels,
             temperatures: &[],
+            spots: &[],
         });
     }
 

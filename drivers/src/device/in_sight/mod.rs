@@ -70,6 +70,8 @@ pub struct InSight {
     pending: bool,
     /// A fence stands behind the picture asked for: it has been taken, or never will be.
     fenced: bool,
+    /// When the last picture was asked for.
+    asked: Time,
     /// When the picture asked for is late.
     picture_due: Time,
     /// The picture before the one that is awaited.
@@ -109,6 +111,7 @@ impl InSight {
             started: false,
             pending: false,
             fenced: false,
+            asked: Time::ZERO,
             picture_due: Time::ZERO,
             count: 0,
             lines: LineAssembler::new(TERMINATOR, LINE_MAX),
@@ -140,6 +143,7 @@ impl InSight {
             Question::Picture => {
                 self.pending = true;
                 self.fenced = false;
+                self.asked = now;
                 deadline = now + self.settings.inspection_timeout;
                 self.picture_due = deadline;
             }
@@ -468,6 +472,10 @@ impl PoseInstrument for InSight {
 
     fn pose(&self) -> Option<PoseReading> {
         self.pose
+    }
+
+    fn asked(&self) -> Time {
+        self.asked
     }
 }
 

@@ -6,7 +6,7 @@ use super::config::{ActuatorConfig, ScrewConfig};
 use super::screw::Play;
 use super::*;
 use crate::plant::config::PlantConfig;
-use crate::plant::{HallDrift, Plant, Servo, Target};
+use crate::plant::{HallDrift, Plant, Scene, Servo, Target};
 
 const AXES: usize = 3;
 
@@ -379,8 +379,8 @@ fn limits_stops_and_faults_act_on_their_own_axis() {
 
 /// Two marks, seen: the platform's pose by elementary geometry.
 fn seen(plant: &mut Plant) -> Option<(f64, f64, f64)> {
-    plant.open_shutter();
-    let marks: Option<Vec<_>> = plant.close_shutter().into_iter().collect();
+    plant.open_shutter(Scene::Marks);
+    let marks: Option<Vec<_>> = plant.close_shutter(Scene::Marks).into_iter().collect();
     let [a, b] = marks?.try_into().unwrap();
     let angle_of = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]).atan2(b[0] - a[0]);
     let middle = |i: usize| (a.place_m[i] + b.place_m[i]) / 2.0;
@@ -438,10 +438,10 @@ fn a_camera_that_is_turned_and_mirrored_sees_it_so() {
 fn a_mark_that_is_absent_covered_smeared_or_out_of_the_field_shows() {
     let mut plant = plant(8);
     let likeness = |plant: &mut Plant| {
-        let marks = plant.close_shutter();
+        let marks = plant.close_shutter(Scene::Marks);
         marks[0].map(|mark| mark.likeness)
     };
-    plant.open_shutter();
+    plant.open_shutter(Scene::Marks);
     let good = likeness(&mut plant).unwrap();
     assert!(good > 0.9);
     plant.set_target(Target::Covered);
@@ -449,7 +449,7 @@ fn a_mark_that_is_absent_covered_smeared_or_out_of_the_field_shows() {
     plant.set_target(Target::Absent);
     assert_eq!(likeness(&mut plant), None);
     plant.set_target(Target::Good);
-    plant.open_shutter();
+    plant.open_shutter(Scene::Marks);
     let now = go(&mut plant, Time(1_000_000), [0.1e-3; AXES], MS);
     assert!(likeness(&mut plant).unwrap() < 0.5 * good, "smeared");
     go(&mut plant, now, [4.5e-3, 4.5e-3, 0.0], MS);

@@ -10,6 +10,8 @@
 //! (1 + erf(√2·s/w))/2, in each direction by itself, so that ((A + D) − (B + C))/ΣV and
 //! ((A + B) − (C + D))/ΣV are erf(√2·s/w): nearly 1.596·s/w in the middle.
 //!
+//! A camera may stand in a detector's place ([`SpotCamera`]); it sees the same spot.
+//!
 //! Absent: dead zones between quadrants, stray light, clipping of the spot.
 
 use core::f64::consts::{SQRT_2, TAU};
@@ -20,6 +22,8 @@ use units::portable::sin;
 use super::config::BeamConfig;
 use super::guide::Motion;
 use super::rigid::{Rotation, Vector, add, minus};
+use super::spot::SpotCamera;
+use crate::plant::picture::{BeamPlace as Place, Mark};
 use crate::random::Stream;
 
 /// Something that drifts to and fro between −1 and 1: three periods, drawn from the seed.
@@ -45,15 +49,6 @@ impl Wander {
     }
 }
 
-/// Which of a beam's detectors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
-    /// On the slide.
-    Slide,
-    /// Behind the end of the travel.
-    End,
-}
-
 /// What is wrong with a beam.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BeamTrouble {
@@ -73,6 +68,7 @@ struct Detector {
     radius_m: f64,
     turbulence: Stream,
     seen: Seen,
+    camera: SpotCamera,
 }
 
 /// What a detector saw last: all channels read at one moment are of one spot.
@@ -180,6 +176,47 @@ impl Beam {
         (detector.seen.at == now).then_some(detector.seen.volts)
     }
 
+    /// What turbulent air does to the spot there.
+    fn turbulence_m(&self, place: Place, position_m: f64) -> f64 {
+        let share = self.distance_m(place, position_m) / self.distance_m(Place::End, 0.0);
+        self.config.turbulence_um * 1e-6 * share
+    }
+
+    const fn detector_mut(&mut self, place: Place) -> &mut Detector {
+        match place {
+            Place::Slide => &mut self.slide,
+            Place::End => &mut self.end,
+        }
+    }
+
+    /// The camera in a detector's place opens its shutter.
+    pub(super) fn open_shutter(
+        &mut self,
+        place: Place,
+        position_m: f64,
+        motion: (&Motion, [usize; 2]),
+        now: Time,
+    ) {
+        let spot = self.spot_m(place, position_m, motion, now);
+        let detector = self.detector_mut(place);
+        detector.camera.open(detector.off_middle(spot));
+    }
+
+    /// It closes its shutter: what its picture shows.
+    pub(super) fn close_shutter(
+        &mut self,
+        place: Place,
+        position_m: f64,
+        motion: (&Motion, [usize; 2]),
+        now: Time,
+    ) -> Option<Mark> {
+        let spot = self.spot_m(place, position_m, motion, now);
+        let (light, turbulence_m) = (self.light(place, now), self.turbulence_m(place, position_m));
+        let detector = self.detector_mut(place);
+        let spot = detector.off_middle(spot);
+        detector.camera.close(spot, light, turbulence_m)
+    }
+
     /// Looks at a detector, the first time at this moment.
     pub(super) fn look(
         &mut self,
@@ -190,12 +227,8 @@ impl Beam {
     ) -> [f64; 4] {
         let spot = self.spot_m(place, position_m, motion, now);
         let light_v = self.light(place, now) * self.config.sum_v;
-        let share = self.distance_m(place, position_m) / self.distance_m(Place::End, 0.0);
-        let turbulence_m = self.config.turbulence_um * 1e-6 * share;
-        let detector = match place {
-            Place::Slide => &mut self.slide,
-            Place::End => &mut self.end,
-        };
+        let turbulence_m = self.turbulence_m(place, position_m);
+        let detector = self.detector_mut(place);
         let volts = detector.quadrants(spot, turbulence_m);
         let volts = volts.map(|it| it * light_v);
         detector.seen = Seen { at: now, volts };
@@ -216,17 +249,21 @@ impl Detector {
                 at: Time::NEVER,
                 volts: [0.0; 4],
             },
+            camera: SpotCamera::new(config, seed, whose),
         }
+    }
+
+    /// The spot, from the middle of the detector as it is mounted.
+    fn off_middle(&self, spot_m: [f64; 2]) -> [f64; 2] {
+        core::array::from_fn(|k| spot_m[k] - self.mounting_m[k])
     }
 
     /// The share of the light on A, B, C and D.
     fn quadrants(&mut self, spot_m: [f64; 2], turbulence_m: f64) -> [f64; 4] {
-        let mut ratio = [0.0; 2];
-        for across in 0..2 {
+        let ratio = self.off_middle(spot_m).map(|off_m| {
             let trembles_m = turbulence_m * self.turbulence.gaussian();
-            let from_middle_m = spot_m[across] - self.mounting_m[across] + trembles_m;
-            ratio[across] = erf(SQRT_2 * from_middle_m / self.radius_m);
-        }
+            erf(SQRT_2 * (off_m + trembles_m) / self.radius_m)
+        });
         let share =
             |first: f64, second: f64| (1.0 + first * ratio[0]) * (1.0 + second * ratio[1]) / 4.0;
         [

@@ -280,6 +280,10 @@ pub struct BeamConfig {
     pub noise_mv: f64,
     /// The channels saturate here.
     pub rail_v: f64,
+    /// Standard deviation of where a camera finds the spot in one picture, in each direction.
+    pub camera_noise_um: f64,
+    /// A camera sees the spot up to this far from its middle, in each direction.
+    pub camera_field_um: f64,
 }
 
 impl Default for BeamConfig {
@@ -299,6 +303,8 @@ impl Default for BeamConfig {
             intensity_drift_percent: 8.0,
             noise_mv: 0.1,
             rail_v: 5.0,
+            camera_noise_um: 0.15,
+            camera_field_um: 300.0,
         }
     }
 }
@@ -452,6 +458,7 @@ impl VolumetricConfig {
             ("film_time_constant_min", heat.film_time_constant_min),
             ("wander_period_min", beams.wander_period_min),
             ("spot_radius_mm", beams.spot_radius_mm),
+            ("camera_field_um", beams.camera_field_um),
             ("sum_v", beams.sum_v),
             ("beams.rail_v", beams.rail_v),
             ("distance_mm", self.roll.distance_mm),

@@ -27,6 +27,7 @@ mod laser_tests;
 mod rigid;
 mod roll;
 mod slide;
+mod spot;
 #[cfg(test)]
 mod tests;
 mod truth;
@@ -41,9 +42,10 @@ pub use truth::{ErrorMotion, LineTruth, Point, VolumetricTruth};
 use super::config::InterferometerConfig;
 use super::mechanics::{Mechanics, Section};
 use super::parts::actuator::Actuator;
+use super::picture::{BeamPlace as Place, Mark};
 use crate::config::error::ConfigError;
 use crate::random::Stream;
-use beam::{Beam, Place};
+use beam::Beam;
 use chain::{Chain, Stand};
 use config::VolumetricConfig;
 use guide::{Guide, Motion};
@@ -206,6 +208,23 @@ impl Volumetric {
             }
             _ => None,
         }
+    }
+
+    /// The camera in the place of a detector opens its shutter; nothing happens on an axis that is not there.
+    pub(super) fn open_shutter(&mut self, axis: usize, place: Place, now: Time) {
+        let Some(slide) = self.slides.get(axis) else {
+            return;
+        };
+        let scale_m = slide.scale_m(now);
+        let motion = self.motion(axis, scale_m, now);
+        self.beams[axis].open_shutter(place, scale_m, (&motion, across(axis)), now);
+    }
+
+    /// It closes its shutter: the spot in its picture.
+    pub(super) fn close_shutter(&mut self, axis: usize, place: Place, now: Time) -> Option<Mark> {
+        let scale_m = self.slides.get(axis)?.scale_m(now);
+        let motion = self.motion(axis, scale_m, now);
+        self.beams[axis].close_shutter(place, scale_m, (&motion, across(axis)), now)
     }
 
     /// What the roll detectors of a slide give.

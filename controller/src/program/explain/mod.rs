@@ -1,0 +1,177 @@
+//! `truestage explain CODE`: what a code means that a device, a drive or this program gave, what it mostly comes from,
+//! and what to do next.
+
+mod aborts;
+mod emergencies;
+mod exits;
+
+use clap::Args;
+use serde_json::{Value, json};
+use wire::canopen::emcy::EmergencyCode;
+use wire::canopen::sdo::AbortCode;
+
+use crate::Failure;
+use crate::program::output::{Ended, Output};
+
+/// What `truestage explain` is told.
+#[derive(Debug, Args)]
+pub(crate) struct ExplainArgs {
+    /// `0x06090030`: an SDO abort code; `0x8611`: the code of an emergency message, or a drive's own (object 0x603F);
+    /// `4`: an exit code of this program.
+    #[arg(value_name = "CODE", required = true)]
+    codes: Vec<String>,
+}
+
+/// What mostly stands behind a code, and what to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Advice {
+    cause: &'static str,
+    next: &'static str,
+}
+
+/// One code explained.
+#[derive(Clone, Debug, PartialEq)]
+struct Explained {
+    /// What kind of code it is.
+    kind: &'static str,
+    /// The code and what the standard calls it.
+    meaning: String,
+    advice: Advice,
+}
+
+/// Explains each code.
+///
+/// # Errors
+/// When one of them is no code.
+pub(crate) fn run(args: &ExplainArgs, output: Output) -> Ended {
+    let each = args.codes.iter().map(|it| explained(it));
+    let each = each.collect::<Result<Vec<_>, _>>()?;
+    let texts: Vec<String> = each.iter().map(text).collect();
+    let values: Vec<Value> = each.iter().map(value).collect();
+    output.result(&texts.join("\n\n"), &json!({ "codes": values }))
+}
+
+fn text(it: &Explained) -> String {
+    let Advice { cause, next } = it.advice;
+    format!(
+        "{}: {}\n  cause  {cause}\n  next   {next}",
+        it.kind, it.meaning
+    )
+}
+
+fn value(it: &Explained) -> Value {
+    json!({
+        "kind": it.kind,
+        "meaning": it.meaning,
+        "cause": it.advice.cause,
+        "next": it.advice.next,
+    })
+}
+
+/// By its form: eight digits behind `0x` are an SDO abort code, four an emergency code, a decimal number an exit code.
+fn explained(word: &str) -> Result<Explained, Failure> {
+    let unknown = || {
+        let exits = exits::CODES.iter().map(u8::to_string);
+        let exits: Vec<String> = exits.collect();
+        Failure::Usage {
+            what: format!("`{word}` is no code"),
+            help: format!(
+                "write an SDO abort code as 0x06090030, an emergency code or a drive's as 0x8611, an exit code of this \
+                 program as one of {}",
+                exits.join(", ")
+            ),
+        }
+    };
+    let Some(digits) = word.strip_prefix("0x").or(word.strip_prefix("0X")) else {
+        let code = word.parse().map_err(|_| unknown())?;
+        let (meaning, advice) = exits::of(code).ok_or_else(unknown)?;
+        return Ok(Explained {
+            kind: "exit code",
+            meaning: format!("{code} ({meaning})"),
+            advice,
+        });
+    };
+    let digits = digits.replace('_', "");
+    let raw = u32::from_str_radix(&digits, 16).map_err(|_| unknown())?;
+    match (digits.len(), u16::try_from(raw)) {
+        (..=4, Ok(code)) => Ok(Explained {
+            kind: "emergency or drive fault code",
+            meaning: EmergencyCode(code).to_string(),
+            advice: emergencies::of(EmergencyCode(code)),
+        }),
+        (5..=8, _) => Ok(Explained {
+            kind: "SDO abort code",
+            meaning: AbortCode::from_raw(raw).to_string(),
+            advice: aborts::of(AbortCode::from_raw(raw)),
+        }),
+        _ => Err(unknown()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_code_is_known_by_its_form() {
+        let kind = |word: &str| explained(word).map(|it| (it.kind, it.meaning));
+        let (abort, emergency, exit) = (
+            "SDO abort code",
+            "emergency or drive fault code",
+            "exit code",
+        );
+        for (word, expected, says) in [
+            ("0x06090030", abort, "value out of range"),
+            ("0x0609_0030", abort, "value out of range"),
+            ("0X8611", emergency, "following error"),
+            ("0x2311", emergency, "current"),
+            ("4", exit, "device or bus"),
+            ("130", exit, "Ctrl-C"),
+        ] {
+            let (seen, meaning) = kind(word).unwrap_or_else(|failure| panic!("{failure}"));
+            assert_eq!(seen, expected, "{word}");
+            assert!(meaning.contains(says), "{meaning}");
+        }
+        for word in ["", "0x", "0x123456789", "-1", "77", "four", "0xzz"] {
+            let told = kind(word).expect_err(word).to_string();
+            assert!(told.contains("is no code"), "{told}");
+        }
+    }
+
+    /// Words for an operator: a sentence each, and no code is sent to another one's advice by mistake.
+    fn check(of: Advice, whose: &str) {
+        for text in [of.cause, of.next] {
+            assert!(text.len() > 20, "{whose}: `{text}`");
+            assert!(!text.ends_with('.'), "{whose}: `{text}`");
+        }
+        assert_ne!(of.cause, of.next, "{whose}");
+    }
+
+    #[test]
+    fn no_code_that_has_a_name_is_without_advice_of_its_own() {
+        for code in AbortCode::ALL {
+            let of = aborts::of(*code);
+            check(of, &code.to_string());
+            assert_ne!(of, aborts::UNNAMED, "{code}");
+        }
+        for code in EmergencyCode::named() {
+            let of = emergencies::of(code);
+            check(of, &code.to_string());
+            assert_ne!(of, emergencies::UNNAMED, "{code}");
+        }
+        for code in exits::CODES {
+            check(exits::of(*code).expect("it is listed").1, &code.to_string());
+        }
+    }
+
+    /// What the help of the program lists.
+    #[test]
+    fn every_exit_code_of_the_help_is_explained() {
+        let numbers = crate::program::EXIT_CODES.split(|c: char| !c.is_ascii_digit());
+        let listed: Vec<u8> = numbers.filter_map(|it| it.parse().ok()).collect();
+        assert!(listed.len() > 5, "{listed:?}");
+        for code in listed {
+            assert!(exits::CODES.contains(&code), "{code}");
+        }
+    }
+}
