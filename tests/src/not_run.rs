@@ -32,11 +32,16 @@ pub fn left_out(test: &str, why: &str) {
     }
 }
 
-/// One file each: tests run at the same time, in processes of their own.
+/// One file each: tests run at the same time, in processes of their own. One line each: lines are counted.
 fn write_down(folder: &OsString, test: &str, why: &str) {
     fs::create_dir_all(folder).expect("the folder can be made");
     let file = tempfile::Builder::new().suffix(".txt").tempfile_in(folder);
     let mut file = file.expect("a file can be made");
-    writeln!(file, "{test}: {why}").expect("there is room");
+    let why: Vec<&str> = why
+        .lines()
+        .map(str::trim)
+        .filter(|it| !it.is_empty())
+        .collect();
+    writeln!(file, "{test}: {}", why.join(" | ")).expect("there is room");
     file.keep().expect("it can be kept");
 }
