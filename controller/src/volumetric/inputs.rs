@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::{RollOptics, Sample, Shown, StuckWatch, Trouble};
+use compensator::volumetric::online::{JumpWatch, RollOptics, Sample, Shown, StuckWatch, Trouble};
 use units::{Metres, Quantity, Radians, Time, Volts};
 
 use crate::config::{AnalogConfig, MachineConfig};
@@ -126,10 +126,7 @@ pub(super) struct RollReader {
     per_volt: [f64; 2],
     optics: RollOptics,
     age_max: Duration,
-    /// Radians per second.
-    speed_max: f64,
-    noise_max: Radians,
-    last: Option<(Time, Radians)>,
+    jump: JumpWatch<Radians, 1>,
     stuck: StuckWatch<2>,
 }
 
@@ -144,9 +141,10 @@ impl RollReader {
             per_volt: roll.mm_per_v.map(|mm| mm * 1e-3),
             optics: roll_optics(roll)?,
             age_max: Duration::from_secs_f64(roll.age_max_ms * 1e-3),
-            speed_max: Radians::from_arcsec(roll.speed_max_arcsec_per_s).value(),
-            noise_max: Radians::from_arcsec(roll.noise_max_arcsec),
-            last: None,
+            jump: JumpWatch::new(
+                Radians::from_arcsec(roll.speed_max_arcsec_per_s).value(),
+                Radians::from_arcsec(roll.noise_max_arcsec),
+            ),
             stuck: StuckWatch::new(roll.stuck_samples),
         })
     }
@@ -156,15 +154,7 @@ impl RollReader {
         let (volts, at) = self.volts(observed)?;
         self.stuck.check(at, volts.map(Quantity::value))?;
         let roll = self.roll(volts)?;
-        if let Some((before, last)) = self.last {
-            let passed = at.since(before).as_secs_f64();
-            let limit = self.noise_max.value() + self.speed_max * passed;
-            let seen = (roll - last).value().abs();
-            if seen > limit {
-                return Err(Trouble::Jumped { seen, limit });
-            }
-        }
-        self.last = Some((at, roll));
+        self.jump.check(at, [roll])?;
         Ok(roll)
     }
 

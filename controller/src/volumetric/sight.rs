@@ -243,10 +243,9 @@ impl Watched {
                 let Some(Shown::Channels(sample)) = place.shown(observed) else {
                     return;
                 };
-                if self.newest.is_some_and(|before| sample.at <= before) {
+                if !is_news(&mut self.newest, sample.at) {
                     return;
                 }
-                self.newest = Some(sample.at);
                 let look = detector.look(&sample.channels);
                 self.light.add(look.light.value());
                 let place = look.place.map(|it| it.map(Metres::value));
@@ -256,10 +255,9 @@ impl Watched {
                 let Some(Shown::Camera(spot)) = place.shown(observed) else {
                     return;
                 };
-                if self.newest.is_some_and(|before| spot.at <= before) {
+                if !is_news(&mut self.newest, spot.at) {
                     return;
                 }
-                self.newest = Some(spot.at);
                 let field = camera.field();
                 let nearest = |place: [Metres; 2]| {
                     core::array::from_fn(|k| {
@@ -272,10 +270,9 @@ impl Watched {
             }
             Watch::Roll(reader) => match reader.look(observed) {
                 Ok((roll, at)) => {
-                    if self.newest.is_some_and(|before| at <= before) {
+                    if !is_news(&mut self.newest, at) {
                         return;
                     }
-                    self.newest = Some(at);
                     let value = [roll.value(); 2];
                     self.take(Ok(value), Some(value));
                 }
@@ -327,6 +324,15 @@ impl Watched {
         }
         self.sight.clone()
     }
+}
+
+/// Whether something of `at` has not been taken yet; it counts as taken from now on.
+fn is_news(newest: &mut Option<Time>, at: Time) -> bool {
+    let is_new = newest.is_none_or(|before| at > before);
+    if is_new {
+        *newest = Some(at);
+    }
+    is_new
 }
 
 /// The references in use of the machine of `config`, where detectors were read or references given; drives are not

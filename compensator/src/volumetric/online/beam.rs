@@ -13,8 +13,7 @@ use core::time::Duration;
 
 use units::{Metres, MetresPerSecond, Quantity, Time, Volts};
 
-use super::jump::JumpWatch;
-use super::{StuckWatch, Trouble};
+use super::{JumpWatch, StuckWatch, Trouble};
 use crate::volumetric::function::{FunctionError, Pieces, Shape};
 
 /// How the four channels belong to the two directions.
@@ -144,7 +143,7 @@ pub struct BeamLook {
 #[derive(Clone, Debug)]
 pub struct BeamDetector {
     settings: BeamDetectorSettings,
-    jump: JumpWatch,
+    jump: JumpWatch<Metres, 2>,
     stuck: StuckWatch<4>,
 }
 
@@ -168,7 +167,7 @@ impl BeamDetector {
         }
         Ok(Self {
             stuck: StuckWatch::new(settings.stuck_samples),
-            jump: JumpWatch::new(settings.speed_max, settings.noise_max),
+            jump: JumpWatch::new(settings.speed_max.value(), settings.noise_max),
             settings,
         })
     }

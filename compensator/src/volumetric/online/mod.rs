@@ -52,6 +52,7 @@ pub use beam::{
 pub use eye::{Eye, Shown};
 pub use feed::{Feed, FeedSettings, FeedStatus, Reaction};
 pub use influence::{Influence, Influences, MovingState};
+pub use jump::JumpWatch;
 pub use lever::DetectorLever;
 pub use memory::{Coverage, Memories, MemoryError, RecorderSettings, StateMap, StateRecorder};
 pub use monitor::{AxisMonitor, EndOfTravel};

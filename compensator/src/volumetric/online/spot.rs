@@ -10,8 +10,7 @@ use core::time::Duration;
 
 use units::{Metres, MetresPerSecond, Time};
 
-use super::jump::JumpWatch;
-use super::{SettingsError, Trouble};
+use super::{JumpWatch, SettingsError, Trouble};
 
 /// What is known of a camera that sees a beam's spot.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +38,7 @@ pub struct Spot {
 #[derive(Clone, Copy, Debug)]
 pub struct SpotCamera {
     settings: SpotSettings,
-    jump: JumpWatch,
+    jump: JumpWatch<Metres, 2>,
     last: Option<Time>,
     repeats: bool,
 }
@@ -62,7 +61,7 @@ impl SpotCamera {
         }
         Ok(Self {
             settings,
-            jump: JumpWatch::new(speed_max, noise_max),
+            jump: JumpWatch::new(speed_max.value(), noise_max),
             last: None,
             repeats: false,
         })

@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use units::{Celsius, Time};
 
-use super::{StuckWatch, Trouble};
+use super::{JumpWatch, StuckWatch, Trouble};
 
 /// What a temperature can be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub struct TemperatureSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemperatureChannel {
     settings: TemperatureSettings,
-    last: Option<(Time, Celsius)>,
+    jump: JumpWatch<Celsius, 1>,
     stuck: StuckWatch<1>,
 }
 
@@ -40,7 +40,7 @@ impl TemperatureChannel {
     pub fn new(settings: TemperatureSettings) -> Self {
         Self {
             settings,
-            last: None,
+            jump: JumpWatch::new(settings.rate_max, Celsius(settings.noise_max)),
             stuck: StuckWatch::new(settings.stuck_samples),
         }
     }
@@ -65,14 +65,7 @@ impl TemperatureChannel {
             });
         }
         stuck?;
-        if let Some((before, last)) = self.last {
-            let limit = own.noise_max + own.rate_max * at.since(before).as_secs_f64();
-            let seen = (value - last).value().abs();
-            if seen > limit {
-                return Err(Trouble::Jumped { seen, limit });
-            }
-        }
-        self.last = Some((at, value));
+        self.jump.check(at, [value])?;
         Ok(value)
     }
 }
