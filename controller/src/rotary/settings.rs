@@ -35,11 +35,9 @@ pub(crate) fn rotaries(
         .iter()
         .map(|(name, rotary)| {
             let device: Box<dyn RotaryAxis> = match rotary.device {
-                RotaryDevice::Cia402 => Box::new(Cia402Drive::new(rotary_settings(
-                    rotary,
-                    &config.can,
-                    patience,
-                ))),
+                RotaryDevice::Cia402 => {
+                    Cia402Drive::rotary(rotary_settings(rotary, &config.can, patience))
+                }
             };
             Unit {
                 name: name.clone(),

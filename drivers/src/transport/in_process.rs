@@ -90,21 +90,84 @@ const ROUNDS_MAX: u32 = 1_000_000;
 #[derive(Debug)]
 pub struct InProcess<W> {
     world: W,
+    near: NearEnd,
+}
+
+/// The host's end of the ports. It knows its world as a `dyn`: one loop serves all worlds, compiled here and not
+/// once more wherever a world is.
+#[derive(Debug)]
+struct NearEnd {
     now: Time,
     syncs: SyncGrid,
     /// What could wait, in order, and behind it at most one that could not.
     kept: VecDeque<Arrival>,
 }
 
-impl<W: World> InProcess<W> {
+impl NearEnd {
+    fn now(&self, world: &dyn World) -> Time {
+        self.now.max(world.now())
+    }
+
+    /// Sends the SYNCs that are due; the host does not hear its own.
+    fn send_due_syncs(&mut self, world: &mut dyn World) {
+        self.syncs.send_due(self.now, |port, at| {
+            // A SYNC that the port cannot take is lost, as on a real bus.
+            let _ = world.deliver(at, port, &Payload::Frame(emit_sync(None)));
+        });
+    }
+
+    /// What has arrived by now: the first thing, once there is something that cannot wait.
+    fn arrived(&mut self, world: &mut dyn World, unhurried: Ports) -> Option<Arrival> {
+        let mut is_due = self.kept.iter().any(|it| !it.can_wait(unhurried));
+        while !is_due && let Some(arrival) = world.collect() {
+            is_due = !arrival.can_wait(unhurried);
+            self.kept.push_back(arrival);
+        }
+        is_due.then(|| self.kept.pop_front())?
+    }
+
+    /// # Panics
+    /// When the world asks for the same moment without end.
+    fn receive(&mut self, world: &mut dyn World, until: Time, unhurried: Ports) -> Option<Arrival> {
+        let mut rounds = 0;
+        self.now = self.now(world);
+        loop {
+            if let Some(arrival) = self.arrived(world, unhurried) {
+                return Some(arrival);
+            }
+            let to = until.min(self.syncs.next()).max(self.now);
+            let before = self.now;
+            // A world may be late for an event, but time does not run backwards.
+            self.now = world.advance_until_arrival(to).max(self.now);
+            self.send_due_syncs(world);
+            if self.now >= until {
+                world.advance(self.now);
+                return self.arrived(world, Ports::NONE);
+            }
+            rounds = if self.now == before { rounds + 1 } else { 0 };
+            assert!(rounds < ROUNDS_MAX, "the world hangs at {}", self.now);
+        }
+    }
+
+    fn sleep_until(&mut self, world: &mut dyn World, until: Time) {
+        self.now = self.now(world);
+        while self.now < until {
+            self.now = until.min(self.syncs.next()).max(self.now);
+            self.send_due_syncs(world);
+            world.advance(self.now);
+        }
+    }
+}
+
+impl<W> InProcess<W> {
     /// Starts at [`Time::ZERO`].
     pub const fn new(world: W) -> Self {
-        Self {
-            world,
+        let near = NearEnd {
             now: Time::ZERO,
             syncs: SyncGrid::new(),
             kept: VecDeque::new(),
-        }
+        };
+        Self { world, near }
     }
 
     /// The world.
@@ -121,34 +184,15 @@ impl<W: World> InProcess<W> {
     pub fn into_world(self) -> W {
         self.world
     }
-
-    /// Sends the SYNCs that are due; the host does not hear its own.
-    fn send_due_syncs(&mut self) {
-        let world = &mut self.world;
-        self.syncs.send_due(self.now, |port, at| {
-            // A SYNC that the port cannot take is lost, as on a real bus.
-            let _ = world.deliver(at, port, &Payload::Frame(emit_sync(None)));
-        });
-    }
-
-    /// What has arrived by now: the first thing, once there is something that cannot wait.
-    fn arrived(&mut self, unhurried: Ports) -> Option<Arrival> {
-        let mut is_due = self.kept.iter().any(|it| !it.can_wait(unhurried));
-        while !is_due && let Some(arrival) = self.world.collect() {
-            is_due = !arrival.can_wait(unhurried);
-            self.kept.push_back(arrival);
-        }
-        is_due.then(|| self.kept.pop_front())?
-    }
 }
 
 impl<W: World> Transport for InProcess<W> {
     fn now(&self) -> Time {
-        self.now.max(self.world.now())
+        self.near.now(&self.world)
     }
 
     fn send(&mut self, port: Port, payload: &Payload) -> Result<(), SendError> {
-        self.world.deliver(self.now, port, payload)
+        self.world.deliver(self.near.now, port, payload)
     }
 
     fn receive(&mut self, until: Time) -> Option<Arrival> {
@@ -158,33 +202,11 @@ impl<W: World> Transport for InProcess<W> {
     /// # Panics
     /// When the world asks for the same moment without end.
     fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
-        let mut rounds = 0;
-        self.now = self.now.max(self.world.now());
-        loop {
-            if let Some(arrival) = self.arrived(unhurried) {
-                return Some(arrival);
-            }
-            let to = until.min(self.syncs.next()).max(self.now);
-            let before = self.now;
-            // A world may be late for an event, but time does not run backwards.
-            self.now = self.world.advance_until_arrival(to).max(self.now);
-            self.send_due_syncs();
-            if self.now >= until {
-                self.world.advance(self.now);
-                return self.arrived(Ports::NONE);
-            }
-            rounds = if self.now == before { rounds + 1 } else { 0 };
-            assert!(rounds < ROUNDS_MAX, "the world hangs at {}", self.now);
-        }
+        self.near.receive(&mut self.world, until, unhurried)
     }
 
     fn sleep_until(&mut self, until: Time) {
-        self.now = self.now.max(self.world.now());
-        while self.now < until {
-            self.now = until.min(self.syncs.next()).max(self.now);
-            self.send_due_syncs();
-            self.world.advance(self.now);
-        }
+        self.near.sleep_until(&mut self.world, until);
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {
@@ -194,7 +216,7 @@ impl<W: World> Transport for InProcess<W> {
                 errno: EINVAL,
             });
         }
-        self.syncs.set(self.now, port, period);
+        self.near.syncs.set(self.near.now, port, period);
         Ok(())
     }
 }

@@ -643,3 +643,11 @@ fn a_path_is_written_as_there_is_room_and_finished_behind_its_last_point() {
     assert_eq!(bench.engine.core.ended(), Some(Cause::PathDone));
     assert_eq!(bench.desk.path.write(&mut points), Ok(true));
 }
+
+/// A program that was built without optimisation copies them again and again while it makes them, in threads
+/// with a stack of 2 MB.
+#[test]
+fn an_engine_and_its_desk_are_small_enough_to_be_moved_about() {
+    assert!(size_of::<super::Engine>() < 16_384);
+    assert!(size_of::<super::Desk>() < 16_384);
+}

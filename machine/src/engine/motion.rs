@@ -78,7 +78,9 @@ impl From<Refusal> for MotionError {
 pub struct Motion {
     axes: usize,
     limits: PerAxis<AxisLimits>,
-    planner: Planner,
+    /// Boxed for its 42 KB: an engine is moved about while it is made, and without optimisation each move is a copy
+    /// on the stack, of which threads have 2 MB.
+    planner: Box<Planner>,
     way: Leg,
     /// Where the way ends, when that was asked for; a stop ends where it ends.
     target: Option<PerAxis<Metres>>,
@@ -95,7 +97,7 @@ impl Motion {
         Self {
             axes,
             limits,
-            planner: Planner::new(axes, limits),
+            planner: Box::new(Planner::new(axes, limits)),
             way: Leg::new(axes),
             target: None,
             pause: Leg::new(axes),

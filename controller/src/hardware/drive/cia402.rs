@@ -182,7 +182,7 @@ impl Family for Cia402AxisConfig {
     }
 
     fn driver(&self, task: Task<'_>, wiring: Wiring<'_>, patience: Patience) -> Box<dyn Axis> {
-        Box::new(Cia402Drive::new(self.settings(task, wiring, patience)))
+        Cia402Drive::linear(self.settings(task, wiring, patience))
     }
 }
 

@@ -39,7 +39,7 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use units::{Coordinate, Metres, Quantity, Time};
+use units::{Coordinate, Metres, Quantity, Radians, Time};
 use wire::Input;
 use wire::Payload;
 use wire::can::CanFrame;
@@ -54,7 +54,7 @@ pub use settings::{
 
 use super::canopen_node::{CanopenNode, NodeEvent};
 use super::plausible::Plausible;
-use super::{Alarm, Device, DeviceError, Identity, Seen};
+use super::{Alarm, Axis, Device, DeviceError, Identity, RotaryAxis, Seen};
 use crate::protocol::script::Script;
 use cyclic::ModeChange;
 use homing::Homing;
@@ -162,6 +162,20 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     alarms: VecDeque<Alarm>,
     short_pdos: u64,
     repeated_commands: u64,
+}
+
+impl Cia402Drive<Metres> {
+    /// [`Cia402Drive::new`] as any axis: compiled with this package, not once more in each that drives one.
+    pub fn linear(settings: Cia402Settings<Metres>) -> Box<dyn Axis> {
+        Box::new(Self::new(settings))
+    }
+}
+
+impl Cia402Drive<Radians> {
+    /// As [`Cia402Drive::linear`].
+    pub fn rotary(settings: Cia402Settings<Radians>) -> Box<dyn RotaryAxis> {
+        Box::new(Self::new(settings))
+    }
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
