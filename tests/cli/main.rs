@@ -12,6 +12,7 @@ mod job;
 mod jog;
 mod killed;
 mod manager;
+mod monitor;
 mod platform;
 mod programs;
 mod rotary;

@@ -1,7 +1,7 @@
 //! One request to a service that keeps a machine, and its answer: HTTP/1.1, a connection for each.
 
 use std::ffi::OsString;
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
@@ -19,9 +19,9 @@ const LEASE: &str = "TRUESTAGE_LEASE";
 /// A device, a bus, or a service in their place that is gone.
 pub(crate) const LOST: u8 = 4;
 
-trait Stream: Read + Write {}
+trait Stream: Read + Write + Send {}
 
-impl<S: Read + Write> Stream for S {}
+impl<S: Read + Write + Send> Stream for S {}
 
 fn connect(at: &str) -> io::Result<Box<dyn Stream>> {
     match at.split_once(':') {
@@ -51,6 +51,46 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
     exchange(stream, at, (method, path), body)
 }
 
+/// An answer without an end, from its first line on. A service says something at least as often as [`PATIENCE`], or
+/// the stream ends.
+pub(crate) fn follow(at: &str, path: &str) -> Result<impl BufRead + use<>, Failure> {
+    let mut stream = connect(at).map_err(|error| gone(at, path, &error))?;
+    let host = host_of(at);
+    // HTTP/1.0: the answer comes as it is, not in chunks.
+    let request =
+        format!("GET {path} HTTP/1.0\r\nhost: {host}\r\naccept: text/event-stream\r\n\r\n");
+    let said = |error: io::Error| gone(at, path, &error);
+    stream.write_all(request.as_bytes()).map_err(said)?;
+    let mut stream = BufReader::new(stream);
+    let head = head_of(&mut stream).map_err(said)?;
+    let status = status_of(&head);
+    if status == "200" {
+        return Ok(stream);
+    }
+    let mut body = String::new();
+    stream
+        .take(ANSWER_MAX)
+        .read_to_string(&mut body)
+        .map_err(said)?;
+    let answer: Value = serde_json::from_str(&body).unwrap_or_default();
+    Err(refusal(at, status, &answer))
+}
+
+/// To the empty line, or as far as it goes.
+fn head_of(stream: &mut impl BufRead) -> io::Result<String> {
+    let mut head = String::new();
+    while stream.read_line(&mut head)? > 0 && !head.ends_with("\r\n\r\n") {}
+    Ok(head)
+}
+
+fn status_of(head: &str) -> &str {
+    head.split(' ').nth(1).unwrap_or_default()
+}
+
+fn host_of(at: &str) -> &str {
+    at.strip_prefix("tcp:").unwrap_or("localhost")
+}
+
 /// The same of a service that has begun what this program waits for: one that is not there any more has ended meanwhile.
 pub(crate) fn ask_on(at: &str, method: &str, path: &str, body: &str) -> Result<Value, Failure> {
     let stream = connect(at).map_err(|error| gone(at, path, &error))?;
@@ -74,7 +114,7 @@ fn exchange(
     body: &str,
 ) -> Result<Value, Failure> {
     let lease = lease_header(std::env::var_os(LEASE))?;
-    let host = at.strip_prefix("tcp:").unwrap_or("localhost");
+    let host = host_of(at);
     let length = body.len();
     let request = format!(
         "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
@@ -96,7 +136,7 @@ fn said_to(mut stream: Box<dyn Stream>, request: &str) -> io::Result<String> {
 
 fn understood(at: &str, said: &str) -> Result<Value, Failure> {
     let (head, body) = said.split_once("\r\n\r\n").unwrap_or((said, ""));
-    let status = head.split(' ').nth(1).unwrap_or_default();
+    let status = status_of(head);
     let answer: Value = serde_json::from_str(body).unwrap_or_default();
     if status.starts_with('2') {
         return Ok(answer);

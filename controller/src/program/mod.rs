@@ -15,6 +15,7 @@ mod kept;
 mod kind;
 mod linear;
 mod made_from;
+mod monitor;
 mod operator;
 mod output;
 mod page;
@@ -133,6 +134,8 @@ enum Command {
     Serve(ServeArgs),
     /// What a machine that is kept by a service does, and its axes.
     Status(ServiceArgs),
+    /// What it does as it happens: a picture on a terminal, elsewhere a line for each event.
+    Monitor(monitor::MonitorArgs),
     /// Stop everything that a service moves; taken from anybody.
     Stop {
         #[command(flatten)]
@@ -429,6 +432,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Iso230 { data, by } => data::iso230(&data, &by, output),
         Command::Explain(args) => explain::run(&args, output),
         Command::Status(service) => ask::status(&service, output),
+        Command::Monitor(args) => monitor::run(&args, output),
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
         Command::Report(args) => report::run(&args, output),

@@ -30,8 +30,16 @@ resolution_bits = 16
 # In its case until"#;
 
 /// The machine with detectors on x, y and z.
-fn three_rolls(text: &str) -> String {
+pub(super) fn three_rolls(text: &str) -> String {
     with_three_rolls(text).edit(TOOL, ON_LEVERS)
+}
+
+/// What emulates them.
+pub(super) fn emulated_three_rolls(text: &str) -> String {
+    let more_axes = "\naxis = 0\nfurther_axes = [1, 2]\ndistance_mm";
+    text.edit("\naxis = 0\ndistance_mm", more_axes)
+        .edit("\n# In its case until", NODE)
+        .edit(TOOL, ON_LEVERS)
 }
 
 /// With its errors known and the detectors' references taken; the slide of `axis` rolls by 5 arcsec from then on.
@@ -39,14 +47,9 @@ fn known(axis: Axis) -> Volume {
     let emulated = |text: String| {
         let which = format!("deliberate_roll_axis = {}", axis.index());
         let roll = format!("deliberate_roll_arcsec = 5.0\n{which}");
-        text.edit("deliberate_roll_arcsec = 0.0", &roll)
+        emulated_three_rolls(&text)
+            .edit("deliberate_roll_arcsec = 0.0", &roll)
             .edit("deliberate_from_h = 0.0", "deliberate_from_h = 0.1")
-            .edit(
-                "\naxis = 0\ndistance_mm",
-                "\naxis = 0\nfurther_axes = [1, 2]\ndistance_mm",
-            )
-            .edit("\n# In its case until", NODE)
-            .edit(TOOL, ON_LEVERS)
     };
     let mut volume = Volume::zeroed(1, |text| calm(three_rolls(&text)), emulated);
     volume.know_errors();

@@ -1,0 +1,127 @@
+//! What is known of a machine, from all that was heard.
+
+use std::collections::VecDeque;
+
+use serde_json::Value;
+
+use super::feed::Heard;
+use super::words;
+
+/// More than any terminal shows.
+const EVENTS_KEPT: usize = 100;
+
+/// What is known.
+#[derive(Debug, Default)]
+pub(super) struct Board {
+    pub(super) at: String,
+    pub(super) machine: Value,
+    pub(super) axes: Vec<Value>,
+    /// The newest first.
+    pub(super) runs: Vec<Value>,
+    /// The newest first.
+    pub(super) events: VecDeque<String>,
+    /// Why nothing is heard, since when everything here is old.
+    pub(super) lost: Option<String>,
+    /// What became of a key that was pressed.
+    pub(super) answer: String,
+}
+
+impl Board {
+    pub(super) fn new(at: &str) -> Self {
+        Self {
+            at: at.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn hear(&mut self, heard: Heard) {
+        match heard {
+            Heard::Lost(why) => {
+                self.lost = Some(why);
+                return;
+            }
+            Heard::Machine(machine) => self.machine = machine,
+            Heard::Axes(axes) => self.axes = listed(axes),
+            Heard::Runs(runs) => {
+                self.runs.clear();
+                listed(runs).into_iter().for_each(|it| self.run(it));
+            }
+            Heard::Event(event) => self.event(&event),
+        }
+        self.lost = None;
+    }
+
+    fn event(&mut self, event: &Value) {
+        if event["kind"] == "run" {
+            let mut run = event["data"].clone();
+            if run["id"].is_null() {
+                run["id"] = event["of"].clone();
+            }
+            self.run(run);
+        }
+        self.events.push_front(words::line(event));
+        self.events.truncate(EVENTS_KEPT);
+    }
+
+    /// Progress says only what has changed.
+    fn run(&mut self, said: Value) {
+        let known = self.runs.iter_mut().find(|it| it["id"] == said["id"]);
+        match (known, said) {
+            (Some(Value::Object(known)), Value::Object(said)) => known.extend(said),
+            (_, said) => self.runs.insert(0, said),
+        }
+    }
+}
+
+fn listed(value: Value) -> Vec<Value> {
+    match value {
+        Value::Array(list) => list,
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn progress_changes_the_run_that_is_known_and_a_new_one_comes_first() {
+        let mut board = Board::new("unix:s");
+        board.hear(Heard::Runs(
+            json!([{"id": "r1-1", "kind": "zero", "state": "done"}]),
+        ));
+        let event =
+            |of: &str, data: Value| Heard::Event(json!({"kind": "run", "of": of, "data": data}));
+        board.hear(event(
+            "r1-2",
+            json!({"id": "r1-2", "kind": "verify", "state": "running"}),
+        ));
+        board.hear(event(
+            "r1-2",
+            json!({"stage": "runs", "steps_done": 3, "steps": 84}),
+        ));
+        let known: Vec<_> = board
+            .runs
+            .iter()
+            .map(|it| (&it["id"], &it["steps_done"], &it["state"]))
+            .collect();
+        assert_eq!(
+            known,
+            [
+                (&json!("r1-2"), &json!(3), &json!("running")),
+                (&json!("r1-1"), &Value::Null, &json!("done"))
+            ]
+        );
+    }
+
+    #[test]
+    fn a_connection_that_was_lost_shows_until_something_is_heard_again() {
+        let mut board = Board::new("unix:s");
+        board.hear(Heard::Lost("it hung up".into()));
+        assert_eq!(board.lost.as_deref(), Some("it hung up"));
+        board.hear(Heard::Axes(json!([])));
+        assert_eq!(board.lost, None);
+    }
+}
