@@ -8,7 +8,7 @@ use service::{Edge, Listen, Manager, Opened, Service, StartError};
 use truestage::{Failure, Serving};
 
 fn main() -> ExitCode {
-    truestage::main(serve)
+    truestage::main(serve, env!("TRUESTAGE_VERSION"))
 }
 
 /// Keeps a machine until somebody ends it.

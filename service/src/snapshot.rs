@@ -15,6 +15,8 @@ pub(crate) struct Fixed {
     pub(crate) name: String,
     pub(crate) stage_serial: String,
     pub(crate) config_hash: String,
+    /// When the service began, UTC, RFC 3339.
+    pub(crate) started: String,
     pub(crate) axes: Vec<FixedAxis>,
 }
 
@@ -101,6 +103,7 @@ impl Snapshot {
             stage_serial: fixed.stage_serial.clone(),
             config_hash: fixed.config_hash.clone(),
             program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+            started: fixed.started.clone(),
             state: self.state,
             cause: self.cause.as_deref().cloned(),
             clock_s: self.now.seconds(),

@@ -110,6 +110,9 @@ pub struct MachineView {
     pub config_hash: String,
     /// This program.
     pub program: String,
+    /// When the service began, UTC, RFC 3339: one that began again counts its events from 1.
+    #[serde(default)]
+    pub started: String,
     /// What it is.
     pub state: MachineState,
     /// What stopped it, while it is in `error_stop`.

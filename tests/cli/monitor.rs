@@ -53,12 +53,15 @@ fn every_event_is_a_line_from_the_first_one_on_until_the_service_ends() {
         assert!(lines.any(is_stop));
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
-        for mut child in [objects, texts] {
-            // Neither holds the other end of a full pipe: what is left is read, or nobody wants it.
-            assert_eq!(
-                child.wait().expect("a child can be waited for").code(),
-                Some(0)
-            );
+        // To their end: who cannot print what it hears leaves earlier.
+        heard.for_each(drop);
+        lines.for_each(drop);
+        for child in [objects, texts] {
+            let ended = child.wait_with_output();
+            let ended = ended.expect("a child can be waited for");
+            assert_eq!(ended.status.code(), Some(0), "{ended:?}");
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert!(said.contains("the service has ended"), "{said}");
         }
         let nobody = bench.run(&["monitor"]);
         assert_eq!(nobody.code, Some(2), "{nobody:?}");

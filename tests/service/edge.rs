@@ -1,8 +1,10 @@
 //! What only HTTP has: units, problems, hosts, sizes, streams, its description.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use service::{Caller, Edge, Listen};
@@ -163,6 +165,27 @@ fn a_stream_of_events_goes_on_where_it_was_broken_off() {
             axes.len() >= 2 && axes.iter().all(|it| it.kind == "axis"),
             "{axes:?}"
         );
+    });
+}
+
+/// Whoever hears nothing for ten seconds takes the service for lost.
+#[test]
+fn a_stream_in_which_nothing_happens_says_that_it_is_alive() {
+    on_a_stage(|_, http| {
+        let mut stream = UnixStream::connect(http.socket()).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(60)))
+            .unwrap();
+        stream
+            .write_all(b"GET /v1/events HTTP/1.0\r\nhost: x\r\n\r\n")
+            .unwrap();
+        let begun = Instant::now();
+        let lines = BufReader::new(stream)
+            .lines()
+            .map(|it| it.expect("it is not silent"));
+        let said: Vec<String> = lines.skip_while(|it| !it.is_empty()).take(2).collect();
+        assert_eq!(said[1], ":", "no event, a comment");
+        assert!(begun.elapsed() < Duration::from_secs(10));
     });
 }
 

@@ -51,8 +51,8 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
     exchange(stream, at, (method, path), body)
 }
 
-/// An answer without an end, from its first line on. A service says something at least as often as [`PATIENCE`], or
-/// the stream ends.
+/// An answer without an end, from its first line on. A service that lives says so every three seconds; one that says
+/// nothing for [`PATIENCE`] is lost.
 pub(crate) fn follow(at: &str, path: &str) -> Result<impl BufRead + use<>, Failure> {
     let mut stream = connect(at).map_err(|error| gone(at, path, &error))?;
     let host = host_of(at);

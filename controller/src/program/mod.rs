@@ -31,6 +31,7 @@ mod same_figures_tests;
 mod scan;
 mod serve;
 mod session;
+mod shell;
 mod show;
 mod span;
 #[cfg(test)]
@@ -43,7 +44,7 @@ mod volumetric;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use wire::lockstep::path_of;
 
 use crate::Failure;
@@ -146,6 +147,11 @@ enum Command {
     },
     /// A self-contained HTML page of a run.
     Report(report::ReportArgs),
+    /// A script by which a shell completes the words of this program: for bash,
+    /// `truestage completions bash > ~/.local/share/bash-completion/completions/truestage`.
+    Completions(shell::CompletionsArgs),
+    /// Manual pages of this program and its verbs.
+    Man(shell::ManArgs),
 }
 
 /// How a machine is reached.
@@ -379,9 +385,11 @@ struct ServiceArgs {
     at: String,
 }
 
-/// Runs the command line of this process; `keep` keeps a machine for `truestage serve`.
-pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
-    let cli = Cli::parse();
+/// Runs the command line of this process; `keep` keeps a machine for `truestage serve`, and `version` is what
+/// `--version` says of this program.
+pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>, version: &'static str) -> ExitCode {
+    let words = Cli::command().version(version).get_matches();
+    let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
     let output = Output::new(cli.json);
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args, output),
@@ -436,6 +444,8 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>) -> ExitCode {
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
         Command::Report(args) => report::run(&args, output),
+        Command::Completions(args) => shell::completions(args, Cli::command()),
+        Command::Man(args) => shell::man(&args, Cli::command(), output),
     };
     match result {
         Ok(None) => ExitCode::SUCCESS,
@@ -463,7 +473,6 @@ mod tests {
 
     #[test]
     fn every_verb_can_be_parsed() {
-        use clap::CommandFactory as _;
         Cli::command().debug_assert();
     }
 

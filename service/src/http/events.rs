@@ -24,6 +24,9 @@ const STREAMS: usize = 16;
 /// How often a stream looks.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
+/// A stream in which nothing happens says that it is alive so often: whoever hears nothing for longer has lost it.
+const ALIVE_EVERY: Duration = Duration::from_secs(3);
+
 /// Between two samples of every axis.
 const SAMPLE_MS: core::ops::RangeInclusive<u64> = 5..=60_000;
 
@@ -95,7 +98,7 @@ pub(super) async fn events(
         let sent = following.next().await;
         Some((Ok(sent), following))
     });
-    Ok(Sse::new(stream).keep_alive(KeepAlive::new()))
+    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(ALIVE_EVERY)))
 }
 
 /// How often the axes are told, when they are.

@@ -6,6 +6,7 @@ use machine::Stage;
 use truestage::linear::Course;
 use truestage::{Failure, Machine};
 
+use super::events::utc_now;
 use super::seat::{MovedBy, Plans, Seat, Task};
 use crate::quantity::Quantity;
 use crate::snapshot::{Fixed, FixedAxis};
@@ -26,6 +27,7 @@ pub(crate) fn fixed(machine: &Machine) -> Result<Fixed, Failure> {
         name: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
         config_hash: machine.config_hash().as_str().to_owned(),
+        started: utc_now(),
         axes: axes.collect::<Result<_, Failure>>()?,
     })
 }

@@ -1,6 +1,7 @@
 //! What is known of a machine, from all that was heard.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -9,6 +10,9 @@ use super::words;
 
 /// More than any terminal shows.
 const EVENTS_KEPT: usize = 100;
+
+/// Longer than samples are apart, on however busy a computer.
+const SILENT: Duration = Duration::from_secs(2);
 
 /// What is known.
 #[derive(Debug, Default)]
@@ -36,8 +40,12 @@ impl Board {
 
     pub(super) fn hear(&mut self, heard: Heard) {
         match heard {
-            Heard::Lost(why) => {
-                self.lost = Some(why);
+            Heard::Lost(failure) => {
+                self.lost = Some(failure.to_string());
+                return;
+            }
+            Heard::Ended => {
+                self.lost = Some("the service has ended".into());
                 return;
             }
             Heard::Machine(machine) => self.machine = machine,
@@ -49,6 +57,20 @@ impl Board {
             Heard::Event(event) => self.event(&event),
         }
         self.lost = None;
+    }
+
+    /// Nothing was heard for so long.
+    pub(super) fn silent_for(&mut self, silence: Duration) {
+        if silence > SILENT && self.lost.is_none() {
+            self.lost = Some(format!("silent for {} s", silence.as_secs()));
+        }
+    }
+
+    /// Those that are under way first, then the newest.
+    pub(super) fn runs_in_order(&self) -> impl Iterator<Item = &Value> {
+        let is_under_way = |it: &&Value| it["state"] == "running" || it["state"] == "stopping";
+        let first = self.runs.iter().filter(is_under_way);
+        first.chain(self.runs.iter().filter(move |it| !is_under_way(it)))
     }
 
     fn event(&mut self, event: &Value) {
@@ -114,14 +136,28 @@ mod tests {
                 (&json!("r1-1"), &Value::Null, &json!("done"))
             ]
         );
+        board.hear(event(
+            "r1-3",
+            json!({"id": "r1-3", "kind": "zero", "state": "planned"}),
+        ));
+        let shown: Vec<_> = board.runs_in_order().map(|it| &it["id"]).collect();
+        assert_eq!(
+            shown,
+            ["r1-2", "r1-3", "r1-1"],
+            "what is under way stays in view"
+        );
     }
 
     #[test]
     fn a_connection_that_was_lost_shows_until_something_is_heard_again() {
         let mut board = Board::new("unix:s");
-        board.hear(Heard::Lost("it hung up".into()));
-        assert_eq!(board.lost.as_deref(), Some("it hung up"));
+        board.hear(Heard::Ended);
+        assert_eq!(board.lost.as_deref(), Some("the service has ended"));
         board.hear(Heard::Axes(json!([])));
         assert_eq!(board.lost, None);
+        board.silent_for(Duration::from_secs(1));
+        assert_eq!(board.lost, None);
+        board.silent_for(Duration::from_secs(3));
+        assert_eq!(board.lost.as_deref(), Some("silent for 3 s"));
     }
 }

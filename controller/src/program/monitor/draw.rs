@@ -3,7 +3,7 @@
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize as _};
-use ratatui::text::Line;
+use ratatui::text::{Line, Span};
 use ratatui::widgets::{Cell, Paragraph, Row, Table};
 use serde_json::Value;
 
@@ -66,15 +66,18 @@ pub(super) fn draw(frame: &mut Frame<'_>, board: &Board, looks: Looks) {
     .areas(frame.area());
     frame.render_widget(Paragraph::new(head_lines(board, looks)), head);
     draw_axes(frame, axes, board, looks);
-    let shown = board.runs.iter().take(runs).map(|it| run_line(it, looks));
+    let shown = board
+        .runs_in_order()
+        .take(runs)
+        .map(|it| run_line(it, looks));
     frame.render_widget(Paragraph::new(shown.collect::<Vec<_>>()), of_runs);
     let happened = board.events.iter().map(|it| Line::raw(it.as_str()));
     frame.render_widget(Paragraph::new(happened.collect::<Vec<_>>()), events);
-    let help = "Esc or s: STOP   S: quick stop, drives off   q: leave";
-    let foot = match board.answer.as_str() {
-        "" => Line::raw(help).reversed(),
-        answer => Line::styled(format!("{answer}   {help}"), looks.bad),
-    };
+    // What stops the machine comes first: it is in view whatever else is said.
+    let mut foot = Line::raw("Esc: STOP   S: quick stop, drives off   q: leave").reversed();
+    if !board.answer.is_empty() {
+        foot.push_span(Span::styled(format!("  {}", board.answer), looks.bad));
+    }
     frame.render_widget(Paragraph::new(foot), keys);
 }
 
@@ -92,10 +95,7 @@ fn head_lines(board: &Board, looks: Looks) -> Vec<Line<'static>> {
         text(&machine["stage_serial"])
     ))
     .bold();
-    first.push_span(ratatui::text::Span::styled(
-        state.replace('_', " "),
-        looks_of_state,
-    ));
+    first.push_span(Span::styled(state.replace('_', " "), looks_of_state));
     let second = if let Some(why) = &board.lost {
         let why = plain(why).replace('\n', " ");
         Line::styled(
@@ -148,9 +148,9 @@ fn axis_row(axis: &Value, looks: Looks) -> Row<'static> {
         "Disabled" | "Standstill" => Style::new(),
         _ => looks.good,
     };
-    let user = match axis["homed"] == true {
-        true => Cell::from(text(&axis["used_by"])),
-        false => Cell::from("NOT ZEROED").style(looks.bad),
+    let user = match (axis["used_by"].as_str(), axis["homed"] == true) {
+        (None, false) => Cell::from("NOT ZEROED").style(looks.bad),
+        _ => Cell::from(text(&axis["used_by"])),
     };
     Row::new([
         Cell::from(text(&axis["name"])),
@@ -191,10 +191,7 @@ fn run_line(run: &Value, looks: Looks) -> Line<'static> {
         _ => text(&run["cause"]["cause"]),
     };
     let mut line = Line::raw(format!("{name:<24} "));
-    line.push_span(ratatui::text::Span::styled(
-        format!("{state:<9}"),
-        looks_of_state,
-    ));
+    line.push_span(Span::styled(format!("{state:<9}"), looks_of_state));
     line.push_span(detail);
     line
 }
@@ -280,11 +277,11 @@ mod tests {
             picture(&board, 80, 24)[..2],
             ["linear   error stop", "x: fault"]
         );
-        board.hear(Heard::Lost("it hung up".into()));
+        board.hear(Heard::Ended);
         assert_eq!(
             picture(&board, 80, 24)[1],
-            "NOTHING IS HEARD, all below is old: it hung up"
+            "NOTHING IS HEARD, all below is old: the service has ended"
         );
-        assert!(picture(&board, 40, 8)[7].starts_with("Esc or s: STOP"));
+        assert!(picture(&board, 40, 8)[7].starts_with("Esc: STOP"));
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{self, BufRead};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -12,9 +12,11 @@ use crate::program::exchange::{ask, follow as open};
 
 /// As often as an eye reads a number.
 const SAMPLE_MS: u32 = 250;
+/// How often the machine itself is asked for: that a lease has run out is no event.
+const LOOK_EVERY: Duration = Duration::from_secs(2);
 /// From one attempt to reach a service to the next.
 const RETRY: Duration = Duration::from_secs(1);
-/// A reader that is slower than so many is waited for; the service leaves out what its ring has lost meanwhile.
+/// A reader that is slower than so many is waited for; the service tells which events its ring has lost meanwhile.
 const AHEAD: usize = 64;
 
 /// What is heard of a machine.
@@ -27,8 +29,10 @@ pub(super) enum Heard {
     Runs(Value),
     /// What happened.
     Event(Value),
+    /// A stream that was there is at its end.
+    Ended,
     /// Nothing can be heard, and why.
-    Lost(String),
+    Lost(Failure),
 }
 
 /// What is asked for.
@@ -36,8 +40,8 @@ pub(super) enum Heard {
 pub(super) struct Wanted {
     /// Events after the one of this number.
     pub(super) after: u64,
-    /// The axes as well, again and again.
-    pub(super) axes: bool,
+    /// All that a picture needs besides events, again and again.
+    pub(super) picture: bool,
 }
 
 /// Whoever listened has gone.
@@ -49,6 +53,8 @@ pub(super) fn follow(at: &str, wanted: Wanted) -> Receiver<Heard> {
     let mut feed = Feed {
         at: at.to_owned(),
         wanted,
+        started: Value::Null,
+        looked: Instant::now(),
         heard,
     };
     thread::spawn(move || while feed.once().is_ok() {});
@@ -58,31 +64,34 @@ pub(super) fn follow(at: &str, wanted: Wanted) -> Receiver<Heard> {
 struct Feed {
     at: String,
     wanted: Wanted,
+    /// When the service that was heard last began.
+    started: Value,
+    looked: Instant,
     heard: SyncSender<Heard>,
 }
 
 impl Feed {
     /// One connection from its beginning to its end.
     fn once(&mut self) -> Result<(), Gone> {
-        match self.connected() {
-            Err(End::Gone) => Err(Gone),
-            Err(End::Lost(why)) => {
-                self.tell(Heard::Lost(why))?;
-                thread::sleep(RETRY);
-                Ok(())
-            }
+        let heard = match self.connected() {
             Ok(never) => match never {},
-        }
+            Err(End::Gone) => return Err(Gone),
+            Err(End::Stream) => Heard::Ended,
+            Err(End::Lost(failure)) => Heard::Lost(failure),
+        };
+        self.tell(heard)?;
+        thread::sleep(RETRY);
+        Ok(())
     }
 
     fn connected(&mut self) -> Result<core::convert::Infallible, End> {
-        let machine = self.whole()?;
-        // One that was started again counts from one.
-        let newest = machine["newest_event"].as_u64().unwrap_or_default();
-        if self.wanted.after > newest {
+        let machine = self.look()?;
+        if !self.started.is_null() && self.started != machine["started"] {
+            // Its events count from 1 again, and all of them are new.
             self.wanted.after = 0;
         }
-        let sample = match self.wanted.axes {
+        self.started = machine["started"].clone();
+        let sample = match self.wanted.picture {
             true => format!("&sample_ms={SAMPLE_MS}"),
             false => String::new(),
         };
@@ -94,37 +103,46 @@ impl Feed {
         }
     }
 
-    /// All there is to know at the moment.
-    fn whole(&mut self) -> Result<Value, End> {
-        let machine = ask(&self.at, "GET", "/v1/machine", "")?;
-        self.tell(Heard::Machine(machine.clone()))?;
-        self.tell(Heard::Axes(ask(&self.at, "GET", "/v1/axes", "")?))?;
-        self.tell(Heard::Runs(ask(&self.at, "GET", "/v1/runs", "")?))?;
+    /// What the machine is, and for a picture all else that there is to know.
+    fn look(&mut self) -> Result<Value, End> {
+        let machine = self.look_at_machine()?;
+        if self.wanted.picture {
+            self.tell(Heard::Axes(ask(&self.at, "GET", "/v1/axes", "")?))?;
+            self.tell(Heard::Runs(ask(&self.at, "GET", "/v1/runs", "")?))?;
+        }
         Ok(machine)
     }
 
-    fn take(&mut self, message: &Message) -> Result<(), End> {
+    fn look_at_machine(&mut self) -> Result<Value, End> {
+        let machine = ask(&self.at, "GET", "/v1/machine", "")?;
+        self.looked = Instant::now();
+        self.tell(Heard::Machine(machine.clone()))?;
+        Ok(machine)
+    }
+
+    fn take(&mut self, message: &Message) -> Result<(), Gone> {
         let Ok(data) = serde_json::from_str::<Value>(&message.data) else {
             return Ok(());
         };
-        match message.event.as_str() {
-            "sample" => self.tell(Heard::Axes(data))?,
-            // What an event changes of the machine itself is not in it.
-            "machine" | "lease" => {
-                let machine = ask(&self.at, "GET", "/v1/machine", "")?;
-                self.tell(Heard::Machine(machine))?;
-                self.event(data)?;
-            }
-            _ => self.event(data)?,
+        if message.event == "sample" {
+            self.tell(Heard::Axes(data))?;
+            return match self.looked.elapsed() > LOOK_EVERY {
+                true => gone(self.look_at_machine()),
+                false => Ok(()),
+            };
         }
-        Ok(())
-    }
-
-    fn event(&mut self, event: Value) -> Result<(), End> {
-        if let Some(id) = event["id"].as_u64() {
+        if let Some(id) = data["id"].as_u64() {
             self.wanted.after = id;
         }
-        Ok(self.tell(Heard::Event(event))?)
+        // First of all: the last event of a service that ends is followed by nothing that could be asked for.
+        self.tell(Heard::Event(data))?;
+        match message.event.as_str() {
+            // What they change of the machine itself is not in them.
+            "machine" | "lease" if self.wanted.picture => gone(self.look_at_machine()),
+            // What was missed may have changed anything.
+            "gap" if self.wanted.picture => gone(self.look()),
+            _ => Ok(()),
+        }
     }
 
     fn tell(&self, heard: Heard) -> Result<(), Gone> {
@@ -132,10 +150,21 @@ impl Feed {
     }
 }
 
+/// A look that fails is no end of a stream that still has something to say: that comes by itself.
+fn gone(looked: Result<Value, End>) -> Result<(), Gone> {
+    match looked {
+        Err(End::Gone) => Err(Gone),
+        Ok(_) | Err(End::Stream | End::Lost(_)) => Ok(()),
+    }
+}
+
 /// Why a connection is over.
 enum End {
+    /// Nobody listens.
     Gone,
-    Lost(String),
+    /// The service has closed it.
+    Stream,
+    Lost(Failure),
 }
 
 impl From<Gone> for End {
@@ -146,13 +175,19 @@ impl From<Gone> for End {
 
 impl From<Failure> for End {
     fn from(failure: Failure) -> Self {
-        Self::Lost(failure.to_string())
+        Self::Lost(failure)
     }
 }
 
 impl From<io::Error> for End {
     fn from(error: io::Error) -> Self {
-        Self::Lost(error.to_string())
+        match error.kind() {
+            io::ErrorKind::UnexpectedEof | io::ErrorKind::ConnectionReset => Self::Stream,
+            _ => Self::Lost(Failure::Kept {
+                said: format!("the service says nothing any more: {error}"),
+                exit_code: crate::program::exchange::LOST,
+            }),
+        }
     }
 }
 
@@ -191,7 +226,8 @@ mod tests {
 
     #[test]
     fn messages_are_read_to_their_empty_line_and_comments_are_passed_over() {
-        let mut stream = ":\n\nid: 7\nevent: axis\ndata: {\"a\":1}\n\n: alive\n\nevent:sample\r\ndata:[]\r\n\r\n".as_bytes();
+        let said = ":\n\nid: 7\nevent: axis\ndata: {\"a\":1}\n\n: alive\n\nevent:sample\r\ndata:[]\r\n\r\n";
+        let mut stream = said.as_bytes();
         let first = next_message(&mut stream).unwrap();
         assert_eq!(
             (first.event.as_str(), first.data.as_str()),
@@ -203,6 +239,8 @@ mod tests {
             ("sample", "[]")
         );
         let ended = next_message(&mut stream).unwrap_err();
-        assert_eq!(ended.kind(), io::ErrorKind::UnexpectedEof);
+        assert!(matches!(End::from(ended), End::Stream));
+        let silent = io::Error::from(io::ErrorKind::WouldBlock);
+        assert!(matches!(End::from(silent), End::Lost(it) if it.exit_code() == 4));
     }
 }

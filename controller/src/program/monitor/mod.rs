@@ -58,13 +58,13 @@ pub(crate) fn run(args: &MonitorArgs, output: Output) -> Ended {
     if stdout().is_terminal() && !output.is_json() {
         let wanted = Wanted {
             after: args.after(newest, EVENTS),
-            axes: true,
+            picture: true,
         };
         return picture::show(at, &feed::follow(at, wanted), until);
     }
     let wanted = Wanted {
         after: args.after(newest, 0),
-        axes: false,
+        picture: false,
     };
     lines(&feed::follow(at, wanted), until, output)
 }
@@ -76,7 +76,8 @@ fn lines(heard: &Receiver<Heard>, until: Instant, output: Output) -> Ended {
         let line = match heard.recv_timeout(left) {
             Ok(Heard::Event(event)) if output.is_json() => event.to_string(),
             Ok(Heard::Event(event)) => words::line(&event),
-            Ok(Heard::Lost(_)) | Err(RecvTimeoutError::Disconnected) => {
+            Ok(Heard::Lost(failure)) => return Err(failure),
+            Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => {
                 output.note("the service has ended");
                 return Ok(None);
             }

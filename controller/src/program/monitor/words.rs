@@ -31,16 +31,13 @@ fn told(data: &Value) -> String {
     if let Some(why) = cause.map(str::to_owned).or(stopped) {
         return format!("{state} {why}").trim_start().to_owned();
     }
-    let first = [
-        "text",
-        "waiting",
-        "state",
-        "mode",
-        "stage",
-        "id",
-        "name",
-        "released_by",
-    ];
+    if let Some(by) = data["released_by"].as_str() {
+        return format!("released by {by}");
+    }
+    if let (Some(name), Some(from)) = (data["name"].as_str(), data["taken_from"].as_str()) {
+        return format!("{name}, taken from {from}");
+    }
+    let first = ["text", "waiting", "state", "mode", "stage", "id", "name"];
     let first = first
         .into_iter()
         .find_map(|it| data[it].as_str())
@@ -67,77 +64,42 @@ pub(super) fn line(event: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
+
+    /// Kind, what it is of, what it says; and how its line ends.
+    const EVENTS: &str = r#"
+motion m1-2 {"id": "m1-2", "state": "done", "by": "anna"} => motion m1-2 done by anna
+motion m1-3 {"state": "failed", "cause": {"cause": "axis x:\u001b[2J\nfault"}} => motion m1-3 failed axis x:[2J fault
+motion m1-4 {"state": "stopped", "stopped": {"by": "bob"}} => motion m1-4 stopped by bob
+position x {"position": {"value": 12.5, "unit": "mm"}, "motion": "m1-2"} => position x 12.500000 mm
+run r1-1 {"stage": "runs", "steps_done": 3, "steps": 84} => run r1-1 runs, 3 of 84
+stop - {"by": "page", "mode": "quick"} => stop quick by page
+lease - {"name": null, "released_by": "anna"} => lease released by anna
+lease - {"name": "anna", "taken_from": "bob"} => lease anna, taken from bob
+lease - {"name": "anna", "taken_from": null} => lease anna
+warning - {"text": "late"} => warning late
+axis x {"state": "Standstill"} => axis x Standstill
+"#;
 
     #[test]
     fn an_event_says_when_what_and_why_and_nothing_that_a_terminal_obeys() {
-        let event = |kind: &str, of: &str, data: Value| {
-            line(
-                &json!({"id": 3, "at": "2026-03-01T08:00:01.123Z", "kind": kind, "of": of, "data": data}),
-            )
-        };
-        for (line, expected) in [
-            (
-                event(
-                    "motion",
-                    "m1-2",
-                    json!({"id": "m1-2", "state": "done", "by": "anna"}),
-                ),
-                "motion m1-2 done by anna",
-            ),
-            (
-                event(
-                    "motion",
-                    "m1-3",
-                    json!({"state": "failed", "cause": {"cause": "axis x:\u{1b}[2J\nfault"}}),
-                ),
-                "motion m1-3 failed axis x:[2J fault",
-            ),
-            (
-                event(
-                    "motion",
-                    "m1-4",
-                    json!({"state": "stopped", "stopped": {"by": "bob"}}),
-                ),
-                "motion m1-4 stopped by bob",
-            ),
-            (
-                event(
-                    "position",
-                    "x",
-                    json!({"position": {"value": 12.5, "unit": "mm"}, "motion": "m1-2"}),
-                ),
-                "position x 12.500000 mm",
-            ),
-            (
-                event(
-                    "run",
-                    "r1-1",
-                    json!({"stage": "runs", "steps_done": 3, "steps": 84}),
-                ),
-                "run r1-1 runs, 3 of 84",
-            ),
-            (
-                event("stop", "", json!({"by": "page", "mode": "quick"})),
-                "stop quick by page",
-            ),
-            (
-                event("warning", "", json!({"text": "late"})),
-                "warning late",
-            ),
-            (
-                event("axis", "x", json!({"state": "Standstill"})),
-                "axis x Standstill",
-            ),
-        ] {
-            assert_eq!(line, format!("08:00:01.123 {expected}"));
+        for row in EVENTS.trim().lines() {
+            let (event, expected) = row.split_once(" => ").unwrap();
+            let [kind, of, data] = event.splitn(3, ' ').collect::<Vec<_>>()[..] else {
+                panic!("{row}");
+            };
+            let data: Value = serde_json::from_str(data).unwrap();
+            let event = serde_json::json!({
+                "id": 3,
+                "at": "2026-03-01T08:00:01.123Z",
+                "kind": kind,
+                "of": of.trim_matches('-'),
+                "data": data,
+            });
+            assert_eq!(line(&event), format!("08:00:01.123 {expected}"));
         }
-        assert_eq!(
-            line(&json!({"from": 3, "to": 9})),
-            "events 3 to 9 were missed"
-        );
+        let gap = serde_json::json!({"from": 3, "to": 9});
+        assert_eq!(line(&gap), "events 3 to 9 were missed");
         assert_eq!(line(&Value::Null), "");
     }
 }
