@@ -58,9 +58,8 @@ mod tests {
 
     #[test]
     fn every_verb_has_a_page_and_options_and_exit_codes_are_in_them() {
-        let folder = tempfile::tempdir().unwrap();
-        let folder = folder.path().to_path_buf();
-        fs::create_dir_all(&folder).unwrap();
+        let kept = tempfile::tempdir().unwrap();
+        let folder = kept.path().to_path_buf();
         man(
             &ManArgs {
                 folder: folder.clone(),

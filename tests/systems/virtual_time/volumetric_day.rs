@@ -102,14 +102,14 @@ fn day_of_calibrated(seed: u64, places: usize) -> Day {
     day_of_made(|| Volume::zeroed(seed, calm, |text| text), seed, places)
 }
 
-/// The same of a machine that `made` makes: each time the same one, just switched on.
-fn day_of_made(made: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
-    let mut volume = made();
+/// The same of a machine that `fresh` makes: each time the same one, just switched on.
+fn day_of_made(fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
+    let mut volume = fresh();
     let store = volume.bench.store.clone();
     let mut hand = volume.bench.emulated.clone();
     let warm_up = WarmUp::Idle(Duration::from_secs(2 * 3600));
     let machine = &mut volume.bench.machine;
-    let found = good(
+    let made = good(
         machine
             .volumetric()
             .unwrap()
@@ -117,23 +117,23 @@ fn day_of_made(made: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
     );
     eprintln!(
         "seed {seed}: {} lines, {} readings beyond the unknowns, scatter {:.2} of what was stated, u {:.3} um",
-        found.lines,
-        found.found.degrees_of_freedom,
-        found.found.birge_ratio.unwrap_or(f64::NAN),
-        found.u_max.um(),
+        made.lines,
+        made.found.degrees_of_freedom,
+        made.found.birge_ratio.unwrap_or(f64::NAN),
+        made.u_max.um(),
     );
-    for it in &found.found.bends {
+    for it in &made.found.bends {
         let (bow, u) = (it.bow.um(), it.u.um());
         eprintln!("  bend of {}: {bow:.3} um/K, u {u:.3}", it.plan.axis);
     }
-    for it in &found.found.expansions {
+    for it in &made.found.expansions {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
         eprintln!("  scale of {}: {value:.3} ppm/K, u {u:.3}", it.plan.axis);
     }
-    let mut later = made();
+    let mut later = fresh();
     later.inherit(&volume);
     Day {
-        birge: found.found.birge_ratio,
+        birge: made.found.birge_ratio,
         ..work(&mut later, seed, places)
     }
 }
@@ -414,7 +414,7 @@ fn coverage_of_volumes() {
         .flat_map(|(_, day)| day.by_stated.iter().copied())
         .collect();
     let within = all.iter().filter(|it| it.abs() <= 2.0).count() as f64 / all.len() as f64;
-    let mean_square = all.iter().map(|it| it * it).sum::<f64>() / all.len() as f64;
+    let mean_square = rms(&all).powi(2);
     eprintln!(
         "{} machines, {} coordinates: {within:.3} within 2u, mean square {mean_square:.3}",
         days.len(),

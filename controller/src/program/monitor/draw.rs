@@ -8,7 +8,7 @@ use ratatui::widgets::{Cell, Paragraph, Row, Table};
 use serde_json::Value;
 
 use super::board::Board;
-use crate::program::exchange::plain;
+use super::words::one_line;
 
 /// Of the newest runs.
 const RUNS_SHOWN: usize = 4;
@@ -50,7 +50,7 @@ impl Looks {
 }
 
 fn text(value: &Value) -> String {
-    plain(value.as_str().unwrap_or_default()).replace('\n', " ")
+    one_line(value.as_str().unwrap_or_default())
 }
 
 pub(super) fn draw(frame: &mut Frame<'_>, board: &Board, looks: Looks) {
@@ -97,15 +97,15 @@ fn head_lines(board: &Board, looks: Looks) -> Vec<Line<'static>> {
     .bold();
     first.push_span(Span::styled(state.replace('_', " "), looks_of_state));
     let second = if let Some(why) = &board.lost {
-        let why = plain(why).replace('\n', " ");
+        let why = one_line(why);
         Line::styled(
             format!("NOTHING IS HEARD, all below is old: {why}"),
             looks.bad,
         )
     } else if let Some(cause) = machine["cause"]["cause"].as_str() {
-        Line::styled(plain(cause).replace('\n', " "), looks.bad)
+        Line::styled(one_line(cause), looks.bad)
     } else if let Some(name) = machine["lease"]["name"].as_str() {
-        Line::raw(format!("{} commands it", plain(name)))
+        Line::raw(format!("{} commands it", one_line(name)))
     } else {
         Line::raw(board.at.clone())
     };

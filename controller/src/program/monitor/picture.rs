@@ -17,6 +17,7 @@ use signal_hook::consts::{SIGINT, SIGQUIT, SIGTERM};
 use super::board::Board;
 use super::draw::{Looks, draw};
 use super::feed::Heard;
+use super::words::one_line;
 use crate::Failure;
 use crate::program::exchange::ask;
 use crate::program::output::Ended;
@@ -159,7 +160,7 @@ fn asked(key: KeyEvent) -> Option<Asked> {
 fn stop(at: &str, mode: &str) -> String {
     match ask(at, "POST", "/v1/stop", &json!({"mode": mode}).to_string()) {
         Ok(_) => format!("a {mode} stop is under way"),
-        Err(failure) => failure.to_string().replace('\n', " "),
+        Err(failure) => one_line(&failure.to_string()),
     }
 }
 

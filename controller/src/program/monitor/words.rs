@@ -4,8 +4,13 @@ use serde_json::Value;
 
 use crate::program::exchange::plain;
 
+/// In one line, and nothing that a terminal would obey.
+pub(super) fn one_line(text: &str) -> String {
+    plain(text).replace('\n', " ")
+}
+
 /// A number with its unit, as it came.
-pub(super) fn quantity(value: &Value, digits: usize) -> Option<String> {
+fn quantity(value: &Value, digits: usize) -> Option<String> {
     let number = value["value"].as_f64()?;
     let unit = value["unit"]
         .as_str()
@@ -59,7 +64,7 @@ pub(super) fn line(event: &Value) -> String {
     };
     let words = [time, word("kind"), word("of"), &what];
     let said: Vec<&str> = words.into_iter().filter(|it| !it.is_empty()).collect();
-    plain(&said.join(" ")).replace('\n', " ")
+    one_line(&said.join(" "))
 }
 
 #[cfg(test)]
