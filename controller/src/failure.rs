@@ -112,6 +112,32 @@ pub enum Failure {
         /// Where, and what is calibrated.
         source: compensator::error_table::OutOfRange,
     },
+    /// Nothing would correct the move, and nobody has agreed to that.
+    #[error(
+        "{what}: it would go to its target by its encoders alone, off by the deviation of the stage there; nothing \
+         was moved. Run `truestage calibrate`, put a calibration into use (`truestage cal activate`), or agree to it: \
+         --uncompensated (in a request \"uncompensated\": true)"
+    )]
+    NotCalibrated {
+        /// Which axes, and what they lack.
+        what: String,
+    },
+    /// The target is beyond the calibrated range, and nobody has agreed to that.
+    #[error(
+        "axis {axis}: {} mm is beyond the calibrated range of {} to {} mm, where the deviation of the stage was never \
+         measured; nothing was moved. Calibrate a wider range, or agree to it: --beyond (in a request \"beyond\": true)",
+        units::Short(target.mm()), units::Short(first.mm()), units::Short(last.mm())
+    )]
+    BeyondCalibrated {
+        /// Which axis.
+        axis: String,
+        /// Where it was told to go.
+        target: Metres,
+        /// First calibrated position.
+        first: Metres,
+        /// Last calibrated position.
+        last: Metres,
+    },
     /// An input that a job waits for did not show what was wanted.
     #[error(
         "axis {axis}: point {point} of the job: {wanted} was wanted within {} s; {}; the axis was stopped where it \

@@ -41,6 +41,7 @@
 //!
 //! This is not a safety controller: wire STO.
 
+mod agreed;
 mod assemble;
 mod bus_plan;
 pub mod config;
@@ -67,7 +68,8 @@ mod store;
 mod stores;
 pub mod volumetric;
 
-// A machine, and why it stopped or refused.
+// A machine, what its moves may do without, and why it stopped or refused.
+pub use agreed::Agreed;
 pub use connected::Machine;
 pub use failure::Failure;
 pub use run::CalibrateOptions;

@@ -280,6 +280,8 @@ pub(crate) fn code_of(failure: &Failure) -> Code {
         Failure::Machine(failure) => code_of_machine(failure),
         Failure::Resumable { source, .. } => code_of(source),
         Failure::OutOfCalibration { .. }
+        | Failure::NotCalibrated { .. }
+        | Failure::BeyondCalibrated { .. }
         | Failure::Compensation { .. }
         | Failure::StandsOff { .. } => Code::Calibration,
         Failure::Store(failure) => code_of_store(failure),

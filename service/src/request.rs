@@ -45,9 +45,15 @@ pub struct MoveRequest {
     /// What happens when one of the axes is in use.
     #[serde(default)]
     pub if_moving: IfMoving,
-    /// `true`: axes whose errors are corrected only together move uncorrected. Without it they are refused.
+    /// `true`: the axes go by their encoders alone. Without it those that have no calibration are refused, and those
+    /// whose errors are corrected only together.
+    // Motions that were written down before it had this name are still read.
+    #[serde(default, alias = "uncorrected")]
+    pub uncompensated: bool,
+    /// `true`: also beyond the calibrated range of an axis, where its deviation was never measured. Without it that is
+    /// refused.
     #[serde(default)]
-    pub uncorrected: bool,
+    pub beyond: bool,
     /// A dead-man: the motion stops unless it is renewed within this time, again and again, in milliseconds.
     #[serde(
         default,
@@ -65,7 +71,8 @@ impl MoveRequest {
             targets: [(axis.to_owned(), Length(target))].into(),
             speed: None,
             if_moving: IfMoving::default(),
-            uncorrected: false,
+            uncompensated: false,
+            beyond: false,
             dead_man_ms: None,
         }
     }

@@ -9,7 +9,7 @@ use truestage::config;
 use truestage::platform::Pose;
 
 use crate::demo;
-use crate::programs::{check_says, live_rigs, page, truestage};
+use crate::programs::{self, check_error, check_says, live_rigs, number, page, truestage};
 
 /// A platform that was calibrated twice, verified before and after, and its runs.
 struct Runs {
@@ -175,5 +175,36 @@ fn both_platforms_shown_in_one_folder_keep_their_calibrations() {
                 (machine.name.clone(), machine.stage_serial.clone())
             );
         }
+    }
+}
+
+/// Whoever names only x does not move y.
+#[test]
+fn what_nobody_names_stays_where_it_is() {
+    for rig in live_rigs() {
+        let bench = programs::Bench::of(rig, UVW, |text| text);
+        let unasked = [
+            "move",
+            "machine.toml",
+            "x=0.5mm",
+            "y=0.3mm",
+            "theta=60arcsec",
+        ];
+        let refused = bench.run(&unasked).with_code(3);
+        check_error(&refused, &["(u, v, w)", "--uncompensated"]);
+        bench
+            .run(&[&unasked[..], &["--uncompensated"]].concat())
+            .with_code(0);
+        let one = ["move", "machine.toml", "x=-0.2mm", "--uncompensated"];
+        let moved = bench.run(&one).with_code(0);
+        assert_eq!(moved["unnamed"], serde_json::json!(["y", "theta"]));
+        // The screws go by their encoders alone, to where the camera saw the platform.
+        for place in ["target", "seen"] {
+            let at = |name: &str| number(&moved[place][name]);
+            assert!((at("x_mm") + 0.2).abs() < 0.05, "{moved}");
+            assert!((at("y_mm") - 0.3).abs() < 0.05, "{moved}");
+            assert!((at("theta_arcsec") - 60.0).abs() < 20.0, "{moved}");
+        }
+        assert_eq!(bench.stop(), Some(0));
     }
 }

@@ -71,7 +71,8 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
         let (_, run) = ask(folder, &format!("GET /v1/runs/{id}?wait_s=120"), &json!({}));
         assert_eq!(run["state"], "done", "{run}");
         for mm in [12.5, -1.0] {
-            let body = json!({"targets": {"x": {"value": mm, "unit": "mm"}}});
+            let body =
+                json!({"targets": {"x": {"value": mm, "unit": "mm"}}, "uncompensated": true});
             let (status, motion) = ask(folder, "POST /v1/motions", &body);
             assert_eq!(status, 201, "{motion}");
             let id = motion["id"].as_str().expect("it has a name");
@@ -88,7 +89,7 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
         assert_eq!(status["machine"]["state"], "running", "{status}");
         assert_eq!(status["axes"][0]["homed"], true, "{status}");
         // Slowly: it would take minutes.
-        let body = json!({"targets": {"x": "60mm"}, "speed": "0.1mm/s"});
+        let body = json!({"targets": {"x": "60mm"}, "speed": "0.1mm/s", "uncompensated": true});
         let (status, motion) = ask(folder, "POST /v1/motions", &body);
         assert_eq!(status, 201, "{motion}");
         bench.run(&["stop"]).with_code(0);

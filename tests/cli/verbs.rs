@@ -62,6 +62,7 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         let log = fs::read_to_string(bench.folder().join("move.log")).unwrap();
         assert!(log.starts_with("# truestage recording 1\n"));
         assert!(log.lines().any(|line| line.contains(" can0 601#")));
+        goes_unasked_nowhere(&bench);
         out_of_tolerance(&bench);
         assert_eq!(bench.stop(), Some(0));
     }
@@ -89,6 +90,13 @@ fn refuses_before_any_bus(bench: &Bench) {
     bench.run(&["move", "machine.toml", "x=12.5"]).with_code(2);
     let far = bench.run(&["move", "machine.toml", "x=500mm"]).with_code(3);
     assert!(text(&far["error"]).contains("soft limits"), "{far}");
+    let unasked = bench
+        .run(&["move", "machine.toml", "x=12.5mm"])
+        .with_code(3);
+    assert!(
+        text(&unasked["error"]).contains("--uncompensated"),
+        "{unasked}"
+    );
     let none = bench.run(&["cal", "rollback", "machine.toml", "--axis", "x"]);
     assert_eq!(none.with_code(2)["exit_code"], 2);
 }
@@ -101,6 +109,25 @@ fn refuses_on_the_bus(bench: &Bench) {
         (&scan["matches"], &scan["exit_code"]),
         (&Value::Bool(false), &4.into())
     );
+}
+
+/// What was not measured is not trusted without a word.
+fn goes_unasked_nowhere(bench: &Bench) {
+    let beyond = ["move", "machine.toml", "x=62.5mm"];
+    let refused = bench.run(&beyond).with_code(3);
+    assert!(text(&refused["error"]).contains("--beyond"), "{refused}");
+    let agreed = [&beyond[..], &["--beyond"]].concat();
+    let moved = bench.run(&agreed).with_code(0);
+    let said = text(&moved["moves"][0]["warning"]);
+    assert!(said.contains("BEYOND THE CALIBRATED RANGE"), "{moved}");
+    let alone = ["move", "machine.toml", "x=12.5mm", "--uncompensated"];
+    let moved = bench.run(&alone).with_code(0);
+    let one = &moved["moves"][0];
+    assert_eq!(
+        (&one["corrected"], &one["calibration"]),
+        (&"no".into(), &Value::Null)
+    );
+    assert_eq!(one["set_point_mm"], one["target_mm"]);
 }
 
 /// A bad result is a result: the figures are there, and why they are bad.

@@ -115,6 +115,8 @@ def meant(case):
     if "targets" in case.body:
         mm = WATCH.random.uniform(LOW - 1, HIGH + 1)
         case.body["targets"] = {"x": WATCH.random.choice([f"{mm:.6f}mm", {"value": mm, "unit": "mm"}])}
+        # Nothing corrects the axis, and most strangers are to get it moving.
+        case.body["uncompensated"] = WATCH.random.random() < 0.9
         case.body["dead_man_ms"] = WATCH.random.choice([None, case.body.get("dead_man_ms")])
 
 

@@ -96,7 +96,15 @@ fn bert() -> Caller {
     Caller::named("bert")
 }
 
+/// By the encoder alone: most of these stages have no calibration.
 fn to(axis: &str, mm: f64) -> MoveRequest {
+    MoveRequest {
+        uncompensated: true,
+        ..compensated(axis, mm)
+    }
+}
+
+fn compensated(axis: &str, mm: f64) -> MoveRequest {
     MoveRequest::of(axis, Metres::from_mm(mm))
 }
 

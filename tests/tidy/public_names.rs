@@ -10,8 +10,9 @@ use crate::root;
 const LIBRARY: &str = "controller/src/lib.rs";
 const LIST: &str = "tests/tidy/public_names.txt";
 
-/// How many names somebody else's program may be promised; whoever takes one off the list lowers it.
-const PROMISED_MAX: usize = 61;
+/// How many names somebody else's program may be promised; whoever takes one off the list lowers it. The last was
+/// raised for `Agreed` (decision 0040).
+const PROMISED_MAX: usize = 62;
 
 /// The packages whose modules may be offered under another roof.
 const PACKAGES: &[&str] = &[

@@ -35,6 +35,8 @@ impl Failure {
             Self::Store(_)
             | Self::Compensation { .. }
             | Self::OutOfCalibration { .. }
+            | Self::NotCalibrated { .. }
+            | Self::BeyondCalibrated { .. }
             | Self::StandsOff { .. }
             | Self::ScaleMismatch { .. } => 3,
             Self::Open(_)

@@ -7,6 +7,7 @@ use compensator::error_table::uncertainty;
 use compensator::error_table::{Compensation, EndPolicy, OutOfRange};
 use units::{Approach, Metres, MetresPerSecond};
 
+use crate::agreed::Agreed;
 use crate::correction::Correction;
 use crate::failure::Failure;
 
@@ -54,6 +55,28 @@ pub enum Corrected {
 }
 
 impl Corrected {
+    /// Whether `axis` may go to `target` so.
+    ///
+    /// # Errors
+    /// Nothing corrects it, or not as far as that, and nobody has agreed to it.
+    pub fn require(self, axis: &str, target: Metres, agreed: Agreed) -> Result<(), Failure> {
+        match self {
+            Self::No if !agreed.uncompensated => Err(Failure::NotCalibrated {
+                what: format!("axis {axis} has no calibration"),
+            }),
+            Self::Held { first, last } | Self::Fading { first, last, .. } if !agreed.beyond => {
+                let axis = axis.to_owned();
+                Err(Failure::BeyondCalibrated {
+                    axis,
+                    target,
+                    first,
+                    last,
+                })
+            }
+            Self::No | Self::Within | Self::Held { .. } | Self::Fading { .. } => Ok(()),
+        }
+    }
+
     /// For programs: `no`, `yes`, `held` or `fading`.
     pub const fn word(self) -> &'static str {
         match self {

@@ -5,6 +5,7 @@ use core::time::Duration;
 use compensator::budget::Combined;
 use units::{Approach, Metres};
 
+use crate::agreed::Agreed;
 use crate::failure::Failure;
 use crate::linear::course::Corrected;
 use crate::linear::stage::LinearStage;
@@ -30,6 +31,15 @@ pub struct Moved {
 }
 
 impl LinearStage<'_> {
+    /// Whether the axis may be sent to `target` with the calibration that it uses now.
+    ///
+    /// # Errors
+    /// As [`Corrected::require`].
+    pub fn require_corrected(&self, target: Metres, agreed: Agreed) -> Result<(), Failure> {
+        let corrected = self.memory.course.corrected(target);
+        corrected.require(self.axis, target, agreed)
+    }
+
     /// [`Self::move_to`], then the encoder's place once the axis stands, and what corrected the move.
     ///
     /// # Errors

@@ -297,6 +297,20 @@ impl AlignmentPlatform<'_> {
         Ok(calibrated)
     }
 
+    /// The screws for which `store` has no active calibration. Asks no device.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    pub fn without_calibration(&self, store: &Store) -> Result<Vec<String>, Failure> {
+        let mut without = Vec::new();
+        for screw in &self.state.screws {
+            if store.active(&screw.axis)?.current.is_none() {
+                without.push(screw.axis.clone());
+            }
+        }
+        Ok(without)
+    }
+
     /// Loads the calibrations that `store` says are active for the screws, after checking that
     /// they belong to this machine; returns their names by axis, `None` where there is none.
     ///

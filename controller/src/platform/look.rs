@@ -13,10 +13,26 @@ impl AlignmentPlatform<'_> {
     /// # Errors
     /// Not zeroed, or the camera sees nothing it can judge.
     pub fn measure_pose(&mut self) -> Result<Pose, Failure> {
-        let datum = self.state.datum;
-        let datum = datum.ok_or(PlatformFailure::NotZeroed)?;
-        let exposures = self.config.exposures;
-        Ok(self.camera_pose(exposures)?.since(datum))
+        self.state.datum.ok_or(PlatformFailure::NotZeroed)?;
+        let seen = self.look()?;
+        self.since_zero(seen)
+    }
+
+    /// Where the camera sees the platform now, in the machine's frame; the platform needs no zero for that.
+    ///
+    /// # Errors
+    /// The camera sees nothing it can judge.
+    pub fn look(&mut self) -> Result<Pose, Failure> {
+        self.camera_pose(self.config.exposures)
+    }
+
+    /// The place that the camera has `seen`, from where the screws' zeros put the platform.
+    ///
+    /// # Errors
+    /// Not zeroed.
+    pub fn since_zero(&self, seen: Pose) -> Result<Pose, Failure> {
+        let datum = self.state.datum.ok_or(PlatformFailure::NotZeroed)?;
+        Ok(seen.since(datum))
     }
 
     /// Where the camera sees the platform, in the machine's frame.

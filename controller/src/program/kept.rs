@@ -86,7 +86,9 @@ impl Service {
             self.zero_first(Some(&axis), &stop, output)?;
             targets.insert(axis, json!({"value": target.mm(), "unit": "mm"}));
         }
-        let motion = self.motion(&json!({"targets": targets}), &stop)?;
+        let request = json!({"targets": targets, "uncompensated": args.agreed.uncompensated,
+                             "beyond": args.agreed.beyond});
+        let motion = self.motion(&request, &stop)?;
         let legs = motion["axes"].as_object().into_iter().flatten();
         let (texts, values): (Vec<_>, Vec<_>) = legs.map(|(_, leg)| words_of(leg)).unzip();
         output.result(&texts.join("\n"), &json!({"moves": values}))

@@ -47,8 +47,8 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use wire::lockstep::path_of;
 
-use crate::Failure;
 use crate::ports::Pace;
+use crate::{Agreed, Failure};
 use kind::by_kind;
 use output::Output;
 use rotary::readings::ReadingsArgs;
@@ -332,6 +332,28 @@ struct MoveArgs {
     /// Which way round a rotary axis goes; the shortest when not given.
     #[arg(long, value_enum)]
     way: Option<WayName>,
+    #[command(flatten)]
+    agreed: AgreedArgs,
+}
+
+/// What is agreed to in so many words: what nothing corrects does not move unasked.
+#[derive(Clone, Copy, Debug, Args)]
+struct AgreedArgs {
+    /// Go by the encoders alone: where nothing is calibrated, or without what is.
+    #[arg(long)]
+    uncompensated: bool,
+    /// Go beyond the calibrated range of a linear axis, where its deviation was never measured.
+    #[arg(long)]
+    beyond: bool,
+}
+
+impl AgreedArgs {
+    const fn agreed(self) -> Agreed {
+        Agreed {
+            uncompensated: self.uncompensated,
+            beyond: self.beyond,
+        }
+    }
 }
 
 impl MoveArgs {
@@ -352,15 +374,32 @@ impl MoveArgs {
     }
 
     /// # Errors
+    /// When it agrees to go beyond a calibration that has no end, or cannot be left.
+    fn without_beyond(&self) -> Result<(), crate::Failure> {
+        only_for("--beyond", "linear axes", self.agreed.beyond)
+    }
+
+    /// # Errors
     /// When it says which way round what does not turn.
     fn without_way(&self) -> Result<(), crate::Failure> {
-        match self.way {
-            None => Ok(()),
-            Some(_) => Err(crate::Failure::Usage {
-                what: "--way is for rotary axes".into(),
-                help: "leave it out".into(),
-            }),
-        }
+        only_for("--way", "rotary axes", self.way.is_some())
+    }
+
+    /// # Errors
+    /// When it shall align what no camera sees.
+    fn without_align(&self) -> Result<(), crate::Failure> {
+        only_for("--align", "platforms, which a camera sees", self.align)
+    }
+}
+
+/// Refuses `option`, when it `is_given`, for a machine of another kind.
+fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failure> {
+    match is_given {
+        false => Ok(()),
+        true => Err(crate::Failure::Usage {
+            what: format!("{option} is for {kind}"),
+            help: "leave it out".into(),
+        }),
     }
 }
 

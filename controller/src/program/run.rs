@@ -8,7 +8,7 @@ use crate::Failure;
 use crate::program::linear::job::{self, JobOptions};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::part;
-use crate::program::{MachineArgs, NEWEST_RUN};
+use crate::program::{AgreedArgs, MachineArgs, NEWEST_RUN};
 
 /// A job or a path, and on which machine.
 #[derive(Clone, Debug, Args)]
@@ -31,6 +31,8 @@ pub(crate) struct RunArgs {
     /// but recorded as the second memory, so that all later parts are made like this one.
     #[arg(long)]
     pub(super) first_part: bool,
+    #[command(flatten)]
+    agreed: AgreedArgs,
 }
 
 impl RunArgs {
@@ -46,6 +48,10 @@ impl RunArgs {
 /// The ending of its name says what is run.
 pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
     let (is_first, yes, dry_run) = (args.first_part, args.yes, args.dry_run);
+    let AgreedArgs {
+        uncompensated,
+        beyond,
+    } = args.agreed;
     let resume = args.resume.clone();
     let (machine, path) = args.settle();
     let is_job = path
@@ -57,17 +63,27 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
             help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
         })
     };
-    match (is_job, is_first, yes || dry_run || resume.is_some()) {
-        (true, true, _) => usage("--first-part is for paths of three axes, and this is a job"),
-        (false, _, true) => usage("--dry-run, --yes and --resume are for jobs, and this is a path"),
+    let of_paths = is_first || uncompensated;
+    let of_jobs = yes || dry_run || beyond || resume.is_some();
+    match (is_job, of_paths, of_jobs) {
+        (true, true, _) => {
+            usage("--first-part and --uncompensated are for paths of three axes, and this is a job")
+        }
+        (false, _, true) => {
+            usage("--dry-run, --yes, --beyond and --resume are for jobs, and this is a path")
+        }
         (true, false, _) => {
             let options = JobOptions {
                 dry_run,
+                beyond,
                 yes,
                 resume,
             };
             job::run(&machine, &path, &options, output)
         }
-        (false, _, false) => part::run(&machine, &path, is_first, output),
+        (false, _, false) if is_first && uncompensated => {
+            usage("--first-part records what the correction leaves: not with --uncompensated")
+        }
+        (false, _, false) => part::run(&machine, &path, (is_first, uncompensated), output),
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use machine::{Failure, Machine, Moving};
 use serde_json::json;
+use truestage::Agreed;
 use truestage::linear::{Corrected, PlannedMove};
 use units::{Metres, MetresPerSecond, Time};
 
@@ -82,7 +83,7 @@ pub(super) struct Motion {
     by: String,
     accepted: String,
     speed: Option<MetresPerSecond>,
-    uncorrected: bool,
+    agreed: Agreed,
     dead_man: Option<(Duration, Time)>,
     /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
     jog: Option<MetresPerSecond>,

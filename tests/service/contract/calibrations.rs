@@ -2,11 +2,11 @@
 
 use service::{Code, MotionState, RunKind, RunRequest, RunState};
 
-use super::{Bed, anna, slowly, to, with_zeroed_stage};
+use super::{Bed, anna, compensated, slowly, with_zeroed_stage};
 use crate::client::PATIENCE;
 
 impl Bed<'_> {
-    fn calibrates(&self) -> String {
+    pub(super) fn calibrates(&self) -> String {
         let request = RunRequest::of(RunKind::Calibrate, None);
         let id = self.client.plan(&anna(), &request);
         let run = id.and_then(|id| self.client.run(&id, PATIENCE));
@@ -44,7 +44,7 @@ fn an_earlier_calibration_is_used_again_without_a_move_and_the_newer_one_after_i
         used(&second);
         let moved_um = (bed.stage.true_mm() - stands) * 1e3;
         assert!(moved_um.abs() < 0.2, "{moved_um} um");
-        let id = bed.begin(&to("x", 12.5));
+        let id = bed.begin(&compensated("x", 12.5));
         let view = bed.ended(&id);
         assert_eq!(view.state, MotionState::Done);
         assert_eq!(view.axes["x"].corrected, "yes");

@@ -5,7 +5,8 @@ use service::{AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest,
 use tests::{Edit, LINEAR};
 
 use super::{
-    Bed, SEED, anna, bert, each, length, slowly, to, with_stage, with_three_axes, with_zeroed_stage,
+    Bed, SEED, anna, bert, compensated, each, length, slowly, to, with_stage, with_three_axes,
+    with_zeroed_stage,
 };
 use crate::stage::Stage;
 
@@ -319,11 +320,11 @@ fn motions_of_disjoint_axes_overlap() {
                 .iter()
                 .map(|(axis, mm)| ((*axis).to_owned(), length(*mm)))
                 .collect(),
-            uncorrected: true,
+            uncompensated: true,
             ..slowly("x", 0.0)
         };
         let refused = MoveRequest {
-            uncorrected: false,
+            uncompensated: false,
             ..of(&[("x", 2.0)])
         };
         bed.refused(&refused, Code::NotOffered);
@@ -355,6 +356,13 @@ fn what_must_not_be_driven_is_refused_with_the_text_of_the_command_line() {
         let said = "axis x: 70.000000 mm is outside the soft limits -3.000 to 63.000 mm; nothing was moved";
         assert_eq!((&*problem.detail(), problem.exit_code), (said, 3));
         bed.refused(&to("q", 1.0), Code::NoSuchAxis);
+        let problem = bed.refused(&compensated("x", 1.0), Code::Calibration);
+        let said = problem.detail();
+        assert!(
+            said.contains("axis x has no calibration") && said.contains("uncompensated"),
+            "{said}"
+        );
+        assert_eq!(problem.exit_code, 3);
         let nothing = MoveRequest {
             targets: [].into(),
             ..to("x", 0.0)
@@ -362,5 +370,26 @@ fn what_must_not_be_driven_is_refused_with_the_text_of_the_command_line() {
         bed.refused(&nothing, Code::BadRequest);
         bed.stage.simulation(|_| ());
         assert!((bed.encoder_mm("x") - here).abs() < 1e-3);
+    });
+}
+
+/// The deviation of the stage was never measured there.
+#[test]
+fn beyond_the_calibrated_range_no_axis_goes_unasked() {
+    with_zeroed_stage(|bed| {
+        bed.calibrates();
+        let beyond = compensated("x", 62.5);
+        let problem = bed.refused(&beyond, Code::Calibration);
+        assert!(
+            problem.detail().contains("beyond the calibrated range"),
+            "{problem}"
+        );
+        let agreed = MoveRequest {
+            beyond: true,
+            ..beyond
+        };
+        let ended = bed.ended(&bed.begin(&agreed));
+        assert_eq!(ended.state, MotionState::Done);
+        assert_ne!(ended.axes["x"].corrected, "yes");
     });
 }

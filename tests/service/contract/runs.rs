@@ -5,7 +5,7 @@ use core::time::Duration;
 use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
 use tests::{Edit, LINEAR};
 
-use super::{SEED, anna, bert, each, patient, to, with_stage, with_zeroed_stage};
+use super::{SEED, anna, bert, compensated, each, patient, with_stage, with_zeroed_stage};
 use crate::client::PATIENCE;
 use crate::stage::Stage;
 
@@ -44,7 +44,7 @@ fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
             assert_eq!(judged.state, RunState::Done, "{judged:?}");
             assert_eq!(judged.result["within_tolerance"], true, "{judged:?}");
 
-            let id = bed.begin(&to("x", 31.0));
+            let id = bed.begin(&compensated("x", 31.0));
             let view = bed.ended(&id);
             assert_eq!(view.state, MotionState::Done);
             let leg = &view.axes["x"];
@@ -63,7 +63,7 @@ fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
             let sent_mm = || bed.client.axis("x").unwrap().set_point.unwrap().value;
             // However slowly this computer answers, it looks many times on either way.
             bed.stage.gate.limit(Duration::from_millis(2));
-            let id = bed.begin(&to("x", 31.05));
+            let id = bed.begin(&compensated("x", 31.05));
             let mut sent = Vec::new();
             while bed.now(&id).state != MotionState::Done {
                 sent.push(sent_mm());
@@ -76,7 +76,7 @@ fn a_stage_is_zeroed_calibrated_verified_and_moved_without_a_second_zero() {
             assert_eq!(view.state, MotionState::Done, "{view:?}");
             assert!((sent_mm() - 31.05).abs() < 0.02);
             // There already: nothing moves.
-            let id = bed.begin(&to("x", 31.05));
+            let id = bed.begin(&compensated("x", 31.05));
             bed.let_time_pass(0.02);
             assert!((sent_mm() - 31.05).abs() < 0.02);
             assert_eq!(bed.ended(&id).state, MotionState::Done);

@@ -19,13 +19,15 @@ use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
-use crate::{Failure, config};
+use crate::{Agreed, Failure, config};
 
 /// What is asked of a job besides doing it.
 #[derive(Clone, Debug)]
 pub(crate) struct JobOptions {
     /// Judge it, and open nothing.
     pub(crate) dry_run: bool,
+    /// Points beyond the calibrated range are gone to.
+    pub(crate) beyond: bool,
     /// Nobody is waited for.
     pub(crate) yes: bool,
     /// Go on with this journal.
@@ -81,6 +83,13 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output:
     let job = Job::parse(&text, &file.display().to_string(), &loaded.config)?;
     let store = loaded.config.machine.store();
     let plan = JobPlan::of(&job, &loaded, &store)?;
+    let agreed = Agreed {
+        uncompensated: false,
+        beyond: options.beyond,
+    };
+    for it in &plan.points {
+        it.corrected.require(&job.axis, it.target, agreed)?;
+    }
     let goes_on = GoesOn::of(options.resume.as_ref(), &store, &job, &plan)?;
     if options.dry_run {
         let mut text = planned_text(&job, &plan);

@@ -83,9 +83,8 @@ pub(super) fn warning_of(corrected: Corrected, target: Metres) -> Option<String>
     match corrected {
         Corrected::Within => None,
         Corrected::No => Some(
-            "NOT CORRECTED: the axis has no calibration, so the drive went to the target by its \
-             encoder alone and the point is off by the deviation of the stage there; run \
-             `truestage calibrate`, or activate a calibration with `truestage cal activate`"
+            "NOT CORRECTED: the drive went to the target by its encoder alone, and the point is off by the \
+             deviation of the stage there"
                 .into(),
         ),
         Corrected::Held { first, last } => Some(format!(

@@ -16,7 +16,7 @@ use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_target;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::run::CalibrateOptions;
-use crate::{Failure, Machine};
+use crate::{Agreed, Failure, Machine};
 
 /// What is settled before anything moves.
 struct Prepared {
@@ -134,12 +134,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_way()?;
-    if args.align {
-        return Err(Failure::Usage {
-            what: "--align is for platforms, which a camera sees".into(),
-            help: "leave it out".into(),
-        });
-    }
+    args.without_align()?;
     if args.targets.is_empty() {
         return Err(Failure::Usage {
             what: "`move` needs a target".into(),
@@ -152,6 +147,7 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         .map(|text| axis_target(text))
         .collect::<Result<Vec<_>, _>>()?;
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
+    let agreed = args.agreed.agreed();
     for (axis, target) in &targets {
         let (min, max) = {
             let config = session.machine.linear(axis)?.config();
@@ -172,9 +168,12 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let store = session.store.clone();
     let moved = session.machine.guarded(|machine| {
         machine.start()?;
-        let mut moved = Vec::new();
+        let mut calibrations = Vec::new();
         for (axis, target) in &targets {
-            let calibration = machine.linear(axis)?.load_active(&store)?;
+            calibrations.push(corrected(machine, axis, (*target, agreed), &store)?);
+        }
+        let mut moved = Vec::new();
+        for ((axis, target), calibration) in targets.iter().zip(calibrations) {
             machine.linear(axis)?.zero(&store)?;
             let one = machine.linear(axis)?.move_and_read(*target)?;
             moved.push((axis, one, calibration));
@@ -191,4 +190,20 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         .map(|(axis, moved, calibration)| moved::value(axis, moved, calibration.as_deref()))
         .collect();
     output.result(&lines.join("\n"), &json!({"moves": value}))
+}
+
+/// Takes the calibration that corrects `axis` on its way into use, unless it shall go without; what nobody has
+/// agreed to is refused while nothing has moved.
+fn corrected(
+    machine: &mut Machine,
+    axis: &str,
+    (target, agreed): (Metres, Agreed),
+    store: &Store,
+) -> Result<Option<String>, Failure> {
+    let calibration = match agreed.uncompensated {
+        true => None,
+        false => machine.linear(axis)?.load_active(store)?,
+    };
+    machine.linear(axis)?.require_corrected(target, agreed)?;
+    Ok(calibration)
 }

@@ -7,6 +7,7 @@ pub(crate) mod plan;
 mod report;
 #[cfg(test)]
 mod stored_tests;
+mod target;
 pub(crate) mod verbs;
 
 use std::path::Path;

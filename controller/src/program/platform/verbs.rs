@@ -9,28 +9,39 @@ use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::output::{Ended, Output};
 use crate::program::platform::fit::outlier_lines;
+use crate::program::platform::target::NamedPose;
 use crate::program::session::Session;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::{Failure, Machine};
 use machine::records::Store;
-use units::text::{angle, length};
 
-/// Starts the platform, zeroes it, runs `procedure`, switches off; what `possible` refuses, before
-/// anything is sent.
+/// Starts the platform, zeroes it, runs `procedure`, switches off.
 fn with_zeroed_platform<R>(
     args: &MachineArgs,
     verb: &str,
     output: Output,
-    possible: impl FnOnce(&mut Machine) -> Result<(), Failure>,
     procedure: impl FnOnce(&mut Machine, &Store) -> Result<R, Failure>,
 ) -> Result<(R, Value), Failure> {
-    let mut session = Session::open(args, verb, Use::Measurement, output)?;
-    possible(&mut session.machine)?;
+    let session = Session::open(args, verb, Use::Measurement, output)?;
+    zeroed_platform(
+        session,
+        |_| Ok(()),
+        |machine, store, ()| procedure(machine, store),
+    )
+}
+
+/// The same on a machine that is connected; `prepare` is done before anything moves.
+fn zeroed_platform<P, R>(
+    mut session: Session,
+    prepare: impl FnOnce(&mut Machine) -> Result<P, Failure>,
+    procedure: impl FnOnce(&mut Machine, &Store, P) -> Result<R, Failure>,
+) -> Result<(R, Value), Failure> {
     let store = session.store.clone();
     session.machine.guarded(|machine| {
         machine.start()?;
+        let prepared = prepare(machine)?;
         machine.platform()?.zero(&store)?;
-        let result = procedure(machine, &store)?;
+        let result = procedure(machine, &store, prepared)?;
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.devices().counters())))
     })
@@ -90,7 +101,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     }
     let run = |machine: &mut Machine, store: &Store| machine.platform()?.calibrate(store);
     let (calibrated, counters) =
-        with_zeroed_platform(&args.axis.machine, "calibrate", output, |_| Ok(()), run)?;
+        with_zeroed_platform(&args.axis.machine, "calibrate", output, run)?;
     let mut value = calibrated_value(&calibrated);
     value["counters"] = counters;
     output.result(&calibrated_text(&calibrated), &value)
@@ -107,8 +118,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         }
         machine.platform()?.verify(store, compensated)
     };
-    let (verified, counters) =
-        with_zeroed_platform(&args.axis.machine, "verify", output, |_| Ok(()), run)?;
+    let (verified, counters) = with_zeroed_platform(&args.axis.machine, "verify", output, run)?;
     let title = if compensated { "as left" } else { "as found" };
     let mut value = json!({title.replace(' ', "_"): verified_value(&verified)});
     value["counters"] = counters;
@@ -121,56 +131,110 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_way()?;
-    let target = target_pose(&args.targets)?;
-    let possible = |machine: &mut Machine| {
-        machine.platform()?.check_pose(target)?;
-        if args.align {
-            machine.platform()?.check_alignable()?;
-        }
-        Ok(())
+    args.without_beyond()?;
+    let named = NamedPose::parse(&args.targets)?;
+    let mut session = Session::open(&args.machine, "move", Use::Measurement, output)?;
+    let compensated = !args.agreed.uncompensated;
+    refuse_impossible(&mut session, named, (args.align, compensated))?;
+    let look = |machine: &mut Machine| match named.unnamed().is_empty() {
+        true => Ok(None),
+        false => machine.platform()?.look().map(Some),
     };
-    let run = |machine: &mut Machine, store: &Store| {
-        let calibrations = machine.platform()?.load_active(store)?;
-        let aligned = args
-            .align
-            .then(|| machine.platform()?.align(target))
-            .transpose()?;
-        let moved = match aligned {
-            None => Some(machine.platform()?.move_to(target)?),
-            Some(_) => None,
+    let run = |machine: &mut Machine, store: &Store, before: Option<Pose>| {
+        let mut platform = machine.platform()?;
+        let here = before.map(|seen| platform.since_zero(seen)).transpose()?;
+        let target = named.from(here.unwrap_or_default());
+        let calibrations = match compensated {
+            true => platform.load_active(store)?,
+            false => Vec::new(),
         };
-        Ok((
+        let (moved, aligned) = match args.align {
+            true => (None, Some(platform.align(target)?)),
+            false => (Some(platform.move_to(target)?), None),
+        };
+        let seen = platform.measure_pose()?;
+        Ok(PlatformMove {
+            target,
             calibrations,
             moved,
             aligned,
-            machine.platform()?.measure_pose()?,
-        ))
+            seen,
+        })
     };
-    let ((calibrations, moved, aligned, seen), counters) =
-        with_zeroed_platform(&args.machine, "move", output, possible, run)?;
-    let calibrated = calibrations.iter().all(|(_, id)| id.is_some());
-    let mut text = format!(
-        "platform: target {}, the camera sees it at {}",
-        pose_text(target),
-        pose_text(seen)
-    );
-    text += if calibrated {
-        ""
-    } else {
-        "\nNOT CORRECTED: not every screw is calibrated; run `truestage calibrate`"
-    };
-    text += &moved.as_ref().map_or(String::new(), moved_text);
-    text += &aligned.as_ref().map_or(String::new(), aligned_text);
-    let value = json!({
-        "target": pose_value(target),
-        "seen": pose_value(seen),
-        "calibrations": calibrations,
-        "corrected": calibrated,
-        "move": moved.as_ref().map(moved_value),
-        "alignment": aligned.as_ref().map(aligned_value),
-        "counters": counters,
-    });
-    output.result(&text, &value)
+    let (it, counters) = zeroed_platform(session, look, run)?;
+    let mut value = it.value(&named.unnamed());
+    value["counters"] = counters;
+    output.result(&it.text(&named.unnamed()), &value)
+}
+
+/// What can be told before anything is sent. Where it stands, what is not named is judged after the zero.
+fn refuse_impossible(
+    session: &mut Session,
+    named: NamedPose,
+    (align, compensated): (bool, bool),
+) -> Result<(), Failure> {
+    let (machine, store) = (&mut session.machine, &session.store);
+    machine
+        .platform()?
+        .check_pose(named.from(Pose::default()))?;
+    if align {
+        machine.platform()?.check_alignable()?;
+    }
+    if !compensated {
+        return Ok(());
+    }
+    let without = machine.platform()?.without_calibration(store)?;
+    match without.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::NotCalibrated {
+            what: format!(
+                "the platform has screws without a calibration ({})",
+                without.join(", ")
+            ),
+        }),
+    }
+}
+
+/// A move of a platform as it was asked for, and what came of it.
+struct PlatformMove {
+    target: Pose,
+    calibrations: Vec<(String, Option<String>)>,
+    moved: Option<PoseMoved>,
+    aligned: Option<Aligned>,
+    seen: Pose,
+}
+
+impl PlatformMove {
+    fn text(&self, unnamed: &[&str]) -> String {
+        let mut text = format!(
+            "platform: target {}, the camera sees it at {}",
+            pose_text(self.target),
+            pose_text(self.seen)
+        );
+        if !unnamed.is_empty() {
+            let unnamed = unnamed.join(" and ");
+            text += &format!(
+                "\n{unnamed}, which nobody named: where the camera saw the platform before"
+            );
+        }
+        if self.calibrations.is_empty() {
+            text += "\nNOT CORRECTED: the screws went by their encoders alone";
+        }
+        text += &self.moved.as_ref().map_or(String::new(), moved_text);
+        text + &self.aligned.as_ref().map_or(String::new(), aligned_text)
+    }
+
+    fn value(&self, unnamed: &[&str]) -> Value {
+        json!({
+            "target": pose_value(self.target),
+            "unnamed": unnamed,
+            "seen": pose_value(self.seen),
+            "calibrations": self.calibrations,
+            "corrected": !self.calibrations.is_empty(),
+            "move": self.moved.as_ref().map(moved_value),
+            "alignment": self.aligned.as_ref().map(aligned_value),
+        })
+    }
 }
 
 fn moved_text(moved: &PoseMoved) -> String {
@@ -342,64 +406,4 @@ fn pose_value(pose: Pose) -> Value {
         "y_mm": pose.y.mm(),
         "theta_arcsec": pose.angle.arcsec(),
     })
-}
-
-/// `x=1mm y=-0.5mm theta=20arcsec`: what is not named is zero.
-fn target_pose(words: &[String]) -> Result<Pose, Failure> {
-    if words.is_empty() {
-        return Err(Failure::Usage {
-            what: "`move` needs a target".into(),
-            help: "write x=1mm y=-0.5mm theta=20arcsec; what is not named is zero".into(),
-        });
-    }
-    let mut pose = Pose::default();
-    let mut named = Vec::new();
-    for word in words {
-        let usage = || Failure::Usage {
-            what: format!("`{word}` is not part of a pose"),
-            help: "write x=1mm, y=-300um, theta=20arcsec or theta=0.5deg, each once".into(),
-        };
-        let (name, value) = word.split_once('=').ok_or_else(usage)?;
-        if named.contains(&name) {
-            return Err(usage());
-        }
-        match name {
-            "x" => pose.x = length(value).ok_or_else(usage)?,
-            "y" => pose.y = length(value).ok_or_else(usage)?,
-            "theta" => pose.angle = angle(value).ok_or_else(usage)?,
-            _ => return Err(usage()),
-        }
-        named.push(name);
-    }
-    Ok(pose)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use units::Metres;
-
-    fn parsed(words: &[&str]) -> Result<Pose, Failure> {
-        let words: Vec<_> = words.iter().map(|it| (*it).to_owned()).collect();
-        target_pose(&words)
-    }
-
-    #[test]
-    fn a_pose_is_named_part_by_part_with_units() {
-        let pose = parsed(&["x=1mm", "theta=-0.5deg"]).unwrap();
-        assert_eq!((pose.x, pose.y), (Metres(1e-3), Metres::ZERO));
-        assert!((pose.angle.value() + 0.5_f64.to_radians()).abs() < 1e-15);
-        let arcsec = parsed(&["theta=20arcsec"]).unwrap().angle.arcsec();
-        assert!((arcsec - 20.0).abs() < 1e-9);
-        for words in [
-            &["x=1"][..],
-            &["z=1mm"],
-            &["x=1mm", "x=2mm"],
-            &["theta=1mm"],
-            &["x=nanmm"],
-            &[],
-        ] {
-            assert!(parsed(words).is_err(), "{words:?}");
-        }
-    }
 }

@@ -124,12 +124,8 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    if args.align {
-        return Err(Failure::Usage {
-            what: "--align is for platforms, which a camera sees".into(),
-            help: "leave it out".into(),
-        });
-    }
+    args.without_beyond()?;
+    args.without_align()?;
     let targets: Vec<_> = args
         .targets
         .iter()
@@ -149,17 +145,18 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     };
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let store = session.store.clone();
+    let uncompensated = args.agreed.uncompensated;
     let moved = session.machine.guarded(|machine| {
         machine.start()?;
+        let mut calibrations = Vec::new();
+        for (axis, _) in &targets {
+            calibrations.push(calibration_of(machine, axis, uncompensated, &store)?);
+        }
         let mut moved = Vec::new();
-        for (axis, angle) in &targets {
-            let calibration = machine.rotary(axis)?.load_active(&store)?;
+        for ((axis, angle), calibration) in targets.iter().zip(calibrations) {
             machine.rotary(axis)?.zero()?;
-            moved.push((
-                axis,
-                machine.rotary(axis)?.move_to(*angle, way)?,
-                calibration,
-            ));
+            let turned = machine.rotary(axis)?.move_to(*angle, way)?;
+            moved.push((axis, turned, calibration));
         }
         machine.shut_down()?;
         Ok(moved)
@@ -173,6 +170,23 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         .map(|(axis, moved, calibration)| moved_value(axis, moved, calibration.as_deref()))
         .collect();
     output.result(&lines.join("\n"), &json!({"moves": values}))
+}
+
+/// Takes the calibration of `axis` into use, unless it shall go without. Without one it does not turn to a place
+/// unless somebody has agreed to that.
+fn calibration_of(
+    machine: &mut Machine,
+    axis: &str,
+    uncompensated: bool,
+    store: &Store,
+) -> Result<Option<String>, Failure> {
+    if uncompensated {
+        return Ok(None);
+    }
+    let id = machine.rotary(axis)?.load_active(store)?;
+    id.map(Some).ok_or_else(|| Failure::NotCalibrated {
+        what: format!("axis {axis} has no calibration"),
+    })
 }
 
 pub(crate) fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
@@ -195,9 +209,7 @@ fn uncorrected(axis: &str, calibration: Option<&str>) -> String {
         return String::new();
     }
     format!(
-        "\naxis {axis}: NOT CORRECTED: the axis has no calibration and is off by the deviation of \
-         its encoder there; run `truestage calibrate`, or activate a calibration with `truestage \
-         cal activate`"
+        "\naxis {axis}: NOT CORRECTED: the axis went by its encoder alone, and is off by the deviation of that there"
     )
 }
 

@@ -14,7 +14,7 @@ use crate::ports::Use;
 use crate::program::data_file::{read, volume_head_of};
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
-use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
+use crate::program::volumetric::verbs::{never_measured, with_zeroed_volume, zeroed_volume};
 use crate::program::{ImportArgs, MachineArgs, MemoryArgs};
 use crate::volumetric::MemoryName;
 use crate::volumetric::VolumetricFailure;
@@ -42,12 +42,20 @@ struct Ready {
     part: Option<FirstPart>,
 }
 
-pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Output) -> Ended {
+pub(crate) fn run(
+    args: &MachineArgs,
+    file: &Path,
+    (is_first, uncompensated): (bool, bool),
+    output: Output,
+) -> Ended {
     let path = read(file)?;
     let mut session = Session::open(args, "run", Use::Motion, output)?;
     let is_measured = session.store.active(GEOMETRY)?.current.is_some();
+    if !is_measured && !uncompensated {
+        return Err(never_measured());
+    }
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
-    let path = judged(&mut session.machine, (file, &path), is_measured)?;
+    let path = judged(&mut session.machine, (file, &path), !uncompensated)?;
     output.note(&before_it_moves(file, &path));
     let CsvPath { points, departure } = path;
     let ready = |machine: &mut Machine, store: &Store| {
@@ -56,7 +64,10 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
             let (mover, part) = (Some(mover), Some(part));
             return Ok(Ready { mover, part });
         }
-        let mover = machine.volumetric()?.stored_mover(store)?;
+        let mover = match uncompensated {
+            true => None,
+            false => machine.volumetric()?.stored_mover(store)?,
+        };
         Ok(Ready { mover, part: None })
     };
     let follow =
@@ -64,7 +75,7 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, is_first: bool, output: Outpu
     let (followed, counters) = zeroed_volume(session, ready, follow)?;
     let said = match &followed.corrected {
         Some(corrected) => corrected.text(),
-        None => "uncorrected: the errors were never measured".into(),
+        None => "NOT CORRECTED: by the encoders alone".into(),
     };
     let (count, timing) = (followed.count, &followed.timing);
     let mut text = format!("{count} points followed, {said}\n{timing}");

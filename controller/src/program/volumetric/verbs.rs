@@ -275,12 +275,8 @@ fn mm(point: Point) -> [f64; 3] {
 /// Where the axes that are not named stay: where the zero left them.
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_way()?;
-    if args.align {
-        return Err(Failure::Usage {
-            what: "--align is for platforms, which a camera sees".into(),
-            help: "leave it out".into(),
-        });
-    }
+    args.without_beyond()?;
+    args.without_align()?;
     let mut target: [Option<Metres>; 3] = [None; 3];
     for text in &args.targets {
         let (axis, place) = axis_target(text)?;
@@ -302,7 +298,10 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         let index_mm = machine.volumetric()?.config().zero.index_mm;
         let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
         let target = Point::new(at(0), at(1), at(2));
-        let mover = machine.volumetric()?.stored_mover(store)?;
+        let mover = match args.agreed.uncompensated {
+            true => None,
+            false => Some(stored_mover(machine, store)?),
+        };
         machine
             .volumetric()?
             .uncorrected_mover()?
@@ -325,12 +324,24 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let machine = &args.machine;
     let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
     let Some(live) = live else {
-        let text = "NOT CORRECTED: the errors of these axes were never measured; run `truestage calibrate`";
+        let text = "NOT CORRECTED: the axes went by their encoders alone";
         return output.result(text, &json!({"corrected": false, "counters": counters}));
     };
     let value =
         json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
     output.result(&live_text(&live), &value)
+}
+
+fn stored_mover(machine: &mut Machine, store: &Store) -> Result<Mover, Failure> {
+    let mover = machine.volumetric()?.stored_mover(store)?;
+    mover.ok_or_else(never_measured)
+}
+
+/// Three axes that nothing corrects.
+pub(crate) fn never_measured() -> Failure {
+    Failure::NotCalibrated {
+        what: "the errors of x, y and z were never measured".into(),
+    }
 }
 
 fn live_text(live: &Live) -> String {

@@ -91,7 +91,8 @@ function card(axis) {
   made.querySelector(".go").addEventListener("submit", (event) => {
     event.preventDefault();
     const target = made.querySelector(".go input").value.trim();
-    told(ask("POST", "/v1/motions", { targets: { [axis.name]: target } }));
+    const [uncompensated, beyond] = [".uncompensated", ".beyond"].map((name) => agreed(made.querySelector(name)));
+    told(ask("POST", "/v1/motions", { targets: { [axis.name]: target }, uncompensated, beyond }));
   });
   for (const button of made.querySelectorAll(".jog")) holdToJog(button, axis.name, made.querySelector(".speed"));
   made.querySelector(".power").addEventListener("click", (event) => {
@@ -101,6 +102,13 @@ function card(axis) {
   byId("axis").append(new Option(axis.name, axis.name));
   showControl();
   return made;
+}
+
+// For this move only.
+function agreed(box) {
+  const { checked } = box;
+  box.checked = false;
+  return checked;
 }
 
 // As long as the button or a key on it is held, and not longer: the service stops it when nothing comes.

@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use machine::Machine;
 use serde_json::json;
+use truestage::Agreed;
 use truestage::linear::{Course, PlannedMove};
 use units::{Metres, MetresPerSecond, Time};
 
@@ -76,7 +77,10 @@ impl Keeper {
             by: by.to_owned(),
             accepted: utc_now(),
             speed: speed_of(request)?,
-            uncorrected: request.uncorrected,
+            agreed: Agreed {
+                uncompensated: request.uncompensated,
+                beyond: request.beyond,
+            },
             dead_man: dead_man.map(|it| (it, now + it)),
             jog: None,
             legs,
@@ -86,10 +90,10 @@ impl Keeper {
 
     /// What each axis is sent, and how fast; everything is judged before anything moves.
     pub(super) fn plan_legs(&self, machine: &Machine, motion: &mut Motion) -> Result<(), Problem> {
-        let (uncorrected, wanted) = (motion.uncorrected, motion.speed);
+        let (agreed, wanted) = (motion.agreed, motion.speed);
         motion.legs.iter_mut().try_for_each(|leg| {
             let seat = &self.seats[leg.at];
-            let mut planned = plan_leg(machine, seat, leg.target, uncorrected)?;
+            let mut planned = plan_leg(machine, seat, leg.target, agreed)?;
             planned.speed = wanted.map_or(planned.speed, |it| it.min(planned.speed));
             leg.planned = Some(planned);
             Ok(())
@@ -176,11 +180,11 @@ fn plan_leg(
     machine: &Machine,
     seat: &Seat,
     target: Metres,
-    uncorrected: bool,
+    agreed: Agreed,
 ) -> Result<PlannedMove, Problem> {
     let axis = &seat.name;
     let alone = Course::default();
-    let course = match (seat.moved_by, uncorrected) {
+    let course = match (seat.moved_by, agreed.uncompensated) {
         (MovedBy::Platform, _) => {
             let what = format!("axis {axis} carries the platform and is not moved by itself");
             let help = "use `truestage move` for the platform";
@@ -188,13 +192,14 @@ fn plan_leg(
         }
         (MovedBy::Volume, false) => {
             let what = format!("axis {axis} is corrected only together with the other two");
-            let help = "ask for it with uncorrected = true, or use `truestage move`";
+            let help = "ask for it with \"uncompensated\": true, or use `truestage move`";
             return Err(Problem::new(Code::NotOffered, what, help));
         }
         (MovedBy::Volume, true) | (MovedBy::Itself, true) => &alone,
         (MovedBy::Itself, false) => &seat.course,
     };
     let planned = course.plan(machine, axis, target)?;
+    planned.corrected.require(axis, target, agreed)?;
     if seat.is_enabled(machine) {
         return Ok(planned);
     }

@@ -76,7 +76,7 @@ impl Keeper {
         };
         let request = MoveRequest {
             speed: Some(Speed(MetresPerSecond(speed.value().abs()))),
-            uncorrected: true,
+            uncompensated: true,
             ..MoveRequest::of(&request.axis, target)
         };
         let now = machine.now();
