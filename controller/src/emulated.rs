@@ -41,6 +41,8 @@ pub struct Emulated {
     simulation: Rc<RefCell<Simulation>>,
     /// The controller's port numbers to the simulation's.
     ports: BTreeMap<Port, Port>,
+    /// The controller's, by the place of the simulation's: asked for with everything that arrives.
+    hosts: Vec<Option<Port>>,
 }
 
 impl Emulated {
@@ -72,9 +74,14 @@ impl Emulated {
         let emulated = EmulatedConfig::parse(toml)?;
         let ports = match_ports(&emulated, config)?;
         let simulation = Simulation::new(&emulated, seed)?;
+        let mut hosts = vec![None; emulated.ports.len()];
+        for (host, simulated) in &ports {
+            hosts[usize::from(simulated.0)] = Some(*host);
+        }
         Ok(Self {
             simulation: Rc::new(RefCell::new(simulation)),
             ports,
+            hosts,
         })
     }
 
@@ -104,10 +111,7 @@ impl Emulated {
     }
 
     fn host_port(&self, simulated: Port) -> Option<Port> {
-        self.ports
-            .iter()
-            .find(|(_, inner)| **inner == simulated)
-            .map(|(outer, _)| *outer)
+        self.hosts.get(usize::from(simulated.0)).copied().flatten()
     }
 }
 

@@ -8,7 +8,8 @@ use tests::Rig;
 use crate::programs::{live_rigs, truestage};
 
 /// Runs the demonstration of `machine` to its end, which is a good one: as found and as left, by
-/// their places in what it prints, and a page.
+/// their places in what it prints, and a page. What is shown without terminals, and how soon, is the
+/// only difference to one in the same process.
 #[track_caller]
 pub(crate) fn check(machine: &str, found: &str, left: [&str; 2], limit: f64) {
     let Some((said, page)) = shown(machine) else {
@@ -21,6 +22,7 @@ pub(crate) fn check(machine: &str, found: &str, left: [&str; 2], limit: f64) {
         assert!(left < limit, "{left}");
     }
     assert!(page.contains("<svg"));
+    assert_eq!(figures(in_process(machine)), figures(said), "{machine}");
 }
 
 pub(crate) fn number(said: &Value, place: &str) -> f64 {
@@ -51,25 +53,11 @@ fn the_linear_stage_shows_its_cycle() {
     check("linear", &of("as_found"), [&left, &after], 2.0);
 }
 
-/// What is shown without terminals, and how soon, is the only difference.
-#[test]
-fn without_terminals_it_is_the_same() {
-    for machine in ["linear", "uvw", "rotary"] {
-        let Some((on_terminals, _)) = shown(machine) else {
-            return;
-        };
-        let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let words = [
-            "demo",
-            "--machine",
-            machine,
-            "--data-dir",
-            ".",
-            "--in-process",
-        ];
-        let in_process = truestage(folder.path(), &words).with_code(0);
-        assert_eq!(figures(in_process), figures(on_terminals), "{machine}");
-    }
+/// What it prints without terminals.
+fn in_process(machine: &str) -> Value {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let words = ["demo", "--machine", machine, "--data-dir", "."];
+    truestage(folder.path(), &[&words[..], &["--in-process"]].concat()).with_code(0)
 }
 
 /// The numbers without the time on the wall, which is another one in every run, as are the names of files and the

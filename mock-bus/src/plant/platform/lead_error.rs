@@ -54,13 +54,18 @@ impl LeadError {
     /// How steep the slope must be for the largest deviation to be `peak_m`; 0 when the other
     /// parts are larger than that already.
     fn slope_for(&self, peak_m: f64, sign: f64, range_m: f64) -> f64 {
+        // Where it is looked for, and what the other parts are there.
+        let others: Vec<_> = (0..SCAN_POINTS)
+            .map(|i| {
+                let share = 2.0 * f64::from(i) / f64::from(SCAN_POINTS - 1) - 1.0;
+                let at_m = share * range_m;
+                (at_m, self.at(at_m))
+            })
+            .collect();
         let peak_with = |slope: f64| {
-            (0..SCAN_POINTS)
-                .map(|i| {
-                    let share = 2.0 * f64::from(i) / f64::from(SCAN_POINTS - 1) - 1.0;
-                    let at_m = share * range_m;
-                    (self.at(at_m) + sign * slope * at_m).abs()
-                })
+            others
+                .iter()
+                .map(|(at_m, other_m)| (other_m + sign * slope * at_m).abs())
                 .fold(0.0, f64::max)
                 + self.lost_motion_m / 2.0
         };
